@@ -1,0 +1,156 @@
+"""Quantities with units, as bearing files and notebooks give them, into SI floats."""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from typing import Any
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
+_UNIT = r"[A-Za-zµμ°%Ω][A-Za-z0-9µμ°%Ω/*^ .]{0,40}|1/[A-Za-z]{1,10}|"
+_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*({_UNIT})\s*", re.ASCII | re.UNICODE)
+#: What each physical dimension is called and its SI unit as pint writes it.
+SI_UNITS = {
+    "length": "m",
+    "angle": "rad",
+    "mass": "kg",
+    "force": "N",
+    "stiffness": "N/m",
+    "damping": "N*s/m",
+    "rotational stiffness": "N*m/rad",
+    "moment of inertia": "kg*m^2",
+    "pressure": "Pa",
+    "viscosity": "Pa*s",
+    "density": "kg/m^3",
+    "temperature": "degC",
+    "temperature difference": "K",
+    "per kelvin": "1/K",
+    "specific heat": "J/kg/K",
+    "conductivity": "W/m/K",
+    "heat transfer": "W/m^2/K",
+    "angular speed": "rad/s",
+    "time": "s",
+    "ratio": "",
+}
+
+
+class UnitError(ValueError):
+    """A quantity that cannot be read, or has the wrong dimension."""
+
+
+@functools.cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None, on_redefinition="ignore")
+
+
+@functools.lru_cache(maxsize=512)
+def _factor(unit: str, dimension: str) -> float:
+    """Multiplier from `unit` to the SI unit of `dimension` (not for degC)."""
+    registry = _registry()
+    target = SI_UNITS[dimension]
+    try:
+        factor = float((1.0 * registry.parse_units(unit)).to(registry.parse_units(target)).magnitude)
+    except Exception as error:  # pint raises a dozen kinds for a bad unit; all mean the same to a user
+        raise UnitError(
+            f"unit {unit!r} is not one of {dimension} (expected something like {target or 'a plain number'!r})"
+        ) from error
+    return factor
+
+
+def parse_quantity(value: str | float | int, dimension: str, name: str = "value") -> float:
+    """Turn ``"0.080 mm"`` into 8e-5.
+
+    Parameters
+    ----------
+    value : str or number
+        A number followed by a unit; a bare number only where `dimension` is ``"ratio"``.
+    dimension : str
+        Key of `SI_UNITS`. ``"temperature"`` is returned in degC, ``"angular speed"`` takes Hz as
+        revolutions per second.
+    name : str
+        What to call it in an error message.
+
+    Returns
+    -------
+    float
+        SI value.
+
+    Raises
+    ------
+    UnitError
+        Not a quantity, wrong dimension, or not finite.
+    """
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise UnitError(f"{name}: expected a number with a unit of {dimension}, got {value!r}")
+    if isinstance(value, (int, float)):
+        if dimension != "ratio":
+            raise UnitError(
+                f"{name}: {value!r} has no unit; write it with one of {dimension}, "
+                f'e.g. "{value} {SI_UNITS[dimension]}"'
+            )
+        return _finite(float(value), name)
+    match = _QUANTITY.fullmatch(value)
+    if match is None:
+        raise UnitError(f"{name}: {value!r} is not a number with a unit")
+    number, unit = float(match[1]), match[2].strip()
+    return _finite(_convert(number, unit, dimension, name), name)
+
+
+def _convert(number: float, unit: str, dimension: str, name: str) -> float:
+    try:
+        if dimension == "temperature":
+            return number - 273.15 if unit == "K" else number * _celsius(unit)
+        if dimension == "angular speed" and unit in {"Hz", "rpm", "1/min", "1/s"}:
+            return number * 2 * math.pi / (60.0 if "m" in unit else 1.0)
+        if not unit and dimension != "ratio":
+            raise UnitError(f"{number:g} has no unit; write it with one of {dimension}")
+        if unit == "%":
+            unit = "percent"
+        return number * _factor(unit, dimension)
+    except UnitError as error:
+        raise UnitError(f"{name}: {error}") from error
+
+
+def _celsius(unit: str) -> float:
+    if unit not in {"degC", "°C", "C", "celsius"}:
+        raise UnitError(f"unit {unit!r} is not a temperature (degC or K)")
+    return 1.0
+
+
+def _finite(number: float, name: str) -> float:
+    if not math.isfinite(number):
+        raise UnitError(f"{name}: {number} is not a finite number")
+    return number
+
+
+def to_si(value: Any, dimension: str, name: str) -> Any:
+    """Take SI floats or arrays as they are, pint quantities converted; refuse a wrong dimension.
+
+    Parameters
+    ----------
+    value : float, array or pint quantity
+    dimension : str
+        Key of `SI_UNITS`.
+    name : str
+        The argument's name, for the message.
+
+    Raises
+    ------
+    UnitError
+        A pint quantity of another dimension, or a string that does not parse.
+    """
+    if isinstance(value, str):
+        return parse_quantity(value, dimension, name)
+    if hasattr(value, "to") and hasattr(value, "magnitude"):
+        if dimension == "angular speed" and value.check("1/[time]"):
+            unit = str(value.units)
+            cycles = 2 * math.pi if unit in {"hertz", "kilohertz"} else 1.0
+            return value.to("1/s").magnitude * cycles if cycles != 1.0 else value.to("rad/s").magnitude
+        try:
+            return value.to(SI_UNITS[dimension]).magnitude
+        except Exception as error:  # a foreign registry raises its own DimensionalityError
+            raise UnitError(f"{name}: {value} is not a {dimension}") from error
+    return value

@@ -1,0 +1,43 @@
+"""The operating point of a run: the key under which results are grouped."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, order=True)
+class OperatingPoint:
+    """Set points of a test, SI, angles in radians.
+
+    Attributes
+    ----------
+    static_load : float
+        Per bearing [N].
+    static_load_direction : float
+        Direction in which the load pushes the shaft [rad, counter-clockwise from +X].
+    shaft_speed : float
+        [rad/s]; zero in dry tests.
+    excitation : float
+        Excitation frequency [rad/s]; zero where nothing is excited.
+    """
+
+    static_load: float
+    static_load_direction: float = -math.pi / 2
+    shaft_speed: float = 0.0
+    excitation: float = 0.0
+
+    @property
+    def shaft_speed_hz(self) -> float:
+        """Shaft speed in Hz, free of the rounding noise of 2 pi."""
+        return round(self.shaft_speed / (2 * math.pi), 9)
+
+    @property
+    def excitation_hz(self) -> float:
+        """Excitation frequency in Hz."""
+        return round(self.excitation / (2 * math.pi), 9)
+
+    @property
+    def static_load_direction_deg(self) -> float:
+        """Load direction in degrees."""
+        return round(math.degrees(self.static_load_direction), 9)

@@ -1,0 +1,51 @@
+"""What is wrong with an export, said so that the person at the rig can mend it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+Severity = Literal["error", "warning", "note"]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One finding: where, what, and what to do about it.
+
+    Attributes
+    ----------
+    severity : {"error", "warning", "note"}
+        An error makes the file or the run unusable; a warning needs a look; a note is for information.
+    file : str
+        File name as the user knows it (relative to the campaign).
+    place : str
+        Line, column, key, channel, dataset: as near to the trouble as is known; "" if the whole file.
+    what : str
+        What is wrong.
+    cure : str
+        What to do.
+    run : str or None
+        Run id, where the problem belongs to one run.
+    """
+
+    severity: Severity
+    file: str
+    place: str
+    what: str
+    cure: str
+    run: str | None = None
+
+    def __str__(self) -> str:
+        where = f"{self.file}, {self.place}" if self.place else self.file
+        return f"{where}: {self.what}. {self.cure}"
+
+
+class RigDataError(ValueError):
+    """A campaign, manifest or record file that cannot be used; carries every problem found."""
+
+    def __init__(self, problems: Problem | Iterable[Problem]) -> None:
+        self.problems: tuple[Problem, ...] = (
+            (problems,) if isinstance(problems, Problem) else tuple(problems)
+        )
+        super().__init__("\n".join(str(p) for p in self.problems))

@@ -1,0 +1,70 @@
+"""One channel of one run, calibrated: the smallest thing the toolkit computes with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Record:
+    """A calibrated time series in SI units.
+
+    Attributes
+    ----------
+    name : str
+        Channel name, as in the manifest.
+    quantity : str
+        ``"displacement"`` [m], ``"force"`` [N], ``"acceleration"`` [m/s^2], ``"temperature"`` [K],
+        ``"pressure"`` [Pa] or ``"speed"`` [rad/s].
+    values : (n,) ndarray
+        SI values; NaN where the export had no value.
+    time : (n,) ndarray
+        Seconds; not necessarily equidistant (jitter, gaps).
+    rate : float
+        Nominal sample rate [Hz].
+    axis : float or None
+        Direction of the positive reading [rad, counter-clockwise from +X].
+    """
+
+    name: str
+    quantity: str
+    values: FloatArray = field(repr=False)
+    time: FloatArray = field(repr=False)
+    rate: float
+    axis: float | None = None
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+
+@dataclass(frozen=True)
+class VectorRecord:
+    """Two channels of one quantity, turned into the bearing frame.
+
+    Attributes
+    ----------
+    quantity : str
+        As in `Record`.
+    values : (n, 2) ndarray
+        X and Y components, SI; NaN rows where either channel has no value.
+    time : (n,) ndarray
+        Seconds.
+    rate : float
+        Nominal sample rate [Hz].
+    names : tuple of str
+        The two channels it was made from.
+    """
+
+    quantity: str
+    values: FloatArray = field(repr=False)
+    time: FloatArray = field(repr=False)
+    rate: float
+    names: tuple[str, str]
+
+    def __len__(self) -> int:
+        return len(self.values)

@@ -1,0 +1,1 @@
+"""Identify, predict and compare the dynamic coefficients of tilting-pad journal bearings."""
