@@ -9,7 +9,7 @@ from typing import Any
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
 _UNIT = r"[A-Za-zµμ°%Ω][A-Za-z0-9µμ°%Ω/*^ .]{0,40}|1/[A-Za-z]{1,10}|"
-_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*({_UNIT})\s*", re.ASCII | re.UNICODE)
+_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*({_UNIT})\s*")
 #: What each physical dimension is called and its SI unit as pint writes it.
 SI_UNITS = {
     "length": "m",
