@@ -1,0 +1,160 @@
+"""One pad with its film: mesh, arrays, geometry; one step of its pressure, heat and deformation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from model.bearing import Oil, Pad
+from model.energy import solve_energy
+from model.film import FilmForces, FilmGrid, FilmWork, film_grid, film_work, solve_film
+from model.setup import Setup
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass
+class PadFilm:
+    """State of one pad while an equilibrium is sought.
+
+    Attributes
+    ----------
+    number : int
+        From 1.
+    pad : Pad
+    normal, tangent : (2,) ndarray
+        Unit vectors at the pivot.
+    gap : float
+        Cp - Cb: preload times Cp, plus running changes [m].
+    pivot_radius : float
+        R_P [m].
+    grid, work
+        Mesh and arrays.
+    inlet : float
+        Temperature of the oil that enters [degC].
+    tilt, deflection : float
+        t [rad], eta [m].
+    idle : bool
+        No loaded attitude: carries nothing.
+    forces : FilmForces or None
+    """
+
+    number: int
+    pad: Pad
+    normal: FloatArray
+    tangent: FloatArray
+    gap: float
+    pivot_radius: float
+    grid: FilmGrid
+    work: FilmWork
+    inlet: float
+    tilt: float = 0.0
+    deflection: float = 0.0
+    idle: bool = False
+    forces: FilmForces | None = None
+    temperature_change: float = field(default=math.inf)
+
+    def approach(self, position: FloatArray) -> tuple[float, float]:
+        """(a, b) of the film for a journal position and the pad's present tilt and deflection [m]."""
+        a = self.gap + float(self.normal @ position) - self.deflection
+        b = float(self.tangent @ position) + self.pivot_radius * self.tilt
+        return a, b
+
+
+def pad_films(setup: Setup) -> list[PadFilm]:
+    """Lay out every pad's film."""
+    bearing = setup.bearing
+    symmetric = setup.misalignment[0] == 0.0
+    angle, toward = setup.misalignment
+    films = []
+    for number, pad in enumerate(bearing.pads, start=1):
+        start = pad.leading_edge + setup.starvation * pad.arc
+        shape = (setup.mesh.along, setup.mesh.across * (1 if symmetric else 2))
+        grid = film_grid(start, pad.leading_edge + pad.arc, bearing.journal_radius, bearing.length, shape, symmetric)
+        work = film_work(grid, setup.inlet_temperature)
+        if not symmetric:
+            # the axis leans by `angle` towards `toward`: at z the journal stands z * angle further that way
+            work.extra[:, :] = -np.outer(np.cos(grid.angle + pad.pivot_angle - toward), grid.z * angle)
+        films.append(
+            PadFilm(
+                number=number,
+                pad=pad,
+                normal=np.array([math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)]),
+                tangent=np.array([-math.sin(pad.pivot_angle), math.cos(pad.pivot_angle)]),
+                gap=pad.pad_clearance - pad.assembled_clearance - setup.clearance_change,
+                pivot_radius=bearing.pivot_radius(pad),
+                grid=grid,
+                work=work,
+                inlet=setup.inlet_temperature,
+            )
+        )
+    return films
+
+
+def oil_constants(oil: Oil) -> tuple[float, float, float, float]:
+    """What the compiled viscosity and density need: mu_40, kappa, rho_40, alpha_v."""
+    return oil.viscosity_40, oil.viscosity_exponent, oil.density_40, oil.thermal_expansion
+
+
+@njit(cache=True)
+def film_step(
+    grid: FilmGrid,
+    work: FilmWork,
+    wedge: tuple[float, float, float],
+    speed: float,
+    oil: tuple[float, float, float, float],
+    heat: tuple[float, float],
+    thermal: tuple[float, float],
+) -> tuple[FilmForces, float, float]:
+    """Solve pressure for the present temperature, then the temperature for that pressure.
+
+    Parameters
+    ----------
+    grid, work
+        Mesh and arrays.
+    wedge : tuple of float
+        Cp, a, b [m].
+    speed : float
+        [m/s]
+    oil : tuple of float
+        See `oil_constants`.
+    heat : tuple of float
+        Specific heat and conductivity.
+    thermal : tuple of float
+        Inlet temperature [degC] and relaxation of the temperature update; 0 leaves it alone (isothermal).
+
+    Returns
+    -------
+    forces : FilmForces
+    change : float
+        Largest change of temperature that the new pressure asks for [K].
+    limited : float
+        See `solve_energy`.
+    """
+    set_viscosity(work, oil)
+    forces = solve_film(grid, work, wedge[0], wedge[1], wedge[2], speed)
+    if thermal[1] == 0.0 or forces.steps < 0:
+        return forces, 0.0, 0.0
+    new = np.empty_like(work.temperature)
+    limited = solve_energy(grid, work, thermal[0], speed, heat, new)
+    change = 0.0
+    for i in range(new.shape[0]):
+        for j in range(new.shape[1]):
+            difference = new[i, j] - work.temperature[i, j]
+            change = max(change, abs(difference))
+            work.temperature[i, j] += thermal[1] * difference
+    return forces, change, limited
+
+
+@njit(cache=True)
+def set_viscosity(work: FilmWork, oil: tuple[float, float, float, float]) -> None:
+    """Eq. (4) and (5) at every node."""
+    t = work.temperature
+    for i in range(t.shape[0]):
+        for j in range(t.shape[1]):
+            work.viscosity[i, j] = oil[0] * np.exp(oil[1] * (40.0 - t[i, j]))
+            work.density[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - t[i, j]))

@@ -1,0 +1,140 @@
+"""Piecewise polynomials on one axis: the building brick of the tensor-product finite elements of a pad."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """Continuous Lagrange elements on an interval.
+
+    Attributes
+    ----------
+    breaks : (n_elements + 1,) ndarray
+        Element ends, strictly increasing [m or rad].
+    degree : int
+        Polynomial degree; 1 is what a film grid interpolates with, 2 the pad's default.
+
+    Raises
+    ------
+    ValueError
+        `breaks` is not a strictly increasing 1-D array of at least two values, or `degree` < 1.
+    """
+
+    breaks: Array
+    degree: int = 2
+
+    def __post_init__(self) -> None:
+        breaks = np.array(self.breaks, dtype=float)
+        if breaks.ndim != 1 or breaks.size < 2 or not np.all(np.diff(breaks) > 0):
+            raise ValueError(
+                f"breaks must be 1-D, strictly increasing, of at least two values; got shape {breaks.shape}."
+            )
+        if self.degree < 1:
+            raise ValueError(f"degree must be at least 1, got {self.degree}.")
+        breaks.setflags(write=False)
+        object.__setattr__(self, "breaks", breaks)
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements."""
+        return self.breaks.size - 1
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return self.n_elements * self.degree + 1
+
+    @cached_property
+    def nodes(self) -> Array:
+        """Node coordinates, shape (n_nodes,), increasing."""
+        inside = self.breaks[:-1, None] + np.diff(self.breaks)[:, None] * _reference_nodes(self.degree)[None, :-1]
+        return np.append(inside.ravel(), self.breaks[-1])
+
+    def tabulate(self, x: ArrayLike, derivative: int = 0) -> Array:
+        """Basis functions at points.
+
+        Parameters
+        ----------
+        x : (n,) array_like
+            Points inside the interval (outside: the end element is continued).
+        derivative : {0, 1}
+            Order of the derivative with respect to x.
+
+        Returns
+        -------
+        ndarray, shape (n, n_nodes)
+            At an inner break the derivative is the one from the right.
+        """
+        points = np.asarray(x, dtype=float)
+        element = np.clip(np.searchsorted(self.breaks, points, side="right") - 1, 0, self.n_elements - 1)
+        size = np.diff(self.breaks)[element]
+        local = (points - self.breaks[element]) / size
+        powers = np.arange(self.degree + 1)
+        if derivative == 0:
+            monomials = local[:, None] ** powers
+        else:
+            monomials = powers * local[:, None] ** np.maximum(powers - 1, 0) / size[:, None]
+        shape = monomials @ np.linalg.inv(_reference_nodes(self.degree)[:, None] ** powers)
+        out = np.zeros((points.size, self.n_nodes))
+        columns = element[:, None] * self.degree + powers
+        np.put_along_axis(out, columns, shape, axis=1)
+        return out
+
+    @cached_property
+    def gauss(self) -> tuple[Array, Array]:
+        """Gauss points and weights, each of shape (n_elements * (degree + 2),).
+
+        Two points more than a polynomial needs: the weights 1/r of cylindrical coordinates are none.
+        """
+        return gauss_rule(self.breaks, self.degree + 2)
+
+    def matrix(self, rows: int, columns: int, weight: Array | float = 1.0) -> Array:
+        """Weighted product of basis functions or their derivatives.
+
+        Parameters
+        ----------
+        rows, columns : {0, 1}
+            Order of derivative of the row and of the column function.
+        weight : ndarray or float
+            Weight at the points of `gauss`.
+
+        Returns
+        -------
+        ndarray, shape (n_nodes, n_nodes)
+            Integral of weight * phi_i^(rows) * phi_j^(columns).
+        """
+        points, factor = self.gauss
+        left, right = (self.tabulate(points, order) for order in (rows, columns))
+        return left.T @ ((factor * weight)[:, None] * right)
+
+
+def graded(start: float, stop: float, count: int, ratio: float = 1.0) -> Array:
+    """Break an interval into `count` elements, each `ratio` times as long as the one before; shape (count + 1,)."""
+    sizes = ratio ** np.arange(count)
+    breaks = start + (stop - start) * np.concatenate(([0.0], np.cumsum(sizes))) / sizes.sum()
+    breaks[-1] = stop
+    return breaks
+
+
+def gauss_rule(breaks: Array, count: int) -> tuple[Array, Array]:
+    """Gauss-Legendre points and weights, `count` in every interval of `breaks`."""
+    points, weights = np.polynomial.legendre.leggauss(count)
+    size = np.diff(breaks)
+    x = breaks[:-1, None] + 0.5 * size[:, None] * (points + 1.0)
+    return x.ravel(), (0.5 * size[:, None] * weights).ravel()
+
+
+def _reference_nodes(degree: int) -> Array:
+    """Gauss-Lobatto points on [0, 1]: well conditioned, and equally spaced up to degree 2."""
+    if degree == 1:
+        return np.array([0.0, 1.0])
+    inner = np.polynomial.legendre.Legendre.basis(degree).deriv().roots()
+    return 0.5 * (1.0 + np.concatenate(([-1.0], np.sort(inner.real), [1.0])))

@@ -1,0 +1,368 @@
+"""Pivot laws: how far a pivot gives under the pad load, and how stiff it is for small vibrations.
+
+The Kirk and Reedy formulas, Eq. (16) and (17), are secant stiffnesses K = W / delta. Statics use the deflection
+delta(W) = W / K(W); small vibrations feel the tangent dW/ddelta. ``kirk-secant`` keeps the printed K for the
+vibrations too, which is what the paper compares.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.bearing import Bearing, BearingError, Pivot
+
+FloatArray = NDArray[np.float64]
+
+
+@runtime_checkable
+class PivotLaw(Protocol):
+    """Load-deflection law of one pivot."""
+
+    name: str
+
+    def deflection(self, load: float) -> float:
+        """delta(W) [m], for W >= 0 [N]."""
+        ...
+
+    def stiffness(self, load: float) -> float:
+        """Tangent dW/ddelta [N/m]; infinite for a rigid pivot."""
+        ...
+
+    def vibration_stiffness(self, load: float) -> float:
+        """What small vibrations feel [N/m]: the tangent, unless the law says otherwise."""
+        ...
+
+
+@dataclass(frozen=True)
+class RigidPivot:
+    """No deflection."""
+
+    name: str = "rigid"
+
+    def deflection(self, load: float) -> float:
+        """Zero [m]."""
+        return 0.0
+
+    def stiffness(self, load: float) -> float:
+        """Infinite [N/m]."""
+        return math.inf
+
+    vibration_stiffness = stiffness
+
+
+@dataclass(frozen=True)
+class ConstantPivot:
+    """A linear spring.
+
+    Attributes
+    ----------
+    value : float
+        [N/m]
+    """
+
+    value: float
+    name: str = "constant"
+
+    def deflection(self, load: float) -> float:
+        """W / K [m]."""
+        return load / self.value
+
+    def stiffness(self, load: float) -> float:
+        """K [N/m]."""
+        return self.value
+
+    vibration_stiffness = stiffness
+
+
+@dataclass(frozen=True)
+class RockerPivot:
+    """Line contact, Kirk and Reedy, Eq. (16) of the paper.
+
+    K = pi E L / { 2 (1 - nu^2) [ 2/3 + ln( pi E L (D_H - D_P) / (4 W (1 - nu^2)) ) ] } is the secant; its tangent
+    has 1/3 less than the logarithm: [ ln(...) - 1/3 ].
+
+    Attributes
+    ----------
+    line_modulus : float
+        pi E L / (2 (1 - nu^2)) [N/m].
+    load_scale : float
+        pi E L (D_H - D_P) / (4 (1 - nu^2)) [N]: the logarithm is ln(load_scale / W).
+    secant_vibrations : bool
+        Use the printed secant for vibrations.
+    """
+
+    line_modulus: float
+    load_scale: float
+    secant_vibrations: bool = False
+    name: str = "kirk"
+
+    def _logarithm(self, load: float) -> float:
+        # Past W = load_scale / e the formula leaves its physics (the contact is as wide as the gap); hold it there.
+        return math.log(self.load_scale / min(max(load, 1e-9), self.load_scale / math.e))
+
+    def deflection(self, load: float) -> float:
+        """W / K(W) [m]."""
+        return load * (2.0 / 3.0 + self._logarithm(load)) / self.line_modulus if load > 0 else 0.0
+
+    def secant(self, load: float) -> float:
+        """K as printed [N/m]."""
+        return self.line_modulus / (2.0 / 3.0 + self._logarithm(load))
+
+    def stiffness(self, load: float) -> float:
+        """Tangent [N/m]."""
+        return self.line_modulus / (self._logarithm(load) - 1.0 / 3.0)
+
+    def vibration_stiffness(self, load: float) -> float:
+        """Tangent, or the printed secant [N/m]."""
+        return self.secant(load) if self.secant_vibrations else self.stiffness(load)
+
+
+@dataclass(frozen=True)
+class SphericalPivot:
+    """Point contact, sphere on flat, Eq. (17) of the paper (= Hertz).
+
+    K = W / cbrt(9 W^2 (1 - nu^2)^2 / (2 E^2 D_s)); the tangent is 1.5 K.
+
+    Attributes
+    ----------
+    compliance : float
+        delta = compliance * W^(2/3) [m / N^(2/3)].
+    secant_vibrations : bool
+        Use the printed secant for vibrations.
+    """
+
+    compliance: float
+    secant_vibrations: bool = False
+    name: str = "kirk"
+
+    def deflection(self, load: float) -> float:
+        """W / K(W) [m]."""
+        return self.compliance * max(load, 0.0) ** (2.0 / 3.0)
+
+    def secant(self, load: float) -> float:
+        """K as printed [N/m]."""
+        return max(load, 1e-9) ** (1.0 / 3.0) / self.compliance
+
+    def stiffness(self, load: float) -> float:
+        """Tangent, 1.5 times the secant [N/m]."""
+        return 1.5 * self.secant(load)
+
+    def vibration_stiffness(self, load: float) -> float:
+        """Tangent, or the printed secant [N/m]."""
+        return self.secant(load) if self.secant_vibrations else self.stiffness(load)
+
+
+@dataclass(frozen=True)
+class ScaledPivot:
+    """Another law whose deflection is divided by a factor.
+
+    Attributes
+    ----------
+    law : PivotLaw
+    stiffness_factor : float
+        f: the pivot deflects delta(W) / f.
+    """
+
+    law: PivotLaw
+    stiffness_factor: float
+
+    @property
+    def name(self) -> str:
+        """Name of the law and the factor."""
+        return f"{self.law.name} x {self.stiffness_factor:g}"
+
+    def deflection(self, load: float) -> float:
+        """delta(W) / f [m]."""
+        return self.law.deflection(load) / self.stiffness_factor
+
+    def stiffness(self, load: float) -> float:
+        """F dW/ddelta [N/m]."""
+        return self.law.stiffness(load) * self.stiffness_factor
+
+    def vibration_stiffness(self, load: float) -> float:
+        """F times the law's own [N/m]."""
+        return self.law.vibration_stiffness(load) * self.stiffness_factor
+
+
+@dataclass(frozen=True)
+class MeasuredPivot:
+    """A measured monotone curve, interpolated with a continuous tangent (PCHIP in load).
+
+    Beyond the last point the curve goes on with its last tangent; `extrapolated` says when that is so.
+
+    Attributes
+    ----------
+    load, deflection_points : (n,) ndarray
+        Strictly increasing, from (0, 0) [N], [m].
+    valid_from, valid_to : float
+        Loads between which the curve was measured [N].
+    name : str
+    includes_housing : bool
+        The curve holds the compliance of pivot AND housing up to the probes.
+    """
+
+    load: FloatArray
+    deflection_points: FloatArray
+    valid_from: float = 0.0
+    valid_to: float = math.inf
+    name: str = "measured"
+    includes_housing: bool = True
+    _coefficients: FloatArray = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        load, points = np.asarray(self.load, float), np.asarray(self.deflection_points, float)
+        if load.ndim != 1 or load.shape != points.shape or len(load) < 2:
+            raise ValueError(f"load and deflection must be 1-D and alike, got {load.shape} and {points.shape}")
+        if not (np.all(np.isfinite(load)) and np.all(np.isfinite(points))):
+            raise ValueError("a pivot curve must be finite")
+        if np.any(np.diff(load) <= 0) or np.any(np.diff(points) <= 0):
+            raise ValueError("a pivot curve must rise strictly in load and deflection")
+        if load[0] != 0.0 or points[0] != 0.0:
+            load, points = np.concatenate([[0.0], load]), np.concatenate([[0.0], points])
+            if load[1] <= 0 or points[1] <= 0:
+                raise ValueError("a pivot curve must start at or above zero load and deflection")
+        from scipy.interpolate import PchipInterpolator
+
+        object.__setattr__(self, "load", load)
+        object.__setattr__(self, "deflection_points", points)
+        object.__setattr__(self, "_coefficients", PchipInterpolator(load, points).c)
+
+    def _piece(self, load: float) -> tuple[int, float]:
+        i = int(np.searchsorted(self.load, load, side="right")) - 1
+        i = min(max(i, 0), len(self.load) - 2)
+        return i, load - self.load[i]
+
+    def deflection(self, load: float) -> float:
+        """delta(W) [m]."""
+        if load <= 0:
+            return 0.0
+        end = self.load[-1]
+        i, s = self._piece(min(load, end))
+        c = self._coefficients[:, i]
+        value = float(((c[0] * s + c[1]) * s + c[2]) * s + c[3])
+        return value if load <= end else value + (load - end) * self._compliance(end)
+
+    def _compliance(self, load: float) -> float:
+        i, s = self._piece(min(max(load, 0.0), self.load[-1]))
+        c = self._coefficients[:, i]
+        return max(float((3 * c[0] * s + 2 * c[1]) * s + c[2]), 1e-15)
+
+    def stiffness(self, load: float) -> float:
+        """Tangent dW/ddelta [N/m]."""
+        return 1.0 / self._compliance(load)
+
+    vibration_stiffness = stiffness
+
+    def extrapolated(self, load: float) -> bool:
+        """Whether `load` lies beyond what was measured."""
+        return not self.valid_from <= load <= self.valid_to
+
+
+def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> PivotLaw:
+    """The printed formula for a contact geometry, Eq. (16) or (17)."""
+    modulus = pivot.youngs_modulus / (1.0 - pivot.poissons_ratio**2)
+    name = "kirk-secant" if secant_vibrations else "kirk"
+    if pivot.kind == "rocker":
+        line = math.pi * modulus * pivot.contact_length
+        gap = pivot.housing_diameter - pivot.pivot_diameter
+        return RockerPivot(line / 2.0, line * gap / 4.0, secant_vibrations, name)
+    if pivot.kind == "spherical":
+        return SphericalPivot((9.0 / (2.0 * modulus**2 * pivot.sphere_diameter)) ** (1.0 / 3.0), secant_vibrations, name)
+    return RigidPivot()
+
+
+PivotChoice = str | float | PivotLaw | Sequence[PivotLaw] | Path
+
+
+def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
+    """One law per pad from what a user may say.
+
+    Parameters
+    ----------
+    choice : str, float, Path, PivotLaw or sequence of PivotLaw
+        ``"rigid"``, ``"kirk"``, ``"kirk-secant"``, the path of a ``pivots.toml``, a constant stiffness [N/m],
+        one law for all pads, or one per pad.
+    bearing : Bearing
+
+    Raises
+    ------
+    BearingError
+        Unknown name, wrong number of laws, or a stiffness that is not positive.
+    """
+    n = len(bearing.pads)
+    if isinstance(choice, str) and choice in {"rigid", "kirk", "kirk-secant"}:
+        law = RigidPivot() if choice == "rigid" else formula_pivot(bearing.pivot, choice == "kirk-secant")
+        return (law,) * n
+    if isinstance(choice, (str, Path)):
+        if not Path(choice).suffix:
+            raise BearingError(f"pivots: {str(choice)!r} is not known. Use rigid, kirk, kirk-secant or a pivots.toml.")
+        return load_pivots(choice, n)
+    if isinstance(choice, (int, float)) and not isinstance(choice, bool):
+        if not (math.isfinite(choice) and choice > 0):
+            raise BearingError(f"pivots: a constant stiffness must be positive, got {choice!r} N/m.")
+        return (ConstantPivot(float(choice)),) * n
+    if isinstance(choice, PivotLaw):
+        return (choice,) * n
+    laws = tuple(choice)
+    if len(laws) != n or not all(isinstance(law, PivotLaw) for law in laws):
+        raise BearingError(f"pivots: need one pivot law per pad ({n}), got {len(laws)} entries.")
+    return laws
+
+
+def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ...]:
+    """Read measured pivot laws from a ``pivots.toml`` (schema ``tpjb-pivots/1``), pad #1 first.
+
+    Raises
+    ------
+    BearingError
+        Missing or broken file, a pad left out, or a curve that does not rise.
+    """
+    path = Path(path)
+    try:
+        if path.stat().st_size > 20_000_000:
+            raise BearingError(f"{path.name}: larger than 20 MB. A pivots.toml holds some hundred numbers; check the path.")
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError as error:
+        raise BearingError(f"{path}: no such file. `tpjb pivot CAMPAIGN` writes a pivots.toml.") from error
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise BearingError(f"{path}: cannot be read: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
+    if data.get("schema") != "tpjb-pivots/1":
+        raise BearingError(f"{path.name}, schema: need 'tpjb-pivots/1', got {data.get('schema')!r}.")
+    tables = data.get("pads")
+    if not isinstance(tables, list) or not tables:
+        raise BearingError(f"{path.name}: no [[pads]] table. Write it anew with `tpjb pivot CAMPAIGN`.")
+    housing = bool(data.get("includes_housing", True))
+    laws = dict(_read_pad(table, path.name, housing) for table in tables)
+    wanted = pads or max(laws)
+    missing = sorted(set(range(1, wanted + 1)) - set(laws))
+    if missing or max(laws) > wanted:
+        raise BearingError(
+            f"{path.name}: has pads {sorted(laws)}, needs 1 to {wanted}. Measure pad #{(missing or [wanted])[0]} too."
+        )
+    return tuple(laws[k] for k in range(1, wanted + 1))
+
+
+def _read_pad(table: Any, name: str, housing: bool) -> tuple[int, MeasuredPivot]:
+    number = table.get("pad") if isinstance(table, dict) else None
+    if not isinstance(number, int) or not 1 <= number <= 40:
+        raise BearingError(f"{name}, [[pads]]: pad must be a number from 1, got {number!r}.")
+    try:
+        law = MeasuredPivot(
+            np.asarray(table["force_N"], float),
+            np.asarray(table["deflection_m"], float),
+            float(table.get("valid_from_N", 0.0)),
+            float(table.get("valid_to_N", math.inf)),
+            str(table.get("law", "measured")),
+            housing,
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise BearingError(f"{name}, pad {number}: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
+    return number, law

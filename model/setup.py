@@ -1,0 +1,155 @@
+"""Everything the solver is told about a bearing: the drawing, the pivots, and the switches that effects set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.bearing import Bearing, Pad
+from model.pivots import PivotLaw
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+THERMAL = ("isothermal", "adiabatic", "tehd")
+#: A sensor map: excitation frequency [rad/s] -> (2, 2) complex; 0 gives what static readings see.
+SensorMap = Callable[[float], ComplexArray]
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """What stands between the bearing and the records: linear maps of displacement and force readings.
+
+    Attributes
+    ----------
+    displacement : tuple of SensorMap
+        Each turns true (X, Y) into read (X, Y); applied in order.
+    force : tuple of SensorMap
+        The same for the oil force as computed from cells and accelerometers.
+    housing_mass : float
+        Stated mass [kg] of the housing, for effects that need the force split.
+    cell_stiffness : tuple of float
+        Stiffness between housing and frame in X and Y [N/m] (the rig's; seen in a dry shake).
+    """
+
+    displacement: tuple[SensorMap, ...] = ()
+    force: tuple[SensorMap, ...] = ()
+    housing_mass: float = 30.0
+    cell_stiffness: tuple[float, float] = (4.0e8, 6.0e8)
+
+    def displacement_map(self, omega: float) -> ComplexArray:
+        """S(omega): read displacement = S @ true displacement."""
+        return _product(self.displacement, omega)
+
+    def force_map(self, omega: float) -> ComplexArray:
+        """G(omega): read force = G @ true force."""
+        return _product(self.force, omega)
+
+
+def _product(maps: tuple[SensorMap, ...], omega: float) -> ComplexArray:
+    total = np.eye(2, dtype=complex)
+    for one in maps:
+        total = np.asarray(one(omega), dtype=complex) @ total
+    return total
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Film mesh: intervals along the arc and across half the width; both even."""
+
+    along: int = 64
+    across: int = 8
+
+    def coarser(self) -> Mesh:
+        """Half as many intervals each way (for the two-mesh error), even and no less than 8 x 4."""
+        return Mesh(max(8, 2 * (self.along // 4)), max(4, 2 * (self.across // 4)))
+
+    def finer(self) -> Mesh:
+        """Twice as many intervals each way."""
+        return Mesh(2 * self.along, 2 * self.across)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A bearing, its pivots and every switch of the model; effects return changed copies.
+
+    Attributes
+    ----------
+    bearing : Bearing
+    pivots : tuple of PivotLaw
+        One per pad.
+    thermal : {"isothermal", "adiabatic", "tehd"}
+    mesh : Mesh
+    supply_change : float
+        The oil enters this much hotter than the bearing file says [K].
+    carryover : float
+        Fraction lambda of hot oil carried over from pad to pad.
+    bending : float
+        Factor on the computed pad deformation; 0: rigid pads.
+    rotational_stiffness : float
+        k_theta of Eq. (12) [N m/rad], also in statics.
+    pivot_damping : float
+        c_eta of Eq. (12) [N s/m].
+    misalignment : tuple of float
+        Angle of the shaft axis and the direction towards which it leans [rad].
+    starvation : float
+        Every film starts after this fraction of the arc.
+    series_compliance : float
+        1/stiffness of a spring in series with the whole bearing [m/N].
+    added_mass : float
+        [kg]
+    instruments : Instruments
+    clearance_change : float
+        Change of Cb in running conditions only [m]: dry tests are cold.
+    """
+
+    bearing: Bearing
+    pivots: tuple[PivotLaw, ...]
+    thermal: str = "adiabatic"
+    mesh: Mesh = field(default_factory=Mesh)
+    supply_change: float = 0.0
+    carryover: float = 0.0
+    bending: float = 0.0
+    rotational_stiffness: float = 0.0
+    pivot_damping: float = 0.0
+    misalignment: tuple[float, float] = (0.0, 0.0)
+    starvation: float = 0.0
+    series_compliance: float = 0.0
+    added_mass: float = 0.0
+    instruments: Instruments = field(default_factory=Instruments)
+    clearance_change: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.thermal not in THERMAL:
+            raise ValueError(f"thermal must be one of {', '.join(THERMAL)}, got {self.thermal!r}")
+        if len(self.pivots) != len(self.bearing.pads):
+            raise ValueError(f"need one pivot law per pad ({len(self.bearing.pads)}), got {len(self.pivots)}")
+
+    def change(self, **changes: Any) -> Setup:
+        """Return a copy with other values."""
+        return replace(self, **changes)
+
+    def change_pads(self, change: Callable[[int, Pad], Pad]) -> Setup:
+        """Return a copy with every pad replaced by ``change(number, pad)``; numbers from 1."""
+        pads = tuple(change(k, pad) for k, pad in enumerate(self.bearing.pads, start=1))
+        return replace(self, bearing=self.bearing.with_pads(pads))
+
+    @property
+    def inlet_temperature(self) -> float:
+        """Temperature at which fresh oil enters [degC]."""
+        return self.bearing.oil.supply_temperature + self.supply_change
+
+    @property
+    def flexible_pads(self) -> bool:
+        """Whether pads deform."""
+        return self.thermal == "tehd" or self.bending != 0.0
+
+    @property
+    def bending_factor(self) -> float:
+        """Factor on the computed deformation (1 for ``tehd`` with nothing else said)."""
+        if self.bending:
+            return self.bending
+        return 1.0 if self.thermal == "tehd" else 0.0
