@@ -1,1 +1,59 @@
-"""Rig exports: reading, checking, calibrating and writing test campaigns (`tpjb-rig/1`)."""
+"""Rig exports: reading, checking, calibrating and writing test campaigns (`tpjb-rig/1`).
+
+```python
+campaign = rigdata.load_campaign("rocker-A")
+run = campaign.run("d-05000-25-03")
+run.record("X1A")  # one channel, SI
+run.vector("displacement")  # two channels, turned into X and Y
+```
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rigdata.calibration import Channel
+    from rigdata.campaign import Campaign, Run, load_campaign
+    from rigdata.checks import check_campaign
+    from rigdata.operating_point import OperatingPoint
+    from rigdata.problem import Problem, RigDataError
+    from rigdata.record import Record, VectorRecord
+
+_HOMES = {
+    "Campaign": "campaign",
+    "Channel": "calibration",
+    "OperatingPoint": "operating_point",
+    "Problem": "problem",
+    "Record": "record",
+    "RigDataError": "problem",
+    "Run": "campaign",
+    "VectorRecord": "record",
+    "check_campaign": "checks",
+    "load_campaign": "campaign",
+}
+
+__all__ = [
+    "Campaign",
+    "Channel",
+    "OperatingPoint",
+    "Problem",
+    "Record",
+    "RigDataError",
+    "Run",
+    "VectorRecord",
+    "check_campaign",
+    "load_campaign",
+]
+
+
+def __getattr__(name: str) -> object:
+    """Import on first use: `import rigdata` alone stays quick."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'rigdata' has no attribute {name!r}")
+    return getattr(importlib.import_module(f"rigdata.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

@@ -57,14 +57,14 @@ class VectorRecord:
     rate : float
         Nominal sample rate [Hz].
     names : tuple of str
-        The two channels it was made from.
+        The channels it was made from, two as a rule.
     """
 
     quantity: str
     values: FloatArray = field(repr=False)
     time: FloatArray = field(repr=False)
     rate: float
-    names: tuple[str, str]
+    names: tuple[str, ...]
 
     def __len__(self) -> int:
         return len(self.values)

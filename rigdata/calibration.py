@@ -1,0 +1,177 @@
+"""How one channel's reading becomes an SI value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.units import (
+    UnitError,
+    is_bridge_ratio,
+    is_signal,
+    parse_quantity,
+    parse_unit,
+    sensitivity_gain,
+    split_quantity,
+    temperature_offset,
+    unit_factor,
+)
+
+#: Dimension (key of `rigdata.units.SI_UNITS`) of what each quantity of a manifest measures.
+DIMENSIONS = {
+    "displacement": "length",
+    "force": "force",
+    "acceleration": "acceleration",
+    "temperature": "temperature difference",
+    "pressure": "pressure",
+    "speed": "speed",
+    "time": "time",
+}
+#: Quantities with a direction in the bearing's plane.
+VECTOR_QUANTITIES = ("displacement", "force", "acceleration")
+_ZERO_CELSIUS = 273.15
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One column or dataset: what it measures, in which direction, and its calibration.
+
+    ``value = polarity * gain * reading + zero`` with the reading in the unit that the file holds.
+
+    Attributes
+    ----------
+    name : str
+        Column or dataset name, key of the manifest.
+    quantity : str
+        ``"displacement"``, ``"force"``, ``"acceleration"``, ``"temperature"``, ``"pressure"``,
+        ``"speed"``, ``"time"`` or ``"ignore"``.
+    unit : str
+        Unit of the reading, as the manifest gives it.
+    gain : float
+        SI value per unit of reading, positive.
+    zero : float
+        SI value at reading zero.
+    polarity : int
+        -1 where the reading falls when the quantity grows.
+    axis : float or None
+        Direction of the positive quantity [rad, counter-clockwise from +X].
+    uncertainty : float or None
+        Relative calibration uncertainty, one standard deviation.
+    pad : int or None
+        Pad number from 1, for temperatures and pressures.
+    position : float or None
+        Fraction of the pad's arc from its leading edge.
+    """
+
+    name: str
+    quantity: str
+    unit: str = ""
+    gain: float = 1.0
+    zero: float = 0.0
+    polarity: int = 1
+    axis: float | None = None
+    uncertainty: float | None = None
+    pad: int | None = None
+    position: float | None = None
+
+    @property
+    def slope(self) -> float:
+        """Signed SI value per unit of reading."""
+        return self.polarity * self.gain
+
+    def to_si(self, reading: NDArray[Any]) -> NDArray[np.float64]:
+        """Calibrate readings.
+
+        Parameters
+        ----------
+        reading : (n,) ndarray
+            In the unit that the file holds.
+
+        Returns
+        -------
+        (n,) ndarray of float64
+            SI values; what is not a finite number becomes NaN, and so do the magnitudes of 1e30 and
+            more that loggers write for an overflow.
+        """
+        values = np.array(reading, dtype=np.float64)
+        with np.errstate(invalid="ignore"):  # a NaN compared is what "no value" looks like
+            values[~(np.abs(values) < 1e30)] = np.nan
+        values *= self.slope
+        values += self.zero
+        return values
+
+    def to_reading(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Turn SI values into readings (the inverse of `to_si`)."""
+        return (np.asarray(values, dtype=np.float64) - self.zero) / self.slope
+
+
+def reading_gain(
+    quantity: str, unit: str, sensitivity: object, full_scale: object = None, excitation: object = None
+) -> float:
+    """SI value per unit of reading.
+
+    Parameters
+    ----------
+    quantity : str
+        Key of `DIMENSIONS`.
+    unit : str
+        Unit of the reading. An engineering unit is already converted: `sensitivity` is then not used.
+    sensitivity : object
+        ``"7.78 mV/um"``, ``"15 K/V"``; for a bridge ``"2.0 mV/V"`` at full scale.
+    full_scale, excitation : object
+        Of a bridge: the quantity at full scale, and the supply voltage (not needed where the reading
+        itself is in mV/V). F = reading / (sensitivity * excitation) * full_scale.
+
+    Raises
+    ------
+    UnitError
+        A wrong unit, or a part that is missing.
+    """
+    dimension = DIMENSIONS[quantity]
+    if not is_signal(unit):
+        return unit_factor(unit, dimension)
+    if sensitivity is None:
+        raise UnitError(f"a reading in {unit} needs a sensitivity")
+    if isinstance(sensitivity, str) and is_bridge_ratio(split_quantity(sensitivity, "ratio")[1]):
+        return _bridge_gain(dimension, unit, sensitivity, full_scale, excitation)
+    return sensitivity_gain(sensitivity, unit, dimension)
+
+
+def _bridge_gain(
+    dimension: str, unit: str, sensitivity: str, full_scale: object, excitation: object
+) -> float:
+    ratio = parse_quantity(sensitivity, "ratio")
+    if full_scale is None:
+        raise UnitError(f"a sensitivity in V/V ({sensitivity!r}) needs full_scale")
+    scale = parse_quantity(full_scale, dimension)
+    if ratio <= 0 or scale <= 0:
+        raise UnitError("sensitivity and full_scale must be above zero; a falling reading is polarity = -1")
+    if is_bridge_ratio(unit):
+        return parse_unit(unit).factor / ratio * scale
+    if excitation is None:
+        raise UnitError(f"a sensitivity in V/V ({sensitivity!r}) needs excitation, the bridge supply")
+    supply = parse_quantity(excitation, "voltage")
+    if supply <= 0:
+        raise UnitError(f"excitation {excitation!r} must be above zero")
+    return unit_factor(unit, "voltage") / (ratio * supply) * scale
+
+
+def reading_zero(quantity: str, unit: str, zero: object) -> float:
+    """SI value at reading zero.
+
+    Parameters
+    ----------
+    quantity, unit : str
+        As in `reading_gain`.
+    zero : object
+        What the manifest says, or None: then reading zero is zero; of a temperature 0 degC, unless the
+        reading itself is in K or degF.
+    """
+    if quantity != "temperature":
+        return 0.0 if zero is None else parse_quantity(zero, DIMENSIONS[quantity])
+    if zero is not None:
+        return parse_quantity(zero, "temperature")
+    return _ZERO_CELSIUS if is_signal(unit) else temperature_offset(unit)

@@ -1,0 +1,436 @@
+"""A campaign and its runs: lazy, calibrated access, channel by channel."""
+
+from __future__ import annotations
+
+import hashlib
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from rigdata.calibration import Channel
+from rigdata.manifest import MAX_MANIFEST, Manifest, parse_manifest
+from rigdata.manifest_runs import RunEntry
+from rigdata.operating_point import OperatingPoint
+from rigdata.problem import Problem, RigDataError
+from rigdata.readers.base import RunReader
+from rigdata.record import Record, VectorRecord
+from rigdata.safe_path import inside
+from rigdata.vector import solve_vector
+
+MANIFEST_NAME = "campaign.toml"
+HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
+_MAX_BEARING = 2**20
+
+
+@dataclass(frozen=True)
+class Temperature:
+    """Where a temperature channel sits.
+
+    Attributes
+    ----------
+    channel : str
+    pad : int or None
+    position : float or None
+        Fraction of the pad's arc from its leading edge.
+    """
+
+    channel: str
+    pad: int | None
+    position: float | None
+
+
+@dataclass(frozen=True)
+class Run:
+    """One test run; its samples are read when they are asked for.
+
+    Attributes
+    ----------
+    id, kind : str
+        Kind is ``"dynamic"``, ``"dry_pivot"``, ``"locus"`` or ``"clearance"``.
+    point : OperatingPoint
+        Set points, SI.
+    excitation_direction : float or None
+        [rad]
+    pad : int or None
+        Pad loaded in a dry run, from 1.
+    branch : str
+        ``"up"``, ``"down"`` or ``"cycle"``.
+    channels : mapping of str to Channel
+        Those with a quantity (not ``ignore``).
+    stated : frozenset of str
+        Keys that the manifest gives for this run.
+    """
+
+    id: str
+    kind: str
+    point: OperatingPoint
+    excitation_direction: float | None
+    pad: int | None
+    branch: str
+    channels: Mapping[str, Channel] = field(repr=False)
+    stated: frozenset[str] = field(repr=False)
+    reader: RunReader = field(repr=False, compare=False)
+
+    @property
+    def file(self) -> str:
+        """Name of the file, as the user knows it."""
+        return self.reader.file
+
+    @property
+    def length(self) -> int:
+        """Samples per channel."""
+        return self.reader.length()
+
+    @property
+    def sample_rate(self) -> float:
+        """Nominal sample rate [Hz]: time column or HDF5 attribute, else the run's, else the campaign's."""
+        return self.reader.rate()
+
+    def _slice(self, start: int | None, stop: int | None) -> tuple[int, int]:
+        length = self.length
+        first, last, _ = slice(start, stop).indices(length)
+        return first, max(first, last)
+
+    def _error(self, place: str, what: str, cure: str) -> RigDataError:
+        return RigDataError(Problem("error", self.file, place, what, cure, self.id))
+
+    def record(self, name: str, start: int | None = None, stop: int | None = None) -> Record:
+        """One channel, calibrated.
+
+        Parameters
+        ----------
+        name : str
+            Channel name of the manifest.
+        start, stop : int, optional
+            Samples, as in a Python slice; default all.
+
+        Returns
+        -------
+        Record
+            SI values (stop - start,).
+
+        Raises
+        ------
+        RigDataError
+            The manifest has no such channel, or the file cannot give it.
+        """
+        channel = self.channels.get(name)
+        if channel is None:
+            known = ", ".join(self.channels)
+            raise self._error(f"channel {name}", "is not described in the manifest", f"Described: {known}")
+        first, last = self._slice(start, stop)
+        (reading,) = self.reader.read([name], first, last)
+        return Record(
+            name=name,
+            quantity=channel.quantity,
+            values=channel.to_si(reading),
+            time=self.reader.time(first, last),
+            rate=self.sample_rate,
+            axis=channel.axis,
+        )
+
+    def vector(self, quantity: str, start: int | None = None, stop: int | None = None) -> VectorRecord:
+        """X and Y of `quantity`, from its channels at any two different angles.
+
+        Parameters
+        ----------
+        quantity : str
+            ``"displacement"``, ``"force"`` or ``"acceleration"``.
+        start, stop : int, optional
+            Samples, as in a Python slice; default all.
+
+        Returns
+        -------
+        VectorRecord
+            values (n, 2): solves ``[cos a_i, sin a_i] . (X, Y) = reading_i``; by least squares where there
+            are more than two channels. NaN where fewer than two directions have a value.
+
+        Raises
+        ------
+        RigDataError
+            Fewer than two channels, all of them along one line, or the file cannot give them.
+        """
+        chosen = [c for c in self.channels.values() if c.quantity == quantity and c.axis is not None]
+        names = tuple(c.name for c in chosen)
+        if len(chosen) < 2:
+            cure = f"Describe two {quantity} channels with different axes in the manifest"
+            raise self._error(f"quantity {quantity}", f"has {len(chosen)} channels, two are needed", cure)
+        axes = np.array([c.axis for c in chosen])
+        if not np.any(np.abs(np.sin(axes - axes[0])) > 0.05):
+            cure = "Two channels at different angles (3 deg apart or more) are needed; check their axis"
+            raise self._error(f"channels {', '.join(names)}", "all measure along one line", cure)
+        first, last = self._slice(start, stop)
+        readings = self.reader.read(names, first, last)
+        values = np.stack([c.to_si(r) for c, r in zip(chosen, readings)], axis=1)
+        return VectorRecord(
+            quantity=quantity,
+            values=solve_vector(axes, values),
+            time=self.reader.time(first, last),
+            rate=self.sample_rate,
+            names=names,
+        )
+
+    def temperatures(self) -> tuple[Temperature, ...]:
+        """Where the temperature channels of this run sit, by pad and position."""
+        found = [c for c in self.channels.values() if c.quantity == "temperature"]
+        found.sort(key=lambda c: (c.pad or 0, c.position or 0.0, c.name))
+        return tuple(Temperature(c.name, c.pad, c.position) for c in found)
+
+    def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
+        """The shaft speed record [rad/s], None where no channel measures it."""
+        for channel in self.channels.values():
+            if channel.quantity == "speed":
+                return self.record(channel.name, start, stop)
+        return None
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A test series: what was measured on one bearing, and how.
+
+    Attributes
+    ----------
+    id, description : str
+    path : Path
+        Folder or HDF5 file.
+    bearing_name : str
+        As the manifest names the bearing file.
+    bearing_text : str
+        Its content; "" where the campaign does not carry it.
+    housing_mass : float
+        Stator mass between film and load cells [kg]; NaN where unknown.
+    channels : mapping of str to Channel
+    runs : tuple of Run
+    notes : tuple of Problem
+        Findings that did not stop loading.
+    """
+
+    id: str
+    description: str
+    path: Path
+    bearing_name: str
+    bearing_text: str = field(repr=False)
+    housing_mass: float
+    channels: Mapping[str, Channel] = field(repr=False)
+    runs: tuple[Run, ...] = field(repr=False)
+    notes: tuple[Problem, ...] = field(repr=False, default=())
+    files: Mapping[str, Path] = field(repr=False, default_factory=dict)
+
+    def __str__(self) -> str:
+        kinds = {k: sum(r.kind == k for r in self.runs) for k in dict.fromkeys(r.kind for r in self.runs)}
+        listed = ", ".join(f"{n} {k}" for k, n in kinds.items())
+        return f"campaign {self.id}: {len(self.runs)} runs ({listed}), {len(self.channels)} channels"
+
+    def run(self, run_id: str) -> Run:
+        """The run `run_id`.
+
+        Raises
+        ------
+        RigDataError
+            There is none; names the nearest.
+        """
+        for run in self.runs:
+            if run.id == run_id:
+                return run
+        import difflib
+
+        close = difflib.get_close_matches(run_id, [r.id for r in self.runs], n=1)
+        cure = (
+            f"Did you mean {close[0]!r}?" if close else f"There are {len(self.runs)} runs; see campaign.runs"
+        )
+        raise RigDataError(Problem("error", self.path.name, "", f"no run has the id {run_id!r}", cure))
+
+    def of_kind(self, kind: str) -> tuple[Run, ...]:
+        """All runs of one kind, in the manifest's order."""
+        return tuple(r for r in self.runs if r.kind == kind)
+
+    def fingerprint(self) -> dict[str, str]:
+        """SHA-256 of every file of the campaign, by display name; ``"missing"`` where one is not there."""
+        return {name: _sha256(path) for name, path in self.files.items()}
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    try:
+        with path.open("rb") as stream:
+            while block := stream.read(2**20):
+                digest.update(block)
+    except (FileNotFoundError, IsADirectoryError):
+        return "missing"
+    return digest.hexdigest()
+
+
+def load_campaign(path: str | Path) -> Campaign:
+    """Open a campaign; records are read only when they are asked for.
+
+    Parameters
+    ----------
+    path : str or Path
+        A folder with ``campaign.toml``, that file, or one HDF5 file.
+
+    Returns
+    -------
+    Campaign
+
+    Raises
+    ------
+    RigDataError
+        Every problem of the manifest at once, each with its line.
+    """
+    given = Path(path)
+    try:
+        is_folder, exists = given.is_dir(), given.exists()
+    except (OSError, ValueError) as error:  # a name too long, or with a NUL
+        raise _cannot(
+            str(path)[:100], f"is not a usable path ({type(error).__name__})", "Check the path"
+        ) from error
+    if not exists:
+        raise _cannot(str(path), "there is no such file or folder", "Check the path")
+    if is_folder:
+        manifest = given / MANIFEST_NAME
+        if not manifest.is_file():
+            inside_it = [p.name for p in given.iterdir() if p.suffix.lower() in HDF5_SUFFIXES][:3]
+            hint = f", or one of its HDF5 files ({', '.join(inside_it)})" if inside_it else ""
+            cure = f"Give the folder that holds campaign.toml{hint}"
+            raise _cannot(str(path), f"the folder has no {MANIFEST_NAME}", cure)
+        return _load_folder(given, manifest)
+    if given.suffix.lower() == ".toml":
+        return _load_folder(given.parent, given)
+    return _load_hdf5(given)
+
+
+def _cannot(file: str, what: str, cure: str) -> RigDataError:
+    return RigDataError(Problem("error", file, "", what, cure))
+
+
+def _read_text(path: Path, file: str, limit: int) -> str:
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise _cannot(file, "is not an ordinary file", "Give a text file")
+        with path.open("rb") as stream:
+            data = stream.read(limit + 1)
+    except OSError as error:
+        raise _cannot(
+            file, f"cannot be read ({error.strerror or error})", "Check the path and its rights"
+        ) from error
+    if len(data) > limit:
+        raise _cannot(file, f"is larger than {limit >> 20} MB", "Is it the right file?")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        problem = Problem("error", file, f"line {line}", "is not UTF-8 text", "Save the file as UTF-8")
+        raise RigDataError(problem) from error
+
+
+def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
+    from rigdata.readers.csv import CsvReader, TableCache
+
+    text = _read_text(manifest_path, manifest_path.name, MAX_MANIFEST)
+    manifest = parse_manifest(text, manifest_path.name)
+    problems: list[Problem] = []
+    files: dict[str, Path] = {manifest_path.name: manifest_path}
+    bearing = _bearing_text(folder, manifest, manifest_path.name, files, problems)
+    channels = {n: c for n, c in manifest.channels.items() if c.quantity != "ignore"}
+    cache = TableCache()
+    runs = []
+    for entry in manifest.runs:
+        place = f"[[runs]] no. {entry.index + 1} file"
+        try:
+            target = inside(folder, entry.file, manifest_path.name, place, entry.id)
+        except RigDataError as error:
+            problems.extend(error.problems)
+            continue
+        files[entry.file] = target
+        rate = entry.sample_rate or manifest.sample_rate
+        reader = CsvReader(target, entry.file, entry.id, manifest.csv, manifest.channels, rate, cache)
+        runs.append(_make_run(entry, channels, reader))
+    return _finish(manifest, folder, bearing, channels, runs, problems, files)
+
+
+def _bearing_text(
+    folder: Path, manifest: Manifest, file: str, files: dict[str, Path], problems: list[Problem]
+) -> str:
+    try:
+        path = inside(folder, manifest.bearing, file, "bearing")
+    except RigDataError as error:
+        problems.extend(error.problems)
+        return ""
+    if not path.is_file():
+        what = f"the bearing file {manifest.bearing!r} is not in the folder"
+        problems.append(
+            Problem("warning", file, "bearing", what, "Add it, or give --bearing where one is needed")
+        )
+        return ""
+    files[manifest.bearing] = path
+    try:
+        return _read_text(path, manifest.bearing, _MAX_BEARING)
+    except RigDataError as error:
+        problems.extend(error.problems)
+        return ""
+
+
+def _load_hdf5(path: Path) -> Campaign:
+    from rigdata.readers.hdf5 import Hdf5Reader, read_texts
+
+    text, bearing = read_texts(path, path.name)
+    manifest = parse_manifest(text, f"{path.name}:manifest")
+    problems: list[Problem] = []
+    if not bearing or len(bearing) > _MAX_BEARING:
+        cure = "Store the bearing's TOML text there, or give --bearing where one is needed"
+        problems.append(
+            Problem("warning", path.name, "root attribute bearing", "is missing or too long", cure)
+        )
+        bearing = ""
+    channels = {n: c for n, c in manifest.channels.items() if c.quantity != "ignore"}
+    clock = next((c for c in channels.values() if c.quantity == "time"), None)
+    runs = []
+    for entry in manifest.runs:
+        rate = entry.sample_rate or manifest.sample_rate
+        reader = Hdf5Reader(
+            path, entry.id, path.name, rate, clock and clock.name, clock.slope if clock else 1.0
+        )
+        runs.append(_make_run(entry, channels, reader))
+    return _finish(manifest, path, bearing, channels, runs, problems, {path.name: path})
+
+
+def _make_run(entry: RunEntry, channels: Mapping[str, Channel], reader: RunReader) -> Run:
+    return Run(
+        id=entry.id,
+        kind=entry.kind,
+        point=entry.point,
+        excitation_direction=entry.excitation_direction,
+        pad=entry.pad,
+        branch=entry.branch,
+        channels=channels,
+        stated=entry.stated,
+        reader=reader,
+    )
+
+
+def _finish(
+    manifest: Manifest,
+    path: Path,
+    bearing: str,
+    channels: Mapping[str, Channel],
+    runs: list[Run],
+    problems: list[Problem],
+    files: dict[str, Path],
+) -> Campaign:
+    if any(p.severity == "error" for p in problems):
+        raise RigDataError([*manifest.notes, *problems])
+    return Campaign(
+        id=manifest.id,
+        description=manifest.description,
+        path=path,
+        bearing_name=manifest.bearing,
+        bearing_text=bearing,
+        housing_mass=manifest.housing_mass,
+        channels=channels,
+        runs=tuple(runs),
+        notes=(*manifest.notes, *problems),
+        files=files,
+    )

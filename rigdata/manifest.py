@@ -1,0 +1,192 @@
+"""The manifest of a campaign (`campaign.toml`): parsed and checked as a whole, every problem at once."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+from rigdata.calibration import Channel
+from rigdata.manifest_channels import read_channels
+from rigdata.manifest_runs import RunEntry, read_runs
+from rigdata.manifest_table import Findings, Table
+from rigdata.problem import Problem, RigDataError
+from rigdata.toml_lines import key_lines
+
+SCHEMA = "tpjb-rig/1"
+#: Larger manifests are refused before they are parsed [bytes].
+MAX_MANIFEST = 8 * 2**20
+_TOP = ("schema", "id", "bearing", "description", "housing", "acquisition", "csv", "channels", "runs")
+_CSV = ("delimiter", "decimal", "encoding", "header_line", "units_line")
+
+
+@dataclass(frozen=True)
+class CsvSpec:
+    """What the manifest says of the CSV dialect; None is detected.
+
+    Attributes
+    ----------
+    delimiter, decimal : str or None
+        One character each.
+    encoding : str or None
+        Python codec name.
+    header_line, units_line : int or None
+        1-based lines of the column names and of their units.
+    """
+
+    delimiter: str | None = None
+    decimal: str | None = None
+    encoding: str | None = None
+    header_line: int | None = None
+    units_line: int | None = None
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """A checked manifest, SI.
+
+    Attributes
+    ----------
+    id, bearing, description : str
+        `bearing` is the file name as written.
+    housing_mass : float
+        Stator mass between film and cells [kg]; NaN where the manifest gives none (then no run is dynamic).
+    sample_rate : float or None
+        Of ``[acquisition]`` [Hz].
+    csv : CsvSpec
+    channels : mapping of str to Channel
+    runs : tuple of RunEntry
+    notes : tuple of Problem
+        Findings that do not stop a campaign from being used.
+    """
+
+    id: str
+    bearing: str
+    description: str
+    housing_mass: float
+    sample_rate: float | None
+    csv: CsvSpec
+    channels: Mapping[str, Channel] = field(repr=False)
+    runs: tuple[RunEntry, ...] = field(repr=False)
+    notes: tuple[Problem, ...] = ()
+
+
+def parse_manifest(text: str, file: str = "campaign.toml") -> Manifest:
+    """Read and check the text of a manifest.
+
+    Parameters
+    ----------
+    text : str
+        TOML.
+    file : str
+        What to call it in messages.
+
+    Returns
+    -------
+    Manifest
+
+    Raises
+    ------
+    RigDataError
+        With every problem found.
+    """
+    data = _load_toml(text, file)
+    findings = Findings(file, key_lines(text))
+    top = Table(data, (), findings)
+    top.only(_TOP, "the manifest")
+    schema = top.text("schema", required=True)
+    if schema is not None and schema != SCHEMA:
+        findings.error(
+            ("schema",), f"schema is {schema!r}, not {SCHEMA!r}", "Export in the format tpjb-rig/1"
+        )
+    channels = read_channels(top.subtable("channels"), findings)
+    runs = read_runs(data.get("runs"), findings)
+    housing = top.subtable("housing")
+    housing.only(("mass",), "[housing]")
+    mass = housing.quantity("mass", "mass", low=0.0, required=any(r.kind == "dynamic" for r in runs))
+    acquisition = top.subtable("acquisition")
+    acquisition.only(("sample_rate",), "[acquisition]")
+    rate = acquisition.quantity("sample_rate", "frequency", above=0.0)
+    manifest = Manifest(
+        id=top.text("id", required=True) or "",
+        bearing=top.text("bearing", required=True) or "",
+        description=top.text("description") or "",
+        housing_mass=math.nan if mass is None else mass,
+        sample_rate=rate,
+        csv=_read_csv(top.subtable("csv"), findings),
+        channels=MappingProxyType(channels),
+        runs=runs,
+        notes=tuple(p for p in findings.problems if p.severity != "error"),
+    )
+    if findings.failed:
+        raise RigDataError(findings.problems)
+    return manifest
+
+
+def _load_toml(text: str, file: str) -> dict[str, Any]:
+    if len(text) > MAX_MANIFEST:
+        raise RigDataError(
+            Problem(
+                "error",
+                file,
+                "",
+                f"the manifest is larger than {MAX_MANIFEST >> 20} MB",
+                "Is it the right file?",
+            )
+        )
+    cure = "Mend the TOML at this place"
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise RigDataError(Problem("error", file, "", f"not valid TOML: {error}", cure)) from error
+    except (RecursionError, ValueError) as error:  # deep nesting; integers of thousands of digits
+        what = f"not usable TOML: {type(error).__name__}, nested too deep or a number too long"
+        raise RigDataError(Problem("error", file, "", what, cure)) from error
+
+
+def _read_csv(table: Table, findings: Findings) -> CsvSpec:
+    table.only(_CSV, "[csv]")
+    delimiter, decimal = table.text("delimiter"), table.text("decimal")
+    if delimiter in {"\\t", "tab", "TAB"}:
+        delimiter = "\t"
+    for key, value, allowed in (("delimiter", delimiter, None), ("decimal", decimal, ".,")):
+        if value is not None and (len(value) != 1 or (allowed and value not in allowed)):
+            findings.error(
+                ("csv", key), f"{key} is {value!r}", "Give one character" + (", . or ," if allowed else "")
+            )
+    if delimiter is not None and delimiter in '0123456789+-.eE"\r\n':
+        findings.error(("csv", "delimiter"), f"delimiter {delimiter!r} cannot part numbers", 'Give e.g. ";"')
+    if delimiter is not None and delimiter == decimal:
+        findings.error(("csv", "decimal"), f"delimiter and decimal are both {decimal!r}", "They must differ")
+    header, units = table.integer("header_line", low=1), table.integer("units_line", low=1)
+    if header is not None and units is not None and units <= header:
+        findings.error(
+            ("csv", "units_line"),
+            f"units_line {units} is not below header_line {header}",
+            "Lines count from 1",
+        )
+    return CsvSpec(delimiter, decimal, _codec(table.text("encoding"), findings), header, units)
+
+
+def _codec(encoding: str | None, findings: Findings) -> str | None:
+    if encoding is None:
+        return None
+    import codecs
+
+    try:
+        info = codecs.lookup(encoding)
+        text = "0,5;1\n"
+        usable = info.decode(text.encode(encoding))[0].lstrip("\ufeff") == text
+    except (LookupError, TypeError, ValueError, AttributeError):
+        usable = False
+    if not usable:
+        findings.error(
+            ("csv", "encoding"),
+            f"encoding {encoding!r} is not known as a text encoding",
+            'Give e.g. "cp1252" or "utf-8", or leave it out: it is then detected',
+        )
+        return None
+    return info.name

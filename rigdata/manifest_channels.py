@@ -1,0 +1,136 @@
+"""The ``[channels.*]`` tables of a manifest."""
+
+from __future__ import annotations
+
+from rigdata.calibration import DIMENSIONS, VECTOR_QUANTITIES, Channel, reading_gain, reading_zero
+from rigdata.manifest_table import Findings, Table, shown
+from rigdata.units import UnitError, is_signal
+
+_KEYS = (
+    "quantity",
+    "axis",
+    "unit",
+    "sensitivity",
+    "polarity",
+    "uncertainty",
+    "full_scale",
+    "excitation",
+    "pad",
+    "position",
+    "zero",
+)
+_QUANTITIES = (*DIMENSIONS, "ignore")
+_MAX_CHANNELS = 4096
+
+
+def read_channels(table: Table, findings: Findings) -> dict[str, Channel]:
+    """Read every channel; what is wrong is noted in `findings`, and that channel left out.
+
+    Parameters
+    ----------
+    table : Table
+        ``channels`` of the manifest.
+    findings : Findings
+        Receives the problems.
+    """
+    channels: dict[str, Channel] = {}
+    if not table.data:
+        findings.error(("channels",), "no channels are described", "Add a [channels.NAME] table per column")
+    if len(table.data) > _MAX_CHANNELS:
+        findings.error(("channels",), f"more than {_MAX_CHANNELS} channels", "Is it the right file?")
+        return channels
+    for name in table.data:
+        before = len(findings.problems)
+        channel = _read_channel(name, table.subtable(name))
+        if not any(p.severity == "error" for p in findings.problems[before:]) and channel is not None:
+            channels[name] = channel
+    if sum(c.quantity == "time" for c in channels.values()) > 1:
+        findings.error(
+            ("channels",), "more than one channel is the time", 'Set the others to quantity = "ignore"'
+        )
+    return channels
+
+
+def _read_channel(name: str, table: Table) -> Channel | None:
+    table.only(_KEYS, f"[channels.{name[:40]}]")
+    if not name.strip() or len(name) > 200 or not name.isprintable() or "/" in name or name in {".", ".."}:
+        table.findings.error(
+            table.path, f"channel name {shown(name)} cannot be used", "Use letters and digits"
+        )
+        return None
+    quantity = table.choice("quantity", _QUANTITIES, required=True)
+    if quantity is None or quantity == "ignore":
+        return Channel(name, "ignore") if quantity else None
+    unit = table.text("unit", required=True)
+    directed = quantity in VECTOR_QUANTITIES
+    axis = table.quantity("axis", "angle", required=directed)
+    polarity = table.data.get("polarity", 1)
+    if isinstance(polarity, bool) or polarity not in (1, -1):
+        table.error("polarity", f"polarity is {shown(polarity)}", "Give 1 or -1, without quotes")
+        return None
+    position = table.quantity("position", "ratio", low=0.0)
+    if position is not None and position > 1.0:
+        table.error("position", f"position is {position:g}", "It is the fraction of the arc, 0 to 1")
+    gain, zero = _calibration(table, quantity, unit)
+    if gain is None or zero is None or unit is None:
+        return None
+    return Channel(
+        name=name,
+        quantity=quantity,
+        unit=unit,
+        gain=gain,
+        zero=zero,
+        polarity=int(polarity),
+        axis=axis,
+        uncertainty=_uncertainty(table),
+        pad=table.integer("pad", low=1, high=100),
+        position=position,
+    )
+
+
+def _uncertainty(table: Table) -> float | None:
+    value = table.quantity("uncertainty", "ratio", low=0.0)
+    if value is not None and value >= 1.0:
+        table.error(
+            "uncertainty",
+            f"uncertainty is {shown(table.data['uncertainty'])}",
+            'Give e.g. "1 %", below 100 %',
+        )
+    return value
+
+
+def _calibration(table: Table, quantity: str, unit: str | None) -> tuple[float | None, float | None]:
+    gain = zero = None
+    if unit is None:
+        return None, None
+    data = table.data
+    try:
+        gain = reading_gain(
+            quantity, unit, data.get("sensitivity"), data.get("full_scale"), data.get("excitation")
+        )
+    except UnitError as error:
+        key = "unit" if "sensitivity" not in data else "sensitivity"
+        table.error(key, f"{quantity} channel: {error}", "See the channel tables of the tpjb-rig/1 format")
+    else:
+        if not 0.0 < gain < 1e30:
+            table.error("sensitivity", f"one {unit} would be {gain:g} SI", "Check the calibration")
+        _note_unused(table, unit)
+    try:
+        zero = reading_zero(quantity, unit, data.get("zero"))
+    except UnitError as error:
+        table.error("zero", f"zero: {error}", f"Give the {quantity} at reading zero")
+    return gain, zero
+
+
+def _note_unused(table: Table, unit: str) -> None:
+    """Say which parts of a calibration are not used, so that none is believed to act."""
+    if is_signal(unit):
+        return
+    for key in ("sensitivity", "full_scale", "excitation"):
+        if key in table.data:
+            table.findings.add(
+                "warning",
+                (*table.path, key),
+                f"{key} is not used: readings in {unit} are already converted",
+                f"Delete {key}, or set unit to what the logger recorded",
+            )

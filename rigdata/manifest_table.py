@@ -1,0 +1,144 @@
+"""Typed access to a table of the manifest, noting every fault instead of stopping at the first."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+from rigdata.problem import Problem, Severity
+from rigdata.toml_lines import Path, place_of
+from rigdata.units import UnitError, parse_quantity
+
+_MAX_FINDINGS = 1000
+_MAX_TEXT = 20_000
+
+
+def shown(value: object, length: int = 60) -> str:
+    """`value` as it stands in a message: quoted, short, on one line, controls escaped."""
+    text = ascii(value) if not isinstance(value, str) else _printable(value)
+    return text if len(text) <= length else text[: length - 3] + "..."
+
+
+def _printable(text: str) -> str:
+    # Right-to-left marks and control characters could make a message read otherwise than it is.
+    return repr("".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in text[:200]))
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Name the nearest of `known`, as the cure for an unknown `name`."""
+    names = list(known)
+    close = difflib.get_close_matches(name[:60].lower(), names, n=1, cutoff=0.4)
+    return f"Did you mean {close[0]!r}?" if close else f"Known: {', '.join(names)}"
+
+
+class Findings:
+    """The problems of one manifest, with the lines they stand on."""
+
+    def __init__(self, file: str, lines: dict[Path, int]) -> None:
+        self.file = file
+        self.lines = lines
+        self.problems: list[Problem] = []
+
+    @property
+    def failed(self) -> bool:
+        """Whether any problem is an error."""
+        return any(p.severity == "error" for p in self.problems)
+
+    def add(self, severity: Severity, path: Path, what: str, cure: str, run: str | None = None) -> None:
+        """Note a problem of the key at `path`."""
+        if len(self.problems) < _MAX_FINDINGS:
+            self.problems.append(Problem(severity, self.file, place_of(self.lines, path), what, cure, run))
+
+    def error(self, path: Path, what: str, cure: str, run: str | None = None) -> None:
+        """Note an error of the key at `path`."""
+        self.add("error", path, what, cure, run)
+
+
+class Table:
+    """One TOML table; every getter returns None where the key is absent or wrong (then noted)."""
+
+    def __init__(self, data: object, path: Path, findings: Findings) -> None:
+        self.path = path
+        self.findings = findings
+        self.data: dict[str, Any] = data if isinstance(data, dict) else {}
+        if not isinstance(data, dict):
+            findings.error(path, f"is {shown(data)}, not a table", "Write it as a [table] with keys")
+
+    def only(self, known: tuple[str, ...], where: str) -> None:
+        """Note every key that is not in `known`."""
+        for key in self.data:
+            if key not in known:
+                self.findings.error(
+                    (*self.path, key), f"unknown key {shown(key)} in {where}", nearest(key, known)
+                )
+
+    def subtable(self, key: str) -> Table:
+        """The table under `key`, empty where absent."""
+        return Table(self.data.get(key, {}), (*self.path, key), self.findings)
+
+    def error(self, key: str, what: str, cure: str) -> None:
+        """Note an error of `key`."""
+        self.findings.error((*self.path, key), what, cure)
+
+    def _get(self, key: str, required: bool, cure: str) -> Any:
+        if key not in self.data and required:
+            self.error(key, f"{key} is missing", cure)
+        return self.data.get(key)
+
+    def text(self, key: str, required: bool = False) -> str | None:
+        """A string, not longer than is sane."""
+        value = self._get(key, required, f'Add {key} = "..."')
+        if value is None:
+            return None
+        if not isinstance(value, str):
+            self.error(key, f"{key} is {shown(value)}, not text", "Put it in quotes")
+            return None
+        if len(value) > _MAX_TEXT or "\0" in value:
+            self.error(key, f"{key} is too long or holds a NUL character", "Shorten it")
+            return None
+        if required and not value.strip():
+            self.error(key, f"{key} is empty", "Give a value")
+            return None
+        return value
+
+    def choice(self, key: str, known: tuple[str, ...], required: bool = False) -> str | None:
+        """One of `known`."""
+        value = self.text(key, required)
+        if value is not None and value not in known:
+            self.error(key, f"{key} {shown(value)} is unknown", nearest(value, known))
+            return None
+        return value
+
+    def integer(self, key: str, low: int, high: int = 10_000_000, required: bool = False) -> int | None:
+        """A whole number between `low` and `high`."""
+        value = self._get(key, required, f"Add {key} = {low}")
+        if value is None:
+            return None
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            self.error(key, f"{key} is {shown(value)}", f"Give a whole number from {low} on, without quotes")
+            return None
+        return value
+
+    def quantity(
+        self,
+        key: str,
+        dimension: str,
+        low: float | None = None,
+        above: float | None = None,
+        required: bool = False,
+    ) -> float | None:
+        """An SI value not below `low` and greater than `above`."""
+        value = self._get(key, required, f"Add {key}, a {dimension} with its unit")
+        if value is None:
+            return None
+        try:
+            number = parse_quantity(value, dimension)
+        except UnitError as error:
+            self.error(key, f"{key}: {error}", f"Give a {dimension} as number and unit in quotes")
+            return None
+        if (low is not None and number < low) or (above is not None and number <= above):
+            bound = f"not below {low:g}" if low is not None else f"above {above:g}"
+            self.error(key, f"{key} is {shown(value)}", f"It must be {bound}")
+            return None
+        return number

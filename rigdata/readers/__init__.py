@@ -1,0 +1,1 @@
+"""Readers of record files: each gives raw readings of single channels, as float64."""

@@ -1,0 +1,63 @@
+"""What every reader of one run's record offers to `rigdata.campaign.Run`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.problem import Problem
+
+FloatArray = NDArray[np.float64]
+#: A channel longer than this is refused: slices of it would be asked for by mistake [samples].
+MAX_SAMPLES = 2**31
+#: One request for more samples of one channel than this is refused (it would be 4 GB) [samples].
+MAX_REQUEST = 2**29
+
+
+class RunReader(Protocol):
+    """Lazy access to one run's record; nothing is opened before it is asked for."""
+
+    @property
+    def file(self) -> str:
+        """Display name of the file (and the group in it)."""
+
+    def names(self) -> tuple[str, ...]:
+        """Names of all columns or datasets."""
+
+    def length(self) -> int:
+        """Samples per channel."""
+
+    def rate(self) -> float:
+        """Nominal sample rate [Hz]."""
+
+    def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings of `names` in samples start..stop-1, one (stop - start,) array each."""
+
+    def time(self, start: int, stop: int) -> FloatArray:
+        """Seconds of samples start..stop-1."""
+
+    def problems(self) -> tuple[Problem, ...]:
+        """What reading found that does not stop the run from being used."""
+
+
+def rate_of_time(time: FloatArray) -> float:
+    """Nominal sample rate of a time column [Hz].
+
+    The median step over many samples is free of gaps, of jitter and of the rounding of the column
+    (0.000, 0.001, 0.001, 0.002 at 2 kHz); NaN where no two times are known or time stands still.
+
+    Parameters
+    ----------
+    time : (n,) ndarray
+        Seconds.
+    """
+    known = time[np.isfinite(time)]
+    span = min(1000, len(known) // 4) or len(known) - 1
+    if span < 1:
+        return float("nan")
+    step = float(np.median(known[span:] - known[:-span])) / span
+    # Ten digits: what a column of rounded times can tell; keeps 1000 Hz from being 999.9999999999.
+    return float(f"{1.0 / step:.10g}") if step > 0 else float("nan")

@@ -1,0 +1,242 @@
+"""Runs in an HDF5 campaign: one group per run, one 1-D dataset per channel, read slice by slice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigdata.problem import Problem, RigDataError
+from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, FloatArray, rate_of_time
+from rigdata.readers.hdf5_links import resolve
+
+#: Filters that the HDF5 library brings along; any other would load foreign code.
+_FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}
+_MAX_CHUNK = 256 * 2**20
+_MAX_TEXT = 8 * 2**20
+
+
+def _refuse(file: str, place: str, what: str, cure: str, run: str | None = None) -> RigDataError:
+    return RigDataError(Problem("error", file, place, what, cure, run))
+
+
+@contextmanager
+def open_readonly(path: Path, file: str, run: str | None = None) -> Iterator[Any]:
+    """Open an HDF5 file for reading; turn what h5py raises on a broken file into `RigDataError`."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r", locking="best-effort") as handle:
+            yield handle
+    except RigDataError:
+        raise
+    except FileNotFoundError as error:
+        raise _refuse(file, "", "the file is not there", "Check the path", run) from error
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError) as error:
+        what = f"the file cannot be read as HDF5 ({_first_line(error)})"
+        raise _refuse(file, "", what, "Copy it again from the rig, or check it with h5dump", run) from error
+
+
+def _first_line(error: BaseException) -> str:
+    text = str(error).splitlines()[0] if str(error) else type(error).__name__
+    return text[:160]
+
+
+def read_texts(path: Path, file: str) -> tuple[str, str]:
+    """Read the manifest and the bearing text from the root attributes.
+
+    Parameters
+    ----------
+    path : Path
+        HDF5 file.
+    file : str
+        Its display name.
+
+    Returns
+    -------
+    manifest, bearing : str
+        `bearing` is "" where the attribute is absent.
+
+    Raises
+    ------
+    RigDataError
+        No HDF5 file, no manifest, or no text.
+    """
+    with open_readonly(path, file) as handle:
+        if "manifest" not in handle.attrs:
+            raise _refuse(file, "root attribute manifest", "is missing", "Store campaign.toml's text there")
+        manifest = _text_attribute(handle, "manifest", file)
+        bearing = _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
+    return manifest, bearing
+
+
+def _text_attribute(handle: Any, name: str, file: str) -> str:
+    place = f"root attribute {name}"
+    stored = handle.attrs.get_id(name)
+    if stored.get_storage_size() > _MAX_TEXT or stored.get_type().get_class() != 3:  # 3: H5T_STRING
+        raise _refuse(file, place, "is not a text, or far too long", "Store it as one UTF-8 string")
+    value = handle.attrs[name]
+    value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
+    if isinstance(value, bytes):
+        try:
+            value = value.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise _refuse(file, place, "is not UTF-8 text", "Store it as one UTF-8 string") from error
+    if not isinstance(value, str) or len(value) > _MAX_TEXT:
+        raise _refuse(file, place, "is not a text, or far too long", "Store it as one UTF-8 string")
+    return value
+
+
+@dataclass(frozen=True)
+class Hdf5Reader:
+    """One run's group in an HDF5 file; the file is opened for every request and closed again.
+
+    Attributes
+    ----------
+    path : Path
+    run : str
+        Group name below ``/runs``.
+    base : str
+        Display name of the file.
+    stated_rate : float or None
+        From the manifest [Hz]; the attribute ``sample_rate_hz`` wins over it.
+    time_channel : str or None
+        Dataset that holds the time.
+    time_factor : float
+        Seconds per unit of it.
+    """
+
+    path: Path
+    run: str
+    base: str
+    stated_rate: float | None = None
+    time_channel: str | None = None
+    time_factor: float = 1.0
+
+    @property
+    def file(self) -> str:
+        """Display name of file and group."""
+        return f"{self.base}:/runs/{self.run}"
+
+    def _error(self, place: str, what: str, cure: str) -> RigDataError:
+        return _refuse(self.file, place, what, cure, self.run)
+
+    @contextmanager
+    def _group(self) -> Iterator[Any]:
+        import h5py
+
+        with open_readonly(self.path, self.base, self.run) as handle:
+            group = resolve(handle, f"runs/{self.run}", self.base, self.run)
+            if group is None:
+                raise self._error(
+                    "", "the group is missing", "Delete the run from the manifest, or add the group"
+                )
+            if not isinstance(group, h5py.Group):
+                raise self._error("", "is not a group", "Store one dataset per channel in a group")
+            yield group
+
+    def _dataset(self, group: Any, name: str) -> Any:
+        import h5py
+
+        place = f"dataset {name}"
+        dataset = resolve(group, name, self.file, self.run)
+        if dataset is None:
+            raise self._error(place, "channel is missing in the file", f"It holds: {_names(group)}")
+        if not isinstance(dataset, h5py.Dataset):
+            raise self._error(place, "is not a dataset", "Store one 1-D dataset per channel")
+        if dataset.dtype.kind not in "fiu" or dataset.ndim != 1:
+            what = f"has type {dataset.dtype} and shape {dataset.shape}, not 1-D numbers"
+            raise self._error(place, what, "Store one 1-D dataset of numbers per channel")
+        if dataset.shape[0] > MAX_SAMPLES:
+            raise self._error(place, f"claims {dataset.shape[0]} samples", "Split the run")
+        self._storage(dataset, place)
+        return dataset
+
+    def _storage(self, dataset: Any, place: str) -> None:
+        """Refuse data that lies outside the file, or needs foreign code or vast memory to unpack."""
+        if dataset.is_virtual or dataset.external:
+            raise self._error(place, "holds its data in another file", "Copy the data into this file")
+        creation = dataset.id.get_create_plist()
+        for index in range(creation.get_nfilters()):
+            code = creation.get_filter(index)[0]
+            if code not in _FILTERS:
+                raise self._error(place, f"needs HDF5 filter {code}, which is not a built-in one", "Use gzip")
+        chunk = dataset.chunks
+        if chunk is not None and chunk[0] * dataset.dtype.itemsize > _MAX_CHUNK:
+            raise self._error(place, f"has chunks of {chunk[0]} samples", "Use chunks below 100 MB")
+
+    def names(self) -> tuple[str, ...]:
+        """Names of all members of the group."""
+        with self._group() as group:
+            return tuple(group.keys())
+
+    def length(self) -> int:
+        """Samples per channel: of the first dataset of numbers."""
+        with self._group() as group:
+            return self._length(group)
+
+    def _length(self, group: Any) -> int:
+        for name in group:
+            try:
+                return int(self._dataset(group, name).shape[0])
+            except RigDataError:  # named when that channel is asked for, or by the check
+                continue
+        raise self._error("", "the group holds no dataset of numbers", "Store one dataset per channel")
+
+    def rate(self) -> float:
+        """Sample rate [Hz]: the attribute, else the manifest's, else from the time dataset."""
+        with self._group() as group:
+            if "sample_rate_hz" in group.attrs:
+                value = group.attrs["sample_rate_hz"]
+                try:
+                    rate = float(np.asarray(value).reshape(()))
+                except (ValueError, TypeError) as error:
+                    raise self._error(
+                        "attribute sample_rate_hz", "is not a number", "Store a number"
+                    ) from error
+                if not 0.0 < rate < 1e12:
+                    raise self._error(
+                        "attribute sample_rate_hz", f"is {rate}", "Store a positive number in Hz"
+                    )
+                return rate
+        if self.time_channel is not None:
+            rate = rate_of_time(self.time(0, min(self.length(), 100_000)))
+            if rate > 0:
+                return rate
+        if self.stated_rate is None:
+            cure = "Add the group attribute sample_rate_hz, or [acquisition] sample_rate"
+            raise self._error("attribute sample_rate_hz", "there is no sample rate", cure)
+        return self.stated_rate
+
+    def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings; only the chunks of the slice are read."""
+        if stop - start > MAX_REQUEST:
+            raise self._error("", f"{stop - start} samples asked for at once", "Read the run in slices")
+        with self._group() as group:
+            columns = []
+            for name in names:
+                dataset = self._dataset(group, name)
+                if dataset.shape[0] < stop:
+                    what = f"has {dataset.shape[0]} samples, the others {self._length(group)}"
+                    raise self._error(f"dataset {name}", what, "Store all channels of a run with one length")
+                columns.append(np.asarray(dataset[start:stop], dtype=np.float64))
+            return columns
+
+    def time(self, start: int, stop: int) -> FloatArray:
+        """Seconds: the time dataset where there is one, else counted from the rate."""
+        if self.time_channel is not None:
+            return self.read([self.time_channel], start, stop)[0] * self.time_factor
+        return np.arange(start, stop) / self.rate()
+
+    def problems(self) -> tuple[Problem, ...]:
+        """None: what is wrong in HDF5 stops the channel from being used."""
+        return ()
+
+
+def _names(group: Any) -> str:
+    names = [str(n)[:40] for _, n in zip(range(20), group)]
+    return ", ".join(names) or "nothing"

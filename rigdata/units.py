@@ -1,0 +1,336 @@
+"""Quantities with units, as a rig manifest gives them, into SI floats.
+
+A quantity is a number, then a unit: ``"7.78 mV/um"``. The grammar is narrower than that of pint,
+so that nothing a stranger writes in a manifest is evaluated: single unit names go to pint, the
+products, quotients and powers between them are worked out here.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from dataclasses import dataclass
+from typing import Any
+
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
+_TOKEN = re.compile(r"\s*(?:([A-Za-z_Ω%]{1,24})(?:(?:\^|\*\*)?([+-]?[1-6]))?(?![0-9])|([*/()])|(1)(?![0-9]))")
+_MAX_UNIT = 48
+#: SI unit of every dimension that a manifest can name.
+SI_UNITS = {
+    "length": "m",
+    "force": "N",
+    "acceleration": "m/s^2",
+    "temperature": "K",
+    "temperature difference": "K",
+    "pressure": "Pa",
+    "speed": "rad/s",
+    "angle": "rad",
+    "mass": "kg",
+    "frequency": "Hz",
+    "time": "s",
+    "voltage": "V",
+    "current": "A",
+    "ratio": "",
+}
+_EXAMPLES = {
+    "length": "um",
+    "force": "kN",
+    "temperature": "degC",
+    "speed": "Hz",
+    "angle": "deg",
+    "frequency": "kHz",
+    "pressure": "bar",
+    "ratio": "%",
+}
+_ZERO_CELSIUS = 273.15
+_SPELLINGS = str.maketrans(
+    {"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "\u2126": "Ω", "\u00a0": " "}
+)
+#: Unit names that mean something else here than in pint (where g is a gram and C a coulomb).
+_ALIASES = {"%": "percent", "degC": "kelvin", "celsius": "kelvin", "degF": "degR", "kp": "kgf"}
+_ALIASES_BY_DIMENSION = {
+    "acceleration": {"g": "standard_gravity", "gn": "standard_gravity", "g_n": "standard_gravity"},
+    "temperature": {"C": "kelvin"},
+    "temperature difference": {"C": "kelvin"},
+    "speed": {"U": "revolution"},
+}
+
+
+class UnitError(ValueError):
+    """A quantity that cannot be read, or has the wrong dimension."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as a multiple of SI base units.
+
+    Attributes
+    ----------
+    factor : float
+        Multiplier to SI base units.
+    powers : tuple of (str, int)
+        Base unit and power, sorted; the radian counts, so that an angle is not a ratio.
+    """
+
+    factor: float
+    powers: tuple[tuple[str, int], ...] = ()
+
+    def __mul__(self, other: Unit) -> Unit:
+        powers = dict(self.powers)
+        for name, power in other.powers:
+            powers[name] = powers.get(name, 0) + power
+        return Unit(self.factor * other.factor, tuple(sorted((n, p) for n, p in powers.items() if p)))
+
+    def __pow__(self, power: int) -> Unit:
+        return Unit(self.factor**power, tuple((n, p * power) for n, p in self.powers))
+
+    def same_dimension(self, other: Unit) -> bool:
+        """Whether both measure the same thing."""
+        return self.powers == other.powers
+
+
+@functools.cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None, on_redefinition="ignore")
+
+
+@functools.lru_cache(maxsize=512)
+def _base(name: str) -> Unit:
+    """One unit name, without powers or quotients, from pint."""
+    registry = _registry()
+    try:
+        magnitude, units = registry.get_base_units(name)
+        powers = {str(n): int(p) for n, p in units._units.items()}
+        factor = float(magnitude)
+    except Exception as error:  # pint raises a dozen kinds for a bad name; all mean the same to a user
+        raise UnitError(f"unit {name!r} is not known") from error
+    return Unit(factor, tuple(sorted(powers.items())))
+
+
+def _dialect(dimension: str) -> dict[str, str]:
+    return {**_ALIASES, **_ALIASES_BY_DIMENSION.get(dimension, {})}
+
+
+@functools.lru_cache(maxsize=1024)
+def parse_unit(text: str, dimension: str = "") -> Unit:
+    """Read a unit such as ``"mV/um"``, ``"m/s^2"`` or ``"V/(rad/s)"``.
+
+    Parameters
+    ----------
+    text : str
+        Unit names with powers -6..6, ``*``, a space or ``/`` between them, parentheses.
+    dimension : str
+        What is measured; key of `SI_UNITS`. In ``"acceleration"`` ``g`` is standard gravity, in
+        ``"speed"`` ``Hz`` is one revolution (2 pi rad) per second.
+
+    Raises
+    ------
+    UnitError
+        Not such a unit.
+    """
+    if len(text) > _MAX_UNIT:
+        raise UnitError(f"unit {text[:_MAX_UNIT]!r}... is too long to be one")
+    plain = text.strip().translate(_SPELLINGS).replace("°C", "degC").replace("°F", "degF").replace("°", "deg")
+    if dimension == "speed" and plain in {"1/s", "s^-1", "s-1", "1/min", "min^-1", "min-1"}:
+        plain = "revolution/min" if "min" in plain else "revolution/s"
+    tokens = _tokens(plain, text)
+    unit, rest = _product(tokens, 0, dimension, text)
+    if rest != len(tokens):
+        raise UnitError(f"unit {text!r} has an unmatched parenthesis")
+    return unit
+
+
+def _tokens(plain: str, text: str) -> list[tuple[str, str, str, str]]:
+    tokens, at = [], 0
+    while at < len(plain):
+        match = _TOKEN.match(plain, at)
+        if match is None or match.end() == at:
+            raise UnitError(f"unit {text!r} cannot be read from {plain[at:].strip()!r} on")
+        tokens.append((match[1] or "", match[2] or "1", match[3] or "", match[4] or ""))
+        at = match.end()
+    return tokens
+
+
+def _product(
+    tokens: list[tuple[str, str, str, str]], at: int, dimension: str, text: str, depth: int = 0
+) -> tuple[Unit, int]:
+    """Multiply and divide from left to right until the closing parenthesis."""
+    result, sign, waiting = Unit(1.0), 1, True
+    while at < len(tokens):
+        name, power, symbol, _one = tokens[at]
+        if symbol == ")":
+            break
+        if symbol in {"*", "/"}:
+            if waiting:
+                raise UnitError(f"unit {text!r} has {symbol!r} where a unit name should be")
+            sign, waiting, at = (-1 if symbol == "/" else 1), True, at + 1
+            continue
+        if symbol == "(":
+            if depth == 2:
+                raise UnitError(f"unit {text!r} has too many parentheses")
+            factor, at = _product(tokens, at + 1, dimension, text, depth + 1)
+            if at == len(tokens):
+                raise UnitError(f"unit {text!r} has an unmatched parenthesis")
+        else:
+            factor = _named(name, dimension) ** int(power) if name else Unit(1.0)
+        result, sign, waiting, at = result * factor**sign, 1, False, at + 1
+    if waiting and tokens:
+        raise UnitError(f"unit {text!r} ends where a unit name should be")
+    return result, at
+
+
+def _named(name: str, dimension: str) -> Unit:
+    if dimension == "speed" and name in {"Hz", "kHz"}:
+        return _base("revolution") * _base("second") ** -1 * Unit(1000.0 if name == "kHz" else 1.0)
+    return _base(_dialect(dimension).get(name, name))
+
+
+def unit_factor(unit: str, dimension: str) -> float:
+    """SI value of one `unit`, a multiple without offset (``degC`` counts as a kelvin step).
+
+    Raises
+    ------
+    UnitError
+        `unit` is not one of `dimension`.
+    """
+    parsed = parse_unit(unit, dimension)
+    # The radian of a speed is asked for: "22 1/s" is caught above as revolutions.
+    if not parsed.same_dimension(parse_unit(SI_UNITS[dimension])):
+        raise UnitError(
+            f"unit {unit!r} is not one of {dimension}; expected something like {_example(dimension)!r}"
+        )
+    return parsed.factor
+
+
+def _example(dimension: str) -> str:
+    return _EXAMPLES.get(dimension, SI_UNITS[dimension])
+
+
+def split_quantity(value: object, dimension: str) -> tuple[float, str]:
+    """Split ``"7.78 mV/um"`` into 7.78 and ``"mV/um"``.
+
+    Raises
+    ------
+    UnitError
+        Not a number followed by a unit, not finite, or no unit where `dimension` needs one.
+    """
+    example = _example(dimension)
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise UnitError(f'expected a number with a unit in quotes, like "1 {example}", got {_short(value)}')
+    if not isinstance(value, str):
+        if dimension != "ratio":
+            raise UnitError(
+                f'{_short(value)} has no unit; write it with one, like "{_short(value)} {example}"'
+            )
+        return _finite(float(value)), ""
+    text = value.strip()
+    match = _NUMBER.match(text)
+    if match is None or (match.end() < len(text) and text[match.end()] in "0123456789.,"):
+        hint = "; write a decimal point, not a comma" if re.match(r"[+-]?[0-9]*,[0-9]", text) else ""
+        raise UnitError(f"{_short(value)} is not a number with a unit{hint}")
+    unit = text[match.end() :].strip()
+    if not unit and dimension != "ratio":
+        raise UnitError(f'{_short(value)} has no unit; write it with one, like "{match[0]} {example}"')
+    return _finite(float(match[0])), unit
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _finite(number: float) -> float:
+    if not math.isfinite(number):
+        raise UnitError(f"{number} is not a finite number")
+    return number
+
+
+def parse_quantity(value: object, dimension: str) -> float:
+    """Turn ``"22 Hz"`` into SI.
+
+    Parameters
+    ----------
+    value : object
+        What TOML gave: a string, or a bare number where `dimension` is ``"ratio"``.
+    dimension : str
+        Key of `SI_UNITS`; a ``"temperature"`` is absolute, in K.
+
+    Returns
+    -------
+    float
+        SI value, finite.
+
+    Raises
+    ------
+    UnitError
+        Not a quantity, or one of another dimension.
+    """
+    number, unit = split_quantity(value, dimension)
+    if dimension == "temperature":
+        return _finite(number * unit_factor(unit, dimension) + temperature_offset(unit))
+    if dimension == "ratio" and not unit:
+        return number
+    return _finite(number * unit_factor(unit, dimension))
+
+
+def temperature_offset(unit: str) -> float:
+    """Kelvin at 0 of the temperature `unit`."""
+    plain = unit.strip().replace("°", "deg")
+    if plain in {"degC", "C", "celsius"}:
+        return _ZERO_CELSIUS
+    return _ZERO_CELSIUS - 32 / 1.8 if plain == "degF" else 0.0
+
+
+def is_signal(unit: str) -> bool:
+    """Whether `unit` is what a data logger sees (V, mA, mV/V), not an engineering unit."""
+    parsed = parse_unit(unit)
+    if is_bridge_ratio(unit):
+        return True
+    return any(parsed.same_dimension(parse_unit(u)) for u in ("V", "A"))
+
+
+def is_bridge_ratio(unit: str) -> bool:
+    """Whether `unit` is volts per volt, as a strain-gauge bridge gives."""
+    numerator, slash, denominator = unit.partition("/")
+    if not slash:
+        return False
+    volt = parse_unit("V")
+    try:
+        return parse_unit(numerator).same_dimension(volt) and parse_unit(denominator).same_dimension(volt)
+    except UnitError:
+        return False
+
+
+def sensitivity_gain(value: object, signal_unit: str, dimension: str) -> float:
+    """SI value of the quantity per one `signal_unit` of reading.
+
+    Parameters
+    ----------
+    value : object
+        ``"7.78 mV/um"`` (reading per quantity) or ``"15 K/V"`` (quantity per reading).
+    signal_unit : str
+        Unit of the reading, e.g. ``"V"``.
+    dimension : str
+        Dimension of the quantity.
+
+    Raises
+    ------
+    UnitError
+        Not positive, or of a dimension that joins neither way.
+    """
+    number, unit = split_quantity(value, dimension)
+    parsed, signal = parse_unit(unit, dimension), parse_unit(signal_unit)
+    target = parse_unit(SI_UNITS[dimension])
+    if number <= 0:
+        raise UnitError(f"{_short(value)} must be above zero; a falling reading is polarity = -1")
+    if parsed.same_dimension(signal * target**-1):
+        return _finite(signal.factor / (number * parsed.factor))
+    if parsed.same_dimension(target * signal**-1):
+        return _finite(number * parsed.factor * signal.factor)
+    example = f"{signal_unit}/{_example(dimension)}"
+    raise UnitError(
+        f"{_short(value)} does not lead from {signal_unit} to {dimension}; expected like {example!r}"
+    )
