@@ -136,7 +136,7 @@ class Pad:
 
     @property
     def preload(self) -> float:
-        """m = 1 - Cb / Cp."""
+        """M = 1 - Cb / Cp."""
         return 1.0 - self.assembled_clearance / self.pad_clearance
 
 
@@ -393,7 +393,9 @@ def _pads(values: dict[str, dict[str, Any]], name: str) -> tuple[Pad, ...]:
         if not isinstance(value, tuple):
             return (value,) * len(angles)
         if len(value) != len(angles):
-            raise BearingError(f"{name}, {key}: {len(value)} values for {len(angles)} pads. Give one each, or one for all.")
+            raise BearingError(
+                f"{name}, {key}: {len(value)} values for {len(angles)} pads. Give one each, or one for all."
+            )
         return value
 
     arc = per_pad(pads["arc"], "[pads] arc")
@@ -426,14 +428,10 @@ def _pads(values: dict[str, dict[str, Any]], name: str) -> tuple[Pad, ...]:
     )
 
 
-def _check_arcs(
-    angles: tuple[float, ...], arc: tuple[float, ...], offset: tuple[float, ...], name: str
-) -> None:
+def _check_arcs(angles: tuple[float, ...], arc: tuple[float, ...], offset: tuple[float, ...], name: str) -> None:
     if any(not 0 < f < 1 for f in offset):
         raise BearingError(f"{name}, [pads] pivot_offset: must lie between 0 and 1 (0.5 is the middle).")
-    edges = sorted(
-        ((a - f * s) % (2 * math.pi), s, k + 1) for k, (a, s, f) in enumerate(zip(angles, arc, offset))
-    )
+    edges = sorted(((a - f * s) % (2 * math.pi), s, k + 1) for k, (a, s, f) in enumerate(zip(angles, arc, offset)))
     for i, (start, span, number) in enumerate(edges):
         follower = edges[(i + 1) % len(edges)]
         room = (follower[0] - start) % (2 * math.pi) or 2 * math.pi

@@ -25,7 +25,12 @@ LEAST_FLOW = 0.05
 
 @njit(cache=True)
 def solve_energy(
-    grid: FilmGrid, work: FilmWork, inlet: float, speed: float, heat: tuple[float, float], temperature: FloatArray
+    grid: FilmGrid,
+    work: FilmWork,
+    inlet: float,
+    speed: float,
+    heat: tuple[float, float],
+    temperature: FloatArray,
 ) -> float:
     """March the film temperature from the leading edge.
 
@@ -61,9 +66,12 @@ def solve_energy(
     right = np.zeros(nz + 1)
     for i in range(nt):
         for j in range(nz + 1):
-            couette = 0.25 * speed * (
-                work.thickness[i, j] * work.density[i, j] + work.thickness[i + 1, j] * work.density[i + 1, j]
-            ) * grid.height[j]
+            couette = (
+                0.25
+                * speed
+                * (work.thickness[i, j] * work.density[i, j] + work.thickness[i + 1, j] * work.density[i + 1, j])
+                * grid.height[j]
+            )
             flow = work.flow_x[i, j]
             if flow < LEAST_FLOW * couette:
                 limited = max(limited, 1.0 - flow / couette)
@@ -85,21 +93,25 @@ def solve_energy(
 
 
 @njit(cache=True)
-def _across(
-    grid: FilmGrid, work: FilmWork, heat: tuple[float, float], i: int, j: int
-) -> tuple[float, float]:
+def _across(grid: FilmGrid, work: FilmWork, heat: tuple[float, float], i: int, j: int) -> tuple[float, float]:
     """Coefficients of (T[j-1] - T[j]) and (T[j+1] - T[j]) in the half-step's cross-flow terms [W/K]."""
     nz = work.flow_z.shape[1]
     low = high = 0.0
     if j > 0:
         south = 0.5 * (work.flow_z[i, j - 1] + work.flow_z[i + 1, j - 1])
-        h = 0.25 * (work.thickness[i, j] + work.thickness[i, j - 1] + work.thickness[i + 1, j] + work.thickness[i + 1, j - 1])
+        h = 0.25 * (
+            work.thickness[i, j] + work.thickness[i, j - 1] + work.thickness[i + 1, j] + work.thickness[i + 1, j - 1]
+        )
         low = -0.5 * (0.5 * heat[0] * south + heat[1] * h * grid.dx / grid.dz)
-        if j == nz:  # the edge: only the half volume's own face, and upwind, because what leaves takes its temperature along
+        if (
+            j == nz
+        ):  # the edge: only the half volume's own face, and upwind, because what leaves takes its temperature along
             low = -0.5 * (0.5 * heat[0] * max(south, 0.0))
     if j < nz:
         north = 0.5 * (work.flow_z[i, j] + work.flow_z[i + 1, j])
-        h = 0.25 * (work.thickness[i, j] + work.thickness[i, j + 1] + work.thickness[i + 1, j] + work.thickness[i + 1, j + 1])
+        h = 0.25 * (
+            work.thickness[i, j] + work.thickness[i, j + 1] + work.thickness[i + 1, j] + work.thickness[i + 1, j + 1]
+        )
         high = -0.5 * (-0.5 * heat[0] * north + heat[1] * h * grid.dx / grid.dz)
         if j == 0 and grid.first == 1:
             high = -0.5 * (0.5 * heat[0] * max(-north, 0.0))

@@ -80,9 +80,7 @@ class _Search:
         return self.speed * self.setup.bearing.journal_radius
 
 
-def solve_equilibrium(
-    setup: Setup, load: FloatArray, speed: float, start: Equilibrium | None = None
-) -> Equilibrium:
+def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equilibrium | None = None) -> Equilibrium:
     """Find where the journal stands.
 
     Parameters
@@ -385,9 +383,7 @@ def _allowed(film: PadFilm, move: _PadMove, shift: FloatArray, damping: float) -
     return damping if worst * damping > SHRINK - 1.0 else (SHRINK - 1.0) / worst
 
 
-def _result(
-    search: _Search, iterations: int, residual: float, heat: float, status: tuple[str, ...]
-) -> Equilibrium:
+def _result(search: _Search, iterations: int, residual: float, heat: float, status: tuple[str, ...]) -> Equilibrium:
     names = list(status)
     idle = [f.number for f in search.films if f.idle]
     if idle:

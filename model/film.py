@@ -130,7 +130,9 @@ class FilmForces(NamedTuple):
     steps: int
 
 
-def film_grid(start: float, end: float, radius: float, length: float, shape: tuple[int, int], symmetric: bool) -> FilmGrid:
+def film_grid(
+    start: float, end: float, radius: float, length: float, shape: tuple[int, int], symmetric: bool
+) -> FilmGrid:
     """Lay a mesh over a film.
 
     Parameters
@@ -161,7 +163,17 @@ def film_grid(start: float, end: float, radius: float, length: float, shape: tup
     along[[0, -1]] = 0.5 * dx
     area = np.outer(along, across) * (2.0 if symmetric else 1.0)
     return FilmGrid(
-        angle, z, np.cos(angle), np.sin(angle), np.cos(face), np.sin(face), dx, dz, height, area, 0 if symmetric else 1
+        angle,
+        z,
+        np.cos(angle),
+        np.sin(angle),
+        np.cos(face),
+        np.sin(face),
+        dx,
+        dz,
+        height,
+        area,
+        0 if symmetric else 1,
     )
 
 
@@ -187,9 +199,7 @@ def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:
 
 
 @njit(cache=True)
-def solve_film(
-    grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float, speed: float
-) -> FilmForces:
+def solve_film(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float, speed: float) -> FilmForces:
     """Pressure of one film and its derivatives.
 
     Parameters
@@ -240,7 +250,7 @@ def _thickness(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: fl
 def _conductances(
     grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float
 ) -> tuple[FloatArray, FloatArray]:
-    """rho h^3 / (12 mu) times face length over distance, at the faces along and across."""
+    """Rho h^3 / (12 mu) times face length over distance, at the faces along and across."""
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     gx = np.empty((nt, nz + 1))
     gz = np.empty((nt + 1, nz))
@@ -258,9 +268,7 @@ def _conductances(
 
 
 @njit(cache=True)
-def _source(
-    grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float, speed: float
-) -> FloatArray:
+def _source(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float, speed: float) -> FloatArray:
     """Couette inflow minus outflow of each control volume (the right-hand side f of A p = f)."""
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     source = np.zeros((nt + 1, nz + 1))
@@ -276,9 +284,7 @@ def _source(
 
 
 @njit(cache=True)
-def _active_set(
-    grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, source: FloatArray
-) -> int:
+def _active_set(grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, source: FloatArray) -> int:
     """Solve the complementarity problem; returns the number of factorisations, -2 if it did not settle."""
     p, ruptured = work.pressure, work.ruptured
     nt, nz = gx.shape[0], gz.shape[1]

@@ -150,7 +150,9 @@ class SectorMesh:
 
     def __post_init__(self) -> None:
         if len(self.layers) != self.r.n_elements:
-            raise ValueError(f"layers: {len(self.layers)} materials for {self.r.n_elements} elements across the thickness.")
+            raise ValueError(
+                f"layers: {len(self.layers)} materials for {self.r.n_elements} elements across the thickness."
+            )
 
     def per_gauss_point(self, values: list[float]) -> Array:
         """Spread one value per radial element over the Gauss points of `r`; shape of ``r.gauss[0]``."""

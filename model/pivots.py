@@ -275,7 +275,9 @@ def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> PivotLaw:
         gap = pivot.housing_diameter - pivot.pivot_diameter
         return RockerPivot(line / 2.0, line * gap / 4.0, secant_vibrations, name)
     if pivot.kind == "spherical":
-        return SphericalPivot((9.0 / (2.0 * modulus**2 * pivot.sphere_diameter)) ** (1.0 / 3.0), secant_vibrations, name)
+        return SphericalPivot(
+            (9.0 / (2.0 * modulus**2 * pivot.sphere_diameter)) ** (1.0 / 3.0), secant_vibrations, name
+        )
     return RigidPivot()
 
 
@@ -328,7 +330,9 @@ def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ..
     path = Path(path)
     try:
         if path.stat().st_size > 20_000_000:
-            raise BearingError(f"{path.name}: larger than 20 MB. A pivots.toml holds some hundred numbers; check the path.")
+            raise BearingError(
+                f"{path.name}: larger than 20 MB. A pivots.toml holds some hundred numbers; check the path."
+            )
         data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError as error:
         raise BearingError(f"{path}: no such file. `tpjb pivot CAMPAIGN` writes a pivots.toml.") from error

@@ -48,6 +48,37 @@ class Instruments:
         """G(omega): read force = G @ true force."""
         return _product(self.force, omega)
 
+    def read_displacement(self, one: SensorMap) -> Instruments:
+        """Return a copy whose displacement readings pass through one more map."""
+        return replace(self, displacement=(*self.displacement, one))
+
+    def read_cells(self, gain: FloatArray) -> Instruments:
+        """Return a copy whose load cells read `gain` (2, 2) times the truth.
+
+        Only the cells' part of F_oil = F_cell + m a passes through the gain; with the housing on springs K,
+        F_cell = F_oil / (1 - m omega^2 / K).
+        """
+
+        def one(omega: float) -> ComplexArray:
+            share = 1.0 / (1.0 - self.housing_mass * omega**2 / np.array(self.cell_stiffness))
+            return np.eye(2) + (np.asarray(gain) - np.eye(2)) * share[None, :] + 0j
+
+        return replace(self, force=(*self.force, one))
+
+    def weigh_housing(self, mass_error: float) -> Instruments:
+        """Return a copy whose housing weighs `mass_error` [kg] more than stated.
+
+        The force computed with the stated mass lacks mass_error times the housing's acceleration,
+        a = -omega^2 F_cell / K.
+        """
+
+        def one(omega: float) -> ComplexArray:
+            stiffness = np.array(self.cell_stiffness)
+            share = 1.0 / (stiffness - (self.housing_mass + mass_error) * omega**2)
+            return np.diag(1.0 + mass_error * omega**2 * share).astype(complex)
+
+        return replace(self, force=(*self.force, one))
+
 
 def _product(maps: tuple[SensorMap, ...], omega: float) -> ComplexArray:
     total = np.eye(2, dtype=complex)

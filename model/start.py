@@ -87,14 +87,35 @@ def loaded_attitude(start: float, end: float, radius: float, length: float) -> L
         if wedge is not None:
             rows.append((curvature, wedge, force(curvature, wedge)[0]))
     if len(rows) < 4:
-        raise ValueError(f"a pad from {math.degrees(start):.1f} to {math.degrees(end):.1f} deg about its pivot has no loaded attitude")
+        raise ValueError(
+            f"a pad from {math.degrees(start):.1f} to {math.degrees(end):.1f} deg about its pivot has no loaded attitude"
+        )
     table = np.array(rows)
     if table[0, 0] == min(_POSITIVE):  # central pivot: carries from A = 0 on, in proportion to A
         table = np.vstack([[0.0, 0.0, 0.0], table])
     return LoadedAttitude(table[:, 0], table[:, 1], table[:, 2])
 
 
-_POSITIVE = (1e-3, 0.02, 0.06, 0.12, 0.2, 0.35, 0.6, 1.0, 1.6, 2.5, 4.0, 6.5, 10.0, 16.0, 25.0, 40.0, 65.0, 100.0)
+_POSITIVE = (
+    1e-3,
+    0.02,
+    0.06,
+    0.12,
+    0.2,
+    0.35,
+    0.6,
+    1.0,
+    1.6,
+    2.5,
+    4.0,
+    6.5,
+    10.0,
+    16.0,
+    25.0,
+    40.0,
+    65.0,
+    100.0,
+)
 
 
 def _curvatures(start: float, end: float) -> list[float]:

@@ -88,8 +88,7 @@ def parse_quantity(value: str | float | int, dimension: str, name: str = "value"
     if isinstance(value, (int, float)):
         if dimension != "ratio":
             raise UnitError(
-                f"{name}: {value!r} has no unit; write it with one of {dimension}, "
-                f'e.g. "{value} {SI_UNITS[dimension]}"'
+                f'{name}: {value!r} has no unit; write it with one of {dimension}, e.g. "{value} {SI_UNITS[dimension]}"'
             )
         return _finite(float(value), name)
     match = _QUANTITY.fullmatch(value)

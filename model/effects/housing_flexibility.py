@@ -1,0 +1,22 @@
+"""`housing_flexibility`: the structure between pivots and probes gives way."""
+
+from __future__ import annotations
+
+import math
+
+from model.effects.kind import EffectKind, Parameter
+from model.setup import Setup
+
+
+def apply(setup: Setup, stiffness: float) -> Setup:
+    """A spring, equal in x and y, in series with the whole bearing."""
+    return setup.change(series_compliance=setup.series_compliance + 1.0 / stiffness)
+
+
+KIND = EffectKind(
+    name="housing_flexibility",
+    side="structure",
+    parameters=(Parameter("stiffness", "N/m", "stiffness", math.inf, 50000000.0, math.inf, 2000000000.0),),
+    apply=apply,
+    source="The paper names it as a likely cause (Sec. 6): 1e9 to 5e9 N/m in rig housings",
+)

@@ -1,0 +1,161 @@
+"""What an effect is: a name, parameters with units and plausible ranges, and one function."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Literal
+
+from model.setup import Setup
+from model.units import parse_quantity
+
+Side = Literal["bearing", "structure", "measurement"]
+
+
+class EffectError(ValueError):
+    """An effect that is not known, or a parameter that is missing, unknown or out of its bounds."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect.
+
+    Attributes
+    ----------
+    name : str
+        As in `physics.md`.
+    unit : str
+        SI unit as text ("1" for a ratio, "pad" for a pad number).
+    dimension : str
+        Key of `model.units.SI_UNITS`, for quantities with units in effects files.
+    neutral : float
+        Value at which the effect does nothing (nan: there is none, e.g. a pad number or an infinite stiffness).
+    low, high : float
+        Physical bounds; a value beyond them is refused.
+    typical : float
+        Size one would not be surprised by (one standard deviation of a prior about `neutral`).
+    """
+
+    name: str
+    unit: str
+    dimension: str
+    neutral: float
+    low: float
+    high: float
+    typical: float = math.nan
+
+    @property
+    def discrete(self) -> bool:
+        """Whether the parameter is a pad number."""
+        return self.unit == "pad"
+
+
+@dataclass(frozen=True)
+class EffectKind:
+    """A kind of effect, as the library holds it.
+
+    Attributes
+    ----------
+    name : str
+    side : {"bearing", "structure", "measurement"}
+        What it acts on; measurement effects act on the records.
+    parameters : tuple of Parameter
+    apply : callable
+        ``apply(setup, **parameters) -> Setup``; parameters in SI.
+    source : str
+        Where the plausible range comes from.
+    """
+
+    name: str
+    side: Side
+    parameters: tuple[Parameter, ...]
+    apply: Callable[..., Setup]
+    source: str = ""
+
+    def check(self, values: Mapping[str, Any]) -> dict[str, float]:
+        """Parameters as SI numbers, complete and within their bounds.
+
+        Raises
+        ------
+        EffectError
+            Unknown, missing or impossible parameter.
+        """
+        known = {p.name: p for p in self.parameters}
+        for name in values:
+            if name not in known:
+                raise EffectError(f"{self.name}: no parameter {name!r}.{_nearest(name, known)}")
+        out = {}
+        for name, parameter in known.items():
+            if name not in values:
+                raise EffectError(f"{self.name}: parameter {name!r} [{parameter.unit}] is missing.")
+            out[name] = _number(values[name], parameter, f"{self.name}.{name}")
+        return out
+
+
+def _number(value: Any, parameter: Parameter, where: str) -> float:
+    if isinstance(value, str):
+        value = parse_quantity(value, parameter.dimension, where)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        if hasattr(value, "__float__"):
+            value = float(value)
+        else:
+            raise EffectError(f"{where}: must be a number [{parameter.unit}], got {value!r}.")
+    if not parameter.low <= value <= parameter.high:
+        raise EffectError(
+            f"{where}: {value:g} is outside the physical range {parameter.low:g} to {parameter.high:g} [{parameter.unit}]."
+        )
+    if parameter.discrete:
+        if value != int(value):
+            raise EffectError(f"{where}: a pad is a whole number, got {value!r}.")
+        return int(value)
+    return float(value)
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    known = list(known)
+    near = difflib.get_close_matches(name, known, n=1)
+    return f" Did you mean {near[0]!r}?" if near else f" Known: {', '.join(known)}."
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect with its parameters: ``Effect("soft_pivot", pad=5, stiffness_factor=0.3)``.
+
+    Attributes
+    ----------
+    name : str
+    parameters : mapping
+        SI numbers by name.
+
+    Raises
+    ------
+    EffectError
+        Unknown effect or parameter, with the nearest known one.
+    """
+
+    name: str
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+    def __init__(self, name: str, **parameters: Any) -> None:
+        from model.effects import kind_of
+
+        kind = kind_of(name)
+        object.__setattr__(self, "name", kind.name)
+        object.__setattr__(self, "parameters", MappingProxyType(kind.check(parameters)))
+
+    def __reduce__(self) -> Any:
+        return _rebuild, (self.name, dict(self.parameters))
+
+    def __repr__(self) -> str:
+        inside = ", ".join(f"{k}={v:g}" for k, v in self.parameters.items())
+        return f"Effect({self.name!r}{', ' if inside else ''}{inside})"
+
+    def __hash__(self) -> int:
+        return hash((self.name, tuple(sorted(self.parameters.items()))))
+
+
+def _rebuild(name: str, parameters: dict[str, float]) -> Effect:
+    return Effect(name, **parameters)

@@ -1,0 +1,25 @@
+"""`misalignment`: the shaft leans in the bearing."""
+
+from __future__ import annotations
+
+import math
+
+from model.effects.kind import EffectKind, Parameter
+from model.setup import Setup
+
+
+def apply(setup: Setup, angle: float, direction: float) -> Setup:
+    """The shaft axis is tilted by angle towards direction, about mid-bearing; pads do not follow."""
+    return setup.change(misalignment=(angle, direction))
+
+
+KIND = EffectKind(
+    name="misalignment",
+    side="bearing",
+    parameters=(
+        Parameter("angle", "rad", "angle", 0.0, 0.0, 0.002, 0.0002),
+        Parameter("direction", "rad", "angle", math.nan, -7.0, 7.0),
+    ),
+    apply=apply,
+    source="Half the clearance over half the length is 1e-3 rad",
+)

@@ -1,0 +1,30 @@
+"""`pad_offset`: one pivot stands further out or in."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from model.effects.kind import EffectKind, Parameter
+from model.setup import Setup
+
+
+def apply(setup: Setup, pad: int, radial_offset: float) -> Setup:
+    """The assembled clearance of one pad is Cb + radial_offset."""
+    return setup.change_pads(
+        lambda number, one: (
+            replace(one, assembled_clearance=one.assembled_clearance + radial_offset) if number == pad else one
+        )
+    )
+
+
+KIND = EffectKind(
+    name="pad_offset",
+    side="bearing",
+    parameters=(
+        Parameter("pad", "pad", "ratio", math.nan, 1, 40),
+        Parameter("radial_offset", "m", "length", 0.0, -6e-05, 6e-05, 1e-05),
+    ),
+    apply=apply,
+    source="Machining tolerance; the paper explains an irregular clearance polygon so (Fig. 14)",
+)

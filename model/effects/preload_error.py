@@ -1,0 +1,22 @@
+"""`preload_error`: the pads are bored to another radius."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from model.effects.kind import EffectKind, Parameter
+from model.setup import Setup
+
+
+def apply(setup: Setup, pad_clearance_change: float) -> Setup:
+    """Cp of every pad changes by this; Cb stays."""
+    return setup.change_pads(lambda number, one: replace(one, pad_clearance=one.pad_clearance + pad_clearance_change))
+
+
+KIND = EffectKind(
+    name="preload_error",
+    side="bearing",
+    parameters=(Parameter("pad_clearance_change", "m", "length", 0.0, -0.0001, 0.0002, 1.2e-05),),
+    apply=apply,
+    source="Boring tolerance of a pad of 100 mm: IT6 to IT7",
+)

@@ -1,0 +1,31 @@
+"""`soft_pivot`: one pivot gives way more than its law says."""
+
+from __future__ import annotations
+
+import math
+
+from model.effects.kind import EffectKind, Parameter
+from model.pivots import ScaledPivot
+from model.setup import Setup
+
+
+def apply(setup: Setup, pad: int, stiffness_factor: float) -> Setup:
+    """The pivot of one pad deflects delta(W) / stiffness_factor."""
+    return setup.change(
+        pivots=tuple(
+            ScaledPivot(law, stiffness_factor) if number == pad else law
+            for number, law in enumerate(setup.pivots, start=1)
+        )
+    )
+
+
+KIND = EffectKind(
+    name="soft_pivot",
+    side="bearing",
+    parameters=(
+        Parameter("pad", "pad", "ratio", math.nan, 1, 40),
+        Parameter("stiffness_factor", "1", "ratio", 1.0, 0.05, 5.0, 0.5),
+    ),
+    apply=apply,
+    source="Pad #5 of the paper is the softest of five (Lubricants 2019, 7, 61, Fig. 12)",
+)

@@ -1,0 +1,20 @@
+"""`supply_temperature`: the oil enters hotter than the record says."""
+
+from __future__ import annotations
+
+from model.effects.kind import EffectKind, Parameter
+from model.setup import Setup
+
+
+def apply(setup: Setup, change: float) -> Setup:
+    """Supply temperature plus change."""
+    return setup.change(supply_change=setup.supply_change + change)
+
+
+KIND = EffectKind(
+    name="supply_temperature",
+    side="bearing",
+    parameters=(Parameter("change", "K", "temperature difference", 0.0, -30.0, 60.0, 3.0),),
+    apply=apply,
+    source="A sensor in the pipe, not at the pads",
+)
