@@ -1,0 +1,280 @@
+"""Predict: one call from a bearing and an operating point to coefficients, position and fields."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.bearing import Bearing
+from model.dynamics import PadMatrices, bearing_impedance, pad_matrices
+from model.effects import Effect, apply_effects
+from model.equilibrium import Equilibrium, solve_equilibrium
+from model.pivots import pivot_laws
+from model.power import power_loss
+from model.setup import Mesh, Setup
+from model.units import to_si
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What the model says about one operating point, as the records would show it.
+
+    Measurement-side effects are in `h`, `position` and `load_reading`; `bearing_h` and `bearing_position` are
+    free of them.
+
+    Attributes
+    ----------
+    load, load_direction : float
+        Static load [N] and where it pushes the shaft [rad].
+    speed : float
+        [rad/s]
+    excitation : float or (n,) ndarray
+        [rad/s]
+    h : (2, 2) or (n, 2, 2) complex ndarray
+        Dynamic stiffness k + i omega c [N/m].
+    position : (2,) ndarray
+        Journal from the bearing centre [m].
+    tilt, deflection, pad_load : (n_pads,) ndarray
+        [rad], [m], [N]
+    status : tuple of str
+        Named conditions; empty when all is well.
+    equilibrium : Equilibrium
+    setup : Setup
+    """
+
+    load: float
+    load_direction: float
+    speed: float
+    excitation: float | FloatArray
+    h: ComplexArray
+    bearing_h: ComplexArray = field(repr=False)
+    position: FloatArray
+    bearing_position: FloatArray = field(repr=False)
+    load_reading: FloatArray = field(repr=False)
+    tilt: FloatArray = field(repr=False)
+    deflection: FloatArray = field(repr=False)
+    pad_load: FloatArray
+    status: tuple[str, ...]
+    equilibrium: Equilibrium = field(repr=False)
+    setup: Setup = field(repr=False)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the equilibrium was found."""
+        return self.equilibrium.converged
+
+    @property
+    def idle_pads(self) -> tuple[int, ...]:
+        """Pads without a loaded attitude, numbers from 1."""
+        return tuple(f.number for f in self.equilibrium.films if f.idle)
+
+    @property
+    def k(self) -> FloatArray:
+        """Re h [N/m], shape of `h`."""
+        return self.h.real
+
+    @property
+    def c(self) -> FloatArray:
+        """Im h / omega [N s/m], shape of `h`."""
+        omega = np.asarray(self.excitation, float)[..., None, None]
+        return self.h.imag / omega
+
+    def __getattr__(self, name: str) -> Any:
+        if len(name) == 3 and name[0] in "kc" and set(name[1:]) <= {"x", "y"}:
+            table = self.k if name[0] == "k" else self.c
+            value = table[..., "xy".index(name[1]), "xy".index(name[2])]
+            return float(value) if value.ndim == 0 else value
+        raise AttributeError(f"Prediction has no attribute {name!r}")
+
+    @property
+    def pressure(self) -> tuple[FloatArray, ...]:
+        """Per pad, (nt + 1, nz + 1) on the half width (full if misaligned) [Pa]."""
+        return tuple(f.work.pressure for f in self.equilibrium.films)
+
+    @property
+    def film(self) -> tuple[FloatArray, ...]:
+        """Film thickness per pad [m], shapes as `pressure`."""
+        return tuple(f.work.thickness for f in self.equilibrium.films)
+
+    @property
+    def temperature(self) -> tuple[FloatArray, ...]:
+        """Film temperature per pad [degC], shapes as `pressure`."""
+        return tuple(f.work.temperature for f in self.equilibrium.films)
+
+    @property
+    def max_pressure(self) -> float:
+        """[Pa]"""
+        return max(float(p.max()) for p in self.pressure)
+
+    @property
+    def max_temperature(self) -> float:
+        """Hottest film of a pad that carries [degC]."""
+        films = [f for f in self.equilibrium.films if not f.idle]
+        return max((float(f.work.temperature.max()) for f in films), default=self.setup.inlet_temperature)
+
+    @property
+    def min_film(self) -> float:
+        """[m]; infinite if no pad carries."""
+        return min((float(f.work.thickness.min()) for f in self.equilibrium.films if not f.idle), default=math.inf)
+
+    @property
+    def power_loss(self) -> float:
+        """Shear of all films [W]."""
+        return power_loss(self.equilibrium, self.speed * self.setup.bearing.journal_radius)
+
+    def pad_temperature(self, fraction: float = 0.75) -> FloatArray:
+        """Film temperature at mid-length, at a fraction of the arc from the leading edge, per pad [degC]."""
+        out = []
+        for film in self.equilibrium.films:
+            angle = film.pad.leading_edge + fraction * film.pad.arc
+            middle = 0 if film.grid.first == 0 else len(film.grid.z) // 2
+            out.append(float(np.interp(angle, film.grid.angle, film.work.temperature[:, middle])))
+        return np.array(out)
+
+    @property
+    def pad_matrices(self) -> tuple[PadMatrices, ...]:
+        """Full matrices of the pads that carry, Eq. (11) and (12)."""
+        matrices = (pad_matrices(self.setup, f) for f in self.equilibrium.films)
+        return tuple(m for m in matrices if m is not None)
+
+    @functools.cached_property
+    def mesh_error(self) -> float:
+        """Estimated relative error of the direct coefficients from the mesh.
+
+        A third of the difference to a mesh half as fine (second order), the largest of kxx, kyy, cxx, cyy. Solved
+        when first asked for.
+        """
+        coarse = predict_setup(
+            self.setup.change(mesh=self.setup.mesh.coarser()),
+            self.load, self.load_direction, self.speed, self.excitation,
+        )  # fmt: skip
+        if not (coarse.converged and self.converged):
+            return math.nan
+        worst = 0.0
+        for part in ("real", "imag"):
+            fine, rough = (np.diagonal(getattr(p.bearing_h, part), axis1=-2, axis2=-1) for p in (self, coarse))
+            scale = np.maximum(np.abs(fine), 0.05 * np.abs(np.diagonal(self.bearing_h, axis1=-2, axis2=-1)))
+            worst = max(worst, float(np.max(np.abs(fine - rough) / scale)) / 3.0)
+        return worst
+
+
+def predict(
+    bearing: Bearing,
+    load: Any,
+    load_direction: Any = -math.pi / 2,
+    speed: Any = 0.0,
+    excitation: Any = None,
+    pivots: Any = "kirk",
+    thermal: str = "adiabatic",
+    effects: Iterable[Effect] = (),
+    mesh: Mesh | tuple[int, int] | None = None,
+    start: Prediction | None = None,
+) -> Prediction:
+    """Predict a bearing's coefficients, position and fields at one operating point.
+
+    Parameters
+    ----------
+    bearing : Bearing
+    load : float or quantity
+        Static load per bearing [N].
+    load_direction : float or quantity
+        Where it pushes the shaft [rad, counter-clockwise from +X].
+    speed : float or quantity
+        Shaft speed [rad/s].
+    excitation : float, (n,) array or quantity, optional
+        [rad/s]; default: synchronous.
+    pivots : str, float, path or laws
+        ``"rigid"``, ``"kirk"``, ``"kirk-secant"``, a constant stiffness [N/m], a ``pivots.toml``, or laws per pad.
+    thermal : {"isothermal", "adiabatic", "tehd"}
+    effects : iterable of Effect
+    mesh : Mesh or (int, int), optional
+        Intervals along the arc and across half the width.
+    start : Prediction, optional
+        A neighbouring prediction to start from.
+
+    Returns
+    -------
+    Prediction
+
+    Raises
+    ------
+    ValueError
+        An argument with a wrong dimension, sign or name (the message says which).
+    """
+    if thermal not in {"isothermal", "adiabatic", "tehd"}:
+        raise ValueError(f"thermal must be isothermal, adiabatic or tehd, got {thermal!r}")
+    chosen = mesh if isinstance(mesh, Mesh) else Mesh(*mesh) if mesh is not None else Mesh()
+    setup = Setup(bearing, pivot_laws(pivots, bearing), thermal, chosen)
+    setup = apply_effects(setup, effects)
+    speed_si = float(to_si(speed, "angular speed", "speed"))
+    omega = speed_si if excitation is None else to_si(excitation, "angular speed", "excitation")
+    return predict_setup(
+        setup,
+        float(to_si(load, "force", "load")),
+        float(to_si(load_direction, "angle", "load_direction")),
+        speed_si,
+        omega,
+        start.equilibrium if start is not None else None,
+    )
+
+
+def predict_setup(
+    setup: Setup, load: float, load_direction: float, speed: float, excitation: Any, start: Equilibrium | None = None
+) -> Prediction:
+    """Predict for a `Setup` (effects applied); SI floats only, see `predict`."""
+    omega = np.asarray(excitation, float)
+    _check_point(load, load_direction, speed, omega)
+    force = load * np.array([math.cos(load_direction), math.sin(load_direction)])
+    equilibrium = solve_equilibrium(setup, force, speed, start)
+    lines = np.atleast_1d(omega)
+    if equilibrium.converged:
+        h = bearing_impedance(setup, equilibrium, lines)
+    else:
+        h = np.full((len(lines), 2, 2), complex(math.nan, math.nan))
+    instruments = setup.instruments
+    read = np.array(
+        [
+            instruments.force_map(w) @ one @ np.linalg.inv(instruments.displacement_map(w))
+            for w, one in zip(lines, h, strict=True)
+        ]
+    )
+    outside = equilibrium.position + setup.series_compliance * force
+    films = equilibrium.films
+    shape = (2, 2) if omega.ndim == 0 else (len(lines), 2, 2)
+    return Prediction(
+        load=load,
+        load_direction=load_direction,
+        speed=speed,
+        excitation=float(omega) if omega.ndim == 0 else omega,
+        h=read.reshape(shape),
+        bearing_h=h.reshape(shape),
+        position=(instruments.displacement_map(0.0) @ outside).real,
+        bearing_position=equilibrium.position,
+        load_reading=(instruments.force_map(0.0) @ force).real,
+        tilt=np.array([f.tilt for f in films]),
+        deflection=np.array([f.deflection for f in films]),
+        pad_load=np.array([f.forces.force[0] if f.forces is not None else 0.0 for f in films]),
+        status=equilibrium.status,
+        equilibrium=equilibrium,
+        setup=setup,
+    )
+
+
+def _check_point(load: float, direction: float, speed: float, omega: FloatArray) -> None:
+    if not (math.isfinite(load) and load >= 0):
+        raise ValueError(f"load must be zero or positive [N], got {load!r}; give its direction as load_direction")
+    if not math.isfinite(direction):
+        raise ValueError(f"load_direction must be finite [rad], got {direction!r}")
+    if not (math.isfinite(speed) and speed > 0):
+        raise ValueError(f"speed must be positive [rad/s] (the shaft turns counter-clockwise), got {speed!r}")
+    if omega.ndim > 1 or not np.all(np.isfinite(omega)) or np.any(omega <= 0):
+        raise ValueError("excitation must be a positive number or a 1-D array of them [rad/s]")
