@@ -1,0 +1,60 @@
+"""A virtual rig: writes whole campaigns in the export format from given physics, with noise and faults.
+
+>>> import numpy as np
+>>> from rigdata.virtual_rig import RigTruth, VirtualRig, write_campaign
+>>> rig = VirtualRig(RigTruth.constant(k=np.diag([2e8, 4e8]), c=np.diag([4e5, 6e5])), seed=1)
+>>> truth = write_campaign("campaign.h5", rig)  # doctest: +SKIP
+"""
+
+from rigdata.virtual_rig.campaign import write_campaign
+from rigdata.virtual_rig.faults import Fault
+from rigdata.virtual_rig.instruments import Instruments, Sensor, SensorError
+from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout
+from rigdata.virtual_rig.ledger import CampaignTruth
+from rigdata.virtual_rig.noise import (
+    ActuatorDefects,
+    ChannelNoise,
+    DryImperfections,
+    Glitches,
+    Noise,
+    SetPointMiss,
+    ShaftDefects,
+)
+from rigdata.virtual_rig.plan import (
+    ClearanceSweep,
+    DryTest,
+    RigPlan,
+    Timing,
+    locus_points,
+    operating_points,
+)
+from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig
+from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
+
+__all__ = [
+    "ActuatorDefects",
+    "CampaignTruth",
+    "ChannelNoise",
+    "ClearanceSweep",
+    "CsvLayout",
+    "DryImperfections",
+    "DryTest",
+    "Fault",
+    "Glitches",
+    "Hdf5Layout",
+    "Instruments",
+    "Noise",
+    "RigPlan",
+    "RigTruth",
+    "Sensor",
+    "SensorError",
+    "SetPointMiss",
+    "ShaftDefects",
+    "SimulatedRun",
+    "Timing",
+    "VirtualRig",
+    "VirtualRigError",
+    "locus_points",
+    "operating_points",
+    "write_campaign",
+]

@@ -1,0 +1,318 @@
+"""The instruments: what the manifest says of them, and what they really do.
+
+Every sensor carries both: its stated calibration (which goes into the manifest) and its `SensorError` (which
+goes into the readings and nowhere else).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from math import radians
+
+import numpy as np
+
+from rigdata.virtual_rig.truth import VirtualRigError, hz
+
+STANDARD_GRAVITY = 9.80665
+
+
+@dataclass(frozen=True)
+class SensorError:
+    """How a sensor departs from its stated calibration.
+
+    Attributes
+    ----------
+    gain : float
+        Readings are this factor times the truth.
+    angle : float
+        The sensor really stands at its stated axis + this [rad].
+    cross : float
+        Fraction of the other sensor's axis (of the same quantity) that it also reads.
+    delay : float
+        It is recorded this much late [s].
+    offset : float
+        Added to the quantity [SI].
+    """
+
+    gain: float = 1.0
+    angle: float = 0.0
+    cross: float = 0.0
+    delay: float = 0.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """One channel.
+
+    Attributes
+    ----------
+    name : str
+    quantity : {"displacement", "force", "acceleration", "temperature", "speed"}
+    unit : str
+        Of the readings, as in the manifest.
+    scale : float
+        Reading per SI unit (per K from 0 degC for temperatures).
+    axis : float or None
+        Stated direction [rad].
+    polarity : {1, -1}
+    zero : float
+        Reading when the quantity is zero: the gap voltage of a probe.
+    span : float
+        The converter takes readings from -span to +span.
+    stated : tuple of (str, str)
+        Further manifest entries: sensitivity, full scale, excitation, ...
+    uncertainty : float
+        Stated, relative, one standard deviation; 0 where none is stated.
+    pad : int or None
+        Of a temperature sensor, 1 for pad #1.
+    error : SensorError
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    scale: float
+    axis: float | None = None
+    polarity: int = 1
+    zero: float = 0.0
+    span: float = 10.0
+    stated: tuple[tuple[str, str], ...] = ()
+    uncertainty: float = 0.0
+    pad: int | None = None
+    error: SensorError = SensorError()
+
+    @classmethod
+    def probe(cls, name: str, axis: float, gap_voltage: float = 8.0, mv_per_um: float = 7.78) -> Sensor:
+        """Eddy-current probe: the reading falls as the shaft comes nearer."""
+        return cls(
+            name,
+            "displacement",
+            "V",
+            mv_per_um * 1e3,
+            axis,
+            polarity=-1,
+            zero=gap_voltage,
+            stated=(("sensitivity", f"{mv_per_um:g} mV/um"),),
+            uncertainty=0.005,
+        )
+
+    @classmethod
+    def load_cell(
+        cls,
+        name: str,
+        axis: float,
+        full_scale: float = 20e3,
+        mv_per_v: float = 2.0,
+        excitation: float = 5.0,
+    ) -> Sensor:
+        """Strain-gauge cell in a bridge; `full_scale` [N], `excitation` [V]."""
+        span = mv_per_v * excitation
+        return cls(
+            name,
+            "force",
+            "mV",
+            span / full_scale,
+            axis,
+            span=span,
+            stated=(
+                ("sensitivity", f"{mv_per_v:.1f} mV/V"),
+                ("full_scale", f"{full_scale / 1e3:g} kN"),
+                ("excitation", f"{excitation:g} V"),
+            ),
+            uncertainty=0.002,
+        )
+
+    @classmethod
+    def accelerometer(cls, name: str, axis: float, mv_per_g: float = 10.0, span: float = 0.05) -> Sensor:
+        """Accelerometer; `span` of its converter in V."""
+        return cls(
+            name,
+            "acceleration",
+            "V",
+            mv_per_g * 1e-3 / STANDARD_GRAVITY,
+            axis,
+            span=span,
+            stated=(("sensitivity", f"{mv_per_g:g} mV/g"),),
+        )
+
+    @classmethod
+    def thermometer(cls, name: str, pad: int, kelvin_per_volt: float = 15.0, position: float = 0.75) -> Sensor:
+        """Pt100 with its amplifier, in `pad` (1 for pad #1) at a fraction of the arc."""
+        return cls(
+            name,
+            "temperature",
+            "V",
+            1 / kelvin_per_volt,
+            stated=(
+                ("position", f"{position:g}"),
+                ("sensitivity", f"{kelvin_per_volt:g} K/V"),
+                ("zero", "0 degC"),
+            ),
+            pad=pad,
+        )
+
+    @classmethod
+    def tachometer(cls, name: str, mv_per_hz: float = 100.0) -> Sensor:
+        """Speed as a voltage."""
+        stated = (("sensitivity", f"{mv_per_hz:g} mV/Hz"),)
+        return cls(name, "speed", "V", mv_per_hz * 1e-3 / hz(1.0), stated=stated)
+
+    def with_error(self, **changes: float) -> Sensor:
+        """Return the sensor with these fields of its error replaced."""
+        return replace(self, error=replace(self.error, **changes))
+
+    @property
+    def direction(self) -> np.ndarray:
+        """Unit vector (2,) along which it really reads."""
+        return _unit(self, self.error.angle)
+
+    @property
+    def stated_direction(self) -> np.ndarray:
+        """Unit vector (2,) along which it is stated to read."""
+        return _unit(self, 0.0)
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """All sensors, and the housing between film and cells.
+
+    Attributes
+    ----------
+    sensors : tuple of Sensor
+        Sensors of a vector quantity come in pairs, one after the other.
+    housing_mass : float
+        Stated [kg].
+    housing_mass_error : float
+        True mass minus stated mass [kg].
+    cell_stiffness : (float, float)
+        The housing stands on these springs, along X and Y [N/m]; infinite is allowed.
+    """
+
+    sensors: tuple[Sensor, ...] = field(repr=False)
+    housing_mass: float = 30.0
+    housing_mass_error: float = 0.0
+    cell_stiffness: tuple[float, float] = (4e8, 6e8)
+
+    def __post_init__(self) -> None:
+        names = [sensor.name for sensor in self.sensors]
+        if len(set(names)) < len(names):
+            raise VirtualRigError(f"channel names must differ, got {names}")
+        for quantity in ("displacement", "force", "acceleration"):
+            if len(self.of(quantity)) % 2:
+                raise VirtualRigError(f"{quantity} sensors must come in pairs")
+        if self.true_mass < 0 or min(self.cell_stiffness) <= 0:
+            raise VirtualRigError("the housing's true mass and cell_stiffness must not be negative")
+
+    @classmethod
+    def like_paper(cls, n_pads: int = 5, seed: int | None = None) -> Instruments:
+        """Two probes at 45 and 135 deg, cells and accelerometers at 0 and 90 deg, a Pt100 per pad, a tacho.
+
+        With a `seed`, gap voltages and the zeros of accelerometers and Pt100s are drawn; without, the probes
+        stand at 8 V and everything else is at zero.
+        """
+        rng = None if seed is None else np.random.default_rng([seed, 0])
+        gaps = (8.0, 8.0) if rng is None else tuple(rng.normal(8.0, 0.2, 2))
+        gravity = (0.0, 0.0) if rng is None else tuple(rng.normal(0.0, 1.5, 2))
+        pt100 = (0.0,) * n_pads if rng is None else tuple(rng.normal(0.0, 0.2, n_pads))
+        quarter = radians(90.0)
+        return cls(
+            (
+                Sensor.probe("X1A", radians(45.0), gaps[0]),
+                Sensor.probe("X1B", radians(135.0), gaps[1]),
+                Sensor.load_cell("L1H", 0.0),
+                Sensor.load_cell("L1V", quarter),
+                Sensor.accelerometer("A1H", 0.0).with_error(offset=gravity[0]),
+                Sensor.accelerometer("A1V", quarter).with_error(offset=gravity[1]),
+                *(Sensor.thermometer(f"T{pad + 1}", pad + 1).with_error(offset=pt100[pad]) for pad in range(n_pads)),
+                Sensor.tachometer("K1"),
+            )
+        )
+
+    @property
+    def true_mass(self) -> float:
+        """Housing mass as it really is [kg]."""
+        return self.housing_mass + self.housing_mass_error
+
+    def of(self, quantity: str) -> tuple[Sensor, ...]:
+        """All sensors of a quantity."""
+        return tuple(sensor for sensor in self.sensors if sensor.quantity == quantity)
+
+    def named(self, name: str) -> Sensor:
+        """Look up one sensor by its channel name."""
+        for sensor in self.sensors:
+            if sensor.name == name:
+                return sensor
+        raise VirtualRigError(f"no channel {name!r}; there are {[s.name for s in self.sensors]}")
+
+    def partner(self, sensor: Sensor) -> Sensor:
+        """Find the other sensor of its pair."""
+        family = [s.name for s in self.of(sensor.quantity)]
+        return self.named(family[family.index(sensor.name) ^ 1])
+
+    def gap_voltages(self) -> dict[str, float]:
+        """Reading of every probe with the shaft in the bearing centre."""
+        return {s.name: s.zero + s.polarity * s.scale * s.error.offset for s in self.of("displacement")}
+
+    def with_errors(
+        self,
+        probe_gain: float = 1.0,
+        probe_rotation: float = 0.0,
+        loadcell_gain: float = 1.0,
+        loadcell_crosstalk: float = 0.0,
+        channel_delay: float = 0.0,
+        mass_error: float = 0.0,
+    ) -> Instruments:
+        """Add measurement effects by their canonical names and meanings (physics.md).
+
+        Parameters
+        ----------
+        probe_gain, loadcell_gain : float
+            Readings are this factor times the truth.
+        probe_rotation : float
+            Both probes really stand at their stated angle + this [rad].
+        loadcell_crosstalk : float
+            Each cell also reads this fraction of the other axis.
+        channel_delay : float
+            Displacement channels are recorded this much later than the others [s].
+        mass_error : float
+            True housing mass = stated mass + this [kg].
+        """
+
+        def changed(sensor: Sensor) -> Sensor:
+            error = sensor.error
+            if sensor.quantity == "displacement":
+                return sensor.with_error(
+                    gain=error.gain * probe_gain,
+                    angle=error.angle + probe_rotation,
+                    delay=error.delay + channel_delay,
+                )
+            if sensor.quantity == "force":
+                return sensor.with_error(gain=error.gain * loadcell_gain, cross=error.cross + loadcell_crosstalk)
+            return sensor
+
+        return replace(
+            self,
+            sensors=tuple(changed(s) for s in self.sensors),
+            housing_mass_error=self.housing_mass_error + mass_error,
+        )
+
+    def with_drawn_errors(self, seed: int, angle: float = 0.0) -> Instruments:
+        """Draw every gain from its stated uncertainty, and the probes' and cells' angles from `angle` [rad].
+
+        A campaign without any hidden effect still has these: leaving them out flatters the false alarms.
+        """
+        rng = np.random.default_rng([seed, 1])
+        gains, turns = rng.standard_normal((2, len(self.sensors)))
+
+        def drawn(sensor: Sensor, gain: float, turn: float) -> Sensor:
+            turned = sensor.error.angle + (angle * turn if sensor.axis is not None else 0.0)
+            return sensor.with_error(gain=sensor.error.gain * (1 + sensor.uncertainty * gain), angle=turned)
+
+        return replace(self, sensors=tuple(drawn(s, float(g), float(t)) for s, g, t in zip(self.sensors, gains, turns)))
+
+
+def _unit(sensor: Sensor, turn: float) -> np.ndarray:
+    if sensor.axis is None:
+        raise VirtualRigError(f"channel {sensor.name} has no axis")
+    return np.array([np.cos(sensor.axis + turn), np.sin(sensor.axis + turn)])

@@ -1,0 +1,150 @@
+"""The truth of a campaign, to be kept outside of it: what really went into every run."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from rigdata.operating_point import OperatingPoint
+from rigdata.virtual_rig.apparent import apparent_stiffness
+from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig
+from rigdata.virtual_rig.truth import FloatArray
+
+PIVOT_LOADS = np.arange(250.0, 8001.0, 250.0)
+
+
+@dataclass(frozen=True)
+class CampaignTruth:
+    """What was really put into a campaign.
+
+    Attributes
+    ----------
+    campaign : str
+    seed : int
+    points : tuple of mapping
+        Per dynamic set point: K, C (rows [[xx, xy], [yx, yy]]), K_apparent and C_apparent (what instrument
+        errors make of them), x_m, y_m, pad_temperature_C. At the set point, not at the point really run.
+    locus : tuple of mapping
+        static_load_N, static_load_direction_deg, x_m, y_m.
+    pivot_curves : tuple of mapping
+        pad, force_N, deflection_m, stiffness_N_per_m (tangent).
+    clearance_cold_m : tuple of float
+    gap_voltage_V : mapping of str to float
+        Reading of each probe with the shaft in the bearing centre.
+    housing_mass_kg : float
+        The true one.
+    cell_stiffness_N_per_m : tuple of float
+    sensor_errors : mapping of str to mapping
+    faults : tuple of mapping
+    runs : mapping of str to mapping
+        Per record: the point really run, force and displacement phasors, glitches.
+    """
+
+    campaign: str
+    seed: int
+    points: tuple[Mapping[str, object], ...] = field(repr=False)
+    locus: tuple[Mapping[str, object], ...] = field(repr=False)
+    pivot_curves: tuple[Mapping[str, object], ...] = field(repr=False)
+    clearance_cold_m: tuple[float, ...]
+    gap_voltage_V: Mapping[str, float]  # noqa: N815 - the truth files' own key
+    housing_mass_kg: float
+    cell_stiffness_N_per_m: tuple[float, ...]  # noqa: N815
+    sensor_errors: Mapping[str, Mapping[str, float]] = field(repr=False)
+    faults: tuple[Mapping[str, object], ...]
+    runs: Mapping[str, Mapping[str, object]] = field(repr=False)
+
+    def to_dict(self) -> dict[str, object]:
+        """Everything as plain Python, in the shape of the samples' truth files."""
+        return {"schema": "tpjb-truth/1", **asdict(self)}
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write as JSON, whole or not at all; never into the campaign itself."""
+        target = Path(path)
+        spare = target.with_name(f".{target.name}.part")
+        spare.write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False), encoding="utf-8")
+        os.replace(spare, target)
+
+
+def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) -> CampaignTruth:
+    """Gather the truth of a rig and of its simulated runs."""
+    cells = rig.instruments.cell_stiffness
+    return CampaignTruth(
+        campaign=rig.campaign,
+        seed=rig.seed,
+        points=tuple(_point(rig, point) for point in rig.plan.dynamic),
+        locus=tuple(_locus(rig, point) for point in rig.plan.locus),
+        pivot_curves=tuple(_pivot_curve(rig, k + 1) for k in range(len(rig.truth.pivot_angles))),
+        clearance_cold_m=tuple(rig.truth.clearance),
+        gap_voltage_V=rig.instruments.gap_voltages(),
+        housing_mass_kg=rig.instruments.true_mass,
+        cell_stiffness_N_per_m=tuple(cells),
+        sensor_errors={s.name: asdict(s.error) for s in rig.instruments.sensors},
+        faults=tuple(_fault(f) for f in map(asdict, rig.faults)),
+        runs=dict(runs),
+    )
+
+
+def run_facts(record: SimulatedRun) -> dict[str, object]:
+    """Facts of one record for the truth."""
+    return {
+        "kind": record.run.kind,
+        **record.physics.facts,
+        "glitches": [asdict(glitch) for glitch in record.glitches],
+    }
+
+
+def _point(rig: VirtualRig, point: OperatingPoint) -> dict[str, object]:
+    h = rig.truth.h(point)
+    seen = apparent_stiffness(h, point.excitation, rig.instruments)
+    position = rig.truth.centre(replace(point, excitation=0.0))
+    return {
+        **_set_point(point),
+        "excitation_Hz": point.excitation_hz,
+        "K": h.real.tolist(),
+        "C": (h.imag / point.excitation).tolist(),
+        "K_apparent": seen.real.tolist(),
+        "C_apparent": (seen.imag / point.excitation).tolist(),
+        "x_m": float(position[0]),
+        "y_m": float(position[1]),
+        "pad_temperature_C": rig.truth.temperatures(replace(point, excitation=0.0)).tolist(),
+    }
+
+
+def _locus(rig: VirtualRig, point: OperatingPoint) -> dict[str, object]:
+    position = rig.truth.centre(point)
+    return {**_set_point(point), "x_m": float(position[0]), "y_m": float(position[1])}
+
+
+def _set_point(point: OperatingPoint) -> dict[str, object]:
+    return {
+        "static_load_N": point.static_load,
+        "static_load_direction_deg": point.static_load_direction_deg,
+        "shaft_speed_Hz": point.shaft_speed_hz,
+    }
+
+
+def _pivot_curve(rig: VirtualRig, pad: int) -> dict[str, object]:
+    return {
+        "pad": pad,
+        "force_N": PIVOT_LOADS.tolist(),
+        "deflection_m": rig.truth.deflection(pad, PIVOT_LOADS).tolist(),
+        "stiffness_N_per_m": _tangent(rig, pad, PIVOT_LOADS).tolist(),
+    }
+
+
+def _tangent(rig: VirtualRig, pad: int, load: FloatArray) -> FloatArray:
+    """Tangent stiffness [N/m] by central differences over 0.1 % of the load: error about 1e-7 for smooth laws."""
+    low, high = load * (1 - 1e-3), load * (1 + 1e-3)
+    rise = rig.truth.deflection(pad, high) - rig.truth.deflection(pad, low)
+    with np.errstate(divide="ignore"):  # a rigid pivot is infinitely stiff
+        return (high - low) / rise
+
+
+def _fault(entries: dict[str, object]) -> dict[str, object]:
+    """Fault without what was not given; an open end is not a JSON number."""
+    return {k: v for k, v in entries.items() if v is not None and v != float("inf")}

@@ -1,0 +1,219 @@
+"""Everything in a record that is not the bearing: how much of it, by kind.
+
+The amounts of `Noise.like_samples` were measured on the sample campaigns; all are in SI units of the quantity, so
+that they do not change with a sensor's sensitivity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from math import radians
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """Noise of one quantity, in its SI unit (K for temperatures).
+
+    Attributes
+    ----------
+    white : float
+        Root mean square per sample.
+    flicker : float
+        1/f noise: amplitude density at 1 Hz [per sqrt(Hz)].
+    mains : float
+        Amplitude of the pick-up at the mains frequency.
+    drift : float
+        Slow drift within a record: standard deviation of its value at the record's end against the start.
+    """
+
+    white: float = 0.0
+    flicker: float = 0.0
+    mains: float = 0.0
+    drift: float = 0.0
+
+    def scaled(self, factor: float) -> ChannelNoise:
+        """Return the same noise, `factor` times as strong."""
+        return ChannelNoise(*(getattr(self, f.name) * factor for f in fields(self)))
+
+
+@dataclass(frozen=True)
+class ShaftDefects:
+    """What the turning shaft adds.
+
+    Attributes
+    ----------
+    runout : tuple of float
+        Surface runout at 1X, 2X, ..., amplitude [m]; only the probes see it.
+    unbalance : float
+        Mass times eccentricity [kg m]: a force m e Omega^2 turning with the shaft, answered by the bearing.
+    """
+
+    runout: tuple[float, ...] = ()
+    unbalance: float = 0.0
+
+
+@dataclass(frozen=True)
+class ActuatorDefects:
+    """What the actuators do beside the command.
+
+    Attributes
+    ----------
+    harmonics : tuple of float
+        2nd, 3rd, ... harmonic as fractions of the commanded amplitude.
+    scatter : float
+        Relative scatter of the amplitude, one standard deviation.
+    cross_talk : float
+        Force across the commanded direction, with a phase of its own, as a fraction, root mean square.
+    """
+
+    harmonics: tuple[float, ...] = ()
+    scatter: float = 0.0
+    cross_talk: float = 0.0
+
+
+@dataclass(frozen=True)
+class SetPointMiss:
+    """By how much a run misses its set point, standard deviations.
+
+    Attributes
+    ----------
+    load : float
+        Relative.
+    direction : float
+        [rad]
+    speed : float
+        Relative.
+    stiffness_follows, position_follows : bool
+        Whether the truth is asked at the point that was really run, or at the set point. The mean force, the load's
+        direction and the 1X frequency always are those of the point really run.
+    """
+
+    load: float = 0.0
+    direction: float = 0.0
+    speed: float = 0.0
+    stiffness_follows: bool = True
+    position_follows: bool = True
+
+
+@dataclass(frozen=True)
+class Glitches:
+    """Bursts in which a displacement or force channel stands off by a constant.
+
+    Attributes
+    ----------
+    share : float
+        Share of the running records that have one (a second one with the same probability again).
+    shortest, longest : int
+        Samples.
+    displacement, force : float
+        Largest size [m], [N]; sizes are between 0.4 and 1 times this, either sign.
+    """
+
+    share: float = 0.0
+    shortest: int = 3
+    longest: int = 50
+    displacement: float = 65e-6
+    force: float = 4000.0
+
+
+@dataclass(frozen=True)
+class DryImperfections:
+    """What goes wrong in dry tests.
+
+    Attributes
+    ----------
+    direction : (float, float)
+        The load is off the pad's direction by an angle between these, either sign [rad].
+    side : (float, float)
+        The shaft also moves sideways by a fraction of the radial deflection between these, either sign.
+    side_start : float
+        Sideways position at no load, standard deviation [m].
+    friction : float
+        Fraction of the force that friction holds back (up) or keeps on (down).
+    contact_gap : (float, float)
+        On upper pads this much contact is missing at no load [m], gone with exp(-F / contact_load).
+    contact_load : float
+        [N]
+    push_scatter : float
+        Relative scatter of the swept load's set point in the clearance test, one standard deviation.
+    """
+
+    direction: tuple[float, float] = (0.0, 0.0)
+    side: tuple[float, float] = (0.0, 0.0)
+    side_start: float = 0.0
+    friction: float = 0.0
+    contact_gap: tuple[float, float] = (0.0, 0.0)
+    contact_load: float = 500.0
+    push_scatter: float = 0.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """All disturbances of a campaign.
+
+    Attributes
+    ----------
+    displacement, force, acceleration, temperature, speed : ChannelNoise
+    mains_frequency, mains_scatter : float
+        [Hz] and its standard deviation from run to run.
+    mains_harmonics : tuple of float
+        Pick-up at 2, 3, ... times the mains frequency, relative to the first.
+    shaft : ShaftDefects
+    actuators : ActuatorDefects
+    set_point : SetPointMiss
+    glitches : Glitches
+    dry : DryImperfections
+    bits : int or None
+        Of the converter; None: no steps, and nothing saturates.
+    """
+
+    displacement: ChannelNoise = ChannelNoise()
+    force: ChannelNoise = ChannelNoise()
+    acceleration: ChannelNoise = ChannelNoise()
+    temperature: ChannelNoise = ChannelNoise()
+    speed: ChannelNoise = ChannelNoise()
+    mains_frequency: float = 50.0
+    mains_scatter: float = 0.0
+    mains_harmonics: tuple[float, ...] = ()
+    shaft: ShaftDefects = ShaftDefects()
+    actuators: ActuatorDefects = ActuatorDefects()
+    set_point: SetPointMiss = SetPointMiss()
+    glitches: Glitches = Glitches()
+    dry: DryImperfections = DryImperfections()
+    bits: int | None = None
+
+    @classmethod
+    def none(cls) -> Noise:
+        """No disturbance at all: the records are the physics."""
+        return cls()
+
+    @classmethod
+    def like_samples(cls) -> Noise:
+        """As strong as in the sample campaigns, of every kind that they have."""
+        return cls(
+            displacement=ChannelNoise(35e-9, 7e-9, 39e-9, 0.15e-6),
+            force=ChannelNoise(2.2, 0.55, 0.44, 1.0),
+            acceleration=ChannelNoise(4e-3, 5e-4, 8e-4, 1e-3),
+            temperature=ChannelNoise(0.068, 0.023, 0.018, 0.05),
+            speed=ChannelNoise(0.126, 0.016, 0.06, 0.01),
+            mains_scatter=0.01,
+            mains_harmonics=(0.02, 0.05),
+            shaft=ShaftDefects((1.1e-6, 0.25e-6), 1.31e-3),
+            actuators=ActuatorDefects((0.02,), 0.03, 0.05),
+            set_point=SetPointMiss(0.003, radians(0.2), 0.0009),
+            glitches=Glitches(1 / 6),
+            dry=DryImperfections(
+                direction=(radians(1.0), radians(2.0)),
+                side=(0.08, 0.22),
+                side_start=2e-6,
+                friction=0.004,
+                contact_gap=(2e-6, 4e-6),
+                push_scatter=0.003,
+            ),
+            bits=16,
+        )
+
+    def scaled(self, factor: float) -> Noise:
+        """Return it with the channels' noise `factor` times as strong; shaft, actuators, dry tests as they are."""
+        names = ("displacement", "force", "acceleration", "temperature", "speed")
+        return replace(self, **{name: getattr(self, name).scaled(factor) for name in names})

@@ -1,0 +1,284 @@
+"""The test plan: which runs a campaign consists of, at which set points, how long."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import pi, radians
+from typing import Literal
+
+from rigdata.operating_point import OperatingPoint
+from rigdata.virtual_rig.truth import VirtualRigError, hz
+
+Branch = Literal["up", "down", "cycle"]
+DOWNWARD = -pi / 2
+
+
+@dataclass(frozen=True)
+class DryTest:
+    """Load steps toward one pad, no oil, no rotation.
+
+    Attributes
+    ----------
+    pad : int
+        1 for pad #1.
+    levels : tuple of float
+        Load of each step, rising [N].
+    hold : float or tuple of float
+        How long each step is held [s]; one value, or one per level in rising order.
+    ramp : float
+        From one level to the next [s].
+    start : float
+        Load before the first step (after the last, going down) [N].
+    branch : {"up", "down", "cycle"}
+    overshoot : float
+        The load overshoots each step by this fraction of it, gone within some tenths of a second.
+    load_drift : float
+        Relative change of the load during a hold [1/s]: leakage of the hydraulics is negative.
+    """
+
+    pad: int
+    levels: tuple[float, ...] = tuple(500.0 * (i + 1) for i in range(10))
+    hold: float | tuple[float, ...] = 1.0
+    ramp: float = 0.3
+    start: float = 250.0
+    branch: Branch = "up"
+    overshoot: float = 0.0
+    load_drift: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.levels or list(self.levels) != sorted(set(self.levels)) or self.start < 0:
+            raise VirtualRigError("levels must rise and start must not be negative")
+        if isinstance(self.hold, tuple) and len(self.hold) != len(self.levels):
+            raise VirtualRigError(f"hold has {len(self.hold)} values for {len(self.levels)} levels")
+        if min(self.holds) <= 0 or self.ramp <= 0:
+            raise VirtualRigError("hold and ramp must be positive")
+        if self.branch not in ("up", "down", "cycle"):
+            raise VirtualRigError(f'branch must be "up", "down" or "cycle", got {self.branch!r}')
+
+    @property
+    def holds(self) -> tuple[float, ...]:
+        """Hold time of each level [s]."""
+        return self.hold if isinstance(self.hold, tuple) else (self.hold,) * len(self.levels)
+
+
+@dataclass(frozen=True)
+class ClearanceSweep:
+    """A small load swept once around, no oil, no rotation.
+
+    Attributes
+    ----------
+    push : float
+        [N]
+    seconds : float
+        For one turn.
+    start : float
+        First direction of the load [rad].
+    slide_lag, slide_width : float
+        The shaft slides from one corner of the polygon to the next when the load has passed the pad between
+        them by this angle, over about this angle [rad]: friction.
+    """
+
+    push: float = 200.0
+    seconds: float = 20.0
+    start: float = 0.0
+    slide_lag: float = radians(5.0)
+    slide_width: float = radians(3.0)
+
+    def __post_init__(self) -> None:
+        if self.push <= 0 or self.seconds <= 0 or self.slide_width <= 0:
+            raise VirtualRigError("push, seconds and slide_width must be positive")
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Sample rates [Hz] and record lengths [s]."""
+
+    dynamic_rate: float = 1000.0
+    dynamic_seconds: float = 2.0
+    locus_seconds: float = 1.0
+    dry_rate: float = 500.0
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One run of the plan.
+
+    Attributes
+    ----------
+    id : str
+    kind : {"dynamic", "locus", "dry_pivot", "clearance"}
+    rate : float
+        [Hz]
+    point : OperatingPoint or None
+        Set point; None in dry tests.
+    direction : float or None
+        Of the excitation, or of the load in a dry test [rad].
+    lines : tuple of (float, float)
+        What the actuators excite: frequency [rad/s] and amplitude [N].
+    record : str
+        Id of the run whose record this is: runs at several frequencies can share one.
+    test : DryTest or ClearanceSweep or None
+    seconds : float
+        Record length of a running test.
+    """
+
+    id: str
+    kind: Literal["dynamic", "locus", "dry_pivot", "clearance"]
+    rate: float
+    point: OperatingPoint | None = None
+    direction: float | None = None
+    lines: tuple[tuple[float, float], ...] = ()
+    record: str = ""
+    test: DryTest | ClearanceSweep | None = None
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class RigPlan:
+    """A whole test series.
+
+    Attributes
+    ----------
+    dynamic : tuple of OperatingPoint
+        Set points with their excitation frequency.
+    directions : tuple of float
+        Excitation directions at every one of them [rad].
+    dynamic_fraction : float
+        Dynamic load / static load.
+    repeats : int
+        Records per point and direction.
+    joint_frequencies : bool
+        Excite all frequencies of one load and speed at once, in one record, the root mean square kept: each
+        line gets 1/sqrt(n) of the amplitude, and the runs of the n frequencies share the record.
+    locus : tuple of OperatingPoint
+    dry : tuple of DryTest
+    clearance : tuple of ClearanceSweep
+    timing : Timing
+    """
+
+    dynamic: tuple[OperatingPoint, ...] = ()
+    directions: tuple[float, ...] = tuple(radians(30.0 * i) for i in range(6))
+    dynamic_fraction: float = 0.1
+    repeats: int = 1
+    joint_frequencies: bool = False
+    locus: tuple[OperatingPoint, ...] = ()
+    dry: tuple[DryTest, ...] = ()
+    clearance: tuple[ClearanceSweep, ...] = ()
+    timing: Timing = Timing()
+
+    @classmethod
+    def like_paper(cls) -> RigPlan:
+        """Six loads at 25 Hz, six frequencies at 5 kN, 20 locus directions, five dry tests, one sweep."""
+        loads = (2500.0, 3750.0, 5000.0, 6250.0, 7500.0, 8750.0)
+        points = {(load, 25.0) for load in loads} | {(5000.0, f) for f in (10.0, 20.0, 30.0, 40.0, 50.0)}
+        return cls(
+            dynamic=operating_points(sorted(points)),
+            locus=locus_points(20),
+            dry=tuple(DryTest(pad) for pad in range(1, 6)),
+            clearance=(ClearanceSweep(),),
+        )
+
+    @classmethod
+    def short(cls) -> RigPlan:
+        """Three loads at 25 Hz, ten locus directions, five dry tests, one sweep: a campaign for a demo."""
+        return cls(
+            dynamic=operating_points([(2500.0, 25.0), (5000.0, 25.0), (8750.0, 25.0)]),
+            locus=locus_points(10),
+            dry=tuple(DryTest(pad) for pad in range(1, 6)),
+            clearance=(ClearanceSweep(),),
+        )
+
+    def runs(self, pivot_angles: Sequence[float]) -> tuple[PlannedRun, ...]:
+        """All runs in order; `pivot_angles` [rad] give the dry tests their directions."""
+        runs = (
+            *self._dynamic_runs(),
+            *self._locus_runs(),
+            *self._dry_runs(pivot_angles),
+            *self._clearance_runs(),
+        )
+        ids = [run.id for run in runs]
+        twice = sorted({i for i in ids if ids.count(i) > 1}) if len(set(ids)) < len(ids) else []
+        if twice:
+            raise VirtualRigError(f"the plan has two runs with the id {twice[0]!r}; every test only once")
+        if not runs:
+            raise VirtualRigError("the plan is empty; give it at least one test")
+        return runs
+
+    def _dynamic_runs(self) -> Iterable[PlannedRun]:
+        for point in self.dynamic:
+            together = [p for p in self.dynamic if _unexcited(p) == _unexcited(point)]
+            if not self.joint_frequencies:
+                together = [point]
+            amplitude = self.dynamic_fraction * point.static_load / len(together) ** 0.5
+            for number, direction in enumerate(self.directions, 1):
+                for repeat in range(1, self.repeats + 1):
+                    tail = f"-{number:02d}" + (f"-r{repeat}" if self.repeats > 1 else "")
+                    yield PlannedRun(
+                        id=f"d-{self._name(point)}-{point.excitation_hz:g}{tail}",
+                        kind="dynamic",
+                        rate=self.timing.dynamic_rate,
+                        point=point,
+                        direction=direction,
+                        lines=tuple((p.excitation, amplitude) for p in together),
+                        record=f"d-{self._name(point)}-{together[0].excitation_hz:g}{tail}",
+                        seconds=self.timing.dynamic_seconds,
+                    )
+
+    def _locus_runs(self) -> Iterable[PlannedRun]:
+        for number, point in enumerate(self.locus, 1):
+            name = f"l-{_load_name(point)}-{number:02d}"
+            yield PlannedRun(
+                id=name,
+                kind="locus",
+                rate=self.timing.dynamic_rate,
+                point=point,
+                record=name,
+                seconds=self.timing.locus_seconds,
+            )
+
+    def _dry_runs(self, pivot_angles: Sequence[float]) -> Iterable[PlannedRun]:
+        for test in self.dry:
+            if not 1 <= test.pad <= len(pivot_angles):
+                raise VirtualRigError(f"dry test on pad {test.pad}: the bearing has pads 1 to {len(pivot_angles)}")
+            name = f"p-{test.pad}-{test.branch}"
+            angle = pivot_angles[test.pad - 1]
+            yield PlannedRun(
+                id=name, kind="dry_pivot", rate=self.timing.dry_rate, direction=angle, record=name, test=test
+            )
+
+    def _clearance_runs(self) -> Iterable[PlannedRun]:
+        for number, sweep in enumerate(self.clearance, 1):
+            name = f"c-{number}"
+            yield PlannedRun(id=name, kind="clearance", rate=self.timing.dry_rate, record=name, test=sweep)
+
+    def _name(self, point: OperatingPoint) -> str:
+        """Load, and whatever else tells the points of this plan apart."""
+        name = _load_name(point)
+        if len({p.static_load_direction for p in self.dynamic}) > 1:
+            name += f"-w{point.static_load_direction_deg:g}"
+        if len({p.shaft_speed for p in self.dynamic}) > 1:
+            name += f"-n{point.shaft_speed_hz:g}"
+        return name
+
+
+def operating_points(
+    pairs: Iterable[tuple[float, float]], direction: float = DOWNWARD, speed: float = hz(22.0)
+) -> tuple[OperatingPoint, ...]:
+    """Make set points of (load [N], excitation [Hz]) at one load direction [rad] and speed [rad/s]."""
+    return tuple(OperatingPoint(load, direction, speed, hz(frequency)) for load, frequency in pairs)
+
+
+def locus_points(
+    count: int, load: float = 5000.0, first: float = DOWNWARD, speed: float = hz(22.0)
+) -> tuple[OperatingPoint, ...]:
+    """Give `count` directions of one load [N], evenly all around, counter-clockwise from `first` [rad]."""
+    return tuple(OperatingPoint(load, first + 2 * pi * i / count, speed) for i in range(count))
+
+
+def _unexcited(point: OperatingPoint) -> tuple[float, float, float]:
+    return point.static_load, point.static_load_direction, point.shaft_speed
+
+
+def _load_name(point: OperatingPoint) -> str:
+    return f"{point.static_load:07.1f}" if point.static_load % 1 else f"{point.static_load:05.0f}"

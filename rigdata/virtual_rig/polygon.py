@@ -1,0 +1,95 @@
+"""The clearance test: a small load swept once around moves the shaft along the sides of a polygon."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigdata.virtual_rig.chance import stream
+from rigdata.virtual_rig.motion import RunPhysics, SlowMotion
+from rigdata.virtual_rig.noise import Noise
+from rigdata.virtual_rig.plan import ClearanceSweep, PlannedRun
+from rigdata.virtual_rig.truth import FloatArray, RigTruth, VirtualRigError
+
+
+def clearance_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> RunPhysics:
+    """Physics of a clearance sweep."""
+    sweep = run.test
+    if not isinstance(sweep, ClearanceSweep):
+        raise VirtualRigError(f"run {run.id} is not a clearance sweep")
+    rng = stream(seed, run.record, "dry")
+    push = sweep.push * (1 + noise.dry.push_scatter * rng.standard_normal())
+    time = np.arange(round(sweep.seconds * run.rate)) / run.rate
+    direction = sweep.start + 2 * np.pi * time / sweep.seconds
+    position = swept_position(truth, push, direction, sweep.slide_lag, sweep.slide_width)
+    load = push * np.stack([np.cos(direction), np.sin(direction)], axis=1)
+    cold = np.full(len(truth.pivot_angles), truth.cold_temperature)
+    return RunPhysics(time, SlowMotion(time, position, load, cold), {"push_N": push})
+
+
+def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: float, width: float) -> FloatArray:
+    """Shaft position (n, 2) [m] under a load `push` [N] toward `direction` (n,) [rad].
+
+    The shaft rests in the corner between the two pads that the load points between; each pivot carries its share
+    of the load and gives by its own law. It slides along a pad's side to the next corner when the load has
+    passed that pad by `lag`, over about `width` (friction). At the pad itself its pivot carries all the load:
+    there the side stands at clearance + deflection(push).
+    """
+    pads = _sides(truth)
+    normals = np.array([[np.cos(truth.pivot_angles[k]), np.sin(truth.pivot_angles[k])] for k in pads])
+    total = np.zeros((len(direction), 2))
+    weight = np.zeros(len(direction))
+    for i, pad in enumerate(pads):
+        after = pads[(i + 1) % len(pads)]
+        here, there = truth.pivot_angles[pad], truth.pivot_angles[after]
+        gap = (there - here) % (2 * np.pi)
+        beyond = (direction - here - lag + np.pi) % (2 * np.pi) - np.pi
+        left = (there + lag - direction + np.pi) % (2 * np.pi) - np.pi
+        share = 0.25 * (1 + np.tanh(beyond / width)) * (1 + np.tanh(left / width))
+        turned = np.clip((direction - here + np.pi) % (2 * np.pi) - np.pi, 0.0, gap)
+        forces = push * np.stack([np.sin(gap - turned), np.sin(turned)]) / np.sin(gap)
+        reach = np.stack([truth.clearance[k] + truth.deflection(k + 1, f) for k, f in zip((pad, after), forces)])
+        corner = np.linalg.solve(np.stack([normals[i], normals[(i + 1) % len(pads)]]), reach).T
+        total += share[:, None] * corner
+        weight += share
+    return total / weight[:, None]
+
+
+def corners(truth: RigTruth) -> FloatArray:
+    """Corners (n_sides, 2) [m] of the cold polygon without load, counter-clockwise."""
+    pads = _sides(truth)
+    return np.array([_corner(truth, k, pads[(i + 1) % len(pads)]) for i, k in enumerate(pads)])
+
+
+def _sides(truth: RigTruth) -> list[int]:
+    """Pads in counter-clockwise order, less those that the shaft cannot touch between their neighbours."""
+    pads = sorted(range(len(truth.pivot_angles)), key=lambda k: truth.pivot_angles[k] % (2 * np.pi))
+    removed = True
+    while removed and len(pads) > 3:
+        removed = False
+        for i, k in enumerate(pads):
+            before, after = pads[i - 1], pads[(i + 1) % len(pads)]
+            if (truth.pivot_angles[after] - truth.pivot_angles[before]) % (2 * np.pi) >= np.pi:
+                continue
+            reach = _corner(truth, before, after) @ _normal(truth, k)
+            if reach <= truth.clearance[k]:
+                pads.remove(k)
+                removed = True
+                break
+    spans = [
+        (truth.pivot_angles[pads[(i + 1) % len(pads)]] - truth.pivot_angles[k]) % (2 * np.pi)
+        for i, k in enumerate(pads)
+    ]
+    if max(spans) >= np.pi - 1e-6:
+        raise VirtualRigError("the pads leave half the circle open: the shaft would fall out of the bearing")
+    return pads
+
+
+def _corner(truth: RigTruth, first: int, second: int) -> FloatArray:
+    normals = np.stack([_normal(truth, first), _normal(truth, second)])
+    reach = np.array([truth.clearance[first], truth.clearance[second]])
+    return np.asarray(np.linalg.solve(normals, reach), dtype=float)
+
+
+def _normal(truth: RigTruth, pad: int) -> FloatArray:
+    angle = truth.pivot_angles[pad]
+    return np.array([np.cos(angle), np.sin(angle)])

@@ -1,0 +1,141 @@
+"""A virtual rig: truth, plan, instruments, noise and faults put together; runs are simulated one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from rigdata.virtual_rig.chance import stream
+from rigdata.virtual_rig.dry import dry_physics
+from rigdata.virtual_rig.faults import Fault, check_faults, faulty_instruments, spoil_record
+from rigdata.virtual_rig.instruments import Instruments
+from rigdata.virtual_rig.motion import RunPhysics
+from rigdata.virtual_rig.noise import Noise
+from rigdata.virtual_rig.plan import PlannedRun, RigPlan
+from rigdata.virtual_rig.polygon import clearance_physics
+from rigdata.virtual_rig.running import running_physics
+from rigdata.virtual_rig.sensing import (
+    Glitch,
+    Readings,
+    add_glitches,
+    analogue_readings,
+    converted,
+    draw_glitches,
+)
+from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
+
+
+@dataclass(frozen=True)
+class SimulatedRun:
+    """One record, and what is in it.
+
+    Attributes
+    ----------
+    run : PlannedRun
+    readings : Readings
+        As the recorder stored them.
+    physics : RunPhysics
+        What really happened.
+    glitches : tuple of Glitch
+    """
+
+    run: PlannedRun
+    readings: Readings = field(repr=False)
+    physics: RunPhysics = field(repr=False)
+    glitches: tuple[Glitch, ...] = ()
+
+
+@dataclass(frozen=True)
+class VirtualRig:
+    """Everything that determines a campaign, to the last bit.
+
+    Attributes
+    ----------
+    truth : RigTruth
+    plan : RigPlan
+    instruments : Instruments
+    noise : Noise
+    faults : tuple of Fault
+    seed : int
+        Each run and purpose draws from a stream of its own: more runs, other noise or a fault leave the
+        rest of the campaign as it was.
+    campaign : str
+        Its id.
+    description : str
+        Free text for the manifest; whoever hides an effect must not tell here.
+    """
+
+    truth: RigTruth
+    plan: RigPlan = field(default_factory=RigPlan.like_paper)
+    instruments: Instruments = field(default_factory=Instruments.like_paper)
+    noise: Noise = field(default_factory=Noise.like_samples)
+    faults: tuple[Fault, ...] = ()
+    seed: int = 0
+    campaign: str = "virtual"
+    description: str = "computed data from a virtual rig"
+
+    def __post_init__(self) -> None:
+        pads = {s.pad for s in self.instruments.of("temperature")}
+        if any(p is None or not 1 <= p <= len(self.truth.pivot_angles) for p in pads):
+            raise VirtualRigError(
+                f"temperature sensors stand in pads {sorted(map(str, pads))}, but the bearing has pads 1 to "
+                f"{len(self.truth.pivot_angles)}"
+            )
+        if self.faults:
+            check_faults(self.faults, [r.id for r in self.runs()], [s.name for s in self.instruments.sensors])
+
+    def runs(self) -> tuple[PlannedRun, ...]:
+        """All runs, in the order of the test."""
+        return self.plan.runs(self.truth.pivot_angles)
+
+    def records(self) -> tuple[PlannedRun, ...]:
+        """The runs that have a record of their own, in order; others share one of these."""
+        return tuple(run for run in self.runs() if run.record == run.id)
+
+    def simulate(self, run_id: str) -> SimulatedRun:
+        """Make the record of one run (or the one that it shares)."""
+        runs = {run.id: run for run in self.runs()}
+        if run_id not in runs:
+            raise VirtualRigError(f"no run {run_id!r} in the plan")
+        return self._simulate(runs[runs[run_id].record])
+
+    def simulate_all(self) -> Iterator[SimulatedRun]:
+        """Make every record, one after the other."""
+        for run in self.records():
+            yield self._simulate(run)
+
+    def faults_of(self, record: str) -> tuple[Fault, ...]:
+        """Faults that strike one of the runs of a record, made to strike it."""
+        members = [run.id for run in self.runs() if run.record == record]
+        return tuple(replace(f, run="*") for f in self.faults if any(f.strikes(member) for member in members))
+
+    def _simulate(self, run: PlannedRun) -> SimulatedRun:
+        faults = self.faults_of(run.record) if self.faults else ()
+        for fault in faults:
+            if fault.kind == "duplicate_run" and fault.other != run.id:
+                return replace(self.simulate(fault.other or run.id), run=run)
+            if fault.kind == "missing_excitation":
+                run = replace(run, lines=())
+        instruments = faulty_instruments(self.instruments, faults, run.id)
+        physics = self._physics(run, instruments)
+        columns = analogue_readings(physics, instruments, self.noise, self.seed, run.id)
+        glitches = self._glitches(run, instruments, len(physics.time))
+        add_glitches(columns, instruments, glitches)
+        columns = {s.name: converted(columns[s.name], s, self.noise.bits) for s in instruments.sensors}
+        readings = Readings(physics.time, columns, run.rate)
+        if faults:
+            rng = stream(self.seed, run.id, "faults")
+            readings = spoil_record(readings, instruments, faults, run.id, rng)
+        return SimulatedRun(run, readings, physics, glitches)
+
+    def _physics(self, run: PlannedRun, instruments: Instruments) -> RunPhysics:
+        if run.kind == "dry_pivot":
+            return dry_physics(run, self.truth, self.noise, self.seed)
+        if run.kind == "clearance":
+            return clearance_physics(run, self.truth, self.noise, self.seed)
+        return running_physics(run, self.truth, instruments, self.noise, self.seed)
+
+    def _glitches(self, run: PlannedRun, instruments: Instruments, samples: int) -> tuple[Glitch, ...]:
+        if run.kind not in ("dynamic", "locus"):
+            return ()
+        return draw_glitches(instruments, self.noise, samples, self.seed, run.id)

@@ -1,0 +1,152 @@
+"""What the rig really does: the physics that goes into a virtual campaign, as plain numbers and callables.
+
+The generator never asks a bearing model (`rigdata` may not import one): whoever calls it hands in the dynamic
+stiffness, the mean position, the temperatures and the pivot law, from a model or from thin air.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.operating_point import OperatingPoint
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+StiffnessLaw = Callable[[OperatingPoint], Any]
+PositionLaw = Callable[[OperatingPoint], Any]
+TemperatureLaw = Callable[[OperatingPoint], Any]
+DeflectionLaw = Callable[[int, FloatArray], Any]
+
+FIVE_PADS = tuple(np.radians([-90.0, -18.0, 54.0, 126.0, 198.0]).tolist())
+
+
+class VirtualRigError(ValueError):
+    """The virtual rig was asked for something it cannot do; says what and how to mend it."""
+
+
+@dataclass(frozen=True)
+class RigTruth:
+    """The physics of one virtual test bearing.
+
+    Attributes
+    ----------
+    stiffness : callable(OperatingPoint) -> (2, 2) complex
+        Dynamic stiffness H(point.excitation) = K + i omega C [N/m], rows force, columns displacement
+        (Eq. 13: dF_oil = H d). It is also asked at running speed (unbalance) and at the actuators'
+        harmonics. Consecutive questions often differ in `excitation` only: cache the equilibrium.
+    position : callable(OperatingPoint) -> (2,)
+        Mean shaft position from the bearing centre [m].
+    temperature : callable(OperatingPoint) -> (n_pads,)
+        Film temperature at the sensors [degC].
+    pivot_deflection : callable(pad, load) -> (n,)
+        Deflection [m] of pivot `pad` (1 is pad #1) under each `load` (n,) >= 0 [N]; monotone, 0 at 0.
+        Whatever else gives way between probes and pad in a dry test (the housing) belongs in it.
+    pivot_angles : tuple of float
+        [rad], counter-clockwise from +X, pad #1 first.
+    clearance : tuple of float
+        Assembled radial clearance of each pad, cold [m].
+    bearing_name : str
+        File name under which the bearing's description is stored.
+    bearing_text : str
+        The bearing file, a text to `rigdata`.
+    cold_temperature : float
+        Of everything in the dry tests [degC].
+    """
+
+    stiffness: StiffnessLaw = field(repr=False)
+    position: PositionLaw = field(repr=False)
+    temperature: TemperatureLaw = field(repr=False)
+    pivot_deflection: DeflectionLaw = field(repr=False)
+    pivot_angles: tuple[float, ...] = FIVE_PADS
+    clearance: tuple[float, ...] = (80e-6,) * 5
+    bearing_name: str = "bearing.toml"
+    bearing_text: str = field(default="", repr=False)
+    cold_temperature: float = 24.0
+
+    def __post_init__(self) -> None:
+        if len(self.clearance) != len(self.pivot_angles):
+            raise VirtualRigError(
+                f"clearance has {len(self.clearance)} values for {len(self.pivot_angles)} pivot_angles; "
+                "give one clearance per pad"
+            )
+        if len(self.pivot_angles) < 3:
+            raise VirtualRigError("a bearing needs at least three pads to hold its shaft")
+        if min(self.clearance) <= 0:
+            raise VirtualRigError("every clearance must be positive")
+        if "/" in self.bearing_name or "\\" in self.bearing_name or self.bearing_name.startswith("."):
+            raise VirtualRigError(f"bearing_name must be a plain file name, got {self.bearing_name!r}")
+
+    @classmethod
+    def constant(cls, k: Any, c: Any, pivot_stiffness: float | Sequence[float] = 6e8, **fields: Any) -> RigTruth:
+        """Make a truth with one K and C at all points: a linear bearing.
+
+        Parameters
+        ----------
+        k, c : (2, 2) array_like
+            Stiffness [N/m] and damping [N s/m].
+        pivot_stiffness : float or (n_pads,)
+            Linear pivots [N/m].
+        **fields
+            Any other attribute of the class, to replace what the linear bearing gives.
+        """
+        stiffness = np.array(k, dtype=float)
+        damping = np.array(c, dtype=float)
+        angles = fields.get("pivot_angles", FIVE_PADS)
+        pivots = np.broadcast_to(np.asarray(pivot_stiffness, dtype=float), (len(angles),))
+        base = cls(
+            stiffness=lambda point: stiffness + 1j * point.excitation * damping,
+            position=lambda point: np.linalg.solve(stiffness, load_vector(point)),
+            temperature=lambda point: np.full(len(angles), 45.0 + point.static_load / 2e3),
+            pivot_deflection=lambda pad, load: load / pivots[pad - 1],
+            pivot_angles=angles,
+            clearance=fields.get("clearance", (80e-6,) * len(angles)),
+            bearing_text='schema = "tpjb-bearing/1"\nname = "linear test bearing"\n',
+        )
+        return replace(base, **fields)
+
+    def h(self, point: OperatingPoint) -> ComplexArray:
+        """Dynamic stiffness at a point, (2, 2) complex [N/m], checked."""
+        h = np.asarray(self.stiffness(point), dtype=complex)
+        if h.shape != (2, 2) or not np.isfinite(h).all():
+            raise VirtualRigError(f"stiffness({point}) must be (2, 2) finite complex, got shape {h.shape}: {h}")
+        if np.linalg.cond(h) > 1e8:
+            raise VirtualRigError(f"stiffness({point}) is singular: the shaft would move without bound")
+        return h
+
+    def centre(self, point: OperatingPoint) -> FloatArray:
+        """Mean shaft position at a point, (2,) [m], checked."""
+        return _checked(self.position(point), (2,), f"position({point})")
+
+    def temperatures(self, point: OperatingPoint) -> FloatArray:
+        """Film temperatures at a point, (n_pads,) [degC], checked."""
+        return _checked(self.temperature(point), (len(self.pivot_angles),), f"temperature({point})")
+
+    def deflection(self, pad: int, load: FloatArray) -> FloatArray:
+        """Pivot deflection of `pad` (1 is pad #1) under `load` (n,) [N] -> (n,) [m], checked; 0 where it lifts off."""
+        pushed = np.maximum(load, 0.0)
+        return _checked(self.pivot_deflection(pad, pushed), pushed.shape, f"pivot_deflection({pad}, load)")
+
+
+def load_vector(point: OperatingPoint) -> FloatArray:
+    """Static load of a point as (2,) [N]: what pushes the shaft, and what the film puts on the housing."""
+    angle = point.static_load_direction
+    return point.static_load * np.array([np.cos(angle), np.sin(angle)])
+
+
+def hz(frequency: float) -> float:
+    """Frequency in Hz as rad/s."""
+    return 2 * pi * frequency
+
+
+def _checked(values: Any, shape: tuple[int, ...], what: str) -> FloatArray:
+    array = np.asarray(values, dtype=float)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise VirtualRigError(f"{what} must be finite with shape {shape}, got shape {array.shape}")
+    return array
