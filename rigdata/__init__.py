@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rigdata.calibration import Channel
-    from rigdata.campaign import Campaign, Run, load_campaign
+    from rigdata.campaign import Campaign, load_campaign
     from rigdata.checks import check_campaign
     from rigdata.operating_point import OperatingPoint
     from rigdata.problem import Problem, RigDataError
     from rigdata.record import Record, VectorRecord
+    from rigdata.run import Run
 
 _HOMES = {
     "Campaign": "campaign",
@@ -28,7 +29,7 @@ _HOMES = {
     "Problem": "problem",
     "Record": "record",
     "RigDataError": "problem",
-    "Run": "campaign",
+    "Run": "run",
     "VectorRecord": "record",
     "check_campaign": "checks",
     "load_campaign": "campaign",

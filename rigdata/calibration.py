@@ -140,9 +140,7 @@ def reading_gain(
     return sensitivity_gain(sensitivity, unit, dimension)
 
 
-def _bridge_gain(
-    dimension: str, unit: str, sensitivity: str, full_scale: object, excitation: object
-) -> float:
+def _bridge_gain(dimension: str, unit: str, sensitivity: str, full_scale: object, excitation: object) -> float:
     ratio = parse_quantity(sensitivity, "ratio")
     if full_scale is None:
         raise UnitError(f"a sensitivity in V/V ({sensitivity!r}) needs full_scale")

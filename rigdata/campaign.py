@@ -1,4 +1,4 @@
-"""A campaign and its runs: lazy, calibrated access, channel by channel."""
+"""A campaign: its manifest read and checked, its runs ready to be read lazily."""
 
 from __future__ import annotations
 
@@ -8,183 +8,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
 from rigdata.calibration import Channel
 from rigdata.manifest import MAX_MANIFEST, Manifest, parse_manifest
 from rigdata.manifest_runs import RunEntry
-from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import RunReader
-from rigdata.record import Record, VectorRecord
+from rigdata.run import Run
 from rigdata.safe_path import inside
-from rigdata.vector import solve_vector
 
 MANIFEST_NAME = "campaign.toml"
 HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
 _MAX_BEARING = 2**20
-
-
-@dataclass(frozen=True)
-class Temperature:
-    """Where a temperature channel sits.
-
-    Attributes
-    ----------
-    channel : str
-    pad : int or None
-    position : float or None
-        Fraction of the pad's arc from its leading edge.
-    """
-
-    channel: str
-    pad: int | None
-    position: float | None
-
-
-@dataclass(frozen=True)
-class Run:
-    """One test run; its samples are read when they are asked for.
-
-    Attributes
-    ----------
-    id, kind : str
-        Kind is ``"dynamic"``, ``"dry_pivot"``, ``"locus"`` or ``"clearance"``.
-    point : OperatingPoint
-        Set points, SI.
-    excitation_direction : float or None
-        [rad]
-    pad : int or None
-        Pad loaded in a dry run, from 1.
-    branch : str
-        ``"up"``, ``"down"`` or ``"cycle"``.
-    channels : mapping of str to Channel
-        Those with a quantity (not ``ignore``).
-    stated : frozenset of str
-        Keys that the manifest gives for this run.
-    """
-
-    id: str
-    kind: str
-    point: OperatingPoint
-    excitation_direction: float | None
-    pad: int | None
-    branch: str
-    channels: Mapping[str, Channel] = field(repr=False)
-    stated: frozenset[str] = field(repr=False)
-    reader: RunReader = field(repr=False, compare=False)
-
-    @property
-    def file(self) -> str:
-        """Name of the file, as the user knows it."""
-        return self.reader.file
-
-    @property
-    def length(self) -> int:
-        """Samples per channel."""
-        return self.reader.length()
-
-    @property
-    def sample_rate(self) -> float:
-        """Nominal sample rate [Hz]: time column or HDF5 attribute, else the run's, else the campaign's."""
-        return self.reader.rate()
-
-    def _slice(self, start: int | None, stop: int | None) -> tuple[int, int]:
-        length = self.length
-        first, last, _ = slice(start, stop).indices(length)
-        return first, max(first, last)
-
-    def _error(self, place: str, what: str, cure: str) -> RigDataError:
-        return RigDataError(Problem("error", self.file, place, what, cure, self.id))
-
-    def record(self, name: str, start: int | None = None, stop: int | None = None) -> Record:
-        """One channel, calibrated.
-
-        Parameters
-        ----------
-        name : str
-            Channel name of the manifest.
-        start, stop : int, optional
-            Samples, as in a Python slice; default all.
-
-        Returns
-        -------
-        Record
-            SI values (stop - start,).
-
-        Raises
-        ------
-        RigDataError
-            The manifest has no such channel, or the file cannot give it.
-        """
-        channel = self.channels.get(name)
-        if channel is None:
-            known = ", ".join(self.channels)
-            raise self._error(f"channel {name}", "is not described in the manifest", f"Described: {known}")
-        first, last = self._slice(start, stop)
-        (reading,) = self.reader.read([name], first, last)
-        return Record(
-            name=name,
-            quantity=channel.quantity,
-            values=channel.to_si(reading),
-            time=self.reader.time(first, last),
-            rate=self.sample_rate,
-            axis=channel.axis,
-        )
-
-    def vector(self, quantity: str, start: int | None = None, stop: int | None = None) -> VectorRecord:
-        """X and Y of `quantity`, from its channels at any two different angles.
-
-        Parameters
-        ----------
-        quantity : str
-            ``"displacement"``, ``"force"`` or ``"acceleration"``.
-        start, stop : int, optional
-            Samples, as in a Python slice; default all.
-
-        Returns
-        -------
-        VectorRecord
-            values (n, 2): solves ``[cos a_i, sin a_i] . (X, Y) = reading_i``; by least squares where there
-            are more than two channels. NaN where fewer than two directions have a value.
-
-        Raises
-        ------
-        RigDataError
-            Fewer than two channels, all of them along one line, or the file cannot give them.
-        """
-        chosen = [c for c in self.channels.values() if c.quantity == quantity and c.axis is not None]
-        names = tuple(c.name for c in chosen)
-        if len(chosen) < 2:
-            cure = f"Describe two {quantity} channels with different axes in the manifest"
-            raise self._error(f"quantity {quantity}", f"has {len(chosen)} channels, two are needed", cure)
-        axes = np.array([c.axis for c in chosen])
-        if not np.any(np.abs(np.sin(axes - axes[0])) > 0.05):
-            cure = "Two channels at different angles (3 deg apart or more) are needed; check their axis"
-            raise self._error(f"channels {', '.join(names)}", "all measure along one line", cure)
-        first, last = self._slice(start, stop)
-        readings = self.reader.read(names, first, last)
-        values = np.stack([c.to_si(r) for c, r in zip(chosen, readings)], axis=1)
-        return VectorRecord(
-            quantity=quantity,
-            values=solve_vector(axes, values),
-            time=self.reader.time(first, last),
-            rate=self.sample_rate,
-            names=names,
-        )
-
-    def temperatures(self) -> tuple[Temperature, ...]:
-        """Where the temperature channels of this run sit, by pad and position."""
-        found = [c for c in self.channels.values() if c.quantity == "temperature"]
-        found.sort(key=lambda c: (c.pad or 0, c.position or 0.0, c.name))
-        return tuple(Temperature(c.name, c.pad, c.position) for c in found)
-
-    def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
-        """The shaft speed record [rad/s], None where no channel measures it."""
-        for channel in self.channels.values():
-            if channel.quantity == "speed":
-                return self.record(channel.name, start, stop)
-        return None
 
 
 @dataclass(frozen=True)
@@ -225,7 +59,7 @@ class Campaign:
         return f"campaign {self.id}: {len(self.runs)} runs ({listed}), {len(self.channels)} channels"
 
     def run(self, run_id: str) -> Run:
-        """The run `run_id`.
+        """Find the run `run_id`.
 
         Raises
         ------
@@ -238,9 +72,7 @@ class Campaign:
         import difflib
 
         close = difflib.get_close_matches(run_id, [r.id for r in self.runs], n=1)
-        cure = (
-            f"Did you mean {close[0]!r}?" if close else f"There are {len(self.runs)} runs; see campaign.runs"
-        )
+        cure = f"Did you mean {close[0]!r}?" if close else f"There are {len(self.runs)} runs; see campaign.runs"
         raise RigDataError(Problem("error", self.path.name, "", f"no run has the id {run_id!r}", cure))
 
     def of_kind(self, kind: str) -> tuple[Run, ...]:
@@ -284,9 +116,7 @@ def load_campaign(path: str | Path) -> Campaign:
     try:
         is_folder, exists = given.is_dir(), given.exists()
     except (OSError, ValueError) as error:  # a name too long, or with a NUL
-        raise _cannot(
-            str(path)[:100], f"is not a usable path ({type(error).__name__})", "Check the path"
-        ) from error
+        raise _cannot(str(path)[:100], f"is not a usable path ({type(error).__name__})", "Check the path") from error
     if not exists:
         raise _cannot(str(path), "there is no such file or folder", "Check the path")
     if is_folder:
@@ -313,9 +143,7 @@ def _read_text(path: Path, file: str, limit: int) -> str:
         with path.open("rb") as stream:
             data = stream.read(limit + 1)
     except OSError as error:
-        raise _cannot(
-            file, f"cannot be read ({error.strerror or error})", "Check the path and its rights"
-        ) from error
+        raise _cannot(file, f"cannot be read ({error.strerror or error})", "Check the path and its rights") from error
     if len(data) > limit:
         raise _cannot(file, f"is larger than {limit >> 20} MB", "Is it the right file?")
     try:
@@ -351,9 +179,7 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
     return _finish(manifest, folder, bearing, channels, runs, problems, files)
 
 
-def _bearing_text(
-    folder: Path, manifest: Manifest, file: str, files: dict[str, Path], problems: list[Problem]
-) -> str:
+def _bearing_text(folder: Path, manifest: Manifest, file: str, files: dict[str, Path], problems: list[Problem]) -> str:
     try:
         path = inside(folder, manifest.bearing, file, "bearing")
     except RigDataError as error:
@@ -361,9 +187,7 @@ def _bearing_text(
         return ""
     if not path.is_file():
         what = f"the bearing file {manifest.bearing!r} is not in the folder"
-        problems.append(
-            Problem("warning", file, "bearing", what, "Add it, or give --bearing where one is needed")
-        )
+        problems.append(Problem("warning", file, "bearing", what, "Add it, or give --bearing where one is needed"))
         return ""
     files[manifest.bearing] = path
     try:
@@ -381,18 +205,14 @@ def _load_hdf5(path: Path) -> Campaign:
     problems: list[Problem] = []
     if not bearing or len(bearing) > _MAX_BEARING:
         cure = "Store the bearing's TOML text there, or give --bearing where one is needed"
-        problems.append(
-            Problem("warning", path.name, "root attribute bearing", "is missing or too long", cure)
-        )
+        problems.append(Problem("warning", path.name, "root attribute bearing", "is missing or too long", cure))
         bearing = ""
     channels = {n: c for n, c in manifest.channels.items() if c.quantity != "ignore"}
     clock = next((c for c in channels.values() if c.quantity == "time"), None)
     runs = []
     for entry in manifest.runs:
         rate = entry.sample_rate or manifest.sample_rate
-        reader = Hdf5Reader(
-            path, entry.id, path.name, rate, clock and clock.name, clock.slope if clock else 1.0
-        )
+        reader = Hdf5Reader(path, entry.id, path.name, rate, clock)
         runs.append(_make_run(entry, channels, reader))
     return _finish(manifest, path, bearing, channels, runs, problems, {path.name: path})
 

@@ -99,9 +99,7 @@ def parse_manifest(text: str, file: str = "campaign.toml") -> Manifest:
     top.only(_TOP, "the manifest")
     schema = top.text("schema", required=True)
     if schema is not None and schema != SCHEMA:
-        findings.error(
-            ("schema",), f"schema is {schema!r}, not {SCHEMA!r}", "Export in the format tpjb-rig/1"
-        )
+        findings.error(("schema",), f"schema is {schema!r}, not {SCHEMA!r}", "Export in the format tpjb-rig/1")
     channels = read_channels(top.subtable("channels"), findings)
     runs = read_runs(data.get("runs"), findings)
     housing = top.subtable("housing")
@@ -154,9 +152,7 @@ def _read_csv(table: Table, findings: Findings) -> CsvSpec:
         delimiter = "\t"
     for key, value, allowed in (("delimiter", delimiter, None), ("decimal", decimal, ".,")):
         if value is not None and (len(value) != 1 or (allowed and value not in allowed)):
-            findings.error(
-                ("csv", key), f"{key} is {value!r}", "Give one character" + (", . or ," if allowed else "")
-            )
+            findings.error(("csv", key), f"{key} is {value!r}", "Give one character" + (", . or ," if allowed else ""))
     if delimiter is not None and delimiter in '0123456789+-.eE"\r\n':
         findings.error(("csv", "delimiter"), f"delimiter {delimiter!r} cannot part numbers", 'Give e.g. ";"')
     if delimiter is not None and delimiter == decimal:

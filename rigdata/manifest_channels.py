@@ -45,18 +45,14 @@ def read_channels(table: Table, findings: Findings) -> dict[str, Channel]:
         if not any(p.severity == "error" for p in findings.problems[before:]) and channel is not None:
             channels[name] = channel
     if sum(c.quantity == "time" for c in channels.values()) > 1:
-        findings.error(
-            ("channels",), "more than one channel is the time", 'Set the others to quantity = "ignore"'
-        )
+        findings.error(("channels",), "more than one channel is the time", 'Set the others to quantity = "ignore"')
     return channels
 
 
 def _read_channel(name: str, table: Table) -> Channel | None:
     table.only(_KEYS, f"[channels.{name[:40]}]")
     if not name.strip() or len(name) > 200 or not name.isprintable() or "/" in name or name in {".", ".."}:
-        table.findings.error(
-            table.path, f"channel name {shown(name)} cannot be used", "Use letters and digits"
-        )
+        table.findings.error(table.path, f"channel name {shown(name)} cannot be used", "Use letters and digits")
         return None
     quantity = table.choice("quantity", _QUANTITIES, required=True)
     if quantity is None or quantity == "ignore":
@@ -105,9 +101,7 @@ def _calibration(table: Table, quantity: str, unit: str | None) -> tuple[float |
         return None, None
     data = table.data
     try:
-        gain = reading_gain(
-            quantity, unit, data.get("sensitivity"), data.get("full_scale"), data.get("excitation")
-        )
+        gain = reading_gain(quantity, unit, data.get("sensitivity"), data.get("full_scale"), data.get("excitation"))
     except UnitError as error:
         key = "unit" if "sensitivity" not in data else "sensitivity"
         table.error(key, f"{quantity} channel: {error}", "See the channel tables of the tpjb-rig/1 format")

@@ -69,12 +69,10 @@ class Table:
         """Note every key that is not in `known`."""
         for key in self.data:
             if key not in known:
-                self.findings.error(
-                    (*self.path, key), f"unknown key {shown(key)} in {where}", nearest(key, known)
-                )
+                self.findings.error((*self.path, key), f"unknown key {shown(key)} in {where}", nearest(key, known))
 
     def subtable(self, key: str) -> Table:
-        """The table under `key`, empty where absent."""
+        """Give the table under `key`, empty where absent."""
         return Table(self.data.get(key, {}), (*self.path, key), self.findings)
 
     def error(self, key: str, what: str, cure: str) -> None:
@@ -87,7 +85,7 @@ class Table:
         return self.data.get(key)
 
     def text(self, key: str, required: bool = False) -> str | None:
-        """A string, not longer than is sane."""
+        """Give a string, not longer than is sane."""
         value = self._get(key, required, f'Add {key} = "..."')
         if value is None:
             return None
@@ -103,7 +101,7 @@ class Table:
         return value
 
     def choice(self, key: str, known: tuple[str, ...], required: bool = False) -> str | None:
-        """One of `known`."""
+        """Give one of the texts `known`."""
         value = self.text(key, required)
         if value is not None and value not in known:
             self.error(key, f"{key} {shown(value)} is unknown", nearest(value, known))
@@ -111,7 +109,7 @@ class Table:
         return value
 
     def integer(self, key: str, low: int, high: int = 10_000_000, required: bool = False) -> int | None:
-        """A whole number between `low` and `high`."""
+        """Give a whole number between `low` and `high`."""
         value = self._get(key, required, f"Add {key} = {low}")
         if value is None:
             return None
@@ -128,7 +126,7 @@ class Table:
         above: float | None = None,
         required: bool = False,
     ) -> float | None:
-        """An SI value not below `low` and greater than `above`."""
+        """Give an SI value not below `low` and greater than `above`."""
         value = self._get(key, required, f"Add {key}, a {dimension} with its unit")
         if value is None:
             return None

@@ -12,14 +12,14 @@ _MAX_NAME = 1000
 
 
 def inside(folder: Path, name: str, file: str, place: str, run: str | None = None) -> Path:
-    """Resolve `name` below `folder`.
+    r"""Resolve `name` below `folder`.
 
     Parameters
     ----------
     folder : Path
         Campaign folder.
     name : str
-        Relative path as the manifest gives it; ``\\`` counts as ``/``.
+        Relative path as the manifest gives it; ``\`` counts as ``/``.
     file, place, run : str
         Where it stands, for the message.
 

@@ -44,9 +44,7 @@ _EXAMPLES = {
     "ratio": "%",
 }
 _ZERO_CELSIUS = 273.15
-_SPELLINGS = str.maketrans(
-    {"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "\u2126": "Ω", "\u00a0": " "}
-)
+_SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "\u2126": "Ω", "\u00a0": " "})
 #: Unit names that mean something else here than in pint (where g is a gram and C a coulomb).
 _ALIASES = {"%": "percent", "degC": "kelvin", "celsius": "kelvin", "degF": "degR", "kp": "kgf"}
 _ALIASES_BY_DIMENSION = {
@@ -199,9 +197,7 @@ def unit_factor(unit: str, dimension: str) -> float:
     parsed = parse_unit(unit, dimension)
     # The radian of a speed is asked for: "22 1/s" is caught above as revolutions.
     if not parsed.same_dimension(parse_unit(SI_UNITS[dimension])):
-        raise UnitError(
-            f"unit {unit!r} is not one of {dimension}; expected something like {_example(dimension)!r}"
-        )
+        raise UnitError(f"unit {unit!r} is not one of {dimension}; expected something like {_example(dimension)!r}")
     return parsed.factor
 
 
@@ -222,9 +218,7 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
         raise UnitError(f'expected a number with a unit in quotes, like "1 {example}", got {_short(value)}')
     if not isinstance(value, str):
         if dimension != "ratio":
-            raise UnitError(
-                f'{_short(value)} has no unit; write it with one, like "{_short(value)} {example}"'
-            )
+            raise UnitError(f'{_short(value)} has no unit; write it with one, like "{_short(value)} {example}"')
         return _finite(float(value)), ""
     text = value.strip()
     match = _NUMBER.match(text)
@@ -331,6 +325,4 @@ def sensitivity_gain(value: object, signal_unit: str, dimension: str) -> float:
     if parsed.same_dimension(target * signal**-1):
         return _finite(number * parsed.factor * signal.factor)
     example = f"{signal_unit}/{_example(dimension)}"
-    raise UnitError(
-        f"{_short(value)} does not lead from {signal_unit} to {dimension}; expected like {example!r}"
-    )
+    raise UnitError(f"{_short(value)} does not lead from {signal_unit} to {dimension}; expected like {example!r}")

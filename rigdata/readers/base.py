@@ -25,22 +25,22 @@ class RunReader(Protocol):
         """Display name of the file (and the group in it)."""
 
     def names(self) -> tuple[str, ...]:
-        """Names of all columns or datasets."""
+        """List the names of all columns or datasets."""
 
     def length(self) -> int:
-        """Samples per channel."""
+        """Count the samples per channel."""
 
     def rate(self) -> float:
-        """Nominal sample rate [Hz]."""
+        """Give the nominal sample rate [Hz]."""
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of `names` in samples start..stop-1, one (stop - start,) array each."""
+        """Read raw readings of `names` in samples start..stop-1, one (stop - start,) array each."""
 
     def time(self, start: int, stop: int) -> FloatArray:
-        """Seconds of samples start..stop-1."""
+        """Give the seconds of samples start..stop-1."""
 
     def problems(self) -> tuple[Problem, ...]:
-        """What reading found that does not stop the run from being used."""
+        """Tell what reading found that does not stop the run from being used."""
 
 
 def rate_of_time(time: FloatArray) -> float:

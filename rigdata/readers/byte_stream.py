@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-#: How much of a file is looked at to find its dialect [bytes].
-HEAD = 2**20
+#: How much of a file is looked at to find its dialect; the names must stand in it [bytes].
+HEAD = 2**18
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF32_LE, "utf-32"),

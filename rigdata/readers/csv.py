@@ -36,7 +36,7 @@ class TableCache:
         return TableCache, (self._limit,)  # a worker process starts with an empty one
 
     def get(self, key: tuple[object, ...]) -> Table | None:
-        """The table under `key`, None where it is not kept."""
+        """Give the table under `key`, None where it is not kept."""
         with self._lock:
             table = self._tables.get(key)
             if table is not None:
@@ -85,7 +85,7 @@ class CsvReader:
         return RigDataError(Problem("error", self.file, place, what, cure, self.run))
 
     def _signature(self) -> tuple[object, ...]:
-        """Changes when the file does, so that the cache never serves an old one."""
+        """Make a key that changes when the file does, so that the cache never serves an old one."""
         try:
             state = self.path.stat()
         except OSError as error:
@@ -95,14 +95,12 @@ class CsvReader:
         return (self.path, state.st_size, state.st_mtime_ns)
 
     def dialect(self) -> Dialect:
-        """The dialect of the file."""
+        """Detect the dialect of the file."""
         self._signature()
         try:
             return DialectFinder(self.path, self.file, self.run, self.spec, self.channels).find()
         except OSError as error:
-            raise self._error(
-                "", f"cannot be read ({error.strerror})", "Check the rights of the file"
-            ) from error
+            raise self._error("", f"cannot be read ({error.strerror})", "Check the rights of the file") from error
 
     def names(self) -> tuple[str, ...]:
         """Names of all columns, "" where one has none."""
@@ -115,9 +113,7 @@ class CsvReader:
         table = self.cache.get(key)
         if table is None:
             dialect = self.dialect()
-            wanted = [
-                n for n in dialect.names if n in self.channels and self.channels[n].quantity != "ignore"
-            ]
+            wanted = [n for n in dialect.names if n in self.channels and self.channels[n].quantity != "ignore"]
             if large:
                 wanted = [n for n in wanted if n in names] or wanted[:1]
             table = read_table(Source(self.path, self.file, self.run, dialect), wanted)
@@ -125,7 +121,7 @@ class CsvReader:
         return table
 
     def length(self) -> int:
-        """Samples in the file."""
+        """Count the samples in the file."""
         return self._table(()).length
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
@@ -135,9 +131,7 @@ class CsvReader:
             if name not in table.columns:
                 known = [n for n in self.names() if n]
                 close = difflib.get_close_matches(name, known, n=1)
-                cure = (
-                    f"Did you mean {close[0]!r}?" if close else f"The columns are: {', '.join(known)[:200]}"
-                )
+                cure = f"Did you mean {close[0]!r}?" if close else f"The columns are: {', '.join(known)[:200]}"
                 raise self._error(f"channel {name}", "is missing in the file", cure)
         return [table.columns[n][start:stop] for n in names]
 
@@ -181,5 +175,5 @@ class CsvReader:
         return time
 
     def problems(self) -> tuple[Problem, ...]:
-        """What was mended while parsing."""
+        """Tell what was mended while parsing."""
         return self._table(()).problems

@@ -1,4 +1,4 @@
-"""The samples of one CSV file, parsed by pyarrow in blocks; what cannot be parsed is named by line and column."""
+"""The samples of one CSV file, parsed by pyarrow in blocks; bad cells are named by line and column."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Source:
     dialect: Dialect = field(repr=False)
 
     def problem(self, severity: Any, place: str, what: str, cure: str) -> Problem:
-        """A finding about this file."""
+        """Make a finding about this file."""
         return Problem(severity, self.file, place, what, cure, self.run)
 
 
@@ -262,4 +262,4 @@ def _cut_inside_last_cell(source: Source) -> bool:
 
 def _decimals(cell: str, decimal: str) -> int:
     _, mark, digits = cell.partition(decimal)
-    return len(digits) if mark else -len(cell == "")
+    return len(digits) if mark else -1

@@ -57,9 +57,7 @@ class _Header:
 class DialectFinder:
     """Finds the dialect of one file; `find` is the way in."""
 
-    def __init__(
-        self, path: Path, file: str, run: str | None, spec: CsvSpec, channels: Iterable[str]
-    ) -> None:
+    def __init__(self, path: Path, file: str, run: str | None, spec: CsvSpec, channels: Iterable[str]) -> None:
         self.path = path
         self.file = file
         self.run = run
@@ -81,7 +79,9 @@ class DialectFinder:
         raw = head_lines(self.path, encoding)
         lines = [line.decode(encoding if encoding != "utf-8-sig" else "utf-8", "replace") for line, _ in raw]
         if not any(line.strip() for line in lines):
-            raise self._error("", "the file is empty", "Export the run again")
+            empty = self.path.stat().st_size < HEAD
+            what = "the file is empty" if empty else f"no line ends within the first {HEAD >> 10} kB"
+            raise self._error("", what, "Export the run again")
         header = self._header(lines)
         self._refuse_duplicates(header)
         first = self._first_data(lines, header)
@@ -107,9 +107,7 @@ class DialectFinder:
         line = self.spec.header_line
         if line is not None and line > len(lines):
             cure = f"The names stand in line {free.line}; correct [csv] header_line"
-            raise self._error(
-                f"line {line}", f"header_line is {line}, beyond the first {len(lines)} lines", cure
-            )
+            raise self._error(f"line {line}", f"header_line is {line}, beyond the first {len(lines)} lines", cure)
         where = range(len(lines)) if line is None else range(line - 1, line)
         found = self._best(lines, _DELIMITERS if given is None else (given,), where)
         if found is not None and (given is None or found.matched >= free.matched or found.line != free.line):
@@ -122,18 +120,19 @@ class DialectFinder:
             f"delimiter {given!r} of the manifest finds {found.matched if found else 0} channel names, "
             f"{there.delimiter!r} finds {there.matched}"
         )
-        raise self._error(
-            f"line {there.line}", what, f"Set [csv] delimiter = {there.delimiter!r}, or leave it out"
-        )
+        raise self._error(f"line {there.line}", what, f"Set [csv] delimiter = {there.delimiter!r}, or leave it out")
 
     def _wanted(self) -> str:
         names = sorted(self.channels)
         return ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
 
     def _best(self, lines: list[str], delimiters: Iterable[str], where: range) -> _Header | None:
-        """The line with most of the channel names; of equals the one that numbers follow."""
+        """Find the line with most of the channel names; of equals the one that numbers follow."""
         best: tuple[tuple[int, bool], _Header] | None = None
+        complete = (len(self.channels), True)
         for number in where:
+            if not any(name in lines[number] for name in self.channels):
+                continue
             for delimiter in delimiters:
                 cells = tuple(self._name(c) for c in split_line(lines[number], delimiter))
                 matched = len(self.channels.intersection(cells))
@@ -144,10 +143,12 @@ class DialectFinder:
                 rank = (matched, followed)
                 if best is None or rank > best[0]:
                     best = (rank, _Header(number + 1, delimiter, cells, matched))
+            if best is not None and best[0] == complete:
+                break
         return None if best is None else best[1]
 
     def _name(self, cell: str) -> str:
-        """A column's name; ``X1A [V]`` counts as ``X1A`` where the manifest knows only that."""
+        """Name a column; ``X1A [V]`` counts as ``X1A`` where the manifest knows only that."""
         if cell in self.channels:
             return cell
         short = _SUFFIX.sub("", cell)
@@ -158,9 +159,7 @@ class DialectFinder:
             columns = [i + 1 for i, n in enumerate(header.names) if n == name]
             if len(columns) > 1:
                 what = f"column name {name!r} stands in columns {', '.join(map(str, columns))}"
-                raise self._error(
-                    f"line {header.line}", what, "Give every column its own name; which one counts?"
-                )
+                raise self._error(f"line {header.line}", what, "Give every column its own name; which one counts?")
 
     def _first_data(self, lines: list[str], header: _Header) -> int:
         """Index of the first data line: below the names and below lines of units."""
@@ -177,9 +176,7 @@ class DialectFinder:
             index += 1
         if index >= len(lines):
             raise self._error(f"line {header.line}", "no samples follow the names", "Export the run again")
-        raise self._error(
-            f"line {index}", "is neither names, units nor numbers", "Check [csv] delimiter and decimal"
-        )
+        raise self._error(f"line {index}", "is neither names, units nor numbers", "Check [csv] delimiter and decimal")
 
     def _decimal(self, sample: list[list[str]], delimiter: str) -> str:
         cells = [c for row in sample for c in row]
@@ -201,9 +198,7 @@ class DialectFinder:
             extra = [c for row in sample if len(row) == width for c in row[len(names) :]]
             if any(extra):
                 what = f"has {len(names)} names, but the samples have {width} cells (the first extra is {extra[0]!r})"
-                raise self._error(
-                    f"line {header.line}", what, "Check [csv] delimiter and decimal; name every column"
-                )
+                raise self._error(f"line {header.line}", what, "Check [csv] delimiter and decimal; name every column")
             return names + ("",) * (width - len(names))
         if any(names[width:]):
             what = f"has {len([n for n in names if n])} names, but the samples have {width} cells"
@@ -223,7 +218,3 @@ def split_line(line: str, delimiter: str) -> list[str]:
         except _csv.Error:
             return [c.strip() for c in line.split(delimiter)]
     return [c.strip() for c in line.split(delimiter)]
-
-
-#: How much of a file is looked at [bytes]; the names must stand in it.
-__all__ = ["HEAD", "Dialect", "DialectFinder", "split_line"]

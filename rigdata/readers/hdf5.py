@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rigdata.calibration import Channel
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, FloatArray, rate_of_time
-from rigdata.readers.hdf5_links import resolve
+from rigdata.readers.hdf5_links import has_link, resolve
 
 #: Filters that the HDF5 library brings along; any other would load foreign code.
 _FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}
@@ -92,6 +93,16 @@ def _text_attribute(handle: Any, name: str, file: str) -> str:
 
 
 @dataclass(frozen=True)
+class _Facts:
+    """What every request needs, kept until the file changes."""
+
+    signature: tuple[int, int]
+    length: int
+    rate: float | None
+    has_time: bool
+
+
+@dataclass(frozen=True)
 class Hdf5Reader:
     """One run's group in an HDF5 file; the file is opened for every request and closed again.
 
@@ -104,18 +115,16 @@ class Hdf5Reader:
         Display name of the file.
     stated_rate : float or None
         From the manifest [Hz]; the attribute ``sample_rate_hz`` wins over it.
-    time_channel : str or None
-        Dataset that holds the time.
-    time_factor : float
-        Seconds per unit of it.
+    clock : Channel or None
+        The manifest's time channel; not every file has its dataset.
     """
 
     path: Path
     run: str
     base: str
     stated_rate: float | None = None
-    time_channel: str | None = None
-    time_factor: float = 1.0
+    clock: Channel | None = field(default=None, repr=False)
+    facts: dict[str, _Facts] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def file(self) -> str:
@@ -132,9 +141,7 @@ class Hdf5Reader:
         with open_readonly(self.path, self.base, self.run) as handle:
             group = resolve(handle, f"runs/{self.run}", self.base, self.run)
             if group is None:
-                raise self._error(
-                    "", "the group is missing", "Delete the run from the manifest, or add the group"
-                )
+                raise self._error("", "the group is missing", "Delete the run from the manifest, or add the group")
             if not isinstance(group, h5py.Group):
                 raise self._error("", "is not a group", "Store one dataset per channel in a group")
             yield group
@@ -174,10 +181,21 @@ class Hdf5Reader:
         with self._group() as group:
             return tuple(group.keys())
 
-    def length(self) -> int:
-        """Samples per channel: of the first dataset of numbers."""
-        with self._group() as group:
-            return self._length(group)
+    def _known(self) -> _Facts:
+        try:
+            state = self.path.stat()
+        except OSError as error:
+            raise self._error("", "the file is not there", "Check the path") from error
+        signature = (state.st_size, state.st_mtime_ns)
+        facts = self.facts.get("")
+        if facts is None or facts.signature != signature:
+            with self._group() as group:
+                attribute = group.attrs.get("sample_rate_hz")
+                rate = None if attribute is None else self._checked_rate(attribute)
+                clock = self.clock is not None and has_link(group, self.clock.name)
+                facts = _Facts(signature, self._length(group), rate, clock)
+            self.facts[""] = facts
+        return facts
 
     def _length(self, group: Any) -> int:
         for name in group:
@@ -187,24 +205,27 @@ class Hdf5Reader:
                 continue
         raise self._error("", "the group holds no dataset of numbers", "Store one dataset per channel")
 
+    def _checked_rate(self, value: object) -> float:
+        place, cure = "attribute sample_rate_hz", "Store one positive number, in Hz"
+        try:
+            rate = float(np.asarray(value).reshape(()))
+        except (ValueError, TypeError) as error:
+            raise self._error(place, "is not a number", cure) from error
+        if not 0.0 < rate < 1e12:
+            raise self._error(place, f"is {rate}", cure)
+        return rate
+
+    def length(self) -> int:
+        """Count the samples per channel: of the first dataset of numbers."""
+        return self._known().length
+
     def rate(self) -> float:
-        """Sample rate [Hz]: the attribute, else the manifest's, else from the time dataset."""
-        with self._group() as group:
-            if "sample_rate_hz" in group.attrs:
-                value = group.attrs["sample_rate_hz"]
-                try:
-                    rate = float(np.asarray(value).reshape(()))
-                except (ValueError, TypeError) as error:
-                    raise self._error(
-                        "attribute sample_rate_hz", "is not a number", "Store a number"
-                    ) from error
-                if not 0.0 < rate < 1e12:
-                    raise self._error(
-                        "attribute sample_rate_hz", f"is {rate}", "Store a positive number in Hz"
-                    )
-                return rate
-        if self.time_channel is not None:
-            rate = rate_of_time(self.time(0, min(self.length(), 100_000)))
+        """Give the sample rate [Hz]: the attribute, else of the time dataset, else the manifest's."""
+        facts = self._known()
+        if facts.rate is not None:
+            return facts.rate
+        if facts.has_time:
+            rate = rate_of_time(self.time(0, min(facts.length, 100_000)))
             if rate > 0:
                 return rate
         if self.stated_rate is None:
@@ -228,8 +249,8 @@ class Hdf5Reader:
 
     def time(self, start: int, stop: int) -> FloatArray:
         """Seconds: the time dataset where there is one, else counted from the rate."""
-        if self.time_channel is not None:
-            return self.read([self.time_channel], start, stop)[0] * self.time_factor
+        if self.clock is not None and self._known().has_time:
+            return self.clock.to_si(self.read([self.clock.name], start, stop)[0])
         return np.arange(start, stop) / self.rate()
 
     def problems(self) -> tuple[Problem, ...]:

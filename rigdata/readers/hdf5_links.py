@@ -42,9 +42,8 @@ def resolve(start: Any, path: str, file: str, run: str | None = None) -> Any:
         if steps > _MAX_STEPS:
             raise refuse(path, "is a circle of links, or too deep")
         name = todo.pop(0)
-        link = (
-            here.get(name, getlink=True) if isinstance(here, h5py.Group) and name in _members(here) else None
-        )
+        known = isinstance(here, h5py.Group) and has_link(here, name)
+        link = here.get(name, getlink=True) if known else None
         if link is None:
             if soft:
                 raise refuse(path, "is a soft link that leads nowhere")
@@ -62,15 +61,6 @@ def resolve(start: Any, path: str, file: str, run: str | None = None) -> Any:
     return here
 
 
-class _Members:
-    """Membership by link, not by target: a dangling or external link counts and is never followed."""
-
-    def __init__(self, group: Any) -> None:
-        self._links = group.id.links
-
-    def __contains__(self, name: str) -> bool:
-        return bool(self._links.exists(name.encode("utf-8", "surrogateescape")))
-
-
-def _members(group: Any) -> _Members:
-    return _Members(group)
+def has_link(group: Any, name: str) -> bool:
+    """Whether the group has such a link: a dangling or external one counts and is never followed."""
+    return bool(group.id.links.exists(name.encode("utf-8", "surrogateescape")))

@@ -1,0 +1,177 @@
+"""One run of a campaign: lazy, calibrated access, channel by channel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigdata.calibration import Channel
+from rigdata.operating_point import OperatingPoint
+from rigdata.problem import Problem, RigDataError
+from rigdata.readers.base import RunReader
+from rigdata.record import Record, VectorRecord
+from rigdata.vector import solve_vector
+
+
+@dataclass(frozen=True)
+class Temperature:
+    """Where a temperature channel sits.
+
+    Attributes
+    ----------
+    channel : str
+    pad : int or None
+    position : float or None
+        Fraction of the pad's arc from its leading edge.
+    """
+
+    channel: str
+    pad: int | None
+    position: float | None
+
+
+@dataclass(frozen=True)
+class Run:
+    """One test run; its samples are read when they are asked for.
+
+    Attributes
+    ----------
+    id, kind : str
+        Kind is ``"dynamic"``, ``"dry_pivot"``, ``"locus"`` or ``"clearance"``.
+    point : OperatingPoint
+        Set points, SI.
+    excitation_direction : float or None
+        [rad]
+    pad : int or None
+        Pad loaded in a dry run, from 1.
+    branch : str
+        ``"up"``, ``"down"`` or ``"cycle"``.
+    channels : mapping of str to Channel
+        Those with a quantity (not ``ignore``).
+    stated : frozenset of str
+        Keys that the manifest gives for this run.
+    """
+
+    id: str
+    kind: str
+    point: OperatingPoint
+    excitation_direction: float | None
+    pad: int | None
+    branch: str
+    channels: Mapping[str, Channel] = field(repr=False)
+    stated: frozenset[str] = field(repr=False)
+    reader: RunReader = field(repr=False, compare=False)
+
+    @property
+    def file(self) -> str:
+        """Name of the file, as the user knows it."""
+        return self.reader.file
+
+    @property
+    def length(self) -> int:
+        """Samples per channel."""
+        return self.reader.length()
+
+    @property
+    def sample_rate(self) -> float:
+        """Nominal sample rate [Hz]: time column or HDF5 attribute, else the run's, else the campaign's."""
+        return self.reader.rate()
+
+    def _slice(self, start: int | None, stop: int | None) -> tuple[int, int]:
+        length = self.length
+        first, last, _ = slice(start, stop).indices(length)
+        return first, max(first, last)
+
+    def _error(self, place: str, what: str, cure: str) -> RigDataError:
+        return RigDataError(Problem("error", self.file, place, what, cure, self.id))
+
+    def record(self, name: str, start: int | None = None, stop: int | None = None) -> Record:
+        """One channel, calibrated.
+
+        Parameters
+        ----------
+        name : str
+            Channel name of the manifest.
+        start, stop : int, optional
+            Samples, as in a Python slice; default all.
+
+        Returns
+        -------
+        Record
+            SI values (stop - start,).
+
+        Raises
+        ------
+        RigDataError
+            The manifest has no such channel, or the file cannot give it.
+        """
+        channel = self.channels.get(name)
+        if channel is None:
+            known = ", ".join(self.channels)
+            raise self._error(f"channel {name}", "is not described in the manifest", f"Described: {known}")
+        first, last = self._slice(start, stop)
+        (reading,) = self.reader.read([name], first, last)
+        return Record(
+            name=name,
+            quantity=channel.quantity,
+            values=channel.to_si(reading),
+            time=self.reader.time(first, last),
+            rate=self.sample_rate,
+            axis=channel.axis,
+        )
+
+    def vector(self, quantity: str, start: int | None = None, stop: int | None = None) -> VectorRecord:
+        """X and Y of `quantity`, from its channels at any two different angles.
+
+        Parameters
+        ----------
+        quantity : str
+            ``"displacement"``, ``"force"`` or ``"acceleration"``.
+        start, stop : int, optional
+            Samples, as in a Python slice; default all.
+
+        Returns
+        -------
+        VectorRecord
+            values (n, 2): solves ``[cos a_i, sin a_i] . (X, Y) = reading_i``; by least squares where there
+            are more than two channels. NaN where fewer than two directions have a value.
+
+        Raises
+        ------
+        RigDataError
+            Fewer than two channels, all of them along one line, or the file cannot give them.
+        """
+        chosen = [c for c in self.channels.values() if c.quantity == quantity and c.axis is not None]
+        names = tuple(c.name for c in chosen)
+        if len(chosen) < 2:
+            cure = f"Describe two {quantity} channels with different axes in the manifest"
+            raise self._error(f"quantity {quantity}", f"has {len(chosen)} channels, two are needed", cure)
+        axes = np.array([c.axis for c in chosen])
+        if not np.any(np.abs(np.sin(axes - axes[0])) > 0.05):
+            cure = "Two channels at different angles (3 deg apart or more) are needed; check their axis"
+            raise self._error(f"channels {', '.join(names)}", "all measure along one line", cure)
+        first, last = self._slice(start, stop)
+        readings = self.reader.read(names, first, last)
+        values = np.stack([c.to_si(r) for c, r in zip(chosen, readings)], axis=1)
+        return VectorRecord(
+            quantity=quantity,
+            values=solve_vector(axes, values),
+            time=self.reader.time(first, last),
+            rate=self.sample_rate,
+            names=names,
+        )
+
+    def temperatures(self) -> tuple[Temperature, ...]:
+        """Where the temperature channels of this run sit, by pad and position."""
+        found = [c for c in self.channels.values() if c.quantity == "temperature"]
+        found.sort(key=lambda c: (c.pad or 0, c.position or 0.0, c.name))
+        return tuple(Temperature(c.name, c.pad, c.position) for c in found)
+
+    def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
+        """Read the shaft speed [rad/s]; None where no channel measures it."""
+        for channel in self.channels.values():
+            if channel.quantity == "speed":
+                return self.record(channel.name, start, stop)
+        return None
