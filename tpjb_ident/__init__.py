@@ -1,1 +1,72 @@
-"""Identify, predict and compare the dynamic coefficients of tilting-pad journal bearings."""
+"""Identify, predict and compare the dynamic coefficients of tilting-pad journal bearings.
+
+```python
+import tpjb_ident as ti
+
+campaign = ti.load_campaign("rocker-A")
+result = ti.identify(campaign)
+bearing = ti.load_bearing(campaign.bearing_text)
+p = ti.predict(bearing, load=5000.0, speed=2 * np.pi * 22, excitation=2 * np.pi * 25, pivots="kirk")
+```
+
+Everything takes and gives SI floats or arrays (radians, rad/s), or pint quantities.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+#: Where each public name lives; imported on first use, so that `import tpjb_ident` stays quick.
+_HOMES = {
+    "Campaign": "rigdata",
+    "OperatingPoint": "rigdata",
+    "Problem": "rigdata",
+    "RigDataError": "rigdata",
+    "check_campaign": "rigdata",
+    "load_campaign": "rigdata",
+    "estimate_dynamic_stiffness": "tpjb_ident.dynamic",
+    "identify": "tpjb_ident.dynamic",
+    "r_matrix": "tpjb_ident.dynamic",
+    "fit_pivots": "tpjb_ident.pivot",
+    "pivot_table": "tpjb_ident.pivot",
+    "write_pivots": "tpjb_ident.pivot",
+    "measure_locus": "tpjb_ident.locus",
+    "measure_clearance": "tpjb_ident.clearance",
+    "Bearing": "model.bearing",
+    "BearingError": "model.bearing",
+    "load_bearing": "model.bearing",
+    "Effect": "model.effects",
+    "EffectError": "model.effects",
+    "load_effects": "model.effects",
+    "load_pivots": "model.pivots",
+    "Prediction": "model.predict",
+    "predict": "model.predict",
+    "compare_campaign": "tpjb_ident.compare",
+    "write_report": "tpjb_ident.report",
+}
+
+__all__ = sorted([*_HOMES, "__version__"])
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        import difflib
+
+        near = difflib.get_close_matches(name, _HOMES, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise AttributeError(f"module 'tpjb_ident' has no attribute {name!r}{hint}")
+    home = _HOMES[name]
+    if home.startswith("model"):
+        from tpjb_ident.model_guard import check_model
+
+        check_model()
+    value = getattr(importlib.import_module(home), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

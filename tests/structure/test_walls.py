@@ -1,0 +1,100 @@
+"""Who may know whom (docs/design.md), held by parsing every import."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+OURS = ("rigdata", "model", "tpjb_ident")
+#: The guard only looks whether the `model` found is ours.
+MAY_IMPORT_MODEL = ("compare", "diagnose", "cli", "model_guard.py")
+SOURCES = sorted(p for top in OURS for p in (ROOT / top).rglob("*.py"))
+
+
+def imported_modules(source: str) -> set[str]:
+    """Every module that `source` imports, at any depth, import_module("literal") included."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "relative import"
+            found.add(node.module or "")
+            found.update(f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "import_module":
+            found.update(a.value for a in node.args if isinstance(a, ast.Constant))
+    return found
+
+
+def breaches(path: str, modules: set[str]) -> list[str]:
+    """Imports of the file `path` (relative, with slashes) that go through a wall."""
+    parts = path.split("/")
+    tops = {m.split(".")[0] for m in modules}
+    found = []
+    if parts[0] in ("rigdata", "model"):
+        others = {"rigdata", "model", "tpjb_ident"} - {parts[0]}
+        found += [f"{path} imports {top}" for top in sorted(tops & others)]
+    elif parts[1] not in MAY_IMPORT_MODEL and "model" in tops:
+        found.append(f"{path} imports model")
+    if parts[:2] != ["tpjb_ident", "report"] and "matplotlib" in tops:
+        found.append(f"{path} imports matplotlib")
+    inside_cli = parts[:2] in (["tpjb_ident", "cli"], ["tpjb_ident", "__main__.py"])
+    if not inside_cli and any(m == "tpjb_ident.cli" or m.startswith("tpjb_ident.cli.") for m in modules):
+        found.append(f"{path} imports the command line")
+    return found
+
+
+def test_no_import_goes_through_a_wall():
+    assert len(SOURCES) > 30
+    found = []
+    for path in SOURCES:
+        name = path.relative_to(ROOT).as_posix()
+        found += breaches(name, imported_modules(path.read_text(encoding="utf-8")))
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    ("path", "source"),
+    [
+        ("rigdata/x.py", "import model.units"),
+        ("rigdata/readers/x.py", "def f():\n    from tpjb_ident import locus"),
+        ("model/x.py", "from rigdata import load_campaign"),
+        ("model/effects/x.py", "import importlib\nimportlib.import_module('rigdata')"),
+        ("tpjb_ident/dynamic/x.py", "from model.bearing import Bearing"),
+        ("tpjb_ident/compare/x.py", "import matplotlib.pyplot as plt"),
+        ("tpjb_ident/report/x.py", "from tpjb_ident.cli import app"),
+    ],
+)
+def test_a_breach_is_seen(path, source):
+    assert breaches(path, imported_modules(source))
+
+
+@pytest.mark.parametrize(
+    ("path", "source"),
+    [
+        ("tpjb_ident/compare/x.py", "from model.predict import predict"),
+        ("tpjb_ident/cli/x.py", "from tpjb_ident.cli.errors import BadInput"),
+        ("tpjb_ident/report/x.py", "from matplotlib.figure import Figure"),
+    ],
+)
+def test_what_is_allowed_is_not_a_breach(path, source):
+    assert not breaches(path, imported_modules(source))
+
+
+def test_every_third_party_import_is_declared():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = {re.split(r"[<>=\[ ]", d)[0].lower() for d in project["dependencies"]}
+    found = {}
+    for path in SOURCES:
+        for module in imported_modules(path.read_text(encoding="utf-8")):
+            top = module.split(".")[0]
+            if top not in sys.stdlib_module_names and top not in OURS and top != "bootstrap":
+                found.setdefault(top.lower(), path.name)
+    undeclared = {top: name for top, name in found.items() if top not in declared}
+    assert not undeclared

@@ -1,0 +1,10 @@
+"""The `tpjb` command. Nothing else imports this package."""
+
+from __future__ import annotations
+
+
+def main() -> None:
+    """Run the command line; the entry point of `tpjb` and of ``python -m tpjb_ident``."""
+    from tpjb_ident.cli.app import app
+
+    app(prog_name="tpjb")

@@ -1,0 +1,39 @@
+"""The command line: commands by name. Heavy imports stay inside the commands, so that help is instant."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from tpjb_ident.cli.check import check
+from tpjb_ident.cli.predict import predict
+
+# plain help: the markup renderer costs more start-up time than all the rest together
+app = typer.Typer(
+    name="tpjb",
+    help="Identify, predict and compare the dynamic coefficients of tilting-pad journal bearings.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from tpjb_ident import __version__
+
+        typer.echo(f"tpjb-ident {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.", callback=_version)] = False,
+) -> None:
+    pass
+
+
+for command in (check, predict):
+    app.command()(command)

@@ -1,0 +1,67 @@
+"""`tpjb check`: read everything, report every problem."""
+
+from __future__ import annotations
+
+import json
+
+from tpjb_ident.cli.errors import BadInputError, guarded
+from tpjb_ident.cli.options import CampaignPath, Out, out_folder
+from tpjb_ident.cli.outdir import output_folder
+from tpjb_ident.cli.record import write_record
+from tpjb_ident.cli.show import progress, say
+from tpjb_ident.tables import write_text
+
+
+@guarded
+def check(campaign: CampaignPath, out: Out = None) -> None:
+    """Read a whole campaign and report every problem found, not just the first.
+
+    Writes check.json. Exit code 2 if there is an error that makes a run unusable.
+    """
+    from rigdata import check_campaign
+
+    if not campaign.exists():
+        raise BadInputError(f"{campaign}: no such file or folder. Give a campaign folder or an HDF5 file.")
+    with progress(f"reading {campaign.name}"):
+        problems = check_campaign(campaign)
+    errors = [p for p in problems if p.severity == "error"]
+    summary = _summary(campaign, problems)
+    target = out_folder(out, "check")
+    with output_folder(target, "check", (campaign,)) as folder:
+        write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")
+        write_record(folder, target, "check", {"campaign": campaign}, summary.pop("files_sha256"))
+    for problem in problems:
+        say(f"{problem.severity}: {problem}")
+    counts = summary["counts"]
+    say(f"{summary['campaign']}: {counts['error']} errors, {counts['warning']} warnings, {counts['note']} notes")
+    say(f"Results: {target}")
+    if errors:
+        raise BadInputError(
+            f"{campaign}: {len(errors)} errors, listed above and in {target / 'check.json'}. Mend them."
+        )
+
+
+def _summary(path: CampaignPath, problems: list) -> dict:
+    """Content of check.json."""
+    from rigdata import RigDataError, load_campaign
+
+    try:
+        campaign = load_campaign(path)
+    except RigDataError:  # what it says is among the problems already
+        identity, kinds, files = path.name, {}, {}
+    else:
+        kinds = {kind: len(campaign.of_kind(kind)) for kind in ("dynamic", "dry_pivot", "locus", "clearance")}
+        identity, files = campaign.id, campaign.fingerprint()
+    severities = ("error", "warning", "note")
+    return {
+        "schema": "tpjb-check/1",
+        "campaign": identity,
+        "ok": not any(p.severity == "error" for p in problems),
+        "runs": kinds,
+        "counts": {s: sum(p.severity == s for p in problems) for s in severities},
+        "problems": [
+            {"severity": p.severity, "file": p.file, "place": p.place, "run": p.run, "what": p.what, "cure": p.cure}
+            for p in problems
+        ],
+        "files_sha256": files,
+    }

@@ -1,0 +1,32 @@
+"""Options and arguments that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+CampaignPath = Annotated[
+    Path, typer.Argument(metavar="CAMPAIGN", help="Campaign: a folder with campaign.toml, or one HDF5 file.")
+]
+BearingPath = Annotated[Path, typer.Argument(metavar="BEARING.toml", help="Bearing file (tpjb-bearing/1).")]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder for the results [default: tpjb-COMMAND-out here]."),
+]
+BearingOption = Annotated[
+    Path | None,
+    typer.Option("--bearing", metavar="FILE", help="Bearing file [default: the one that the campaign names]."),
+]
+Thermal = Annotated[str, typer.Option("--thermal", help="isothermal, adiabatic or tehd.")]
+EffectsFile = Annotated[
+    Path | None, typer.Option("--effects", metavar="FILE", help="Effects file: what the baseline model lacks.")
+]
+Method = Annotated[str, typer.Option("--method", help="Estimator of coefficients.csv: mm-eiv, mm, rlm, ols or iv.")]
+Norm = Annotated[str | None, typer.Option("--norm", help="Norm of --method rlm: huber, tukey, hampel, ...")]
+
+
+def out_folder(out: Path | None, command: str) -> Path:
+    """Return the folder for the results of `command`."""
+    return out if out is not None else Path(f"tpjb-{command}-out")

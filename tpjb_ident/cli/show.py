@@ -1,0 +1,86 @@
+"""What the person at the terminal sees: short tables, messages, progress. Results go to stdout, the rest to stderr."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from tpjb_ident.tables import printable
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+#: Called with the share done, 0 to 1, and what is being done.
+Progress = Callable[[float, str], None]
+
+
+def _console(stderr: bool = False) -> Console:
+    from rich.console import Console
+
+    return Console(stderr=stderr, highlight=False, soft_wrap=True)
+
+
+def say(text: str) -> None:
+    """Print one line; text from outside is shown as it is, less its control characters."""
+    _console().print(printable(text), markup=False)
+
+
+def error_line(kind: str, text: str) -> None:
+    """Print a message to stderr, its lines kept."""
+    lines = "\n".join(printable(line) for line in text.splitlines())
+    style = "bold red" if kind == "bug" else None
+    _console(stderr=True).print(f"tpjb: {kind}: {lines}", markup=False, style=style)
+
+
+def note_line(kind: str, text: str) -> None:
+    """Print a remark to stderr."""
+    _console(stderr=True).print(f"tpjb: {kind}: {printable(text)}", markup=False)
+
+
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table; the first column is text, the others are numbers."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    grid = Table(title=Text(printable(title)), box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    for i, column in enumerate(columns):
+        grid.add_column(Text(printable(column)), justify="left" if i == 0 else "right")
+    for row in rows:
+        grid.add_row(*(Text(printable(cell)) for cell in row))
+    _console().print(grid)
+
+
+@contextlib.contextmanager
+def progress(what: str) -> Iterator[Progress]:
+    """Show a bar on a terminal while the block runs; elsewhere only what is being done, once each.
+
+    Yields
+    ------
+    Progress
+    """
+    console = _console(stderr=True)
+    if not console.is_terminal:
+        yield _plain_progress(what)
+        return
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
+
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Bar(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(what, total=1.0)
+
+        def show(share: float, text: str) -> None:
+            bar.update(task, completed=share, description=printable(text or what))
+
+        yield show
+
+
+def _plain_progress(what: str) -> Progress:
+    note_line("doing", what)
+
+    def silent(share: float, text: str) -> None:
+        """A log file has no use for a moving bar."""
+
+    return silent

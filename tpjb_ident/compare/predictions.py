@@ -1,0 +1,203 @@
+"""Many operating points through the model: one equilibrium per static point, neighbours start one another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigdata.operating_point import OperatingPoint
+from tpjb_ident.model_guard import check_model
+
+check_model()
+
+from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
+from model.effects import Effect  # noqa: E402
+from model.predict import Prediction, predict  # noqa: E402
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Called with the share done, 0 to 1, and what is being done.
+Progress = Callable[[float, str], None]
+ENTRIES = ("xx", "xy", "yx", "yy")
+
+
+@dataclass(frozen=True)
+class ModelSettings:
+    """Which model is asked.
+
+    Attributes
+    ----------
+    pivots : str, float, path or laws per pad
+        As `model.predict.predict` takes them.
+    thermal : {"isothermal", "adiabatic", "tehd"}
+    effects : tuple of Effect
+    """
+
+    pivots: Any = "kirk"
+    thermal: str = "adiabatic"
+    effects: tuple[Effect, ...] = ()
+
+
+@dataclass(frozen=True)
+class PointPrediction:
+    """One operating point, and where in a prediction over several frequencies it stands.
+
+    Attributes
+    ----------
+    point : OperatingPoint
+    prediction : Prediction
+        Over all excitation frequencies of this static point.
+    index : int
+        Place of this point's frequency in ``prediction.excitation``.
+    """
+
+    point: OperatingPoint
+    prediction: Prediction = field(repr=False)
+    index: int
+
+    @property
+    def k(self) -> np.ndarray:
+        """(2, 2) stiffness [N/m]."""
+        return np.asarray(self.prediction.k[self.index])
+
+    @property
+    def c(self) -> np.ndarray:
+        """(2, 2) damping [N s/m]."""
+        return np.asarray(self.prediction.c[self.index])
+
+
+def predict_points(
+    bearing: Bearing,
+    points: Iterable[OperatingPoint],
+    settings: ModelSettings | None = None,
+    progress: Progress | None = None,
+) -> tuple[PointPrediction, ...]:
+    """Predict every operating point.
+
+    Parameters
+    ----------
+    bearing : Bearing
+    points : iterable of OperatingPoint
+        Points without an excitation are predicted at synchronous frequency.
+    settings : ModelSettings, optional
+    progress : callable, optional
+
+    Returns
+    -------
+    tuple of PointPrediction
+        In the order of `points`. A point without convergence has NaN coefficients and a status.
+
+    Raises
+    ------
+    ValueError
+        Impossible operating point, pivot choice or effect; the message says which.
+    """
+    settings = settings or ModelSettings()
+    wanted = tuple(points)
+    groups: dict[OperatingPoint, list[float]] = {}
+    for point in wanted:
+        frequencies = groups.setdefault(_static(point), [])
+        if _excitation(point) not in frequencies:
+            frequencies.append(_excitation(point))
+    found: dict[OperatingPoint, Prediction] = {}
+    before: Prediction | None = None
+    for done, (static, frequencies) in enumerate(sorted(groups.items())):
+        prediction = predict(
+            bearing,
+            static.static_load,
+            static.static_load_direction,
+            static.shaft_speed,
+            np.array(frequencies),
+            pivots=settings.pivots,
+            thermal=settings.thermal,
+            effects=settings.effects,
+            start=before,
+        )
+        before = prediction if prediction.converged else None
+        found[static] = prediction
+        if progress is not None:
+            progress((done + 1) / len(groups), f"predicting {static.static_load / 1e3:g} kN")
+    return tuple(PointPrediction(p, found[_static(p)], groups[_static(p)].index(_excitation(p))) for p in wanted)
+
+
+def _excitation(point: OperatingPoint) -> float:
+    return point.excitation if point.excitation > 0 else point.shaft_speed
+
+
+def _static(point: OperatingPoint) -> OperatingPoint:
+    return OperatingPoint(point.static_load, point.static_load_direction, point.shaft_speed)
+
+
+def point_columns(point: OperatingPoint) -> dict[str, float]:
+    """Key columns of every table over operating points (outputs.md)."""
+    return {
+        "static_load_N": point.static_load,
+        "static_load_direction_deg": point.static_load_direction_deg,
+        "shaft_speed_Hz": point.shaft_speed_hz,
+        "excitation_Hz": OperatingPoint(0.0, 0.0, 0.0, _excitation(point)).excitation_hz,
+    }
+
+
+def coefficient_names(kind: str) -> tuple[str, ...]:
+    """Column names of the four stiffnesses (``"k"``) or dampings (``"c"``), row by row."""
+    unit = "N_per_m" if kind == "k" else "Ns_per_m"
+    return tuple(f"{kind}{entry}_{unit}" for entry in ENTRIES)
+
+
+def prediction_frame(predictions: Sequence[PointPrediction], mesh_error: bool = True) -> pd.DataFrame:
+    """Build prediction.csv: one row per operating point.
+
+    Parameters
+    ----------
+    predictions : sequence of PointPrediction
+    mesh_error : bool
+        Also estimate the error from the mesh, which solves every static point once more, coarsely.
+
+    Returns
+    -------
+    DataFrame
+        Columns as in coefficients.csv, the shaft position, and per pad load, tilt, deflection, largest pressure
+        and temperature, least film.
+    """
+    import pandas as pd
+
+    return pd.DataFrame([_row(one, mesh_error) for one in predictions])
+
+
+def _row(one: PointPrediction, mesh_error: bool) -> dict[str, Any]:
+    p = one.prediction
+    row: dict[str, Any] = dict(point_columns(one.point))
+    row.update(zip(coefficient_names("k"), one.k.ravel(), strict=True))
+    row.update(zip(coefficient_names("c"), one.c.ravel(), strict=True))
+    row.update(x_m=p.position[0], y_m=p.position[1])
+    for number in range(1, len(p.pad_load) + 1):
+        row.update(_pad_columns(p, number))
+    row.update(
+        max_pressure_Pa=p.max_pressure,
+        max_temperature_degC=p.max_temperature,
+        min_film_m=p.min_film,
+        power_loss_W=p.power_loss,
+        converged=p.converged,
+        idle_pads=" ".join(str(n) for n in p.idle_pads),
+        mesh_error=p.mesh_error if mesh_error else math.nan,
+        status="; ".join(p.status),
+    )
+    return row
+
+
+def _pad_columns(p: Prediction, number: int) -> dict[str, float]:
+    i, pad = number - 1, f"pad{number}"
+    idle = number in p.idle_pads
+    return {
+        f"{pad}_load_N": p.pad_load[i],
+        f"{pad}_tilt_rad": p.tilt[i],
+        f"{pad}_deflection_m": p.deflection[i],
+        f"{pad}_max_pressure_Pa": 0.0 if idle else float(p.pressure[i].max()),
+        f"{pad}_max_temperature_degC": math.nan if idle else float(p.temperature[i].max()),
+        f"{pad}_min_film_m": math.nan if idle else float(p.film[i].min()),
+    }

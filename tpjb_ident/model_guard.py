@@ -1,0 +1,22 @@
+"""`model` is a common name: make sure that the one that Python finds is ours."""
+
+from __future__ import annotations
+
+import importlib
+
+
+def check_model() -> None:
+    """Do nothing if `import model` gives the bundled bearing model.
+
+    Raises
+    ------
+    ImportError
+        Another package or file of that name comes first on the path; says which, and what to do.
+    """
+    package = importlib.import_module("model")
+    if getattr(package, "DISTRIBUTION", None) != "tpjb-ident":
+        place = getattr(package, "__file__", None) or getattr(package, "__path__", "an unknown place")
+        raise ImportError(
+            f"another package named 'model' ({place}) hides the bearing model of tpjb-ident. Rename it, start "
+            "Python from another folder, or take its folder off sys.path / PYTHONPATH."
+        )

@@ -1,0 +1,99 @@
+"""Tables on disk: CSV and Parquet under one name, whole or not at all, safe to open in a spreadsheet."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: A text cell that starts like this is a formula to a spreadsheet.
+_FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+
+
+def write_atomic(path: Path, write: Callable[[Path], None]) -> None:
+    """Let `write` fill a temporary file beside `path`, then put it in place in one step.
+
+    Parameters
+    ----------
+    path : Path
+        Where the file shall be; an existing one is replaced.
+    write : callable
+        Gets the temporary path.
+
+    Raises
+    ------
+    OSError
+        The folder cannot be written to. Nothing is left behind.
+    """
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        write(temporary)
+        temporary.chmod(0o644)  # mkstemp gives 0600; results are for colleagues too
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write UTF-8 text with Unix line ends, whole or not at all."""
+    write_atomic(path, lambda temporary: _write_utf8(temporary, text))
+
+
+def _write_utf8(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def write_table(folder: Path, name: str, frame: pd.DataFrame) -> tuple[Path, Path]:
+    """Write ``name.csv`` and ``name.parquet``.
+
+    Parameters
+    ----------
+    folder : Path
+        Existing folder.
+    name : str
+        File name without suffix.
+    frame : DataFrame
+        Numbers in SI; the column names carry the units. Text that a spreadsheet would take for a formula
+        gets a leading apostrophe in the CSV file.
+
+    Returns
+    -------
+    tuple of Path
+        The two files.
+    """
+    csv, parquet = folder / f"{name}.csv", folder / f"{name}.parquet"
+    safe = safe_for_spreadsheets(frame)
+    write_atomic(csv, lambda path: safe.to_csv(path, index=False, encoding="utf-8", lineterminator="\n"))
+    write_atomic(parquet, lambda path: frame.to_parquet(path, index=False))
+    return csv, parquet
+
+
+def safe_for_spreadsheets(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return a copy whose text cells and column names no spreadsheet takes for formulas."""
+    safe = frame.copy()
+    for column in safe.columns:
+        if safe[column].dtype.kind not in "biufcmM":
+            safe[column] = safe[column].map(_disarm)
+    safe.columns = [_disarm(str(column)) for column in safe.columns]
+    return safe
+
+
+def _disarm(cell: Any) -> Any:
+    if not isinstance(cell, str):
+        return cell
+    return "'" + cell if cell.startswith(_FORMULA_STARTS) else cell
+
+
+def printable(text: object) -> str:
+    """Text from outside without control characters: nothing that steers a terminal or turns writing round."""
+    return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", str(text))
