@@ -6,8 +6,10 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
+from rigdata.virtual_rig.faults import CSV_ONLY, HDF5_ONLY, NEEDS_TIME
 from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout, Layout, layout_named
 from rigdata.virtual_rig.ledger import CampaignTruth, campaign_truth, run_facts
 from rigdata.virtual_rig.manifest_text import manifest_text
@@ -53,6 +55,8 @@ def write_campaign(
     target = Path(out)
     chosen = layout_named(layout)
     _check_target(target, chosen, overwrite)
+    _check_faults(rig, chosen)
+    rig = replace(rig, truth=rig.truth.remembered())
     runs = rig.runs()
     header = {
         "id": rig.campaign,
@@ -100,6 +104,16 @@ def _check_target(target: Path, layout: Layout, overwrite: bool) -> None:
             raise VirtualRigError(f"{target} is not a campaign folder; it is not replaced")
     elif not (target.is_file() and _is_hdf5(target)):
         raise VirtualRigError(f"{target} is not an HDF5 file; it is not replaced")
+
+
+def _check_faults(rig: VirtualRig, layout: Layout) -> None:
+    """Refuse faults that this layout cannot show: a campaign must hold what was asked for."""
+    impossible = HDF5_ONLY if isinstance(layout, CsvLayout) else CSV_ONLY
+    for fault in rig.faults:
+        if fault.kind in impossible:
+            raise VirtualRigError(f"fault {fault.kind!r} does not exist in {type(layout).__name__}")
+        if fault.kind in NEEDS_TIME and layout.time_name is None:
+            raise VirtualRigError(f"fault {fault.kind!r} needs a time column; give the layout a time_name")
 
 
 def _is_hdf5(path: Path) -> bool:

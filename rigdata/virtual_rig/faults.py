@@ -58,6 +58,9 @@ NEEDS_VALUE = {
     "wrong_pad", "wrong_direction", "wrong_frequency", "wrong_load",
 }  # fmt: skip
 NEEDS_OTHER = {"swapped", "duplicate_run"}
+CSV_ONLY = {"duplicate_column", "truncated_line"}
+HDF5_ONLY = {"short_channel"}
+NEEDS_TIME = {"time_jitter"}
 
 
 @dataclass(frozen=True)

@@ -93,6 +93,7 @@ def run_facts(record: SimulatedRun) -> dict[str, object]:
     """Facts of one record for the truth."""
     return {
         "kind": record.run.kind,
+        "recorded_in": record.source,
         **record.physics.facts,
         "glitches": [asdict(glitch) for glitch in record.glitches],
     }

@@ -191,11 +191,11 @@ class Noise:
     def like_samples(cls) -> Noise:
         """As strong as in the sample campaigns, of every kind that they have."""
         return cls(
-            displacement=ChannelNoise(35e-9, 7e-9, 39e-9, 0.15e-6),
-            force=ChannelNoise(2.2, 0.55, 0.44, 1.0),
-            acceleration=ChannelNoise(4e-3, 5e-4, 8e-4, 1e-3),
-            temperature=ChannelNoise(0.068, 0.023, 0.018, 0.05),
-            speed=ChannelNoise(0.126, 0.016, 0.06, 0.01),
+            displacement=ChannelNoise(35e-9, 10e-9, 39e-9, 0.15e-6),
+            force=ChannelNoise(2.05, 0.8, 0.44, 0.2),
+            acceleration=ChannelNoise(3.9e-3, 7e-4, 8e-4, 2e-4),
+            temperature=ChannelNoise(0.062, 0.036, 0.018, 0.02),
+            speed=ChannelNoise(0.122, 0.023, 0.06, 0.002),
             mains_scatter=0.01,
             mains_harmonics=(0.02, 0.05),
             shaft=ShaftDefects((1.1e-6, 0.25e-6), 1.31e-3),

@@ -37,12 +37,15 @@ class SimulatedRun:
     physics : RunPhysics
         What really happened.
     glitches : tuple of Glitch
+    source : str
+        Id of the run in which it was recorded; not the run's own where a record was copied.
     """
 
     run: PlannedRun
     readings: Readings = field(repr=False)
     physics: RunPhysics = field(repr=False)
     glitches: tuple[Glitch, ...] = ()
+    source: str = ""
 
 
 @dataclass(frozen=True)
@@ -97,25 +100,32 @@ class VirtualRig:
         runs = {run.id: run for run in self.runs()}
         if run_id not in runs:
             raise VirtualRigError(f"no run {run_id!r} in the plan")
-        return self._simulate(runs[runs[run_id].record])
+        return self._recorded(runs[runs[run_id].record])
 
     def simulate_all(self) -> Iterator[SimulatedRun]:
         """Make every record, one after the other."""
         for run in self.records():
-            yield self._simulate(run)
+            yield self._recorded(run)
 
     def faults_of(self, record: str) -> tuple[Fault, ...]:
         """Faults that strike one of the runs of a record, made to strike it."""
+        if not self.faults:
+            return ()
         members = [run.id for run in self.runs() if run.record == record]
         return tuple(replace(f, run="*") for f in self.faults if any(f.strikes(member) for member in members))
 
+    def _recorded(self, run: PlannedRun) -> SimulatedRun:
+        """Simulate a run, or the one whose record was copied in its place."""
+        for fault in self.faults_of(run.record):
+            if fault.kind == "duplicate_run":
+                copied = next(other for other in self.runs() if other.id == fault.other)
+                return replace(self._simulate(copied), run=run)
+        return self._simulate(run)
+
     def _simulate(self, run: PlannedRun) -> SimulatedRun:
-        faults = self.faults_of(run.record) if self.faults else ()
-        for fault in faults:
-            if fault.kind == "duplicate_run" and fault.other != run.id:
-                return replace(self.simulate(fault.other or run.id), run=run)
-            if fault.kind == "missing_excitation":
-                run = replace(run, lines=())
+        faults = self.faults_of(run.record)
+        if any(fault.kind == "missing_excitation" for fault in faults):
+            run = replace(run, lines=())
         instruments = faulty_instruments(self.instruments, faults, run.id)
         physics = self._physics(run, instruments)
         columns = analogue_readings(physics, instruments, self.noise, self.seed, run.id)
@@ -126,7 +136,7 @@ class VirtualRig:
         if faults:
             rng = stream(self.seed, run.id, "faults")
             readings = spoil_record(readings, instruments, faults, run.id, rng)
-        return SimulatedRun(run, readings, physics, glitches)
+        return SimulatedRun(run, readings, physics, glitches, run.id)
 
     def _physics(self, run: PlannedRun, instruments: Instruments) -> RunPhysics:
         if run.kind == "dry_pivot":

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from math import pi
 from typing import Any
 
@@ -42,9 +43,9 @@ class RigTruth:
         (Eq. 13: dF_oil = H d). It is also asked at running speed (unbalance) and at the actuators'
         harmonics. Consecutive questions often differ in `excitation` only: cache the equilibrium.
     position : callable(OperatingPoint) -> (2,)
-        Mean shaft position from the bearing centre [m].
+        Mean shaft position from the bearing centre [m]; asked with `excitation` 0.
     temperature : callable(OperatingPoint) -> (n_pads,)
-        Film temperature at the sensors [degC].
+        Film temperature at the sensors [degC]; asked with `excitation` 0.
     pivot_deflection : callable(pad, load) -> (n,)
         Deflection [m] of pivot `pad` (1 is pad #1) under each `load` (n,) >= 0 [N]; monotone, 0 at 0.
         Whatever else gives way between probes and pad in a dry test (the housing) belongs in it.
@@ -110,6 +111,15 @@ class RigTruth:
             bearing_text='schema = "tpjb-bearing/1"\nname = "linear test bearing"\n',
         )
         return replace(base, **fields)
+
+    def remembered(self) -> RigTruth:
+        """Return the same truth, which asks each callable only once per point: for the length of one campaign."""
+        return replace(
+            self,
+            stiffness=cache(self.stiffness),
+            position=cache(self.position),
+            temperature=cache(self.temperature),
+        )
 
     def h(self, point: OperatingPoint) -> ComplexArray:
         """Dynamic stiffness at a point, (2, 2) complex [N/m], checked."""

@@ -23,7 +23,7 @@ def write_csv(folder: Path, rig: VirtualRig, manifest: str, records: Iterable[Si
     (folder / rig.truth.bearing_name).write_bytes(rig.truth.bearing_text.encode())
     (folder / "runs").mkdir()
     for record in records:
-        faults = rig.faults_of(record.run.id) if rig.faults else ()
+        faults = rig.faults_of(record.run.id)
         if any(f.kind == "missing_file" for f in faults):
             continue
         text = _record_text(record, rig, layout, faults)

@@ -27,7 +27,7 @@ def write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: Iterable[Sim
         file.attrs["bearing"] = rig.truth.bearing_text
         groups = file.create_group("runs")
         for record in records:
-            faults = rig.faults_of(record.run.id) if rig.faults else ()
+            faults = rig.faults_of(record.run.id)
             if any(f.kind == "missing_file" for f in faults):
                 continue
             _write_record(groups.create_group(record.run.id), record, layout, precision, faults)
