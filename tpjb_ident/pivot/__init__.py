@@ -1,0 +1,19 @@
+"""Dry pivot tests to load-deflection curves per pad (paper, Sec. 5)."""
+
+from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
+from tpjb_ident.pivot.fit import fit_pivots
+from tpjb_ident.pivot.hysteresis import Hysteresis
+from tpjb_ident.pivot.pivots_toml import pivots_text, write_pivots
+from tpjb_ident.pivot.settings import PivotSettings
+from tpjb_ident.pivot.table import pivot_table
+
+__all__ = [
+    "Hysteresis",
+    "PivotCurve",
+    "PivotSettings",
+    "PivotSteps",
+    "fit_pivots",
+    "pivot_table",
+    "pivots_text",
+    "write_pivots",
+]

@@ -1,0 +1,189 @@
+"""The last step of a pivot fit: points, onset, loop, status, one `PivotCurve`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from tpjb_ident.pivot.contact import contact_onset, contact_onset_se
+from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
+from tpjb_ident.pivot.dry_record import DryRecord
+from tpjb_ident.pivot.hysteresis import Hysteresis, measure_loop
+from tpjb_ident.pivot.law_fit import FRICTION, OFFSET, LawFit
+from tpjb_ident.pivot.noise import NoiseModel
+from tpjb_ident.pivot.projection import Direction
+from tpjb_ident.pivot.settings import PivotSettings
+
+if TYPE_CHECKING:
+    from rigdata.calibration import Channel
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+MISFIT_PROBABILITY = 1e-4
+CLEAR_CHOICE = 0.5  # posterior share below which the law counts as undecided
+MANY_LOST = 0.05
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was fitted to one pad.
+
+    Attributes
+    ----------
+    records : tuple of DryRecord
+        Its runs.
+    good : tuple of (m,) ndarray of bool
+        Used blocks per run.
+    directions : tuple of (Direction, Direction)
+        Load and displacement direction per run.
+    fits : tuple of LawFit
+        Likely laws, most likely first.
+    weights : (n,) ndarray
+        Their shares.
+    """
+
+    records: tuple[DryRecord, ...]
+    good: tuple[BoolArray, ...]
+    directions: tuple[tuple[Direction, Direction], ...]
+    fits: tuple[LawFit, ...]
+    weights: FloatArray
+
+
+def assemble_curve(choice: Choice, noise: NoiseModel, settings: PivotSettings, refused: tuple[str, ...]) -> PivotCurve:
+    """Make the curve of one pad.
+
+    Parameters
+    ----------
+    choice : Choice
+        Records and fits.
+    noise : NoiseModel
+        For the points' standard errors.
+    settings : PivotSettings
+        Contact tolerance, warning angle.
+    refused : tuple of str
+        Runs of the campaign that were left out.
+
+    Returns
+    -------
+    PivotCurve
+    """
+    law = choice.fits[0]
+    first = choice.records[0]
+    steps = _all_steps(choice, noise)
+    onset = contact_onset(law, settings.contact_tolerance)
+    loads = np.concatenate([r.projection.load[g] for r, g in zip(choice.records, choice.good, strict=True)])
+    return PivotCurve(
+        pad=first.pad,
+        angle=first.angle,
+        steps=steps,
+        fits=choice.fits,
+        weights=choice.weights,
+        onset_load=onset,
+        onset_load_se=contact_onset_se(law, settings.contact_tolerance),
+        valid_from=max(onset, float(loads.min())),
+        valid_to=float(loads.max()),
+        load_direction=choice.directions[0][0],
+        displacement_direction=choice.directions[0][1],
+        hysteresis=_loop(steps, law),
+        relative_calibration=_calibration(first.run.channels, first.angle),
+        status=_status(choice, steps, settings, onset, refused),
+        runs=tuple(record.run.id for record in choice.records),
+    )
+
+
+def _all_steps(choice: Choice, noise: NoiseModel) -> PivotSteps:
+    """Points of every run of the pad, on one common zero."""
+    law = choice.fits[0]
+    parts = []
+    zero_load = min(float(r.projection.load[g].min()) for r, g in zip(choice.records, choice.good, strict=True))
+    reference = next(
+        float(r.projection.deflection[g][int(np.argmin(r.projection.load[g]))])
+        for r, g in zip(choice.records, choice.good, strict=True)
+        if float(r.projection.load[g].min()) == zero_load
+    )
+    for record, good in zip(choice.records, choice.good, strict=True):
+        parts.append(_steps(record, good, law, noise, reference))
+    joined = [np.concatenate([getattr(p, name) for p in parts]) for name in PivotSteps.__dataclass_fields__]
+    return PivotSteps(*joined)
+
+
+def _steps(record: DryRecord, good: BoolArray, law: LawFit, noise: NoiseModel, reference: float) -> PivotSteps:
+    blocks, projection = record.blocks, record.projection
+    groups = blocks.hold if record.holds else np.arange(len(blocks))
+    names = np.unique(groups[groups >= 0])
+    columns: list[FloatArray] = []
+    for name in names:
+        mine = groups == name
+        share = blocks.duration[mine] / blocks.duration[mine].sum()
+        load = float(share @ projection.load[mine])
+        branch = int(blocks.branch[mine][0])
+        columns.append(
+            np.array(
+                [
+                    load * (1.0 - law.theta[FRICTION] * branch),
+                    float(share @ projection.deflection[mine]) - reference - law.theta[OFFSET],
+                    math.sqrt(noise.mean_variance(float(blocks.duration[mine].sum()))),
+                    float(share @ projection.across_load[mine]),
+                    float(share @ projection.across[mine]) - float(projection.across[0]),
+                    branch,
+                    float(good[mine].all()),
+                ]
+            )
+        )
+    table = np.array(columns)
+    load, deflection, se, across_load, across, branch, weight = table.T
+    return PivotSteps(load, deflection, se, across_load, across, branch.astype(int), weight)
+
+
+def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:
+    """Loop over the loads as applied: taking off the friction would close it."""
+    used = steps.weight > 0
+    applied = steps.load / (1.0 - law.theta[FRICTION] * steps.branch)
+    return measure_loop(applied[used], steps.deflection[used], steps.deflection_se[used], steps.branch[used])
+
+
+def _calibration(channels: Mapping[str, Channel], angle: float) -> float:
+    """Relative standard uncertainty of the stiffness from the certificates of probes and cells."""
+    total = 0.0
+    for quantity in ("displacement", "force"):
+        members = [c for c in channels.values() if c.quantity == quantity and c.axis is not None]
+        # two channels at right angles share a direction as the squares of their cosines
+        total += sum((math.cos((c.axis or 0.0) - angle) ** 2 * (c.uncertainty or 0.0)) ** 2 for c in members)
+    return math.sqrt(total)
+
+
+def _status(
+    choice: Choice, steps: PivotSteps, settings: PivotSettings, onset: float, refused: tuple[str, ...]
+) -> tuple[str, ...]:
+    law = choice.fits[0]
+    found = []
+    if np.any(steps.weight == 0.0):
+        found.append(f"bad-steps: {int(np.sum(steps.weight == 0.0))} left out")
+    if abs(choice.directions[0][0].angle) > settings.angle_warning:
+        found.append(f"load-off-pad: {choice.directions[0][0]}")
+    if onset > 0.0:
+        found.append(f"contact-incomplete: below {onset:.0f} N")
+    if onset >= float(np.max(steps.load)):
+        found.append("contact-never-complete")
+    if choice.weights[0] < CLEAR_CHOICE:
+        found.append(
+            "law-undecided: " + ", ".join(f"{f.name} {w:.2f}" for f, w in zip(choice.fits, choice.weights, strict=True))
+        )
+    if law.name == "spline":
+        found.append("no-physical-law")
+    if law.freedom > 0 and stats.chi2.sf(law.chi_square, law.freedom) < MISFIT_PROBABILITY:
+        found.append("misfit: the scatter exceeds the noise")
+    if not any(record.holds for record in choice.records):
+        found.append("no-holds: drift cannot be told from deflection")
+    if any(record.lost > MANY_LOST for record in choice.records):
+        found.append("samples-lost")
+    if refused:
+        found.append("runs-refused: " + ", ".join(refused))
+    return tuple(found)

@@ -1,0 +1,98 @@
+"""Steps that do not belong to the curve: a slip, a knock, a probe that jumped and came back.
+
+Each hold is tested as a whole against the most flexible law, with the noise as it is correlated: would a
+shift of this hold alone explain the record better, and by how many standard errors? The worst goes first,
+then the rest are tested again without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpjb_ident.pivot.dry_record import DryRecord
+from tpjb_ident.pivot.law_fit import FitData, LawFit, fit_law
+from tpjb_ident.pivot.laws import Law
+from tpjb_ident.pivot.noise import NoiseModel
+from tpjb_ident.pivot.settings import PivotSettings
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int_]
+MakeData = Callable[[Sequence[DryRecord], Sequence[BoolArray], NoiseModel, PivotSettings], FitData]
+
+MOST_BAD = 0.3  # share of the groups that may be dropped
+GROUPS_ON_RAMP = 15
+
+
+def bad_blocks(
+    record: DryRecord, noise: NoiseModel, laws: Mapping[str, Law], make_data: MakeData, settings: PivotSettings
+) -> BoolArray:
+    """Blocks (m,) that belong to bad steps.
+
+    Parameters
+    ----------
+    record : DryRecord
+        One run.
+    noise : NoiseModel
+        As seen within holds.
+    laws : mapping of str to Law
+        ``spline`` is used.
+    make_data : callable
+        Builds the fit's input from records, used blocks, noise and settings.
+    settings : PivotSettings
+        `bad_hold_limit`.
+
+    Returns
+    -------
+    (m,) ndarray of bool
+    """
+    groups = _groups(record)
+    bad = np.zeros(len(groups), dtype=bool)
+    names = [g for g in np.unique(groups) if g >= 0]
+    for _ in range(int(MOST_BAD * len(names))):
+        data = make_data([record], [~bad], noise, settings)
+        worst, size = _worst(fit_law(laws["spline"], True, data), data, groups[~bad])
+        if size < settings.bad_hold_limit:
+            break
+        bad |= groups == worst
+    return bad
+
+
+def _groups(record: DryRecord) -> IntArray:
+    """Hold numbers; consecutive stretches of a continuous ramp; -1 for ramps between holds."""
+    if record.holds:
+        return record.blocks.hold
+    m = len(record.blocks)
+    return np.asarray(np.arange(m) * GROUPS_ON_RAMP // m)
+
+
+def _worst(fit: LawFit, data: FitData, groups: IntArray) -> tuple[int, float]:
+    """The group whose shift is most significant, and its size in standard errors."""
+    residual = data.whitener @ (data.deflection - fit.reading(data.load, data.branch))
+    # tangent space of the fit by differences: what the law could take up of a shift is not held against the
+    # hold
+    jacobian = np.empty((len(residual), len(fit.theta)))
+    for k in range(len(fit.theta)):
+        step = 1e-3 * np.sqrt(fit.covariance[k, k]) + 1e-300
+        theta = fit.theta.copy()
+        theta[k] += step
+        moved = LawFit(fit.law, fit.reference_load, fit.contact, theta, fit.covariance, 0.0, 0.0, 1)
+        jacobian[:, k] = (
+            data.whitener @ (moved.reading(data.load, data.branch) - fit.reading(data.load, data.branch)) / step
+        )
+    scale = np.sqrt(np.diag(fit.covariance))
+    inside = jacobian * scale
+    hat = fit.covariance / np.outer(scale, scale)
+    best, size = -1, 0.0
+    for group in np.unique(groups[groups >= 0]):
+        shift = data.whitener @ (groups == group).astype(float)
+        taken = inside.T @ shift
+        room = float(shift @ shift - taken @ hat @ taken)
+        if room > 1e-6 * float(shift @ shift):
+            statistic = abs(float(shift @ residual - taken @ hat @ (inside.T @ residual))) / np.sqrt(room)
+            if statistic > size:
+                best, size = int(group), statistic
+    return best, size

@@ -1,0 +1,228 @@
+"""The measured curve of one pivot: load, deflection, tangent stiffness, each with its interval."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import optimize, stats
+
+from tpjb_ident.pivot.hysteresis import Hysteresis
+from tpjb_ident.pivot.law_fit import SCALE, LawFit
+from tpjb_ident.pivot.projection import Direction
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int_]
+
+
+@dataclass(frozen=True)
+class PivotSteps:
+    """Settled means of the holds of a test (of all blocks, where the load never stood still).
+
+    Attributes
+    ----------
+    load : (n,) ndarray
+        Along the pad [N], what friction holds back taken off.
+    deflection, deflection_se : (n,) ndarray
+        From zero load [m]; the standard error is that of the mean about the run's own level.
+    across_load, across_deflection : (n,) ndarray
+        Components across the pad [N], [m].
+    branch : (n,) ndarray of int
+        +1 loading, -1 unloading.
+    weight : (n,) ndarray
+        1 used, 0 left out as a bad step.
+    """
+
+    load: FloatArray
+    deflection: FloatArray
+    deflection_se: FloatArray
+    across_load: FloatArray
+    across_deflection: FloatArray
+    branch: IntArray
+    weight: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.load)
+
+
+@dataclass(frozen=True)
+class PivotCurve:
+    """Load-deflection curve of one pad's pivot, housing included.
+
+    The displacement is measured between shaft and housing, so pivot, pad back and housing seat all give:
+    `includes_housing` is True, and no further housing compliance may be put in series with this curve.
+
+    The curve is that of the most likely law; the intervals also hold the spread of the other likely laws
+    about it.
+
+    Attributes
+    ----------
+    pad : int
+        Number, from 1.
+    angle : float
+        Direction of the pad [rad].
+    steps : PivotSteps
+        The points.
+    fits : tuple of LawFit
+        Likely laws, most likely first.
+    weights : (n,) ndarray
+        Their posterior shares.
+    onset_load : float
+        The shaft is fully in contact from here on [N]; zero where no contact loss was seen.
+    onset_load_se : float
+        Its standard error [N].
+    valid_from, valid_to : float
+        Loads between which the curve was measured with full contact [N].
+    load_direction, displacement_direction : Direction
+        Fitted directions, relative to the pad.
+    hysteresis : Hysteresis or None
+        Loop of loading and unloading, where both were recorded.
+    relative_calibration : float
+        Standard uncertainty of the stiffness from probe and cell certificates, relative; not in the bands,
+        because it is common to everything that the same channels measure.
+    status : tuple of str
+        Named conditions; empty when all is well.
+    runs : tuple of str
+        Where it came from.
+    """
+
+    pad: int
+    angle: float
+    steps: PivotSteps
+    fits: tuple[LawFit, ...]
+    weights: FloatArray = field(repr=False)
+    onset_load: float
+    onset_load_se: float
+    valid_from: float
+    valid_to: float
+    load_direction: Direction
+    displacement_direction: Direction
+    hysteresis: Hysteresis | None = None
+    relative_calibration: float = 0.0
+    status: tuple[str, ...] = ()
+    runs: tuple[str, ...] = ()
+    includes_housing: bool = True
+
+    @property
+    def law(self) -> LawFit:
+        """The most likely law with its parameters and covariance."""
+        return self.fits[0]
+
+    @property
+    def load_direction_offset(self) -> float:
+        """Angle from the pad to the load [rad]."""
+        return self.load_direction.angle
+
+    def deflection(self, load: ArrayLike) -> FloatArray:
+        """Deflection [m] at pad loads [N]; same shape as `load`, which must not be negative."""
+        values = _loads(load)
+        return self.law.deflection(values.ravel()).reshape(values.shape)
+
+    def load(self, deflection: ArrayLike) -> FloatArray:
+        """Pad load [N] at deflections [m] (the inverse of `deflection`)."""
+        wanted = np.asarray(deflection, dtype=float)
+        if np.any(~(wanted >= 0.0)):
+            raise ValueError("deflection must be zero or positive, and not NaN")
+        return np.array([self._invert(float(x)) for x in wanted.ravel()]).reshape(wanted.shape)
+
+    def _invert(self, deflection: float) -> float:
+        if deflection == 0.0:
+            return 0.0
+        top = self.valid_to
+        while float(self.deflection(top)) < deflection:
+            top *= 2.0
+        return float(optimize.brentq(lambda w: float(self.deflection(w)) - deflection, 0.0, top, xtol=1e-9 * top))
+
+    def stiffness(self, load: ArrayLike) -> FloatArray:
+        """Tangent stiffness dW/d delta [N/m] at pad loads [N], what small vibrations feel (paper, Eq. 18)."""
+        values = _loads(load)
+        return np.asarray(1.0 / self.law.compliance(values.ravel())).reshape(values.shape)
+
+    def secant(self, load: ArrayLike) -> FloatArray:
+        """Secant stiffness W/delta [N/m] at pad loads [N], what the printed formulas mean (Eq. 16, 17)."""
+        values = _loads(load)
+        return np.asarray(values / self.deflection(values))
+
+    def stiffness_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
+        """Interval of the tangent stiffness.
+
+        Parameters
+        ----------
+        load : array_like
+            Pad loads [N].
+        level : float
+            Coverage.
+
+        Returns
+        -------
+        lo, hi : ndarray
+            [N/m], shape of `load`. Random errors, drift, friction and the choice of the law; calibration is
+            in `relative_calibration`.
+        """
+        values = _loads(load)
+        half = self._quantile(level) * self.relative_stiffness_se(values)
+        centre = self.stiffness(values)
+        return np.asarray(centre * np.exp(-half)), np.asarray(centre * np.exp(half))
+
+    def secant_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
+        """Interval of the secant stiffness [N/m]; as `stiffness_band`."""
+        values = _loads(load)
+        half = self._quantile(level) * self._spread(values, secant=True)
+        centre = self.secant(values)
+        return np.asarray(centre * np.exp(-half)), np.asarray(centre * np.exp(half))
+
+    def relative_stiffness_se(self, load: ArrayLike) -> FloatArray:
+        """Standard error of ln(tangent stiffness) at pad loads [N]."""
+        return self._spread(_loads(load), secant=False)
+
+    def is_extrapolated(self, load: ArrayLike) -> NDArray[np.bool_]:
+        """True where a load lies outside what was measured with full contact."""
+        values = _loads(load)
+        return np.asarray((values < self.valid_from) | (values > self.valid_to))
+
+    def _spread(self, load: FloatArray, secant: bool) -> FloatArray:
+        """Standard deviation of ln(stiffness): each law's own, and the laws' about the leading one."""
+        flat = np.maximum(load.ravel(), 1e-6 * self.valid_to)
+        total = np.zeros(len(flat))
+        value = [np.log(fit.deflection(flat) if secant else fit.compliance(flat)) for fit in self.fits]
+        for fit, weight, logs in zip(self.fits, self.weights, value, strict=True):
+            gradient = fit.log_deflection_gradient(flat) if secant else fit.log_compliance_gradient(flat)
+            own = np.einsum("ij,jk,ik->i", gradient, fit.covariance, gradient)
+            total += weight * (own + (logs - value[0]) ** 2)
+        return np.asarray(np.sqrt(total)).reshape(load.shape)
+
+    def _quantile(self, level: float) -> float:
+        if not 0.0 < level < 1.0:
+            raise ValueError(f"level must lie between 0 and 1, got {level}")
+        return float(stats.norm.ppf(0.5 + 0.5 * level))
+
+    def __str__(self) -> str:
+        parameters = ", ".join(
+            f"{n} = {v:.4g} (se {s:.2g})"
+            for n, v, s in zip(
+                self.law.names[SCALE:],
+                self.law.theta[SCALE:],
+                np.sqrt(np.diag(self.law.covariance))[SCALE:],
+                strict=True,
+            )
+        )
+        at = 0.5 * self.valid_to
+        lo, hi = (float(x) for x in self.stiffness_band(at))
+        share = f"{100 * self.weights[0]:.0f} %"
+        lines = [
+            f"pad {self.pad} at {math.degrees(self.angle):g} deg: {self.law.name} ({share}), {parameters}",
+            f"  tangent stiffness at {at:.0f} N: {float(self.stiffness(at)):.4g} N/m (95 %: {lo:.4g} to {hi:.4g})",
+            f"  holds from {self.valid_from:.0f} to {self.valid_to:.0f} N; load {self.load_direction}",
+        ]
+        if self.status:
+            lines.append("  status: " + ", ".join(self.status))
+        return "\n".join(lines)
+
+
+def _loads(load: ArrayLike) -> FloatArray:
+    values = np.asarray(load, dtype=float)
+    if np.any(~(values >= 0.0)):
+        raise ValueError("load must be zero or positive, and not NaN: a pivot can only be pressed")
+    return values

@@ -1,0 +1,118 @@
+"""A dry-pivot run made ready: glitches out, holds found, averaged, projected on its pad."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.problem import Problem, RigDataError
+from tpjb_ident.pivot.blocks import Blocks, Samples, cut_blocks
+from tpjb_ident.pivot.glitches import good_samples
+from tpjb_ident.pivot.projection import Projection, pad_axes, project
+from tpjb_ident.pivot.settings import PivotSettings
+from tpjb_ident.pivot.steps import Hold, find_holds
+
+if TYPE_CHECKING:
+    from rigdata.campaign import Run
+
+FloatArray = NDArray[np.float64]
+
+FEWEST_SAMPLES = 50
+MOST_LOST = 0.5  # share of samples lost to gaps and glitches above which a record is refused
+FEWEST_BLOCKS = 8
+
+
+@dataclass(frozen=True)
+class DryRecord:
+    """One dry run of one pad.
+
+    Attributes
+    ----------
+    run : Run
+        Where it came from.
+    pad : int
+        Number, from 1.
+    angle : float
+        Direction of the pad [rad].
+    holds : tuple of Hold
+        Empty for a continuous ramp.
+    blocks : Blocks
+        Averages in the bearing frame.
+    projection : Projection
+        The same on the pad's axes.
+    lost : float
+        Share of samples left out.
+    """
+
+    run: Run
+    pad: int
+    angle: float
+    holds: tuple[Hold, ...]
+    blocks: Blocks
+    projection: Projection
+    lost: float
+
+
+def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> DryRecord:
+    """Read one dry run.
+
+    Parameters
+    ----------
+    run : Run
+        Of kind ``dry_pivot``.
+    pad_angles : (n_pads,) ndarray
+        Directions of the pads [rad], pad #1 first.
+    settings : PivotSettings
+        Block length, longest glitch.
+
+    Returns
+    -------
+    DryRecord
+
+    Raises
+    ------
+    RigDataError
+        When the run names no pad or one that the bearing lacks, or holds too little to work with.
+    """
+    if run.pad is None or not 1 <= run.pad <= len(pad_angles):
+        raise refusal(
+            run, "pad", f"names pad {run.pad}, the bearing has pads 1 to {len(pad_angles)}", "Correct the manifest"
+        )
+    angle = float(pad_angles[run.pad - 1])
+    samples = _samples(run, angle, settings)
+    load_range = float(np.ptp(samples.along))
+    if load_range <= 0.0 or np.ptp(samples.displacement, axis=0).max() <= 0.0:
+        what = "does not move: a dead or disconnected channel"
+        raise refusal(run, "force or displacement", what, "Check the channels of this run")
+    holds = find_holds(samples.time, samples.along)
+    blocks = cut_blocks(samples, holds, settings.block)
+    if len(blocks) < FEWEST_BLOCKS:
+        what = f"gives only {len(blocks)} usable averages of {settings.block:g} s"
+        raise refusal(run, "record", what, "Record for longer, or set a shorter block")
+    return DryRecord(run, run.pad, angle, holds, blocks, project(blocks, angle), samples.lost)
+
+
+def _samples(run: Run, angle: float, settings: PivotSettings) -> Samples:
+    """Both vectors on one time base, glitches left out."""
+    force, displacement = run.vector("force"), run.vector("displacement")
+    n = min(len(force), len(displacement))
+    load, position, time = force.values[:n], displacement.values[:n], np.asarray(displacement.time[:n])
+    good = good_samples(np.hstack([load, position]), settings.longest_glitch) & np.isfinite(time)
+    lost = 1.0 - float(np.mean(good)) if n else 1.0
+    if n < FEWEST_SAMPLES or lost > MOST_LOST:
+        what = f"has {n} samples, of which {100 * lost:.0f} % are missing or glitches"
+        raise refusal(run, "record", what, "Repeat the test")
+    time, load, position = time[good], load[good], position[good]
+    if np.any(np.diff(time) <= 0.0):
+        # a logger that repeats or shuffles time stamps: order is what averages need
+        order = np.argsort(time, kind="stable")
+        time, load, position = time[order], load[order], position[order]
+    return Samples(time, load, position, np.asarray(load @ pad_axes(angle)[0]), lost)
+
+
+def refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
+    """Error that names the run, the place, the trouble and the cure."""
+    return RigDataError(Problem("error", run.file, place, f"run {run.id} {what}", cure, run=run.id))

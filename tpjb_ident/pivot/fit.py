@@ -1,0 +1,170 @@
+"""Dry tests to pivot curves: the whole way, for all pads of a campaign (paper, Sec. 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.problem import Problem, RigDataError
+from tpjb_ident.pivot.assemble import Choice, assemble_curve
+from tpjb_ident.pivot.bad_holds import bad_blocks
+from tpjb_ident.pivot.choice import keep_likely, posterior_weights
+from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.pivot.dry_record import DryRecord, read_dry_run
+from tpjb_ident.pivot.law_fit import FitData, LawFit, fit_law
+from tpjb_ident.pivot.laws import Bilinear, HertzLine, HertzPoint, Law, Linear, PointInSeries, Power
+from tpjb_ident.pivot.noise import NoiseModel
+from tpjb_ident.pivot.noise_of_records import noise_about_curve, noise_within_holds
+from tpjb_ident.pivot.projection import Direction
+from tpjb_ident.pivot.refusals import check_directions, check_placement
+from tpjb_ident.pivot.settings import PivotSettings
+from tpjb_ident.pivot.spline_law import SplineLaw
+
+if TYPE_CHECKING:
+    from rigdata.campaign import Campaign
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+REFERENCE_SHARE = 0.4  # reference load of the laws, as a share of the largest load
+UNKNOWN_ZERO = 2.0e-5  # [m], spread of the reading at zero load from run to run of one pad
+LAWS: dict[str, Law] = {
+    law.name: law for law in (HertzLine(), HertzPoint(), Power(), Linear(), PointInSeries(), Bilinear(), SplineLaw())
+}
+
+
+@dataclass(frozen=True)
+class _Pad:
+    """All records of one pad, their used blocks and fitted directions."""
+
+    records: tuple[DryRecord, ...]
+    good: tuple[BoolArray, ...]
+    directions: tuple[tuple[Direction, Direction], ...]
+
+
+def fit_pivots(
+    campaign: Campaign, pivot_angles: Sequence[float], settings: PivotSettings | None = None
+) -> tuple[PivotCurve, ...]:
+    """Fit a load-deflection curve to the dry tests of every pad.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        With runs of kind ``dry_pivot``.
+    pivot_angles : sequence of float
+        Directions of the pads [rad], pad #1 first.
+    settings : PivotSettings, optional
+        Defaults suit staircase tests.
+
+    Returns
+    -------
+    tuple of PivotCurve
+        One per pad that was tested, in order of pads.
+
+    Raises
+    ------
+    RigDataError
+        When the campaign has no dry tests, or records are not what they claim to be (wrong pad, swapped
+        channel, wrong angle); carries every refusal, not just the first. With ``settings.on_refusal =
+        "skip"`` refused records are left out as long as any are left, and the curves say so.
+    """
+    chosen = settings or PivotSettings()
+    records, problems = _read(campaign, np.asarray(pivot_angles, dtype=float), chosen)
+    problems += check_placement(records, pivot_angles)
+    refused = {problem.run for problem in problems}
+    noise = noise_within_holds(records, chosen.drift_rate) if records else NoiseModel(1.0, 1.0, 1.0)
+    pads: dict[int, list[tuple[DryRecord, tuple[Direction, Direction]]]] = {}
+    for record in records:
+        if record.run.id in refused:
+            continue
+        try:
+            pads.setdefault(record.pad, []).append((record, check_directions(record, noise, chosen)))
+        except RigDataError as error:
+            problems += error.problems
+    if problems and (chosen.on_refusal == "raise" or not pads):
+        raise RigDataError(problems)
+    return _curves(pads, noise, chosen, tuple(sorted({str(p.run) for p in problems})))
+
+
+def _read(campaign: Campaign, angles: FloatArray, settings: PivotSettings) -> tuple[list[DryRecord], list[Problem]]:
+    runs = campaign.of_kind("dry_pivot")
+    if not runs:
+        raise RigDataError(
+            Problem(
+                "error", "campaign.toml", "runs", "has no runs of kind dry_pivot", "Record dry pivot tests, one per pad"
+            )
+        )
+    records: list[DryRecord] = []
+    problems: list[Problem] = []
+    for run in runs:
+        try:
+            records.append(read_dry_run(run, angles, settings))
+        except RigDataError as error:
+            problems += error.problems
+    return records, problems
+
+
+def _curves(
+    pads: dict[int, list[tuple[DryRecord, tuple[Direction, Direction]]]],
+    first_noise: NoiseModel,
+    settings: PivotSettings,
+    refused: tuple[str, ...],
+) -> tuple[PivotCurve, ...]:
+    """Drop bad holds, learn the noise about the curves, fit every law, weigh the laws over the pads."""
+    numbers = sorted(pads)
+    members = []
+    for number in numbers:
+        records = tuple(record for record, _ in pads[number])
+        good = tuple(~bad_blocks(record, first_noise, LAWS, _fit_data, settings) for record in records)
+        members.append(_Pad(records, good, tuple(d for _, d in pads[number])))
+    noise = noise_about_curve(
+        [r for m in members for r in m.records], [g for m in members for g in m.good], settings.drift_rate
+    )
+    fits = [_fit_all(member, noise, settings) for member in members]
+    weights = posterior_weights(fits)
+    curves = []
+    for member, candidates, shares in zip(members, fits, weights, strict=True):
+        likely, kept = keep_likely(candidates, shares)
+        choice = Choice(member.records, member.good, member.directions, likely, kept)
+        curves.append(assemble_curve(choice, noise, settings, refused))
+    return tuple(curves)
+
+
+def _fit_all(member: _Pad, noise: NoiseModel, settings: PivotSettings) -> list[LawFit]:
+    data = _fit_data(member.records, member.good, noise, settings)
+    return [fit_law(LAWS[name], contact, data) for name in settings.laws for contact in (False, True)]
+
+
+def _fit_data(
+    records: Sequence[DryRecord], good: Sequence[BoolArray], noise: NoiseModel, settings: PivotSettings
+) -> FitData:
+    """Join the runs of one pad; each has its own drift and its own zero."""
+    load = np.concatenate([r.projection.load[g] for r, g in zip(records, good, strict=True)])
+    deflection = np.concatenate([r.projection.deflection[g] for r, g in zip(records, good, strict=True)])
+    branch = np.concatenate([r.blocks.branch[g] for r, g in zip(records, good, strict=True)]).astype(float)
+    compliance = float(np.ptp(deflection)) / max(float(np.ptp(load)), 1e-300)
+    covariance = np.zeros((len(load), len(load)))
+    at = 0
+    for record, mask in zip(records, good, strict=True):
+        blocks = record.blocks.take(mask)
+        part = slice(at, at + len(blocks))
+        covariance[part, part] = noise.covariance(blocks.time, blocks.duration) + np.diag(
+            (compliance * blocks.load_spread) ** 2 + (settings.lag_allowance * compliance * blocks.rate) ** 2
+        )
+        if len(records) > 1:
+            covariance[part, part] += UNKNOWN_ZERO**2
+        at += len(blocks)
+    both = len(np.unique(branch)) > 1
+    friction = (0.0, 0.05) if both else (settings.friction_share, settings.friction_share_se)
+    return FitData(
+        load=load,
+        deflection=deflection - deflection[int(np.argmin(load))],
+        branch=branch,
+        whitener=np.linalg.inv(np.linalg.cholesky(covariance)),
+        reference_load=REFERENCE_SHARE * float(np.max(load)),
+        friction=friction,
+    )

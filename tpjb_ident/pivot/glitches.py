@@ -1,0 +1,73 @@
+"""Glitches in slow records: samples that jump out of the signal and come back.
+
+A staircase, a ramp and a shaft that slides from corner to corner all move monotonically over the length of
+a glitch. So a sample belongs to the signal when it lies between the median of what came before and the
+median of what comes after, give or take the noise; a median filter alone would cut the corners of every
+ramp.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+THRESHOLD = 7.0  # noise standard deviations beyond both medians
+
+
+def good_samples(values: FloatArray, longest: int = 60) -> BoolArray:
+    """Samples that are neither missing nor part of a glitch.
+
+    Parameters
+    ----------
+    values : (n, d) ndarray
+        Records sampled together; a glitch in one of them spoils the sample.
+    longest : int
+        Longest glitch to recognise [samples].
+
+    Returns
+    -------
+    (n,) ndarray of bool
+    """
+    finite = np.asarray(np.isfinite(values).all(axis=1))
+    good = finite.copy()
+    index = np.flatnonzero(finite)
+    if len(index) < 8:
+        return good
+    bad = np.zeros(len(index), dtype=bool)
+    for column in values[index].T:
+        bad |= _outside_both_medians(column, longest)
+    # the flanks of a glitch stay below the threshold
+    bad = np.asarray(ndimage.binary_dilation(bad, iterations=2))
+    good[index[bad]] = False
+    return good
+
+
+def _outside_both_medians(x: FloatArray, longest: int) -> BoolArray:
+    """True where `x` leaves the range between the medians of its two neighbourhoods."""
+    n = len(x)
+    half = min(longest, (n - 1) // 4)
+    width = 2 * half + 1
+    # a record that begins or ends within a ramp is continued by its point reflection, so the ramp stays a
+    # ramp
+    padded = np.concatenate([2 * np.median(x[:5]) - x[half:0:-1], x, 2 * np.median(x[-5:]) - x[-2 : -half - 2 : -1]])
+    median = ndimage.median_filter(padded, size=width, mode="nearest")
+    centre = np.arange(n) + half
+    before = median[np.clip(centre - half - 1, half, n + half - 1)]
+    after = median[np.clip(centre + half + 1, half, n + half - 1)]
+    noise = _noise(x, median[centre])
+    low = np.minimum(before, after) - THRESHOLD * noise
+    high = np.maximum(before, after) + THRESHOLD * noise
+    return np.asarray((x < low) | (x > high))
+
+
+def _noise(x: FloatArray, median: FloatArray) -> float:
+    """Robust standard deviation about the running median, never below the recording's resolution."""
+    spread = 1.4826 * float(np.median(np.abs(x - median)))
+    steps = np.abs(np.diff(x))
+    steps = steps[steps > 0]
+    resolution = float(np.min(steps)) if len(steps) else 0.0
+    return max(spread, resolution / np.sqrt(12.0))

@@ -1,0 +1,213 @@
+r"""Load-deflection laws of a pivot, in one common form.
+
+Every law is :math:`\delta(W) = s\,W_r\,\varphi(W/W_r; q)` with the compliance
+:math:`d\delta/dW = s\,\psi(W/W_r; q)`, :math:`\psi = \varphi'`: a scale `s` [m/N] and a shape `q`. The reference
+load `W_r` lies in the middle of the test, so scale and shape are nearly independent.
+
+=================  ====================================================  =========================================
+law                psi(u)                                                where it comes from
+=================  ====================================================  =========================================
+hertz-line         1 - kappa ln u                                        line contact (rocker): Kirk and
+Reedy's
+                                                                         W {2/3 + ln(B/W)}; a linear
+                                                                         compliance in series only lowers
+                                                                         kappa
+hertz-point        u^(-1/3)                                              point contact (sphere)
+power              u^(p-1)                                               contact of any conformity
+linear             1                                                     housing, shim, flexure
+point-in-series    (1-lam) u^(-1/3) + lam                                sphere on a linear housing
+bilinear           1 + (r-1)/{1 + exp[(u-b)/(b/10)]}                     two contacts one after the other,
+play spline             exp(piecewise linear in ln u)                         no physics: only monotone and
+smooth =================  ====================================================
+=========================================
+
+Each shape has a weak prior (mean, standard deviation) that says what is physically plausible; it keeps the
+extrapolation sane where the records say nothing, and it makes the laws' evidences comparable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class Law(Protocol):
+    """Shape of a law. `u` (n,) is load over reference load, `q` (k,) the shape parameters."""
+
+    @property
+    def name(self) -> str:
+        """Name in tables and files."""
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the k shape parameters."""
+
+    @property
+    def prior_mean(self) -> FloatArray:
+        """(k,) most plausible shape."""
+
+    @property
+    def prior_precision(self) -> FloatArray:
+        """(k, k) inverse covariance of the prior."""
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest shape parameters (k,), (k,) at which the law is monotone."""
+
+    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deflection shape (n,) and its derivative with respect to q (n, k)."""
+
+    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Compliance shape (n,) and its derivative with respect to q (n, k)."""
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Name, parameters and prior, common to all laws."""
+
+    name: str
+    parameters: tuple[str, ...] = ()
+    mean: tuple[float, ...] = ()
+    spread: tuple[float, ...] = ()
+    low: tuple[float, ...] = ()
+    high: tuple[float, ...] = ()
+
+    @property
+    def prior_mean(self) -> FloatArray:
+        return np.array(self.mean)
+
+    @property
+    def prior_precision(self) -> FloatArray:
+        return np.diag(1.0 / np.array(self.spread) ** 2) if self.spread else np.zeros((0, 0))
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        return np.array(self.low), np.array(self.high)
+
+
+def _no_parameters(u: FloatArray) -> FloatArray:
+    return np.zeros((len(u), 0))
+
+
+def _log(u: FloatArray) -> FloatArray:
+    """Logarithm that stays finite at zero load, where every use multiplies it by zero or bounds it."""
+    return np.log(np.maximum(u, 1e-9))
+
+
+class Linear(_Shape):
+    """Constant compliance."""
+
+    def __init__(self) -> None:
+        super().__init__("linear")
+
+    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deflection shape and its derivative; see `Law.phi`."""
+        return u, _no_parameters(u)
+
+    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Compliance shape and its derivative; see `Law.psi`."""
+        return np.ones_like(u), _no_parameters(u)
+
+
+class HertzPoint(_Shape):
+    """Sphere on flat: deflection as W^(2/3) (paper, Eq. 16)."""
+
+    def __init__(self) -> None:
+        super().__init__("hertz-point")
+
+    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deflection shape and its derivative; see `Law.phi`."""
+        return 1.5 * np.cbrt(u) ** 2, _no_parameters(u)
+
+    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Compliance shape and its derivative; see `Law.psi`."""
+        return 1.0 / np.cbrt(np.maximum(u, 1e-9)), _no_parameters(u)
+
+
+class HertzLine(_Shape):
+    """Cylinder in cylinder: deflection as W (A - ln W) (paper, Eq. 17); kappa = 1 / (A - 1 - ln W_r)."""
+
+    def __init__(self) -> None:
+        super().__init__("hertz-line", ("kappa",), (0.08,), (0.05,), (0.0,), (0.45,))
+
+    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deflection shape and its derivative; see `Law.phi`."""
+        fall = u * (1.0 - _log(u))
+        return u + q[0] * fall, fall[:, None]
+
+    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Compliance shape and its derivative; see `Law.psi`."""
+        # at very small or very large loads the logarithm leaves the law's range: the compliance stays
+        # positive
+        log = np.minimum(_log(u), 0.98 / max(q[0], 1e-12))
+        return 1.0 - q[0] * log, -log[:, None]
+
+
+class Power(_Shape):
+    """Deflection as W^p."""
+
+    def __init__(self) -> None:
+        super().__init__("power", ("p",), (0.85,), (0.15,), (0.3,), (1.3,))
+
+    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deflection shape and its derivative; see `Law.phi`."""
+        p = q[0]
+        value = np.maximum(u, 0.0) ** p / p
+        return value, (value * (_log(u) - 1.0 / p))[:, None]
+
+    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Compliance shape and its derivative; see `Law.psi`."""
+        value = np.maximum(u, 1e-9) ** (q[0] - 1.0)
+        return value, (value * _log(u))[:, None]
+
+
+class PointInSeries(_Shape):
+    """Sphere on flat with a linear compliance in series: lam is the linear share at the reference load."""
+
+    def __init__(self) -> None:
+        super().__init__("point-in-series", ("lam",), (0.5,), (0.25,), (0.0,), (1.0,))
+
+    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deflection shape and its derivative; see `Law.phi`."""
+        point = 1.5 * np.cbrt(u) ** 2
+        return (1.0 - q[0]) * point + q[0] * u, (u - point)[:, None]
+
+    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Compliance shape and its derivative; see `Law.psi`."""
+        point = 1.0 / np.cbrt(np.maximum(u, 1e-9))
+        return (1.0 - q[0]) * point + q[0], (1.0 - point)[:, None]
+
+
+class Bilinear(_Shape):
+    """Two compliances with a bend between them at u = b; r is the first over the second."""
+
+    width = 0.1  # of the bend, as a share of b
+
+    def __init__(self) -> None:
+        super().__init__("bilinear", ("log r", "log b"), (0.0, 0.0), (0.5, 0.5), (-2.0, -1.6), (2.0, 1.0))
+
+    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deflection shape and its derivative; see `Law.phi`."""
+        r, b = np.exp(q)
+        soft, slope_u, _ = self._bend(u, b)
+        # the bent part is b g(u / b) with g homogeneous: d/d(log b) = g b - u g'
+        return u + (r - 1.0) * soft, np.column_stack([r * soft, (r - 1.0) * (soft - u * slope_u)])
+
+    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Compliance shape and its derivative; see `Law.psi`."""
+        r, b = np.exp(q)
+        _, step, curve = self._bend(u, b)
+        return 1.0 + (r - 1.0) * step, np.column_stack([r * step, -(r - 1.0) * u * curve])
+
+    def _bend(self, u: FloatArray, b: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Integral of the smooth step from 0 to u, the step, and its derivative."""
+        w = self.width * b
+        z = np.clip((u - b) / w, -500.0, 500.0)
+        step = 1.0 / (1.0 + np.exp(z))
+        integral = w * (np.logaddexp(0.0, b / w) - np.logaddexp(0.0, -z))
+        return integral, step, -step * (1.0 - step) / w

@@ -1,0 +1,206 @@
+"""Noise of a displacement channel over seconds: white, 1/f, and drift; learnt from the records themselves.
+
+A staircase test lasts some ten seconds, in which a probe drifts by a tenth of a micrometre or more. Drift
+grows with time and so does the load: taken for deflection it makes a stiff pivot several per cent softer or
+stiffer. What tells them apart is that drift goes on during the holds. A covariance with a drift term uses
+exactly that, and widens the interval by what is left; averages with a standard deviation over the square
+root of n would be blind to it.
+
+The three levels are estimated by restricted maximum likelihood (Patterson and Thompson, Biometrika 58,
+1971, 545-554), pooled over all series of a campaign: the probes are the same in each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
+
+FloatArray = NDArray[np.float64]
+
+# time constants [s] of the exponentially correlated processes whose sum has a 1/f spectrum from some 5 mHz
+# to 5 Hz
+FLICKER_TIMES = 0.05 * 4.0 ** np.arange(7)
+
+
+def _flicker_gain() -> float:
+    """Power density [1/Hz] at 1 Hz of the sum of unit processes."""
+    return float(np.sum(4.0 * FLICKER_TIMES / (1.0 + (2.0 * np.pi * FLICKER_TIMES) ** 2)))
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Levels of the three kinds of noise.
+
+    Attributes
+    ----------
+    white : float
+        Variance times averaging time [m^2 s].
+    flicker : float
+        Power density at 1 Hz [m^2/Hz] of the 1/f part.
+    drift : float
+        Standard deviation, over runs, of the drift rate [m/s].
+    """
+
+    white: float
+    flicker: float
+    drift: float
+
+    def covariance(self, time: FloatArray, duration: FloatArray) -> FloatArray:
+        """Covariance of block averages.
+
+        Parameters
+        ----------
+        time, duration : (m,) ndarray
+            Middle and length of the blocks [s].
+
+        Returns
+        -------
+        (m, m) ndarray
+            [m^2], positive definite.
+        """
+        centred = time - np.mean(time)
+        return np.asarray(
+            np.diag(self.white / duration)
+            + self.flicker * flicker_kernel(time, duration)
+            + self.drift**2 * np.outer(centred, centred)
+        )
+
+    def mean_variance(self, duration: float) -> float:
+        """Variance of one average over `duration` seconds about the run's own level [m^2]."""
+        m = 40
+        time = (np.arange(m) + 0.5) * duration / m
+        total = NoiseModel(self.white, self.flicker, 0.0).covariance(time, np.full(m, duration / m))
+        return float(np.mean(total))
+
+
+def flicker_kernel(time: FloatArray, duration: FloatArray) -> FloatArray:
+    """Covariance (m, m) of block averages of 1/f noise of unit power density at 1 Hz."""
+    apart = np.abs(time[:, None] - time[None, :])
+    kernel = np.zeros_like(apart)
+    for tau in FLICKER_TIMES:
+        term = np.exp(-apart / tau)
+        x = duration / tau
+        # variance of the average of an exponentially correlated process over x time constants
+        np.fill_diagonal(term, 2.0 / x * (1.0 + np.expm1(-x) / x))
+        kernel += term
+    return kernel / _flicker_gain()
+
+
+@dataclass(frozen=True)
+class NoiseSeries:
+    """One series from which noise is learnt.
+
+    Attributes
+    ----------
+    time, duration : (m,) ndarray
+        Blocks [s].
+    values : (m,) ndarray
+        Block averages [m].
+    mean : (m, p) ndarray
+        Columns that span the signal; nothing within their span counts as noise.
+    """
+
+    time: FloatArray
+    duration: FloatArray
+    values: FloatArray
+    mean: FloatArray
+
+
+class _Rotated:
+    """A series in the basis in which white and 1/f noise are both diagonal: microseconds per evaluation."""
+
+    def __init__(self, series: NoiseSeries, unit: float) -> None:
+        root = np.sqrt(series.duration)
+        kernel = flicker_kernel(series.time, series.duration) * np.outer(root, root)
+        self.flicker, basis = np.linalg.eigh(kernel)
+        scale = np.maximum(np.max(np.abs(series.mean), axis=0), 1e-300)
+        mean, _ = np.linalg.qr((series.mean / scale) * root[:, None])
+        drift = (series.time - np.mean(series.time)) * root
+        columns = np.column_stack([mean, drift, series.values / unit * root])
+        self.columns = basis.T @ columns
+        self.size = mean.shape[1]
+
+    def minus_log_likelihood(self, white: float, flicker: float, drift: float) -> float:
+        variance = white + flicker * np.maximum(self.flicker, 0.0)
+        p = self.size
+        gram = self.columns.T @ (self.columns / variance[:, None])
+        # the drift is a random column: Woodbury takes it out of every product at once
+        u = gram[:, p]
+        inflation = 1.0 + drift**2 * u[p]
+        gram = gram - drift**2 * np.outer(u, u) / inflation
+        xx, xy, yy = gram[:p, :p], gram[:p, p + 1], gram[p + 1, p + 1]
+        factor = np.linalg.cholesky(xx)
+        solved = np.linalg.solve(factor, xy)
+        log_det = np.sum(np.log(variance)) + np.log(inflation) + 2.0 * np.sum(np.log(np.diag(factor)))
+        return 0.5 * float(log_det + yy - solved @ solved)
+
+
+def estimate_noise(
+    series: Sequence[NoiseSeries], drift_rate: float, closures: Sequence[tuple[float, float]] = ()
+) -> NoiseModel:
+    """Estimate the noise levels common to several series.
+
+    Parameters
+    ----------
+    series : sequence of NoiseSeries
+        Any number, of any length above their number of signal columns.
+    drift_rate : float
+        Centre of the log-normal prior (factor e) of the drift rate [m/s].
+    closures : sequence of (difference, time)
+        Differences [m] between two readings of the same position `time` seconds apart, such as the two ends
+        of a clearance sweep: direct sight of the drift.
+
+    Returns
+    -------
+    NoiseModel
+
+    Raises
+    ------
+    ValueError
+        When no series has more blocks than signal columns.
+    """
+    usable = [s for s in series if len(s.time) > s.mean.shape[1] + 2]
+    if not usable:
+        raise ValueError("no series is long enough to learn noise from: record longer holds")
+    white = float(np.median([_white_level(s) for s in usable]))
+    unit = np.sqrt(white)
+    rotated = [_Rotated(s, unit) for s in usable]
+    prior = np.log(drift_rate / unit)
+
+    def objective(logs: FloatArray) -> float:
+        w, f, d = np.exp(np.clip(logs, -30.0, 30.0))
+        total = sum(r.minus_log_likelihood(w, f, d) for r in rotated)
+        for difference, apart in closures:
+            variance = (d * apart) ** 2 + 4.0 * f * np.log1p(apart) + 4.0 * w
+            total += 0.5 * (np.log(variance) + (difference / unit) ** 2 / variance)
+        # a level that the data do not feel (no 1/f at all) must not run away to minus infinity
+        return total + 0.5 * (logs[2] - prior) ** 2 + 0.5 * (logs[1] / 5.0) ** 2 + 0.5 * (logs[0] / 5.0) ** 2
+
+    found = optimize.minimize(
+        objective,
+        np.array([0.0, 0.0, prior]),
+        method="Nelder-Mead",
+        options={"xatol": 0.02, "fatol": 0.02, "maxiter": 600, "initial_simplex": _simplex(prior)},
+    )
+    w, f, d = np.exp(found.x)
+    return NoiseModel(white=float(w * white), flicker=float(f * white), drift=float(d * unit))
+
+
+def _simplex(prior: float) -> FloatArray:
+    """Start of the search: a factor of four in each level."""
+    start = np.array([-0.5, -0.5, prior])
+    return np.vstack([start, start + 1.4 * np.eye(3)])
+
+
+def _white_level(series: NoiseSeries) -> float:
+    """Rough white level [m^2 s] from second differences of neighbouring blocks."""
+    second = np.diff(series.values, 2) * np.sqrt(np.median(series.duration) / 6.0)
+    level = float(np.median(second**2)) / 0.455
+    if level > 0.0:
+        return level
+    # a noise-free record (a simulation): anything far below the signal will do
+    return max(float(np.ptp(series.values)) * 1e-6, 1e-15) ** 2 * float(np.median(series.duration))

@@ -1,0 +1,115 @@
+"""Records that are not what they claim to be: wrong pad, swapped or reversed channels, wrong angle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigdata.problem import Problem, RigDataError
+from tpjb_ident.pivot.dry_record import DryRecord, refusal
+from tpjb_ident.pivot.noise import NoiseModel
+from tpjb_ident.pivot.projection import Direction, displacement_direction, load_direction
+from tpjb_ident.pivot.settings import PivotSettings
+
+CURE = "Check the run's pad number, the channels' axes, polarities and order, and the pad angles of the bearing file"
+
+
+def check_directions(record: DryRecord, noise: NoiseModel, settings: PivotSettings) -> tuple[Direction, Direction]:
+    """Directions of load and displacement, or a refusal.
+
+    Parameters
+    ----------
+    record : DryRecord
+        One run.
+    noise : NoiseModel
+        Of the displacement channels.
+    settings : PivotSettings
+        Limits of both angles.
+
+    Returns
+    -------
+    load, displacement : Direction
+        Relative to the pad.
+
+    Raises
+    ------
+    RigDataError
+        When either points elsewhere by more than its limit and its uncertainty.
+    """
+    load = load_direction(record.projection, record.blocks)
+    if abs(load.angle) > settings.load_angle_limit:
+        raise _elsewhere(record, "force", load, settings.load_angle_limit)
+    displacement = displacement_direction(record.projection, record.blocks, noise)
+    if abs(displacement.angle) > settings.displacement_angle_limit:
+        raise _elsewhere(record, "displacement", displacement, settings.displacement_angle_limit)
+    return load, displacement
+
+
+def _elsewhere(record: DryRecord, quantity: str, direction: Direction, limit: float) -> RigDataError:
+    degrees = math.degrees(direction.angle)
+    reading = "opposite to" if abs(degrees) > 135.0 else "away from"
+    what = (
+        f"says pad {record.pad} at {math.degrees(record.angle):g} deg, but its {quantity} grows {degrees:+.1f} deg "
+        f"{reading} that direction (limit {math.degrees(limit):g} deg): wrong pad, wrong channel or wrong angle"
+    )
+    return refusal(record.run, f"{quantity} channels", what, CURE)
+
+
+def check_placement(records: Sequence[DryRecord], pad_angles: Sequence[float]) -> list[Problem]:
+    """Where the shaft stood in each run: an absolute check that directions alone cannot make.
+
+    Exchanging two probes mirrors the plane. Along the mirror axis a mirrored movement looks right, but the
+    mirrored position does not: with the probes' zero constant within a campaign, the first readings of all
+    runs must lie around one centre, each toward its own pad, and none further to the side than a pad's flat
+    is wide.
+
+    Parameters
+    ----------
+    records : sequence of DryRecord
+        One campaign; at least three pads, otherwise nothing can be said.
+    pad_angles : sequence of float
+        Directions of all pads [rad].
+
+    Returns
+    -------
+    list of Problem
+        One per run that stands elsewhere.
+    """
+    if len({record.pad for record in records}) < 3:
+        return []
+    starts = np.array([record.blocks.displacement[int(np.argmin(record.projection.load))] for record in records])
+    outward = np.array([[math.cos(r.angle), math.sin(r.angle)] for r in records])
+    centre, reach = _centre(starts, outward)
+    half_width = reach * math.tan(math.pi / len(pad_angles))
+    problems = []
+    for record, start, normal in zip(records, starts, outward, strict=True):
+        along = float((start - centre) @ normal)
+        aside = float((start - centre) @ np.array([-normal[1], normal[0]]))
+        if abs(aside) > 0.6 * half_width or abs(along - reach) > 0.5 * reach:
+            what = (
+                f"run {record.run.id}: the shaft stands {1e6 * along:.0f} um toward pad {record.pad} and "
+                f"{1e6 * aside:+.0f} um beside it, while the other dry runs of this campaign say "
+                f"{1e6 * reach:.0f} um toward it: channels exchanged or wrong pad"
+            )
+            problems.append(Problem("error", record.run.file, "displacement channels", what, CURE, run=record.run.id))
+    return problems
+
+
+def _centre(starts: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre (2,) and distance that most starts agree on: start = centre + distance * outward, robustly."""
+    m = len(starts)
+    design = np.zeros((2 * m, 3))
+    design[0::2, 0] = design[1::2, 1] = 1.0
+    design[:, 2] = outward.ravel()
+    target = starts.ravel()
+    weights = np.ones(m)
+    solution = np.zeros(3)
+    for _ in range(50):
+        root = np.repeat(np.sqrt(weights), 2)
+        solution = np.linalg.lstsq(design * root[:, None], target * root, rcond=None)[0]
+        miss = np.linalg.norm((target - design @ solution).reshape(m, 2), axis=1)
+        # least absolute distance: one run in a wrong place does not move the centre
+        weights = 1.0 / np.maximum(miss, 0.02 * max(float(np.median(miss)), 1e-9))
+    return solution[:2], abs(float(solution[2]))

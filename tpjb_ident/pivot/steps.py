@@ -1,0 +1,159 @@
+"""Holds in a load programme: where the load stands still long enough to be averaged.
+
+No set points are needed: a hold is where the load changes much more slowly than it does on average over the
+record. A record without holds (one continuous ramp) simply has none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int_]
+
+STILL = 0.2  # share of the mean rate of change below which the load counts as held
+SETTLED = 4.0  # noise standard deviations within which the load must lie of the hold's own level
+SHORTEST = 0.15  # shortest hold [s]
+MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
+
+
+@dataclass(frozen=True)
+class Hold:
+    """One stretch of constant load.
+
+    Attributes
+    ----------
+    start, stop : float
+        From the settling of the load to the last moment before it moves on [s].
+    level : float
+        Median load [N].
+    branch : int
+        +1 when the load came up to this hold, -1 when it came down.
+    """
+
+    start: float
+    stop: float
+    level: float
+    branch: int
+
+    @property
+    def duration(self) -> float:
+        """Length [s]."""
+        return self.stop - self.start
+
+
+@dataclass(frozen=True)
+class _Bins:
+    """Medians over whole mains periods: time (m,), load (m,), width [s], noise of one median [N]."""
+
+    time: FloatArray
+    load: FloatArray
+    width: float
+    noise: float
+
+
+def find_holds(time: FloatArray, load: FloatArray) -> tuple[Hold, ...]:
+    """Find the holds of a load programme.
+
+    Parameters
+    ----------
+    time : (n,) ndarray
+        Seconds, increasing; jitter and gaps are allowed.
+    load : (n,) ndarray
+        Load along the pad direction [N], glitches already left out.
+
+    Returns
+    -------
+    tuple of Hold
+        In order of time; empty when the load never stands still.
+    """
+    bins = _bin(time, load)
+    if len(bins.time) < 8:
+        return ()
+    rate = np.gradient(bins.load, bins.time)
+    runs = _runs(np.abs(rate) < _still_rate(bins))
+    holds = [hold for run in _merge(runs, bins) if (hold := _settle(run, bins)) is not None]
+    return tuple(_with_branches(holds, first_load=float(bins.load[0])))
+
+
+def _bin(time: FloatArray, load: FloatArray) -> _Bins:
+    """Load medians over bins of two mains periods (longer for long records)."""
+    span = float(time[-1] - time[0])
+    width = MAINS_PERIOD * max(2.0, np.ceil(span / MAINS_PERIOD / 2000.0))
+    label = np.floor((time - time[0]) / width + 1e-9).astype(int)
+    edges = np.flatnonzero(np.diff(label)) + 1
+    starts, stops = np.r_[0, edges], np.r_[edges, len(time)]
+    whole = (stops - starts) >= 0.5 * np.median(stops - starts)
+    medians = np.array([np.median(load[a:b]) for a, b in zip(starts[whole], stops[whole], strict=True)])
+    times = np.array([np.mean(time[a:b]) for a, b in zip(starts[whole], stops[whole], strict=True)])
+    second = np.diff(medians, 2) if len(medians) > 2 else np.zeros(1)
+    # a second difference of white noise has variance 6; its median does not feel the ramps' corners
+    noise = 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0)
+    return _Bins(times, medians, width, noise)
+
+
+def _still_rate(bins: _Bins) -> float:
+    """Rate [N/s] below which the load counts as held."""
+    steps = np.abs(np.diff(bins.load))
+    # what is left of the total variation when the noise's own share (mean |difference| of noise) is taken
+    # out
+    travelled = max(float(np.sum(steps)) - len(steps) * 1.128 * bins.noise, float(np.ptp(bins.load)))
+    mean_rate = travelled / float(bins.time[-1] - bins.time[0])
+    return max(STILL * mean_rate, 3.0 * bins.noise / (np.sqrt(2.0) * bins.width))
+
+
+def _runs(mask: BoolArray) -> list[tuple[int, int]]:
+    """Half-open index ranges in which `mask` is true."""
+    edges = np.flatnonzero(np.diff(np.r_[False, mask, False].astype(int)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _merge(runs: list[tuple[int, int]], bins: _Bins) -> list[tuple[int, int]]:
+    """Join runs that a single noisy bin split: the gap is short and the level the same on both sides."""
+    merged: list[tuple[int, int]] = []
+    for run in runs:
+        if merged and run[0] - merged[-1][1] <= 2:
+            left = np.median(bins.load[merged[-1][0] : merged[-1][1]])
+            right = np.median(bins.load[run[0] : run[1]])
+            if abs(right - left) < 6.0 * bins.noise:
+                merged[-1] = (merged[-1][0], run[1])
+                continue
+        merged.append(run)
+    return merged
+
+
+def _settle(run: tuple[int, int], bins: _Bins) -> Hold | None:
+    """Cut the overshoot off the front of a run and the first moving bin off either end."""
+    a, b = run
+    while b - a >= 4:
+        level = float(np.median(bins.load[a:b]))
+        noise = max(bins.noise, 1.4826 * float(np.median(np.abs(bins.load[a:b] - level))), 1e-9 * abs(level))
+        if abs(bins.load[a] - level) > SETTLED * noise:
+            a += 1
+        elif abs(bins.load[b - 1] - level) > SETTLED * noise:
+            b -= 1
+        else:
+            break
+    start = float(bins.time[a]) - 0.5 * bins.width if a < len(bins.time) else 0.0
+    stop = float(bins.time[b - 1]) + 0.5 * bins.width
+    if b - a < 4 or stop - start < SHORTEST:
+        return None
+    return Hold(start, stop, float(np.median(bins.load[a:b])), 1)
+
+
+def _with_branches(holds: list[Hold], first_load: float) -> list[Hold]:
+    """Mark each hold as reached from below or from above."""
+    previous = first_load
+    marked = []
+    for k, hold in enumerate(holds):
+        branch = 1 if hold.level >= previous else -1
+        if k == 0 and len(holds) > 1 and abs(hold.level - first_load) < 1e-3 * abs(hold.level):
+            # the record starts on its first hold: it came the way the programme goes on
+            branch = 1 if holds[1].level >= hold.level else -1
+        marked.append(Hold(hold.start, hold.stop, hold.level, branch))
+        previous = hold.level
+    return marked

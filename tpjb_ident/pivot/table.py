@@ -1,0 +1,94 @@
+"""Pivot curves as a table (`pivot_curves.csv`, contract in outputs.md), the printed formula beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpjb_ident.pivot.curve import PivotCurve
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+Formula = Callable[[int, float], tuple[float, float]]
+
+ROWS = 20  # up to the largest measured load
+
+
+def load_grid(curves: Sequence[PivotCurve], extrapolate_to: float = 1.6) -> FloatArray:
+    """Round loads [N] up to `extrapolate_to` times the largest measured one (n,)."""
+    largest = max(curve.valid_to for curve in curves)
+    raw = largest / ROWS
+    decade = 10.0 ** np.floor(np.log10(raw))
+    step = decade * next(m for m in (1.0, 2.0, 2.5, 5.0, 10.0) if m * decade >= 0.99 * raw)
+    return np.asarray(step * np.arange(1, int(extrapolate_to * largest / step + 1e-9) + 1))
+
+
+def pivot_table(
+    curves: Sequence[PivotCurve], loads: FloatArray | None = None, formula: Formula | None = None, level: float = 0.95
+) -> pd.DataFrame:
+    """Curves at given loads.
+
+    Parameters
+    ----------
+    curves : sequence of PivotCurve
+        One per pad.
+    loads : (n,) ndarray, optional
+        Pad loads [N]; default `load_grid`.
+    formula : callable, optional
+        ``formula(pad, load)`` gives the printed formula's (secant, tangent) stiffness [N/m]; adds the
+        ``formula_*`` columns and the ratios measured / formula (paper: 2-3 times softer, so 0.3 to 0.5).
+    level : float
+        Coverage of the intervals.
+
+    Returns
+    -------
+    DataFrame
+        ``pad``, ``force_N``, ``deflection_m``, ``stiffness_N_per_m`` (tangent) with ``_lo``, ``_hi``,
+        ``secant_N_per_m`` likewise, ``law``, ``extrapolated`` (outside the measured loads) and
+        ``contact_complete``.
+    """
+    import pandas as pd
+
+    if not curves:
+        raise ValueError("curves must hold at least one PivotCurve")
+    grid = load_grid(curves) if loads is None else np.asarray(loads, dtype=float)
+    if np.any(~(grid > 0.0)):
+        raise ValueError("loads must be positive: at zero load there is no stiffness to speak of")
+    return pd.concat([_rows(curve, grid, formula, level) for curve in curves], ignore_index=True)
+
+
+def _rows(curve: PivotCurve, loads: FloatArray, formula: Formula | None, level: float) -> pd.DataFrame:
+    import pandas as pd
+
+    stiffness, (lo, hi) = curve.stiffness(loads), curve.stiffness_band(loads, level)
+    secant, (secant_lo, secant_hi) = curve.secant(loads), curve.secant_band(loads, level)
+    columns: dict[str, object] = {
+        "pad": curve.pad,
+        "force_N": loads,
+        "deflection_m": curve.deflection(loads),
+        "stiffness_N_per_m": stiffness,
+        "stiffness_N_per_m_lo": lo,
+        "stiffness_N_per_m_hi": hi,
+        "secant_N_per_m": secant,
+        "secant_N_per_m_lo": secant_lo,
+        "secant_N_per_m_hi": secant_hi,
+        "law": curve.law.name,
+        "extrapolated": curve.is_extrapolated(loads),
+        "contact_complete": loads >= curve.onset_load,
+    }
+    if formula is not None:
+        printed = np.array([formula(curve.pad, float(load)) for load in loads])
+        columns |= {
+            "formula_secant_N_per_m": printed[:, 0],
+            "formula_tangent_N_per_m": printed[:, 1],
+            "ratio_secant": secant / printed[:, 0],
+            "ratio_tangent": stiffness / printed[:, 1],
+            "ratio_tangent_lo": lo / printed[:, 1],
+            "ratio_tangent_hi": hi / printed[:, 1],
+        }
+    return pd.DataFrame(columns)
