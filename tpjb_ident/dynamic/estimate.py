@@ -1,0 +1,237 @@
+"""One interface to all estimators: displacement and force phasors in, dynamic stiffness out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.conditions import Condition, merged
+from tpjb_ident.dynamic.errors_in_variables import eiv_fit, repeats
+from tpjb_ident.dynamic.instrumental import instrumental_fit
+from tpjb_ident.dynamic.mm import mm_fit
+from tpjb_ident.dynamic.ols import ols_fit
+from tpjb_ident.dynamic.phasor_table import PhasorTable, displacement_condition, phasor_table
+from tpjb_ident.dynamic.rlm import NORMS, RlmSettings, rlm_fit
+from tpjb_ident.dynamic.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.uncertainty import homoscedastic, with_repeats
+
+METHODS = ("ols", "rlm", "mm", "mm-eiv", "iv")
+#: Condition number of the displacement directions beyond which entries cannot be told apart.
+MAX_CONDITION = 30.0
+#: Share of windows without weight beyond which the answer needs a look.
+MAX_REJECTED = 0.4
+#: A window counts as rejected below this weight.
+REJECTED_WEIGHT = 0.3
+MIN_COHERENCE = 0.9
+
+
+def estimate_dynamic_stiffness(
+    D: Any,
+    F: Any,
+    omega: Any,
+    direction: Any = None,
+    method: str = "mm-eiv",
+    norm: str | None = None,
+    reference: Any = None,
+) -> DynamicStiffness:
+    """Solve Eq. (15) for the 2x2 complex dynamic stiffness of a bearing.
+
+    Parameters
+    ----------
+    D : (n, 2) complex array
+        Displacement phasors X, Y [m], one row per record window; exp(+i omega t).
+    F : (n, 2) complex array
+        Oil-force phasors [N].
+    omega : float
+        Excitation frequency [rad/s].
+    direction : (n,) array of labels, optional
+        Windows with one label are repeats of one excitation.
+    method : {"mm-eiv", "mm", "rlm", "ols", "iv"}
+        Without enough repeats ``"mm-eiv"`` falls back to ``"mm"`` and says so in `status`.
+    norm : str, optional
+        Norm of ``"rlm"``; see `tpjb_ident.dynamic.rlm.NORMS`.
+    reference : (n, 2) complex array, optional
+        Instruments for ``"iv"`` (for instance the actuators' command), any unit.
+
+    Returns
+    -------
+    DynamicStiffness
+        With NaN in `h` and the reason in `status` where the data give no answer.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit, an unknown method or norm, omega not positive.
+    """
+    if method not in METHODS:
+        import difflib
+
+        near = difflib.get_close_matches(str(method), METHODS, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise ValueError(f"unknown method {method!r}{hint} Known: {', '.join(METHODS)}")
+    if norm is not None and method != "rlm":
+        raise ValueError(f'norm={norm!r} belongs to method="rlm", not to {method!r}')
+    frequency = float(_si(omega, "rad/s", "omega"))
+    if not (np.isfinite(frequency) and frequency > 0):
+        raise ValueError(f"omega must be a positive number of rad/s, got {omega}")
+    instruments = None if reference is None else getattr(reference, "magnitude", reference)
+    table = phasor_table(_si(D, "m", "D"), _si(F, "N", "F"), direction, instruments)
+    return estimate_table(table, frequency, method, RlmSettings(norm or "huber"))
+
+
+def estimate_table(
+    table: PhasorTable, omega: float, method: str, rlm_settings: RlmSettings | None = None
+) -> DynamicStiffness:
+    """As `estimate_dynamic_stiffness`, for a table that is already checked and scaled."""
+    name = f"rlm:{(rlm_settings or RlmSettings()).norm}" if method == "rlm" else method
+    obstacle = _obstacle(table)
+    if obstacle is not None:
+        return _failed(table, omega, name, obstacle)
+    if method == "rlm":
+        return _rlm(table, omega, name, rlm_settings)
+    solver: Callable[[PhasorTable, float, str], DynamicStiffness] = {
+        "ols": _ols,
+        "mm": _mm,
+        "mm-eiv": _mm_eiv,
+        "iv": _iv,
+    }[method]
+    return solver(table, omega, name)
+
+
+def _si(value: Any, unit: str, name: str) -> Any:
+    """Plain SI numbers as they are, pint quantities converted."""
+    if not (hasattr(value, "to") and hasattr(value, "magnitude")):
+        return value
+    try:
+        return value.to(unit).magnitude
+    except Exception as error:  # pint's own class depends on the registry the value came from
+        raise ValueError(f"{name} must be convertible to {unit}, got {value.units}") from error
+
+
+def _obstacle(table: PhasorTable) -> Condition | None:
+    if len(table) < 2 or table.n_directions < 2:
+        return Condition(
+            "fewer-than-two-directions",
+            f"{len(table)} usable windows in {table.n_directions} directions; H needs two directions at least",
+        )
+    if not np.isfinite(displacement_condition(table.D)):
+        return Condition("fewer-than-two-directions", "all displacements are collinear: H needs two directions in them")
+    return None
+
+
+def _failed(table: PhasorTable, omega: float, name: str, why: Condition) -> DynamicStiffness:
+    return DynamicStiffness(
+        np.full((2, 2), np.nan + 0j),
+        omega,
+        np.full((8, 8), np.nan),
+        np.full(8, np.nan),
+        name,
+        np.zeros((len(table.valid), 2)),
+        (why,),
+        displacement_condition(table.D),
+    )
+
+
+def _rlm(table: PhasorTable, omega: float, name: str, settings: RlmSettings | None) -> DynamicStiffness:
+    fit = rlm_fit(table.D, table.F, settings)
+    return _result(table, omega, name, (fit.h, fit.covariance, fit.dof, np.nan), fit.weights, fit.conditions)
+
+
+def _ols(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
+    h = ols_fit(table.D, table.F)
+    weights = np.ones(len(table))
+    return _result(table, omega, name, _regression(table, h, weights, 1.0), weights, ())
+
+
+def _mm(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
+    fit = mm_fit(table.D, table.F, table.direction)
+    robust = "no-robust-start" not in fit.conditions
+    numbers = _regression(table, fit.coefficients, fit.weights, 1 / 0.95 if robust else 1.0)
+    return _result(table, omega, name, numbers, fit.weights, fit.conditions)
+
+
+def _mm_eiv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
+    start = mm_fit(table.D, table.F, table.direction)
+    repeated = repeats(table, start.weights)
+    if repeated is None:
+        plain = _mm(table, omega, name)
+        missing = Condition(
+            "no-repeats",
+            "too few repeats per direction for a noise covariance: plain MM, not corrected for displacement noise",
+        )
+        return _with_status(plain, (missing,))
+    fit = eiv_fit(repeated)
+    numbers = (fit.h, fit.covariance, fit.dof, fit.chi_square)
+    return _result(table, omega, name, numbers, repeated.weights, start.conditions)
+
+
+def _iv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
+    fit = instrumental_fit(table)
+    numbers = _regression(fit.explained, fit.h, fit.weights, 1 / 0.95)
+    return _result(table, omega, name, numbers, fit.weights, fit.conditions)
+
+
+Numbers = tuple[ComplexArray, FloatArray, FloatArray, float]
+
+
+def _regression(table: PhasorTable, h: ComplexArray, weights: FloatArray, correction: float) -> Numbers:
+    """Covariance of a weighted regression: from the repeats where there are any, else from residuals."""
+    known = with_repeats(table, h, weights, correction)
+    if known is not None:
+        return h, known[0], known[1], known[2]
+    covariance, dof = homoscedastic(table.D, table.F - table.D @ h.T, weights, correction)
+    return h, covariance, dof, np.nan
+
+
+def _with_status(result: DynamicStiffness, extra: tuple[Condition, ...]) -> DynamicStiffness:
+    from dataclasses import replace
+
+    return replace(result, status=merged(result.status, extra))
+
+
+def _result(
+    table: PhasorTable,
+    omega: float,
+    name: str,
+    numbers: Numbers,
+    weights: FloatArray,
+    conditions: tuple[Condition, ...],
+) -> DynamicStiffness:
+    """Back to SI, weights back on all given windows, status from what the numbers say."""
+    h, covariance, dof, chi_square = numbers
+    per_axis = np.repeat(weights[:, None], 2, axis=1) if weights.ndim == 1 else weights
+    joint = per_axis.min(axis=1)
+    condition = displacement_condition(table.D, joint)
+    all_weights = np.zeros((len(table.valid), 2))
+    all_weights[table.valid] = per_axis
+    found = [c for c in (_ill_conditioned(condition), _many_rejected(joint)) if c is not None]
+    return DynamicStiffness(
+        h * table.h_scale,
+        omega,
+        covariance * table.h_scale**2,
+        dof,
+        name,
+        all_weights,
+        merged(conditions, tuple(found)),
+        condition,
+        chi_square,
+    )
+
+
+def _ill_conditioned(condition: float) -> Condition | None:
+    if condition <= MAX_CONDITION:
+        return None
+    return Condition("ill-conditioned", f"condition number {condition:.3g} of the displacement directions > 30")
+
+
+def _many_rejected(weights: FloatArray) -> Condition | None:
+    share = float((weights < REJECTED_WEIGHT).mean())
+    if share <= MAX_REJECTED:
+        return None
+    return Condition("many-windows-rejected", f"{100 * share:.0f} % of the windows got no weight (limit 40 %)")
+
+
+__all__ = ["METHODS", "NORMS", "estimate_dynamic_stiffness", "estimate_table"]

@@ -1,0 +1,212 @@
+"""A campaign's dynamic runs to dynamic coefficients: the whole path, point by point."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from tpjb_ident.dynamic.arrays import FloatArray
+from tpjb_ident.dynamic.calibration_uncertainty import GainDraws, apparent_change, gain_draws
+from tpjb_ident.dynamic.conditions import Condition, merged
+from tpjb_ident.dynamic.estimate import REJECTED_WEIGHT, estimate_table
+from tpjb_ident.dynamic.identification import Identification
+from tpjb_ident.dynamic.phasor_table import phasor_table
+from tpjb_ident.dynamic.point_data import PointData, gather
+from tpjb_ident.dynamic.point_result import PointResult
+from tpjb_ident.dynamic.quality import amplitude, coherence, directional_pattern, flags, rejected_windows
+from tpjb_ident.dynamic.rlm import RlmSettings
+from tpjb_ident.dynamic.run_phasors import PhasorSettings, RunPhasors, run_phasors
+from tpjb_ident.dynamic.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.windows import RecordTooShortError
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class IdentifySettings:
+    """Choices of a campaign's identification.
+
+    Attributes
+    ----------
+    method : str
+        Default method, the one in ``coefficients.csv``.
+    methods : tuple of str
+        All that are run; ``"rlm:tukey"`` names a norm.
+    phasors : PhasorSettings
+    clearance : float or None
+        Assembled clearance [m], for the amplitude check; None leaves it out.
+    n_calibration : int
+        Monte-Carlo draws over the calibration uncertainties.
+    seed : int
+        Of those draws.
+    """
+
+    method: str = "mm-eiv"
+    methods: tuple[str, ...] = ("ols", "rlm:huber", "rlm:tukey", "mm", "mm-eiv")
+    phasors: PhasorSettings = field(default_factory=PhasorSettings)
+    clearance: float | None = None
+    n_calibration: int = 400
+    seed: int = 20190722
+
+
+def identify(
+    campaign: Any, settings: IdentifySettings | None = None, progress: Progress | None = None
+) -> Identification:
+    """Identify every operating point of a campaign.
+
+    Parameters
+    ----------
+    campaign : rigdata.campaign.Campaign
+    settings : IdentifySettings, optional
+    progress : callable, optional
+        Called as progress(text, done, total).
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    ValueError
+        The campaign has no dynamic run, or an unknown method is asked for.
+    rigdata.problem.RigDataError
+        A record that cannot be read.
+    RecordTooShortError
+        A record that cannot tell its lines apart.
+    """
+    settings = settings or IdentifySettings()
+    runs = campaign.of_kind("dynamic")
+    if not runs:
+        raise ValueError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
+    tell = progress or (lambda text, done, total: None)
+    extracted = []
+    temperatures: dict[str, dict[int, float]] = {}
+    for i, run in enumerate(runs):
+        tell(run.id, i, len(runs))
+        extracted.append(_extract(run, campaign.housing_mass, settings.phasors))
+        temperatures[run.id] = mean_temperatures(run)
+    tell("estimating", len(runs), len(runs))
+    return assemble(campaign, extracted, temperatures, settings)
+
+
+def _extract(run: Any, housing_mass: float, settings: PhasorSettings) -> RunPhasors:
+    try:
+        return run_phasors(run, housing_mass, settings)
+    except RecordTooShortError as error:
+        raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
+
+
+def assemble(
+    campaign: Any,
+    extracted: list[RunPhasors],
+    temperatures: dict[str, dict[int, float]],
+    settings: IdentifySettings,
+) -> Identification:
+    """Estimate all points from runs already turned to phasors."""
+    draws = gain_draws(campaign.channels, settings.n_calibration, settings.seed)
+    points, changes = [], []
+    for data in gather(extracted):
+        point = identify_point(data, temperatures, settings)
+        change = apparent_change(data, point.stiffness, draws)
+        changes.append(change)
+        points.append(_with_systematic(point, np.cov(change.T, bias=True)))
+    joint = np.concatenate(changes, axis=1)
+    return Identification(
+        campaign.id,
+        settings.method,
+        tuple(points),
+        joint.T @ joint / len(joint) if len(joint) else np.zeros((8 * len(points),) * 2),
+        _campaign_conditions(draws),
+    )
+
+
+def _with_systematic(point: PointResult, systematic: FloatArray) -> PointResult:
+    by_method = {name: replace(est, systematic=systematic) for name, est in point.by_method.items()}
+    return replace(point, stiffness=replace(point.stiffness, systematic=systematic), by_method=by_method)
+
+
+def _campaign_conditions(draws: GainDraws) -> tuple[Condition, ...]:
+    if not draws.unstated:
+        return ()
+    return (
+        Condition(
+            "calibration-uncertainty-unstated",
+            f"no uncertainty in the manifest for {', '.join(draws.unstated)}: their systematic part is left out",
+        ),
+    )
+
+
+def identify_point(
+    data: PointData, temperatures: dict[str, dict[int, float]], settings: IdentifySettings
+) -> PointResult:
+    """All methods on one operating point, and the figures that go with it."""
+    table = phasor_table(data.D, data.F, data.run_index)
+    by_method: dict[str, DynamicStiffness] = {}
+    for name in dict.fromkeys((*settings.methods, settings.method)):
+        method, _, norm = name.partition(":")
+        by_method[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"))
+    best = by_method[settings.method]
+    weights = best.weights.min(axis=1)
+    figure = coherence(data.D, data.F, best.h, weights)
+    size = amplitude(data, weights)
+    pattern = directional_pattern(data, weights)
+    conditions = merged(
+        *(run.conditions for run in data.runs),
+        best.status,
+        flags(best, figure, size, settings.clearance),
+        () if pattern is None else (pattern,),
+        disagreement(by_method, settings.method),
+    )
+    loads, positions = data.mean_loads, data.mean_positions
+    return PointResult(
+        data.point,
+        best,
+        by_method,
+        float(np.linalg.norm(loads.mean(axis=0))),
+        positions.mean(axis=0),
+        positions.std(axis=0, ddof=1) / np.sqrt(len(positions)) if len(positions) > 1 else np.full(2, np.nan),
+        _pad_means([temperatures.get(run.run, {}) for run in data.runs]),
+        len(data.runs),
+        len(data.D),
+        float((weights < REJECTED_WEIGHT).mean()),
+        figure,
+        size,
+        conditions,
+        rejected_windows(data, best.h, weights),
+        tuple(run.run for run in data.runs),
+    )
+
+
+def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[Condition, ...]:
+    """Say which methods differ from the default beyond both intervals."""
+    best = by_method[default]
+    found = []
+    for name, other in by_method.items():
+        if name == default or not (np.isfinite(other.h).all() and np.isfinite(best.h).all()):
+            continue
+        gap = np.abs(other.vector - best.vector)
+        room = np.hypot(other.half_width(systematic=False), best.half_width(systematic=False))
+        if (gap > room).any():
+            worst = int(np.argmax(gap / room))
+            found.append(f"{name} ({gap[worst] / room[worst]:.1f} times the interval)")
+    if not found:
+        return ()
+    return (Condition("methods-disagree", f"{', '.join(found)} away from {default}"),)
+
+
+def mean_temperatures(run: Any) -> dict[int, float]:
+    """Mean temperature per pad over a run [K]; pads with several sensors give their mean."""
+    sums: dict[int, list[float]] = {}
+    for sensor in run.temperatures():
+        values = run.record(sensor.channel, 0, 2**17).values
+        if sensor.pad is not None and np.isfinite(values).any():
+            sums.setdefault(sensor.pad, []).append(float(np.nanmean(values)))
+    return {pad: float(np.mean(values)) for pad, values in sorted(sums.items())}
+
+
+def _pad_means(runs: list[dict[int, float]]) -> dict[int, float]:
+    pads = sorted({pad for run in runs for pad in run})
+    return {pad: float(np.mean([run[pad] for run in runs if pad in run])) for pad in pads}

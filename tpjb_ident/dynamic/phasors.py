@@ -1,0 +1,192 @@
+"""Phasors of the excitation lines, window by window, by a joint least-squares fit of all known lines.
+
+Convention: a channel is Re{ z exp(+i omega t) } with t = 0 at the start of the run, so that windows
+of one run are repeats of one phasor as long as the drive is locked to the recorder's clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.windows import line_design
+
+#: A sample is a glitch beyond this many robust standard deviations of the fit's residual.
+GLITCH_LIMIT = 5.5
+#: A window this many times noisier than its run's median is looked at again.
+SCALE_LIMIT = 1.5
+#: Samples left out on either side of a glitch: its flanks lie below the limit.
+GLITCH_MARGIN = 3
+#: A window that has lost more than this share of its samples gives no phasor.
+MAX_LOST = 0.5
+_LAD_ROUNDS = 15
+_ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class PhasorBlock:
+    """Phasors of one vector quantity in some windows of one run.
+
+    Attributes
+    ----------
+    phasors : (n_windows, n_lines, 2) complex ndarray
+        X and Y at every line, SI; NaN where a window gave none.
+    mean : (n_windows, 2) ndarray
+        Mean of the quantity, SI.
+    noise : (n_windows, 2) ndarray
+        Robust standard deviation of what the lines leave.
+    lost : (n_windows,) ndarray
+        Share of the samples left out (glitches, missing values).
+    """
+
+    phasors: ComplexArray
+    mean: FloatArray
+    noise: FloatArray
+    lost: FloatArray
+
+
+class LineFitter:
+    """Joint fit of lines on equal windows of an even grid: one pseudo-inverse for all of them.
+
+    Parameters
+    ----------
+    length : int
+        Samples per window.
+    rate : float
+        [Hz].
+    frequencies : (n_lines,) ndarray
+        [Hz].
+    """
+
+    def __init__(self, length: int, rate: float, frequencies: FloatArray) -> None:
+        self.length, self.rate = length, rate
+        self.frequencies = np.asarray(frequencies, dtype=float)
+        self.design = line_design(np.arange(length) / rate, self.frequencies)
+        self.inverse = np.linalg.pinv(self.design)
+        # The scale of the residual needs no more than a few hundred samples.
+        self._stride = max(1, length // 512)
+
+    def fit(self, values: FloatArray, start: FloatArray) -> PhasorBlock:
+        """Fit windows of a vector record.
+
+        Parameters
+        ----------
+        values : (n_windows, length, 2) ndarray
+            SI samples, X and Y; NaN where missing.
+        start : (n_windows,) ndarray
+            Time of each window's first sample [s] after the start of the run.
+        """
+        stack = np.ascontiguousarray(values.transpose(0, 2, 1)).reshape(-1, self.length)
+        offset = np.nanmean(stack[:, :: self._stride], axis=1, keepdims=True) if stack.size else 0.0
+        stack = stack - np.where(np.isfinite(offset), offset, 0.0)
+        coefficients = stack @ self.inverse.T
+        residual = np.abs(stack - coefficients @ self.design.T)
+        scale = 1.4826 * np.median(residual[:, :: self._stride], axis=1)
+        scale, largest = scale.reshape(-1, 2), residual.max(axis=1).reshape(-1, 2)
+        usual = np.nanmedian(scale, axis=0) if np.isfinite(scale).any() else np.full(2, np.nan)
+        # A long glitch pulls the whole fit and hides in the window's own scale: the run's tells.
+        # A NaN in the window makes both comparisons false: refit those too.
+        clean = ((largest <= GLITCH_LIMIT * scale) & (scale <= SCALE_LIMIT * usual)).all(axis=1)
+        lost = np.zeros(len(start))
+        coefficients = coefficients.reshape(-1, 2, coefficients.shape[1])
+        for i in np.flatnonzero(~clean):
+            pair = stack.reshape(-1, 2, self.length)[i].T
+            coefficients[i], scale[i], lost[i] = _refit(self.design, pair, usual)
+        mean = coefficients[:, :, 2 * len(self.frequencies)] + np.reshape(offset, (-1, 2))
+        return PhasorBlock(self._phasors(coefficients, start), mean, scale, lost)
+
+    def _phasors(self, coefficients: FloatArray, start: FloatArray) -> ComplexArray:
+        n = 2 * len(self.frequencies)
+        local = coefficients[:, :, 0:n:2] + 1j * coefficients[:, :, 1:n:2]
+        return to_run_origin(local.transpose(0, 2, 1), self.frequencies, start)
+
+
+def to_run_origin(local: ComplexArray, frequencies: FloatArray, start: FloatArray) -> ComplexArray:
+    """Turn phasors from the windows' own starts to the start of the run.
+
+    Parameters
+    ----------
+    local : (n_windows, n_lines, 2) complex ndarray
+    frequencies : (n_lines,) ndarray
+        [Hz].
+    start : (n_windows,) ndarray
+        [s].
+    """
+    return local * np.exp(-2j * np.pi * np.multiply.outer(start, frequencies))[:, :, None]
+
+
+def fit_uneven(values: FloatArray, time: FloatArray, frequencies: FloatArray, origin: float) -> PhasorBlock:
+    """Fit one window with its own time stamps (jitter, gaps).
+
+    Parameters
+    ----------
+    values : (n, 2) ndarray
+        SI; NaN where missing.
+    time : (n,) ndarray
+        [s].
+    frequencies : (n_lines,) ndarray
+        [Hz].
+    origin : float
+        Time of the start of the run [s].
+    """
+    offset = np.nanmean(values, axis=0) if np.isfinite(values).any() else np.zeros(2)
+    local_time = time - time[0]
+    coefficients, scale, lost = _refit(line_design(local_time, frequencies), values - offset, np.full(2, np.inf))
+    n = 2 * len(frequencies)
+    local = (coefficients[:, 0:n:2] + 1j * coefficients[:, 1:n:2]).T[None]
+    return PhasorBlock(
+        to_run_origin(local, frequencies, np.array([time[0] - origin])),
+        (coefficients[:, n] + offset)[None],
+        scale[None],
+        np.array([lost]),
+    )
+
+
+def _refit(design: FloatArray, values: FloatArray, usual: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Robust fit of one window: find the glitches, then plain least squares without them.
+
+    Least absolute deviations (by reweighting) stand a quarter of the window being wrong; bisquare
+    steps with no more than the run's usual scale sharpen that into a clear verdict per sample.
+
+    Returns
+    -------
+    (2, n_columns) ndarray, (2,) ndarray, float
+        Coefficients of X and Y, residual scale, share of samples lost. NaN when too few are left.
+    """
+    present = np.isfinite(values).all(axis=1)
+    nothing = np.full((2, design.shape[1]), np.nan), np.full(2, np.nan)
+    if present.mean() < 1 - MAX_LOST or present.sum() <= 2 * design.shape[1]:
+        return *nothing, float(1 - present.mean())
+    full, y = design[present], values[present]
+    weights = np.ones(len(y))
+    for _ in range(_LAD_ROUNDS):
+        size = np.abs(y - full @ _least_squares(full, y, weights))
+        relative = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).max(axis=1)
+        weights = 1 / np.maximum(relative, 0.1)
+    scale = np.zeros(2)
+    for _ in range(_ROUNDS):
+        size = np.abs(y - full @ _least_squares(full, y, weights))
+        scale = np.minimum(1.4826 * np.median(size, axis=0), SCALE_LIMIT * usual)
+        u = (size / np.maximum(scale, np.finfo(float).tiny)).max(axis=1) / GLITCH_LIMIT
+        previous, weights = weights, np.maximum(1 - u**2, 0.0) ** 2
+        if weights.mean() < 1 - MAX_LOST or np.abs(weights - previous).max() < 1e-3:
+            break
+    if weights.mean() < 1 - MAX_LOST:
+        return *nothing, 1.0
+    bad = u > 1
+    wide = np.zeros(len(values), dtype=bool)
+    wide[present] = bad
+    wide = np.convolve(wide, np.ones(2 * GLITCH_MARGIN + 1), mode="same") > 0
+    keep = present & ~wide
+    lost = float(1 - keep.mean())
+    if lost > MAX_LOST:
+        return *nothing, lost
+    return _least_squares(design[keep], values[keep], np.ones(int(keep.sum()))).T, scale, lost
+
+
+def _least_squares(design: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:
+    root = np.sqrt(weights)[:, None]
+    solution: FloatArray = np.linalg.lstsq(design * root, values * root, rcond=None)[0]
+    return solution

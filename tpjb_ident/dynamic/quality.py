@@ -1,0 +1,120 @@
+"""Figures and flags that say how far a point's coefficients can be trusted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.conditions import Condition
+from tpjb_ident.dynamic.estimate import MIN_COHERENCE, REJECTED_WEIGHT
+from tpjb_ident.dynamic.point_data import PointData
+from tpjb_ident.dynamic.point_result import WindowVerdict
+from tpjb_ident.dynamic.stiffness import DynamicStiffness
+
+#: Coefficients are linear below this share of the clearance.
+MAX_AMPLITUDE = 0.05
+
+
+def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatArray) -> float:
+    """Multiple coherence of the forces with the displacements, smaller axis.
+
+    Parameters
+    ----------
+    D, F : (n, 2) complex ndarray
+    h : (2, 2) complex ndarray
+    weights : (n,) ndarray
+
+    Returns
+    -------
+    float
+        1 - (unexplained power) / (power), in the good windows; NaN without an answer.
+    """
+    good = np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1) & (weights > 0)
+    if not good.any() or not np.isfinite(h).all():
+        return float("nan")
+    w = weights[good, None]
+    residual = F[good] - D[good] @ h.T
+    power = (w * np.abs(F[good]) ** 2).sum(axis=0)
+    return float(np.min(1 - (w * np.abs(residual) ** 2).sum(axis=0) / power))
+
+
+def amplitude(data: PointData, weights: FloatArray) -> float:
+    """Largest displacement amplitude (major half-axis of the orbit) of any run's mean phasor [m]."""
+    largest = 0.0
+    for i in range(len(data.runs)):
+        mine = (data.run_index == i) & (weights > 0) & np.isfinite(data.D).all(axis=1)
+        if mine.any():
+            z = np.average(data.D[mine], axis=0, weights=weights[mine])
+            sizes = np.linalg.svd(np.stack([z.real, z.imag]), compute_uv=False)
+            largest = max(largest, float(sizes[0]))
+    return largest
+
+
+def rejected_windows(data: PointData, h: ComplexArray, weights: FloatArray) -> tuple[WindowVerdict, ...]:
+    """Windows without weight, each with the reason that shows in its own numbers."""
+    found = []
+    for i in np.flatnonzero(weights < REJECTED_WEIGHT):
+        run = data.runs[data.run_index[i]]
+        k = int(i - np.searchsorted(data.run_index, data.run_index[i]))
+        direction = float("nan") if run.direction is None else run.direction
+        reason = _reason(data, run.displacement.lost[k], run.cell_force.lost[k], int(i), h, weights)
+        found.append(WindowVerdict(run.run, float(run.start[k]), float(weights[i]), direction, reason))
+    return tuple(found)
+
+
+def _reason(data: PointData, lost_d: float, lost_f: float, i: int, h: ComplexArray, weights: FloatArray) -> str:
+    for name, lost in (("displacement", lost_d), ("force", lost_f)):
+        if lost > 0.5:
+            return f"{100 * lost:.0f} % of the {name} samples missing or glitched"
+    if not (np.isfinite(data.D[i]).all() and np.isfinite(data.F[i]).all()):
+        return "missing values"
+    siblings = (data.run_index == data.run_index[i]) & (weights >= REJECTED_WEIGHT)
+    if not siblings.any():
+        return "whole run disagrees with the other directions"
+    moves = {
+        "displacement": _shift(data.D[i], data.D[siblings]),
+        "force": _shift(data.F[i], data.F[siblings]),
+    }
+    worst = max(moves, key=lambda name: moves[name])
+    return f"{worst} phasor {100 * moves[worst]:.1f} % away from its repeats"
+
+
+def _shift(z: ComplexArray, repeats: ComplexArray) -> float:
+    mean = repeats.mean(axis=0)
+    return float(np.linalg.norm(z - mean) / max(float(np.linalg.norm(mean)), np.finfo(float).tiny))
+
+
+def flags(
+    stiffness: DynamicStiffness, coherence: float, amplitude: float, clearance: float | None
+) -> tuple[Condition, ...]:
+    """Conditions that the point's figures give rise to."""
+    found = []
+    if not coherence >= MIN_COHERENCE and np.isfinite(stiffness.h).all():
+        found.append(Condition("low-coherence", f"coherence {coherence:.3f} < {MIN_COHERENCE}"))
+    if clearance and amplitude > MAX_AMPLITUDE * clearance:
+        share = 100 * amplitude / clearance
+        found.append(Condition("large-amplitude", f"amplitude {share:.1f} % of the clearance > 5 %"))
+    return tuple(found)
+
+
+def directional_pattern(data: PointData, weights: FloatArray) -> Condition | None:
+    """Point out rejected windows that gather in some directions: physics may do that, glitches do not.
+
+    A binomial test per run: more rejected windows than chance gives once in a thousand, in a run
+    with at least three of them.
+    """
+    from scipy.stats import binom
+
+    bad = weights < REJECTED_WEIGHT
+    total = int(bad.sum())
+    named = []
+    for i, run in enumerate(data.runs):
+        mine = data.run_index == i
+        n, hits = int(mine.sum()), int(bad[mine].sum())
+        others = (total - hits + 0.5) / (len(bad) - n + 1.0)
+        if hits >= 3 and hits > 0.4 * n and binom.sf(hits - 1, n, min(others, 1.0)) < 1e-3:
+            angle = "" if run.direction is None else f" at {np.degrees(run.direction):.0f} deg"
+            named.append(f"{run.run}{angle} ({hits} of {n})")
+    if not named:
+        return None
+    return Condition("directional-rejection", f"rejected windows gather in {', '.join(named)}: look before discarding")
