@@ -1,8 +1,13 @@
-"""Cholesky factors of a symmetric matrix of dense blocks in a narrow band: slabs of a solid, one after another."""
+"""Cholesky factors of a symmetric matrix of dense blocks in a narrow band: slabs of a solid, one after another.
+
+Rows of blocks come and go one at a time, so that a consumer who needs only products of L^-1 B never holds the whole
+factor. Everything is dense matrix algebra on blocks, at the speed of BLAS 3; a general sparse solver needs several
+times as long for the hundreds of right-hand sides that a compliance has.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,88 +15,105 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
 Array = NDArray[np.float64]
-Blocks = Mapping[tuple[int, int], Array]
+BlockRow = dict[int, Array]  # block row i of a lower triangle: column j <= i -> block (i, j); absent ones are zero
+
+
+def factor_rows(rows: Iterable[BlockRow]) -> Iterator[BlockRow]:
+    """Factor a positive definite matrix K = L L^T, row by row of blocks.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+        Block rows of the lower triangle of K, from the first; each holds its diagonal block. Rows are used up.
+
+    Yields
+    ------
+    dict
+        The same block row of L.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        K is not positive definite: the body is not held.
+    """
+    known: dict[int, BlockRow] = {}
+    for i, row in enumerate(rows):
+        first = min(row)
+        known = {j: known[j] for j in range(first, i)}  # the band: nothing before `first` is needed again
+        for j in range(first, i):
+            for k in range(first, j):
+                if k in row and k in known[j]:
+                    row[j] = row.get(j, 0.0) - row[k] @ known[j][k].T
+            if j in row:
+                row[j] = solve_triangular(known[j][j], row[j].T, lower=True, check_finite=False).T
+        for k in range(first, i):
+            if k in row:
+                row[i] = row[i] - row[k] @ row[k].T
+        row[i] = cholesky(row[i], lower=True, check_finite=False)
+        known[i] = row
+        yield row
+
+
+def forward_rows(factor: Iterable[BlockRow], rhs: Iterable[Array]) -> Iterator[Array]:
+    """Solve L Y = B, row by row of blocks.
+
+    Parameters
+    ----------
+    factor : iterable of dict
+        Block rows of L, as from `factor_rows`.
+    rhs : iterable of (m, n_columns) ndarray
+        Block rows of B. The number of columns may grow from row to row: new columns are zero in the rows before.
+        Loads numbered slab by slab are such, and half of the work falls away.
+
+    Yields
+    ------
+    (m, n_columns) ndarray
+        Block rows of Y.
+    """
+    known: dict[int, Array] = {}
+    for i, (row, given) in enumerate(zip(factor, rhs)):
+        known = {j: known[j] for j in range(min(row), i)}
+        block = given.copy()
+        for j, solution in known.items():
+            if j in row:
+                block[:, : solution.shape[1]] -= row[j] @ solution
+        known[i] = solve_triangular(row[i], block, lower=True, check_finite=False)
+        yield known[i]
 
 
 @dataclass(frozen=True, eq=False)
 class BlockCholesky:
-    """Lower triangular L with L L^T = K, block by block.
-
-    Everything is dense matrix algebra on blocks, hence at the speed of BLAS 3; a general sparse solver needs
-    several times as long for the hundreds of right-hand sides that a compliance has.
+    """Factor kept whole, for full solutions.
 
     Attributes
     ----------
-    diagonal : tuple of (m, m) ndarray
-        Lower triangular diagonal blocks.
-    below : tuple of dict
-        ``below[i][j]`` is block (i, j) of L, j < i.
+    rows : tuple of dict
+        Block rows of L.
     """
 
-    diagonal: tuple[Array, ...]
-    below: tuple[dict[int, Array], ...]
+    rows: tuple[BlockRow, ...]
 
     @classmethod
-    def factor(cls, n_blocks: int, lower: Blocks) -> BlockCholesky:
-        """Factor a positive definite matrix.
+    def factor(cls, rows: Iterable[BlockRow]) -> BlockCholesky:
+        """Factor; arguments and errors as for `factor_rows`."""
+        return cls(tuple(factor_rows(rows)))
 
-        Parameters
-        ----------
-        n_blocks : int
-            Number of block rows.
-        lower : mapping (i, j) -> (m, m) ndarray
-            Blocks of the lower triangle, i >= j; absent ones are zero.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            The matrix is not positive definite: the body is not held.
-        """
-        work: list[dict[int, Array]] = [{} for _ in range(n_blocks)]
-        for (i, j), block in lower.items():
-            work[i][j] = np.array(block, order="F")
-        diagonal = []
-        for j in range(n_blocks):
-            diagonal.append(cholesky(work[j].pop(j), lower=True, overwrite_a=True, check_finite=False))
-            rows = [i for i in range(j + 1, n_blocks) if j in work[i]]
-            for i in rows:
-                work[i][j] = solve_triangular(diagonal[j], work[i][j].T, lower=True, check_finite=False).T
-            for i in rows:
-                for k in rows:
-                    if k <= i:
-                        update = work[i][j] @ work[k][j].T
-                        work[i][k] = work[i][k] - update if k in work[i] else -update
-        return cls(tuple(diagonal), tuple(work))
-
-    def forward(self, rhs: Array, active: Sequence[int] | None = None) -> Array:
-        """Solve L Y = B.
+    def solve(self, rhs: Array) -> Array:
+        """Solve K X = B.
 
         Parameters
         ----------
         rhs : (n_blocks, m, n_columns) ndarray
-        active : sequence of int, optional
-            ``active[i]``: so many leading columns are not zero in block rows 0 to i. Loads numbered slab by slab
-            are such, and half of the work falls away.
 
         Returns
         -------
         ndarray, shape (n_blocks, m, n_columns)
         """
-        out = np.zeros_like(rhs)
-        for i, diagonal in enumerate(self.diagonal):
-            width = rhs.shape[2] if active is None else active[i]
-            block = rhs[i, :, :width].copy()
-            for j, factor in self.below[i].items():
-                known = width if active is None else active[j]
-                block[:, :known] -= factor @ out[j, :, :known]
-            out[i, :, :width] = solve_triangular(diagonal, block, lower=True, check_finite=False)
-        return out
-
-    def solve(self, rhs: Array) -> Array:
-        """Solve K X = B; shapes as in `forward`."""
-        out = self.forward(rhs)
-        for i in reversed(range(len(self.diagonal))):
-            out[i] = solve_triangular(self.diagonal[i], out[i], lower=True, trans="T", check_finite=False)
-            for j, factor in self.below[i].items():
-                out[j] -= factor.T @ out[i]
+        out = np.stack(list(forward_rows(self.rows, rhs)))
+        for i in reversed(range(len(self.rows))):
+            row = self.rows[i]
+            out[i] = solve_triangular(row[i], out[i], lower=True, trans="T", check_finite=False)
+            for j in row:
+                if j < i:
+                    out[j] -= row[j].T @ out[i]
         return out

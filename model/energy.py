@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from model.film import FilmGrid, FilmWork
+from model.film import JIT, FilmGrid, FilmWork
 
 FloatArray = NDArray[np.float64]
 
@@ -23,14 +23,9 @@ FloatArray = NDArray[np.float64]
 LEAST_FLOW = 0.05
 
 
-@njit(cache=True)
+@njit(**JIT)
 def solve_energy(
-    grid: FilmGrid,
-    work: FilmWork,
-    inlet: float,
-    speed: float,
-    heat: tuple[float, float],
-    temperature: FloatArray,
+    grid: FilmGrid, work: FilmWork, inlet: float, speed: float, heat: tuple[float, float], temperature: FloatArray
 ) -> float:
     """March the film temperature from the leading edge.
 
@@ -57,88 +52,78 @@ def solve_energy(
     Integrated over the film thickness, Eq. (3) reads
     rho c h (u T_x + w T_z) = k h T_zz + mu U^2 / h + h^3 / (12 mu) (p_x^2 + p_z^2).
     """
-    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
+    nz = work.flow_z.shape[1]
+    heating = dissipation(grid, work, speed)
     limited = 0.0
     temperature[0, :] = inlet
-    lower = np.zeros(nz + 1)
-    main = np.zeros(nz + 1)
-    upper = np.zeros(nz + 1)
-    right = np.zeros(nz + 1)
-    for i in range(nt):
+    lower, main, upper, right = np.zeros(nz + 1), np.zeros(nz + 1), np.zeros(nz + 1), np.zeros(nz + 1)
+    h, flow_x, flow_z, density = work.thickness, work.flow_x, work.flow_z, work.density
+    conduct = heat[1] * grid.dx
+    for i in range(work.flow_x.shape[0]):
         for j in range(nz + 1):
-            couette = (
-                0.25
-                * speed
-                * (work.thickness[i, j] * work.density[i, j] + work.thickness[i + 1, j] * work.density[i + 1, j])
-                * grid.height[j]
-            )
-            flow = work.flow_x[i, j]
+            couette = 0.25 * speed * (h[i, j] * density[i, j] + h[i + 1, j] * density[i + 1, j]) * grid.height[j]
+            flow = flow_x[i, j]
             if flow < LEAST_FLOW * couette:
                 limited = max(limited, 1.0 - flow / couette)
                 flow = LEAST_FLOW * couette
+            # factors of (T[j-1] - T[j]) and (T[j+1] - T[j]); half of them act at i, half at i + 1
+            low = high = 0.0
+            if j > 0:
+                south = 0.5 * (flow_z[i, j - 1] + flow_z[i + 1, j - 1])
+                film = 0.25 * (h[i, j] + h[i, j - 1] + h[i + 1, j] + h[i + 1, j - 1])
+                low = -0.5 * (0.5 * heat[0] * south + conduct / grid.dz[j - 1] * film)
+                if j == nz:  # the edge is upwind: what leaves takes its temperature along
+                    low = -0.25 * heat[0] * max(south, 0.0)
+            if j < nz:
+                north = 0.5 * (flow_z[i, j] + flow_z[i + 1, j])
+                film = 0.25 * (h[i, j] + h[i, j + 1] + h[i + 1, j] + h[i + 1, j + 1])
+                high = -0.5 * (-0.5 * heat[0] * north + conduct / grid.dz[j] * film)
+                if j == 0 and grid.first == 1:
+                    high = -0.25 * heat[0] * max(-north, 0.0)
             advect = heat[0] * flow
-            # half of the cross-flow terms act at i, half at i + 1
-            low, high = _across(grid, work, heat, i, j)
-            main[j] = advect - low - high
-            lower[j] = low
-            upper[j] = high
-            right[j] = (advect + low + high) * temperature[i, j] + _dissipation(grid, work, speed, i, j)
+            lower[j], main[j], upper[j] = low, advect - low - high, high
+            right[j] = (advect + low + high) * temperature[i, j] + 0.5 * (heating[i, j] + heating[i + 1, j])
             if j > 0:
                 right[j] -= low * temperature[i, j - 1]
             if j < nz:
                 right[j] -= high * temperature[i, j + 1]
-        _thomas(lower, main, upper, right)
-        temperature[i + 1, :] = right
+        _tridiagonal(lower, main, upper, right)
+        for j in range(nz + 1):
+            temperature[i + 1, j] = right[j]
     return limited
 
 
-@njit(cache=True)
-def _across(grid: FilmGrid, work: FilmWork, heat: tuple[float, float], i: int, j: int) -> tuple[float, float]:
-    """Coefficients of (T[j-1] - T[j]) and (T[j+1] - T[j]) in the half-step's cross-flow terms [W/K]."""
-    nz = work.flow_z.shape[1]
-    low = high = 0.0
-    if j > 0:
-        south = 0.5 * (work.flow_z[i, j - 1] + work.flow_z[i + 1, j - 1])
-        h = 0.25 * (
-            work.thickness[i, j] + work.thickness[i, j - 1] + work.thickness[i + 1, j] + work.thickness[i + 1, j - 1]
-        )
-        low = -0.5 * (0.5 * heat[0] * south + heat[1] * h * grid.dx / grid.dz)
-        if (
-            j == nz
-        ):  # the edge: only the half volume's own face, and upwind, because what leaves takes its temperature along
-            low = -0.5 * (0.5 * heat[0] * max(south, 0.0))
-    if j < nz:
-        north = 0.5 * (work.flow_z[i, j] + work.flow_z[i + 1, j])
-        h = 0.25 * (
-            work.thickness[i, j] + work.thickness[i, j + 1] + work.thickness[i + 1, j] + work.thickness[i + 1, j + 1]
-        )
-        high = -0.5 * (-0.5 * heat[0] * north + heat[1] * h * grid.dx / grid.dz)
-        if j == 0 and grid.first == 1:
-            high = -0.5 * (0.5 * heat[0] * max(-north, 0.0))
-    return low, high
-
-
-@njit(cache=True)
-def _dissipation(grid: FilmGrid, work: FilmWork, speed: float, i: int, j: int) -> float:
-    """Heat made in the volume between lines i and i + 1 [W]."""
+@njit(**JIT)
+def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
+    """Heat made per station of length dx and control-volume height [W], full film; shape (nt + 1, nz + 1)."""
     p, h, mu = work.pressure, work.thickness, work.viscosity
-    nz = work.flow_z.shape[1]
-    slope_x = (p[i + 1, j] - p[i, j]) / grid.dx
-    total = 0.0
-    for m in range(i, i + 2):
-        if j == 0:
-            slope_z = 0.0 if grid.first == 0 else (p[m, 1] - p[m, 0]) / grid.dz
-        elif j == nz:
-            slope_z = (p[m, nz] - p[m, nz - 1]) / grid.dz
-        else:
-            slope_z = 0.5 * (p[m, j + 1] - p[m, j - 1]) / grid.dz
-        shear = mu[m, j] * speed**2 / h[m, j]
-        total += 0.5 * (shear + h[m, j] ** 3 / (12.0 * mu[m, j]) * (slope_x**2 + slope_z**2))
-    return total * grid.dx * grid.height[j]
+    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
+    out = np.empty((nt + 1, nz + 1))
+    for i in range(nt + 1):
+        for j in range(nz + 1):
+            # mean of the squared slopes on both sides: what the box between two stations sees, to second order
+            squared, sides = 0.0, 0
+            if i > 0:
+                squared += ((p[i, j] - p[i - 1, j]) / grid.dx) ** 2
+                sides += 1
+            if i < nt:
+                squared += ((p[i + 1, j] - p[i, j]) / grid.dx) ** 2
+                sides += 1
+            if j == nz:
+                slope = (p[i, nz] - p[i, nz - 1]) / grid.dz[nz - 1]
+            elif j == 0:
+                slope = 0.0 if grid.first == 0 else (p[i, 1] - p[i, 0]) / grid.dz[0]
+            else:
+                slope = (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1])
+            shear = mu[i, j] * speed**2 / h[i, j]
+            pressed = h[i, j] ** 3 / (12.0 * mu[i, j]) * (squared / sides + slope**2)
+            out[i, j] = (shear + pressed) * grid.dx * grid.height[j]
+    return out
 
 
-@njit(cache=True)
-def _thomas(lower: FloatArray, main: FloatArray, upper: FloatArray, right: FloatArray) -> None:
+@njit(**JIT)
+def _tridiagonal(lower: FloatArray, main: FloatArray, upper: FloatArray, right: FloatArray) -> None:
+    """Thomas' algorithm in place; the solution is left in `right`."""
     n = len(main)
     for j in range(1, n):
         factor = lower[j] / main[j - 1]

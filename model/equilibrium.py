@@ -12,22 +12,27 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from model.film import FilmForces
-from model.pad_film import PadFilm, film_step, oil_constants, pad_films
+from model.acceleration import Anderson
+from model.film import JIT, solve_film
+from model.pad_film import PadFilm, film_step, least_share, oil_constants, pad_films
 from model.setup import Setup
-from model.start import LoadedAttitude, loaded_attitude
+from model.start import LoadedAttitude, first_position, loaded_attitude
 
 FloatArray = NDArray[np.float64]
 
 MAX_ITERATIONS = 80
 #: Residuals that count as equilibrium: share of the load; metres of the pivots; kelvin of the film.
-FORCE_TOLERANCE = 1e-8
-TEMPERATURE_TOLERANCE = 1e-5
+FORCE_TOLERANCE = 1e-7
+TEMPERATURE_TOLERANCE = 3e-5
+#: Below this residual the iteration is accelerated; above it the temperature is held back, because a much hotter
+#: film carries less and heats less: undamped, the two would swing.
+NEAR = 0.3
+HELD_BACK = 0.6
 #: A film may shrink to this share of itself in one step.
 SHRINK = 0.4
-RELAXATION = 0.88
 
 
 @dataclass(frozen=True)
@@ -73,6 +78,7 @@ class _Search:
     tables: list[LoadedAttitude]
     position: FloatArray = field(default_factory=lambda: np.zeros(2))
     limited: float = 0.0
+    relaxation: float = HELD_BACK
     deformation_change: float = 0.0
 
     @property
@@ -134,76 +140,18 @@ def _warm_start(search: _Search, start: Equilibrium) -> bool:
 
 
 def _cold_start(search: _Search) -> None:
-    """Balance the load with the tabulated isothermal films, by fixed steps on two scalars."""
+    """Balance the load with the tabulated isothermal films, then put every pad on its loaded attitude."""
     setup, oil = search.setup, search.setup.bearing.oil
     viscosity = float(oil.viscosity(setup.inlet_temperature + (0.0 if setup.thermal == "isothermal" else 3.0)))
     scale = viscosity * search.surface_speed * setup.bearing.journal_radius**2 * setup.bearing.length
-
-    def pull(position: FloatArray) -> FloatArray:
-        total = np.zeros(2)
-        for film, table in zip(search.films, search.tables):
-            reach = film.gap + float(film.normal @ position)
-            a = _balanced_approach(film, table, scale, reach, setup.pivots[film.number - 1])
-            film.deflection = reach - a
-            _, factor = table.at(film.pad.pad_clearance, a)
-            if a / (film.pad.pad_clearance - a) > table.least:
-                total += film.normal * (scale * factor)
-        return total
-
     size = float(np.hypot(*search.load))
-    room = min(f.pad.pad_clearance - f.gap for f in search.films)
-    position = search.load / max(size, 1e-30) * 0.4 * room
-    if size > 0:
-        position = _balance(pull, position, search.load, room)
-    else:
-        position = np.zeros(2)
-    pull(position)
-    search.position = position
-    for film, table in zip(search.films, search.tables):
+    give = np.array([law.deflection(0.5 * size) / max(0.5 * size, 1e-30) for law in setup.pivots])
+    search.position, deflection = first_position(search.load, scale, give, search.films, search.tables)
+    for film, table, eta in zip(search.films, search.tables, deflection, strict=True):
+        film.deflection = float(eta)
         film.work.temperature[:] = film.inlet
         film.work.ruptured[:] = False
         _set_loaded(search, film, table)
-
-
-def _balanced_approach(film: PadFilm, table: LoadedAttitude, scale: float, reach: float, law) -> float:  # type: ignore[no-untyped-def]
-    """Solve a + delta(W(a)) = reach by bisection on the table (W rises with a)."""
-    clearance = film.pad.pad_clearance
-    low, high = -0.9 * clearance, min(reach, 0.995 * clearance)
-    if law.deflection(1.0) == 0.0 or high <= low:
-        return reach
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        _, factor = table.at(clearance, middle)
-        carries = middle / (clearance - middle) > table.least and math.isfinite(factor)
-        give = law.deflection(scale * factor) if carries else 0.0
-        if middle + give > reach:
-            high = middle
-        else:
-            low = middle
-    return 0.5 * (low + high)
-
-
-def _balance(pull, position: FloatArray, load: FloatArray, room: float) -> FloatArray:  # type: ignore[no-untyped-def]
-    """A few damped Newton steps with a finite-difference Jacobian on the tabulated films."""
-    size = float(np.hypot(*load))
-    step = 1e-3 * room
-    for _ in range(25):
-        residual = load - pull(position)
-        if float(np.hypot(*residual)) < 0.01 * size:
-            break
-        if not np.all(np.isfinite(residual)):  # a film is gone: go back towards the centre
-            position = 0.7 * position
-            continue
-        jacobian = np.column_stack(
-            [(pull(position + step * e) - pull(position - step * e)) / (2 * step) for e in np.eye(2)]
-        )
-        if not np.all(np.isfinite(jacobian)) or abs(np.linalg.det(jacobian)) < 1e-9 * np.sum(jacobian**2):
-            position = position + 0.1 * room * residual / np.hypot(*residual)
-            continue
-        move = np.linalg.solve(jacobian, residual)
-        length = float(np.hypot(*move))
-        position = position + move * min(1.0, 0.2 * room / max(length, 1e-30))
-    return position
 
 
 def _set_loaded(search: _Search, film: PadFilm, table: LoadedAttitude) -> None:
@@ -222,43 +170,86 @@ def _set_loaded(search: _Search, film: PadFilm, table: LoadedAttitude) -> None:
 
 
 def _iterate(search: _Search) -> Equilibrium:
-    best = math.inf
-    stalled = 0
+    best, residual, stalled = math.inf, math.inf, 0
+    memory = Anderson()
+    isothermal = search.setup.thermal == "isothermal" and not search.setup.flexible_pads
     for iteration in range(1, MAX_ITERATIONS + 1):
-        _wake_or_rest(search)
+        if _wake_or_rest(search):
+            memory.reset()
+        before = None if isothermal else _state(search)
         heat_change = _solve_films(search)
         if any(not f.idle and f.forces is not None and f.forces.steps < 0 for f in search.films):
             return _result(search, iteration, math.inf, heat_change, ("film lost", "not converged"))
-        residual, moves = _newton_step(search)
+        residual, shift, moves = _newton_step(search)
+        search.relaxation = 1.0 if residual < NEAR else HELD_BACK
         if residual < FORCE_TOLERANCE and heat_change < TEMPERATURE_TOLERANCE:
+            _sharpen(search)
             return _result(search, iteration, residual, heat_change, ())
         stalled = 0 if residual < 0.7 * best else stalled + 1
         best = min(best, residual)
-        _apply(search, moves, 0.5 if stalled > 12 else 1.0)
+        whole = _apply(search, (shift, moves), 0.5 if stalled > 12 else 1.0)
+        if before is None:
+            continue
+        # steps that were cut short, or still far off, say nothing of the iteration's slow modes
+        if whole and residual < NEAR:
+            _set_state(search, memory.next(before, _state(search)))
+        else:
+            memory.reset()
     return _result(search, iteration, residual, heat_change, ("not converged",))
 
 
-def _wake_or_rest(search: _Search) -> None:
-    """Pads that have come near enough to carry are given their loaded attitude; others idle."""
-    for film, table in zip(search.films, search.tables):
-        a, b = film.approach(search.position)
+#: Scale of lengths in the state that is accelerated [m]: a micrometre weighs as much as a kelvin.
+_MICRO = 1e-6
+
+
+def _state(search: _Search) -> FloatArray:
+    """Journal, pads and film temperatures as one vector, in micrometres and kelvins."""
+    parts = [search.position / _MICRO]
+    for film in search.films:
+        parts.append(np.array([film.tilt * film.pivot_radius, film.deflection]) / _MICRO)
+        parts.append(film.work.temperature.ravel() * (0.0 if film.idle else 1.0))
+        if search.setup.flexible_pads:
+            parts.append(film.work.extra.ravel() / _MICRO)
+    return np.concatenate(parts)
+
+
+def _set_state(search: _Search, state: FloatArray) -> None:
+    search.position = state[:2] * _MICRO
+    at = 2
+    for film in search.films:
+        film.tilt = float(state[at]) * _MICRO / film.pivot_radius
+        film.deflection = float(state[at + 1]) * _MICRO
+        at += 2
+        size = film.work.temperature.size
+        if not film.idle:
+            film.work.temperature.ravel()[:] = state[at : at + size]
+        at += size
+        if search.setup.flexible_pads:
+            film.work.extra.ravel()[:] = state[at : at + size] * _MICRO
+            at += size
+
+
+def _wake_or_rest(search: _Search) -> bool:
+    """Give pads that have come near enough to carry their loaded attitude, let others idle; True if any changed."""
+    changed = False
+    for film, table in zip(search.films, search.tables, strict=True):
+        a, _ = film.approach(search.position)
         room = film.pad.pad_clearance - a
         if film.idle:
             if room <= 0 or a / room > table.least + 1e-7:
                 _set_loaded(search, film, table)
+                changed = True
         elif room > 0 and a / room <= table.least and search.setup.rotational_stiffness == 0:
             film.deflection = 0.0
-            a = film.approach(search.position)[0]
-            if a / (film.pad.pad_clearance - a) <= table.least:
-                film.idle, film.tilt = True, 0.0
-            else:
-                _set_loaded(search, film, table)
+            _set_loaded(search, film, table)
+            changed = True
+    return changed
 
 
 def _solve_films(search: _Search) -> float:
     """One step of every film at the present geometry; returns the largest temperature change asked for."""
     setup, oil = search.setup, search.setup.bearing.oil
-    relaxation = 0.0 if setup.thermal == "isothermal" else RELAXATION
+    isothermal = setup.thermal == "isothermal"
     change = 0.0
     search.limited = 0.0
     if setup.carryover:
@@ -271,11 +262,19 @@ def _solve_films(search: _Search) -> float:
         a, b = film.approach(search.position)
         film.forces, film.temperature_change, limited = film_step(
             film.grid, film.work, (film.pad.pad_clearance, a, b), search.surface_speed,
-            oil_constants(oil), (oil.specific_heat, oil.conductivity), (film.inlet, relaxation),
+            oil_constants(oil), (oil.specific_heat, oil.conductivity), (film.inlet, 0.0 if isothermal else search.relaxation),
         )  # fmt: skip
         change = max(change, film.temperature_change)
         search.limited = max(search.limited, limited)
     return change
+
+
+def _sharpen(search: _Search) -> None:
+    """Derivatives once more, with the rupture line between the nodes; the pressure stays."""
+    for film in search.films:
+        if film.forces is not None:
+            a, b = film.approach(search.position)
+            film.forces = solve_film(film.grid, film.work, (film.pad.pad_clearance, a, b), search.surface_speed, True)
 
 
 def _carry_over(search: _Search) -> None:
@@ -295,92 +294,118 @@ def outlet_temperature(film: PadFilm) -> float:
     return float(flow @ film.work.temperature[-1]) / total
 
 
-@dataclass
-class _PadMove:
-    """Linear response of a pad's (tilt, deflection) to the journal: constant + gradient @ dX."""
-
-    constant: FloatArray
-    gradient: FloatArray
-
-
-def _newton_step(search: _Search) -> tuple[float, tuple[FloatArray, list[_PadMove | None]]]:
-    size = max(float(np.hypot(*search.load)), 1.0)
-    unbalanced = search.load.copy()
-    jacobian = np.zeros((2, 2))
-    worst = 0.0
-    moves: list[_PadMove | None] = []
-    for film in search.films:
-        if film.forces is None:
-            moves.append(None)
-            continue
-        move, force, slope, error = _eliminate_pad(search, film, film.forces)
-        moves.append(move)
-        unbalanced -= force
-        jacobian += slope
-        worst = max(worst, error / size)
-    # a pad that only touches leaves the journal free in one direction: keep the matrix regular
-    jacobian += np.eye(2) * (1e-9 * np.trace(jacobian) + 1.0)
-    shift = np.linalg.solve(jacobian, unbalanced)
-    return max(worst, float(np.hypot(*unbalanced)) / size), (shift, moves)
+def _newton_step(search: _Search) -> tuple[float, FloatArray, FloatArray]:
+    """One linear solve: the residual, the journal's move (2,), and every pad's (tilt, deflection) move (n_pads, 2)."""
+    laws = search.setup.pivots
+    carrying = [f for f in search.films if f.forces is not None]
+    pads = np.zeros((len(carrying), _COLUMNS))
+    for row, film in zip(pads, carrying, strict=True):
+        forces = film.forces
+        assert forces is not None
+        law, radial = laws[film.number - 1], float(forces.force[0])
+        row[0:4] = *film.normal, *film.tangent
+        row[4:10] = *forces.force, *forces.stiffness.ravel()
+        row[10] = film.pivot_radius
+        row[11] = search.setup.rotational_stiffness / film.pivot_radius
+        row[12] = film.tilt
+        row[13] = law.deflection(max(radial, 0.0)) - film.deflection
+        row[14] = 1.0 / law.stiffness(max(radial, 1e-6))
+    residual, shift, moves = eliminate(search.load, pads)
+    every = np.zeros((len(search.films), 2))
+    every[[f.number - 1 for f in carrying]] = moves
+    return residual, shift, every
 
 
-def _eliminate_pad(
-    search: _Search, film: PadFilm, forces: FilmForces
-) -> tuple[_PadMove, FloatArray, FloatArray, float]:
-    """Solve the pad's two equations for its tilt and deflection in terms of the journal's move.
+#: What `eliminate` is told per pad: normal, tangent, force, stiffness, R_P, k_theta / R_P, tilt, missing give,
+#: pivot compliance.
+_COLUMNS = 15
 
-    Returns the move, the force at the journal's present place after the pad has moved, its slope, and the pad's
-    own residual as a force [N].
+
+@njit(**JIT)
+def eliminate(load: FloatArray, pads: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    """Eliminate every pad's tilt and deflection, and solve for the journal's move.
+
+    Parameters
+    ----------
+    load : (2,) ndarray
+        [N]
+    pads : (n, 15) ndarray
+        One row per pad that carries, see `_COLUMNS`.
+
+    Returns
+    -------
+    residual : float
+        Unbalanced force, moment over R_P, or give times stiffness, as a share of the load.
+    shift : (2,) ndarray
+        [m]
+    moves : (n, 2) ndarray
+        Changes of tilt [rad] and deflection [m].
     """
-    law = search.setup.pivots[film.number - 1]
-    radial, tangential = forces.force
-    k = forces.stiffness
-    hold = search.setup.rotational_stiffness / film.pivot_radius
-    compliance = 1.0 / law.stiffness(max(radial, 1e-6))
-    moment = tangential + hold * film.tilt
-    give = law.deflection(max(radial, 0.0)) - film.deflection
-    # d(a, b) = frame @ dX + motion @ (dt, deta)
-    frame = np.vstack([film.normal, film.tangent])
-    motion = np.array([[0.0, -1.0], [film.pivot_radius, 0.0]])
-    response = k @ motion
-    matrix = np.array(
-        [
-            [response[1, 0] + hold, response[1, 1]],
-            [-compliance * response[0, 0], 1.0 - compliance * response[0, 1]],
-        ]
-    )
-    right = np.array([[-moment], [give]])
-    drive = np.vstack([-(k @ frame)[1], compliance * (k @ frame)[0]])
-    solved = np.linalg.solve(matrix, np.hstack([right, drive]))
-    move = _PadMove(solved[:, 0], solved[:, 1:])
-    force = frame.T @ (forces.force + response @ move.constant)
-    slope = frame.T @ (k @ frame + response @ move.gradient)
-    return move, force, slope, max(abs(moment), abs(give) * abs(k[0, 0]))
+    n = pads.shape[0]
+    size = max(math.hypot(load[0], load[1]), 1.0)
+    jxx, jxy, jyx, jyy = 1.0, 0.0, 0.0, 1.0  # a pad that only touches leaves a direction free: keep it regular
+    fx, fy = load[0], load[1]
+    worst = 0.0
+    constant = np.empty((n, 2))
+    gradient = np.empty((n, 2, 2))
+    for m in range(n):
+        nx, ny, tx, ty, radial, tangential, kaa, kab, kba, kbb, arm, hold, tilt, missing, compliance = pads[m]
+        moment = tangential + hold * tilt
+        # d(a, b) = (n . dX - deta, t . dX + R_P dt); rows: tilting force, pivot
+        m11, m12 = kbb * arm + hold, -kba
+        m21, m22 = -compliance * kab * arm, 1.0 + compliance * kaa
+        det = m11 * m22 - m12 * m21
+        for axis in range(3):  # right-hand sides: constant, dx, dy
+            if axis == 0:
+                r1, r2 = -moment, missing
+            else:
+                da = nx if axis == 1 else ny
+                db = tx if axis == 1 else ty
+                r1, r2 = -(kba * da + kbb * db), compliance * (kaa * da + kab * db)
+            dt, deta = (r1 * m22 - m12 * r2) / det, (m11 * r2 - m21 * r1) / det
+            if axis == 0:
+                constant[m, 0], constant[m, 1] = dt, deta
+                da, db = -deta, arm * dt
+            else:
+                gradient[m, 0, axis - 1], gradient[m, 1, axis - 1] = dt, deta
+                da, db = da - deta, db + arm * dt
+            fr, ft = kaa * da + kab * db, kba * da + kbb * db
+            if axis == 0:
+                fx -= nx * (radial + fr) + tx * (tangential + ft)
+                fy -= ny * (radial + fr) + ty * (tangential + ft)
+            elif axis == 1:
+                jxx += nx * fr + tx * ft
+                jyx += ny * fr + ty * ft
+            else:
+                jxy += nx * fr + tx * ft
+                jyy += ny * fr + ty * ft
+        worst = max(worst, max(abs(moment), abs(missing * kaa)) / size)
+    worst = max(worst, math.hypot(fx, fy) / size)
+    det = jxx * jyy - jxy * jyx
+    shift = np.array([(fx * jyy - jxy * fy) / det, (jxx * fy - jyx * fx) / det])
+    moves = np.empty((n, 2))
+    for m in range(n):
+        for q in range(2):
+            moves[m, q] = constant[m, q] + gradient[m, q, 0] * shift[0] + gradient[m, q, 1] * shift[1]
+    return worst, shift, moves
 
 
-def _apply(search: _Search, step: tuple[FloatArray, list[_PadMove | None]], damping: float) -> None:
-    """Move journal and pads, no further than lets every film keep a share of its thickness."""
+def _apply(search: _Search, step: tuple[FloatArray, FloatArray], damping: float) -> bool:
+    """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
     shift, moves = step
     scale = damping
-    for film, move in zip(search.films, moves):
-        if move is not None:
-            scale = min(scale, _allowed(film, move, shift, damping))
+    for film, move in zip(search.films, moves, strict=True):
+        if film.forces is not None:
+            da = float(film.normal @ shift) - move[1]
+            db = float(film.tangent @ shift) + film.pivot_radius * move[0]
+            worst = least_share(film.grid, film.work, da, db)
+            if worst * damping < SHRINK - 1.0:
+                scale = min(scale, (SHRINK - 1.0) / worst)
     search.position = search.position + scale * shift
-    for film, move in zip(search.films, moves):
-        if move is not None:
-            tilt, deflection = scale * (move.constant + move.gradient @ shift)
-            film.tilt += float(tilt)
-            film.deflection += float(deflection)
-
-
-def _allowed(film: PadFilm, move: _PadMove, shift: FloatArray, damping: float) -> float:
-    tilt, deflection = move.constant + move.gradient @ shift
-    da = float(film.normal @ shift) - deflection
-    db = float(film.tangent @ shift) + film.pivot_radius * tilt
-    change = -(da * film.grid.cos + db * film.grid.sin)
-    thickness = film.work.thickness.min(axis=1)
-    worst = float(np.min(change / thickness))
-    return damping if worst * damping > SHRINK - 1.0 else (SHRINK - 1.0) / worst
+    for film, move in zip(search.films, moves, strict=True):
+        film.tilt += float(scale * move[0])
+        film.deflection += float(scale * move[1])
+    return scale == 1.0
 
 
 def _result(search: _Search, iterations: int, residual: float, heat: float, status: tuple[str, ...]) -> Equilibrium:

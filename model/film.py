@@ -28,6 +28,8 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 MAX_ACTIVE_SET_STEPS = 60
+#: How the inner loops are compiled: cached on disk; sums may be reordered, but NaN and infinity keep their meaning.
+JIT = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "reassoc", "arcp", "nsz"}, "nogil": True}
 
 
 class FilmGrid(NamedTuple):
@@ -43,8 +45,10 @@ class FilmGrid(NamedTuple):
         At the nodes.
     cos_face, sin_face : (nt,) ndarray
         At the faces between nodes.
-    dx, dz : float
-        Spacing [m].
+    dx : float
+        Spacing along the arc [m].
+    dz : (nz,) ndarray
+        Spacing across [m]; finer towards the edges, where the pressure bends most.
     height : (nz + 1,) ndarray
         Axial size of each control volume [m].
     area : (nt + 1, nz + 1) ndarray
@@ -60,7 +64,7 @@ class FilmGrid(NamedTuple):
     cos_face: FloatArray
     sin_face: FloatArray
     dx: float
-    dz: float
+    dz: FloatArray
     height: FloatArray
     area: FloatArray
     first: int
@@ -89,8 +93,10 @@ class FilmWork(NamedTuple):
         Mass flow through the faces across [kg/s].
     band : ((nt - 1) * unknowns, unknowns + 1) ndarray
         Factor of the matrix.
-    rhs : (5, (nt - 1) * unknowns) ndarray
-        Pressure and its derivatives by a, b, da/dt, db/dt at the unknowns.
+    unknown : ((nt - 1) * unknowns,) ndarray
+        Pressure at the unknowns.
+    slopes : ((nt - 1) * unknowns, 4) ndarray
+        Its derivatives by a, b, da/dt, db/dt.
     """
 
     pressure: FloatArray
@@ -103,7 +109,8 @@ class FilmWork(NamedTuple):
     flow_x: FloatArray
     flow_z: FloatArray
     band: FloatArray
-    rhs: FloatArray
+    unknown: FloatArray
+    slopes: FloatArray
 
 
 class FilmForces(NamedTuple):
@@ -150,14 +157,13 @@ def film_grid(
     if nt < 4 or nz < 2 or nt % 2 or nz % 2:
         raise ValueError(f"mesh must have even numbers of intervals, at least 4 x 2, got {nt} x {nz}")
     angle = np.linspace(start, end, nt + 1)
-    z = np.linspace(0.0 if symmetric else -0.5 * length, 0.5 * length, nz + 1)
+    z = 0.5 * length * _graded(nz, symmetric)
     face = 0.5 * (angle[1:] + angle[:-1])
-    dx, dz = radius * (end - start) / nt, z[1] - z[0]
-    height = np.full(nz + 1, dz)
-    height[[0, -1]] = 0.5 * dz
-    # Simpson across: the axial profile is smooth and nearly a parabola, which Simpson integrates exactly.
-    across = np.where(np.arange(nz + 1) % 2, 4.0, 2.0) * dz / 3
-    across[[0, -1]] = dz / 3
+    dx, dz = radius * (end - start) / nt, np.diff(z)
+    height = np.zeros(nz + 1)
+    height[:-1] += 0.5 * dz
+    height[1:] += 0.5 * dz
+    across = _parabolic_weights(z)
     # Trapezoids along: the rupture line leaves the profile only once differentiable.
     along = np.full(nt + 1, dx)
     along[[0, -1]] = 0.5 * dx
@@ -177,6 +183,31 @@ def film_grid(
     )
 
 
+#: How much finer the axial mesh is at the edges: the spacing there is 1 - GRADING of the mean.
+GRADING = 0.5
+
+
+def _graded(nz: int, symmetric: bool) -> FloatArray:
+    """Node positions in units of half the width: 0 to 1, or -1 to 1."""
+    if not symmetric:
+        half = _graded(nz // 2, True)
+        return np.concatenate([-half[:0:-1], half])
+    share = np.arange(nz + 1) / nz
+    return share * (1.0 + GRADING - GRADING * share)
+
+
+def _parabolic_weights(z: FloatArray) -> FloatArray:
+    """Simpson's rule for unequal spacing: exact for a parabola through every pair of intervals."""
+    weights = np.zeros(len(z))
+    for k in range(0, len(z) - 2, 2):
+        h0, h1 = z[k + 1] - z[k], z[k + 2] - z[k + 1]
+        total = (h0 + h1) / 6.0
+        weights[k] += total * (2.0 - h1 / h0)
+        weights[k + 1] += total * (h0 + h1) ** 2 / (h0 * h1)
+        weights[k + 2] += total * (2.0 - h0 / h1)
+    return weights
+
+
 def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:
     """Allocate the arrays of one film, at rest at the inlet temperature."""
     nt, nz = len(grid.angle) - 1, len(grid.z) - 1
@@ -194,12 +225,15 @@ def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:
         flow_x=np.zeros((nt, nz + 1)),
         flow_z=np.zeros((nt + 1, nz)),
         band=np.zeros((n, unknowns + 1)),
-        rhs=np.zeros((5, n)),
+        unknown=np.zeros(n),
+        slopes=np.zeros((n, 4)),
     )
 
 
-@njit(cache=True)
-def solve_film(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float, speed: float) -> FilmForces:
+@njit(**JIT)
+def solve_film(
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool
+) -> FilmForces:
     """Pressure of one film and its derivatives.
 
     Parameters
@@ -207,12 +241,13 @@ def solve_film(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: fl
     grid, work
         Mesh and arrays; `work.viscosity`, `work.density`, `work.extra` are read, `work.ruptured` is the first
         guess of the active set, `work.pressure`, `work.thickness` and the flows are written.
-    clearance : float
-        Cp [m].
-    a, b : float
-        Approach and wedge [m].
+    wedge : tuple of float
+        Cp, a, b [m].
     speed : float
         Surface speed of the journal [m/s].
+    sharp : bool
+        Let the perturbed pressure vanish at the rupture line itself, not at the next node: second order in the
+        mesh, for one more factorisation. Newton steps do without.
 
     Returns
     -------
@@ -222,19 +257,26 @@ def solve_film(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: fl
     -----
     Eq. (2) of Dang, Chatterton, Pennacchi, Lubricants 2019, 7, 61; perturbed pressure zero where ruptured.
     """
+    clearance, a, b = wedge
     min_film = _thickness(grid, work, clearance, a, b)
     if not min_film > 0.0:
         return FilmForces(np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2)), min_film, -1)
     gx, gz = _conductances(grid, work, clearance, a, b)
     source = _source(grid, work, clearance, a, b, speed)
     steps = _active_set(grid, work, gx, gz, source)
+    weight = grid.area
     if steps > 0:
-        _derivatives(grid, work, clearance, (a, b), speed, (gx, gz))
-    force, stiffness, damping = _integrate(grid, work)
+        if sharp:
+            diagonal, weight = _rupture_line(grid, work, gx, gz, source)
+            _assemble(work.band, gx, gz, work.ruptured, grid.first)
+            _add_diagonal(work.band, diagonal, grid.first)
+            _factorise(work.band)
+        _derivatives(grid, work, wedge, (gx, gz))
+    force, stiffness, damping = _integrate(grid, work, weight)
     return FilmForces(force, stiffness, damping, min_film, steps)
 
 
-@njit(cache=True)
+@njit(**JIT)
 def _thickness(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float) -> float:
     h = work.thickness
     low = np.inf
@@ -246,7 +288,7 @@ def _thickness(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: fl
     return low
 
 
-@njit(cache=True)
+@njit(**JIT)
 def _conductances(
     grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float
 ) -> tuple[FloatArray, FloatArray]:
@@ -263,11 +305,11 @@ def _conductances(
     for i in range(nt + 1):
         for j in range(nz):
             h = 0.5 * (work.thickness[i, j] + work.thickness[i, j + 1])
-            gz[i, j] = h**3 / 24.0 * (fluidity[i, j] + fluidity[i, j + 1]) * grid.dx / grid.dz
+            gz[i, j] = h**3 / 24.0 * (fluidity[i, j] + fluidity[i, j + 1]) * grid.dx / grid.dz[j]
     return gx, gz
 
 
-@njit(cache=True)
+@njit(**JIT)
 def _source(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float, speed: float) -> FloatArray:
     """Couette inflow minus outflow of each control volume (the right-hand side f of A p = f)."""
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
@@ -283,7 +325,7 @@ def _source(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float
     return source
 
 
-@njit(cache=True)
+@njit(**JIT)
 def _active_set(grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, source: FloatArray) -> int:
     """Solve the complementarity problem; returns the number of factorisations, -2 if it did not settle."""
     p, ruptured = work.pressure, work.ruptured
@@ -293,7 +335,7 @@ def _active_set(grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, 
     for step in range(1, MAX_ACTIVE_SET_STEPS + 1):
         _assemble(work.band, gx, gz, ruptured, first)
         _factorise(work.band)
-        x = work.rhs[0]
+        x = work.unknown
         for i in range(1, nt):
             for j in range(first, nz):
                 k = (i - 1) * width + j - first
@@ -307,7 +349,7 @@ def _active_set(grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, 
     return -2
 
 
-@njit(cache=True)
+@njit(**JIT)
 def _update_active_set(
     p: FloatArray, ruptured: BoolArray, gx: FloatArray, gz: FloatArray, source: FloatArray, first: int
 ) -> int:
@@ -328,7 +370,7 @@ def _update_active_set(
     return changed
 
 
-@njit(cache=True)
+@njit(**JIT)
 def _assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArray, first: int) -> None:
     nt, nz = gx.shape[0], gz.shape[1]
     width = nz - first
@@ -349,7 +391,7 @@ def _assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolAr
                 band[k, width] -= gx[i, j]
 
 
-@njit(cache=True)
+@njit(**JIT)
 def _factorise(band: FloatArray) -> None:
     """L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k]."""
     n, width = band.shape[0], band.shape[1] - 1
@@ -358,15 +400,13 @@ def _factorise(band: FloatArray) -> None:
         for r in range(1, min(width, n - 1 - k) + 1):
             factor = band[k, r] / pivot
             if factor != 0.0:
-                row = band[k + r]
-                column = band[k]
                 for s in range(r, width + 1):
-                    row[s - r] -= factor * column[s]
+                    band[k + r, s - r] -= factor * band[k, s]
         for r in range(1, width + 1):
             band[k, r] /= pivot
 
 
-@njit(cache=True)
+@njit(**JIT)
 def _substitute(band: FloatArray, x: FloatArray) -> None:
     n, width = band.shape[0], band.shape[1] - 1
     for k in range(n):
@@ -379,24 +419,80 @@ def _substitute(band: FloatArray, x: FloatArray) -> None:
         x[k] = total
 
 
-@njit(cache=True)
+@njit(**JIT)
+def _substitute_four(band: FloatArray, x: FloatArray) -> None:
+    """`_substitute` for the four derivatives side by side (n, 4): the inner loop fills a vector register."""
+    n, width = band.shape[0], band.shape[1] - 1
+    for k in range(n):
+        for r in range(1, min(width, n - 1 - k) + 1):
+            factor = band[k, r]
+            for m in range(4):
+                x[k + r, m] -= factor * x[k, m]
+    for k in range(n - 1, -1, -1):
+        pivot = band[k, 0]
+        for m in range(4):
+            x[k, m] /= pivot
+        for r in range(1, min(width, n - 1 - k) + 1):
+            factor = band[k, r]
+            for m in range(4):
+                x[k, m] -= factor * x[k + r, m]
+
+
+@njit(**JIT)
+def _rupture_line(
+    grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, source: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Where between two nodes the film ruptures, as changes of the wet nodes' diagonal and area.
+
+    A dry node is reached by the share `wet` of the flow that would wet it; the pressure rises as the square of
+    the distance from the rupture line, so that the line lies (0.5 + wet) steps from the last wet node. A linear
+    profile that vanishes there has (wet - 0.5) / (wet + 0.5) of the wet node's value at the dry node.
+    """
+    nt, nz = gx.shape[0], gz.shape[1]
+    p, ruptured = work.pressure, work.ruptured
+    diagonal = np.zeros((nt + 1, nz + 1))
+    area = grid.area.copy()
+    for i in range(1, nt):
+        for j in range(grid.first, nz):
+            if not ruptured[i, j] or source[i, j] >= 0.0:
+                continue
+            inflow = gx[i - 1, j] * p[i - 1, j] + gx[i, j] * p[i + 1, j] + gz[i, j] * p[i, j + 1]
+            if j > 0:
+                inflow += gz[i, j - 1] * p[i, j - 1]
+            wet = min(1.0, inflow / -source[i, j])
+            ghost = (wet - 0.5) / (wet + 0.5)
+            for side in range(-1, 2, 2):
+                m = i + side
+                if 0 < m < nt and not ruptured[m, j]:
+                    diagonal[m, j] -= (gx[i - 1, j] if side < 0 else gx[i, j]) * ghost
+                    area[m, j] *= 1.0 + 0.5 * (wet - 0.5)
+    return diagonal, area
+
+
+@njit(**JIT)
+def _add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
+    nt, nz = diagonal.shape[0] - 1, diagonal.shape[1] - 1
+    for i in range(1, nt):
+        for j in range(first, nz):
+            band[(i - 1) * (nz - first) + j - first, 0] += diagonal[i, j]
+
+
+@njit(**JIT)
 def _derivatives(
     grid: FilmGrid,
     work: FilmWork,
-    clearance: float,
-    wedge: tuple[float, float],
-    speed: float,
+    wedge: tuple[float, float, float],
     conductance: tuple[FloatArray, FloatArray],
 ) -> None:
     """Right-hand sides of the perturbed equation, solved with the factor at hand; then the mass flows."""
-    p, rhs, h = work.pressure, work.rhs, work.thickness
+    p, rhs, h = work.pressure, work.slopes, work.thickness
     gx, gz = conductance
     nt, nz = gx.shape[0], gz.shape[1]
     first = grid.first
     width = nz - first
-    rhs[1:] = 0.0
+    rhs[:, :] = 0.0
     for i in range(nt):
-        base = clearance - wedge[0] * grid.cos_face[i] - wedge[1] * grid.sin_face[i]
+        base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
         for j in range(nz + 1):
             poiseuille = gx[i, j] * (p[i + 1, j] - p[i, j])
             hf = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
@@ -406,11 +502,11 @@ def _derivatives(
             if first <= j < nz:
                 k = i * width + j - first
                 if i + 1 < nt:
-                    rhs[1, k] -= slope * grid.cos_face[i]
-                    rhs[2, k] -= slope * grid.sin_face[i]
+                    rhs[k, 0] -= slope * grid.cos_face[i]
+                    rhs[k, 1] -= slope * grid.sin_face[i]
                 if i > 0:
-                    rhs[1, k - width] += slope * grid.cos_face[i]
-                    rhs[2, k - width] += slope * grid.sin_face[i]
+                    rhs[k - width, 0] += slope * grid.cos_face[i]
+                    rhs[k - width, 1] += slope * grid.sin_face[i]
     for i in range(nt + 1):
         for j in range(nz):
             poiseuille = gz[i, j] * (p[i, j + 1] - p[i, j])
@@ -419,37 +515,42 @@ def _derivatives(
                 slope = -3.0 * poiseuille / (0.5 * (h[i, j] + h[i, j + 1]))
                 k = (i - 1) * width + j - first
                 if j >= first:
-                    rhs[1, k] += slope * grid.cos[i]
-                    rhs[2, k] += slope * grid.sin[i]
+                    rhs[k, 0] += slope * grid.cos[i]
+                    rhs[k, 1] += slope * grid.sin[i]
                 if j + 1 < nz:
-                    rhs[1, k + 1] -= slope * grid.cos[i]
-                    rhs[2, k + 1] -= slope * grid.sin[i]
+                    rhs[k + 1, 0] -= slope * grid.cos[i]
+                    rhs[k + 1, 1] -= slope * grid.sin[i]
     for i in range(1, nt):
         for j in range(first, nz):
             k = (i - 1) * width + j - first
             squeeze = work.density[i, j] * grid.dx * grid.height[j]
-            rhs[3, k] = squeeze * grid.cos[i]
-            rhs[4, k] = squeeze * grid.sin[i]
+            rhs[k, 2] = squeeze * grid.cos[i]
+            rhs[k, 3] = squeeze * grid.sin[i]
             if work.ruptured[i, j]:
-                rhs[1:, k] = 0.0
-    for m in range(1, 5):
-        _substitute(work.band, rhs[m])
+                for m in range(4):
+                    rhs[k, m] = 0.0
+    _substitute_four(work.band, rhs)
 
 
-@njit(cache=True)
-def _integrate(grid: FilmGrid, work: FilmWork) -> tuple[FloatArray, FloatArray, FloatArray]:
+@njit(**JIT)
+def _integrate(
+    grid: FilmGrid, work: FilmWork, weight: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Forces and their derivatives; `weight` is the area that a node's perturbed pressure stands for."""
     force = np.zeros(2)
     stiffness = np.zeros((2, 2))
     damping = np.zeros((2, 2))
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     first = grid.first
     width = nz - first
+    total = np.zeros(5)
     for i in range(1, nt):
-        total = np.zeros(5)
+        total[:] = 0.0
         for j in range(first, nz):
             k = (i - 1) * width + j - first
-            for m in range(5):
-                total[m] += grid.area[i, j] * work.rhs[m, k]
+            total[0] += grid.area[i, j] * work.unknown[k]
+            for m in range(4):
+                total[m + 1] += weight[i, j] * work.slopes[k, m]
         for m in range(2):
             direction = grid.cos[i] if m == 0 else grid.sin[i]
             force[m] += direction * total[0]

@@ -14,14 +14,13 @@ band of dense blocks.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from model.block_cholesky import BlockCholesky
-from model.pad_line import Line
+from model.block_cholesky import BlockRow, factor_rows, forward_rows
 from model.pad_mesh import SectorMesh
 
 Array = NDArray[np.float64]
@@ -86,29 +85,28 @@ class ElasticSector:
             fixed[:, component, :, 0] = True
         return cls(mesh, fixed)
 
-    @cached_property
-    def factors(self) -> BlockCholesky:
-        """Cholesky factors of the stiffness matrix; raises `numpy.linalg.LinAlgError` if the body is not held."""
-        return BlockCholesky.factor(self.mesh.theta.n_nodes, self._stiffness_blocks())
+    def stiffness_rows(self) -> Iterator[BlockRow]:
+        """Block rows of the lower triangle of K, slab by slab, for `model.block_cholesky.factor_rows`.
 
-    def _stiffness_blocks(self) -> dict[tuple[int, int], Array]:
-        """Lower blocks of K with fixed rows and columns replaced by those of the unit matrix."""
+        Fixed rows and columns are replaced by those of the unit matrix.
+        """
         theta = self.mesh.theta
         section = self._sections()
         arcs = {key: theta.matrix(*key) for key in section}
         free = ~self.fixed.reshape(theta.n_nodes, -1)
-        blocks = {}
         for i in range(theta.n_nodes):
+            row = {}
             for j in range(max(0, i - theta.degree), i + 1):
                 weights = {key: arc[i, j] for key, arc in arcs.items()}
-                if not any(weights.values()):
-                    continue
-                block = sum(weight * section[key] for key, weight in weights.items())
-                block = np.where(free[i][:, None] & free[j][None, :], block, 0.0)
-                if i == j:
-                    block[np.diag_indices_from(block)] += ~free[i]
-                blocks[i, j] = block
-        return blocks
+                if any(weights.values()):
+                    block = np.zeros_like(section[0, 0])
+                    for key, weight in weights.items():
+                        block += weight * section[key]
+                    block[~free[i]] = 0.0
+                    block[:, ~free[j]] = 0.0
+                    row[j] = block
+            row[i][np.diag_indices_from(row[i])] += ~free[i]
+            yield row
 
     def _sections(self) -> dict[tuple[int, int], Array]:
         """M_ab: for derivative orders a, b along the arc, the cross-section's matrix, shape (m, m)."""
@@ -165,25 +163,11 @@ class ElasticSector:
         out[self.fixed] = 0.0
         return out.reshape(n_theta, -1, n_columns)
 
-    def surface_functionals(self) -> tuple[Array, list[int]]:
-        """Unit radial forces at the nodes of the film face.
-
-        Returns
-        -------
-        rhs : (n_theta, 3 * n_r * n_z, n_surface) ndarray
-        active : list of int
-            Leading non-zero columns up to every slab, for `BlockCholesky.forward`.
-        """
-        mesh = self.mesh
-        n_theta, n_z = mesh.theta.n_nodes, mesh.z.n_nodes
-        rhs = np.zeros((n_theta, 3, mesh.r.n_nodes, n_z, n_theta, n_z))
-        slab, along = np.meshgrid(np.arange(n_theta), np.arange(n_z), indexing="ij")
-        rhs[slab, _U, 0, along, slab, along] = 1.0
-        rhs[self.fixed] = 0.0
-        return rhs.reshape(n_theta, -1, n_theta * n_z), [(i + 1) * n_z for i in range(n_theta)]
-
     def surface_response(self, temperature: Array) -> tuple[Array, Array]:
         """Radial displacement of the film face under nodal forces and temperatures.
+
+        With K = L L^T, E the unit radial forces on the film face and F the thermal loads, both results are products
+        of L^-1 E and L^-1 F, summed slab by slab: the compliance is symmetric and positive semidefinite by build.
 
         Parameters
         ----------
@@ -193,22 +177,34 @@ class ElasticSector:
         Returns
         -------
         compliance : (n_surface, n_surface) ndarray
-            Outward displacement per outward nodal force [m/N]; symmetric and positive semidefinite.
+            Outward displacement per outward nodal force [m/N].
         expansion : (n_surface, n_columns) ndarray
             Outward displacement of every field [m].
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            The body is not held against rigid motion.
         """
-        rhs, active = self.surface_functionals()
-        unit = self.factors.forward(rhs, active)
-        hot = self.factors.forward(self.thermal_load(temperature))
-        n_surface = rhs.shape[2]
+        n_fields, n_surface = temperature.shape[3], self.mesh.n_surface
         compliance = np.zeros((n_surface, n_surface))
-        expansion = np.zeros((n_surface, hot.shape[2]))
-        for i, width in enumerate(active):
-            compliance[:width, :width] += unit[i, :, :width].T @ unit[i, :, :width]
-            expansion[:width] += unit[i, :, :width].T @ hot[i]
+        expansion = np.zeros((n_surface, n_fields))
+        rhs = self._surface_loads(self.thermal_load(temperature))
+        for block in forward_rows(factor_rows(self.stiffness_rows()), rhs):
+            unit = block[:, n_fields:]
+            width = unit.shape[1]
+            compliance[:width, :width] += unit.T @ unit
+            expansion[:width] += unit.T @ block[:, :n_fields]
         return compliance, expansion
 
-
-def surface_mass(theta: Line, z: Line) -> tuple[Array, Array]:
-    """Integrals of products of the face's basis functions along the arc [rad] and along the half length [m]."""
-    return theta.matrix(0, 0), z.matrix(0, 0)
+    def _surface_loads(self, thermal: Array) -> Iterator[Array]:
+        """Thermal loads, then unit forces on the film nodes of this slab and of those before it."""
+        n_r, n_z = self.mesh.r.n_nodes, self.mesh.z.n_nodes
+        n_fields = thermal.shape[2]
+        for i, load in enumerate(thermal):
+            rhs = np.zeros((3, n_r, n_z, n_fields + (i + 1) * n_z))
+            rhs[_U, 0, :, -n_z:] = np.eye(n_z)
+            rhs[self.fixed[i]] = 0.0
+            rhs = rhs.reshape(3 * n_r * n_z, -1)
+            rhs[:, :n_fields] = load
+            yield rhs

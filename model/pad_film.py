@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from model.bearing import Oil, Pad
 from model.energy import solve_energy
-from model.film import FilmForces, FilmGrid, FilmWork, film_grid, film_work, solve_film
+from model.film import JIT, FilmForces, FilmGrid, FilmWork, film_grid, film_work, solve_film
 from model.setup import Setup
 
 FloatArray = NDArray[np.float64]
@@ -100,7 +100,7 @@ def oil_constants(oil: Oil) -> tuple[float, float, float, float]:
     return oil.viscosity_40, oil.viscosity_exponent, oil.density_40, oil.thermal_expansion
 
 
-@njit(cache=True)
+@njit(**JIT)
 def film_step(
     grid: FilmGrid,
     work: FilmWork,
@@ -125,7 +125,7 @@ def film_step(
     heat : tuple of float
         Specific heat and conductivity.
     thermal : tuple of float
-        Inlet temperature [degC] and relaxation of the temperature update; 0 leaves it alone (isothermal).
+        Inlet temperature [degC] and relaxation of the temperature; 0 leaves it alone (isothermal).
 
     Returns
     -------
@@ -136,7 +136,7 @@ def film_step(
         See `solve_energy`.
     """
     set_viscosity(work, oil)
-    forces = solve_film(grid, work, wedge[0], wedge[1], wedge[2], speed)
+    forces = solve_film(grid, work, wedge, speed, False)
     if thermal[1] == 0.0 or forces.steps < 0:
         return forces, 0.0, 0.0
     new = np.empty_like(work.temperature)
@@ -150,7 +150,7 @@ def film_step(
     return forces, change, limited
 
 
-@njit(cache=True)
+@njit(**JIT)
 def set_viscosity(work: FilmWork, oil: tuple[float, float, float, float]) -> None:
     """Eq. (4) and (5) at every node."""
     t = work.temperature
@@ -158,3 +158,14 @@ def set_viscosity(work: FilmWork, oil: tuple[float, float, float, float]) -> Non
         for j in range(t.shape[1]):
             work.viscosity[i, j] = oil[0] * np.exp(oil[1] * (40.0 - t[i, j]))
             work.density[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - t[i, j]))
+
+
+@njit(**JIT)
+def least_share(grid: FilmGrid, work: FilmWork, da: float, db: float) -> float:
+    """Most negative relative change of the film thickness for a change of (a, b)."""
+    worst = 0.0
+    for i in range(work.thickness.shape[0]):
+        change = -(da * grid.cos[i] + db * grid.sin[i])
+        for j in range(work.thickness.shape[1]):
+            worst = min(worst, change / work.thickness[i, j])
+    return worst

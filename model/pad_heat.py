@@ -7,12 +7,13 @@ temperatures are rises above supply.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from model.block_cholesky import BlockCholesky
+from model.block_cholesky import BlockCholesky, BlockRow
 from model.pad_mesh import SectorMesh
 
 Array = NDArray[np.float64]
@@ -50,44 +51,36 @@ def conduct(mesh: SectorMesh, convection: float, even: bool = True) -> HeatSolut
     HeatSolution
     """
     theta, n_r, n_z = mesh.theta, mesh.r.n_nodes, mesh.z.n_nodes
-    blocks = _conduction_blocks(mesh, convection)
-    face = np.zeros((n_r, n_z), dtype=bool)
-    face[0] = True
-    given = face.copy()
+    on_face = np.arange(n_r * n_z) < n_z
+    given = on_face.copy()
     if not even:
-        given[:, 0] = True
-    given, face = given.ravel(), face.ravel()
+        given[::n_z] = True
     coupling = np.zeros((theta.n_nodes, n_r * n_z, theta.n_nodes, n_z))
-    at_face = np.zeros((theta.n_nodes, n_z, theta.n_nodes, n_z))
-    inner = {}
-    for (i, j), block in blocks.items():
-        coupling[i, :, j] += block[:, face]
-        at_face[i, :, j] += block[np.ix_(face, face)]
-        if i != j:  # blocks of K are symmetric in pairs: block (j, i) is the transposed of block (i, j)
-            coupling[j, :, i] += block[face].T
-            at_face[j, :, i] += block[np.ix_(face, face)].T
-        inner[i, j] = np.where(given[:, None] | given[None, :], 0.0, block)
-        if i == j:
-            inner[i, j] += np.diag(given.astype(float))
+    rows: list[BlockRow] = []
+    for i, row in enumerate(_conduction_rows(mesh, convection)):
+        for j, block in row.items():
+            coupling[i, :, j] = block[:, on_face]
+            coupling[j, :, i] = block[on_face].T
+            block[given] = block[:, given] = 0.0
+        row[i][given, given] = 1.0
+        rows.append(row)
     n_surface = theta.n_nodes * n_z
     coupling = coupling.reshape(theta.n_nodes, n_r * n_z, n_surface)
     rhs = -coupling
     rhs[:, given] = 0.0
-    field = BlockCholesky.factor(theta.n_nodes, inner).solve(rhs)
-    heat = at_face.reshape(n_surface, n_surface) + np.tensordot(coupling, field, ((0, 1), (0, 1)))
+    field = BlockCholesky.factor(rows).solve(rhs)
+    field[:, :n_z] = np.eye(n_surface).reshape(theta.n_nodes, n_z, n_surface)
     field = field.reshape(theta.n_nodes, n_r, n_z, n_surface)
-    slab, along = np.meshgrid(np.arange(theta.n_nodes), np.arange(n_z), indexing="ij")
-    field[slab, 0, along, slab * n_z + along] = 1.0
-    if not even:
+    if not even:  # an odd temperature vanishes on the mid-plane: those columns answer to nothing
         field[:, :, 0] = 0.0
-        odd = np.tile(np.arange(n_z) == 0, theta.n_nodes)
-        field[..., odd] = 0.0
-        heat[odd] = heat[:, odd] = 0.0
+        field[..., ::n_z] = 0.0
+        coupling[..., ::n_z] = 0.0
+    heat = np.tensordot(coupling, field.reshape(coupling.shape), ((0, 1), (0, 1)))
     return HeatSolution(field, heat)
 
 
-def _conduction_blocks(mesh: SectorMesh, convection: float) -> dict[tuple[int, int], Array]:
-    """Lower blocks, slab by slab, of conduction plus convection; each (n_r * n_z, n_r * n_z) [W/K]."""
+def _conduction_rows(mesh: SectorMesh, convection: float) -> Iterator[BlockRow]:
+    """Block rows of the lower triangle of conduction plus convection, slab by slab; blocks (n_r * n_z, n_r * n_z) [W/K]."""
     r, theta, z = mesh.r, mesh.theta, mesh.z
     radius = r.gauss[0]
     conductivity = mesh.per_gauss_point([m.conductivity for m in mesh.layers])
@@ -101,12 +94,12 @@ def _conduction_blocks(mesh: SectorMesh, convection: float) -> dict[tuple[int, i
     along = np.kron(r.matrix(0, 0, conductivity / radius), z.matrix(0, 0))
     edge = convection * np.kron(r.matrix(0, 0), z.matrix(0, 0))
     values, slopes = theta.matrix(0, 0), theta.matrix(1, 1)
-    blocks = {}
-    last = theta.n_nodes - 1
     for i in range(theta.n_nodes):
-        for j in range(max(0, i - theta.degree), i + 1):
-            if values[i, j] or slopes[i, j]:
-                blocks[i, j] = values[i, j] * section + slopes[i, j] * along
-                if i == j and i in (0, last):
-                    blocks[i, j] += edge
-    return blocks
+        row = {
+            j: values[i, j] * section + slopes[i, j] * along
+            for j in range(max(0, i - theta.degree), i + 1)
+            if values[i, j] or slopes[i, j]
+        }
+        if i in (0, theta.n_nodes - 1):
+            row[i] += edge
+        yield row

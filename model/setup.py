@@ -91,8 +91,8 @@ def _product(maps: tuple[SensorMap, ...], omega: float) -> ComplexArray:
 class Mesh:
     """Film mesh: intervals along the arc and across half the width; both even."""
 
-    along: int = 64
-    across: int = 8
+    along: int = 80
+    across: int = 6
 
     def coarser(self) -> Mesh:
         """Half as many intervals each way (for the two-mesh error), even and no less than 8 x 4."""

@@ -12,9 +12,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from model.film import film_grid, film_work, solve_film
+from model.film import JIT, film_grid, film_work, solve_film
+from model.pad_film import PadFilm
 
 FloatArray = NDArray[np.float64]
 _TABLE_MESH = (32, 4)
@@ -78,7 +80,7 @@ def loaded_attitude(start: float, end: float, radius: float, length: float) -> L
     def force(curvature: float, wedge: float) -> tuple[float, float, float]:
         # (Cp - a) = 1: Cp = 1 + A
         work.ruptured[:] = False
-        f = solve_film(grid, work, 1.0 + curvature, curvature, wedge, 1.0)
+        f = solve_film(grid, work, (1.0 + curvature, curvature, wedge), 1.0, False)
         return (f.force[0] / unit, f.force[1] / unit, f.steps)
 
     rows = []
@@ -145,3 +147,113 @@ def _free_wedge(force, curvature: float, start: float, end: float) -> float | No
     from scipy.optimize import brentq
 
     return float(brentq(lambda w: force(curvature, w)[1], lower, upper, xtol=1e-6 * upper, rtol=1e-6))
+
+
+def first_position(
+    load: FloatArray, scale: float, give: FloatArray, films: list[PadFilm], tables: list[LoadedAttitude]
+) -> tuple[FloatArray, FloatArray]:
+    """Journal position and pivot deflections that balance a load on tabulated isothermal films.
+
+    Parameters
+    ----------
+    load : (2,) ndarray
+        [N]
+    scale : float
+        mu U R^2 L [N m^2].
+    give : (n_pads,) ndarray
+        Secant compliance of every pivot [m/N].
+
+    Returns
+    -------
+    position : (2,) ndarray
+        [m]
+    deflection : (n_pads,) ndarray
+        [m]
+    """
+    pads = np.array([[*f.normal, f.gap, f.pad.pad_clearance, c] for f, c in zip(films, give, strict=True)])
+    longest = max(len(t.curvature) for t in tables)
+    curves = np.full((len(tables), 2, longest), math.inf)
+    for row, t in zip(curves, tables, strict=True):
+        row[0, : len(t.curvature)] = _root(t.curvature)
+        row[1, : len(t.load)] = t.load
+    return _first_position(np.asarray(load, float), scale, pads, curves)
+
+
+@njit(**JIT)
+def _first_position(
+    load: FloatArray, scale: float, pads: FloatArray, curves: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    n = pads.shape[0]
+    room = np.min(pads[:, 3] - pads[:, 2])
+    size = math.hypot(load[0], load[1])
+    deflection = np.zeros(n)
+    position = np.zeros(2)
+    if size == 0.0:
+        _pull(position, scale, pads, curves, deflection)
+        return position, deflection
+    position = load / size * 0.4 * room
+    step = 1e-3 * room
+    for _ in range(40):
+        residual = load - _pull(position, scale, pads, curves, deflection)
+        error = math.hypot(residual[0], residual[1])
+        if error < 0.005 * size:
+            break
+        jacobian = np.zeros((2, 2))
+        for axis in range(2):
+            ahead, behind = position.copy(), position.copy()
+            ahead[axis] += step
+            behind[axis] -= step
+            slope = _pull(ahead, scale, pads, curves, deflection) - _pull(behind, scale, pads, curves, deflection)
+            jacobian[:, axis] = slope / (2 * step)
+        det = jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0]
+        if abs(det) <= 1e-9 * np.sum(jacobian**2):  # nothing carries in some direction: go where the load pushes
+            position = position + 0.1 * room * residual / error
+            continue
+        move = np.array(
+            [
+                (residual[0] * jacobian[1, 1] - jacobian[0, 1] * residual[1]) / det,
+                (jacobian[0, 0] * residual[1] - jacobian[1, 0] * residual[0]) / det,
+            ]
+        )
+        position = position + move * min(1.0, 0.2 * room / max(math.hypot(move[0], move[1]), 1e-30))
+    _pull(position, scale, pads, curves, deflection)
+    return position, deflection
+
+
+@njit(**JIT)
+def _pull(
+    position: FloatArray, scale: float, pads: FloatArray, curves: FloatArray, deflection: FloatArray
+) -> FloatArray:
+    """Force of all tabulated films at a position; also sets every pivot's deflection."""
+    total = np.zeros(2)
+    for m in range(pads.shape[0]):
+        reach = pads[m, 2] + pads[m, 0] * position[0] + pads[m, 1] * position[1]
+        clearance, compliance = pads[m, 3], pads[m, 4]
+        low, high = -0.9 * clearance, min(reach, 0.999 * clearance)
+        if compliance > 0.0:  # a + c W(a) rises with a
+            for _ in range(30):
+                middle = 0.5 * (low + high)
+                if middle + compliance * _tabulated(middle, clearance, scale, curves[m]) > reach:
+                    high = middle
+                else:
+                    low = middle
+        carried = _tabulated(high, clearance, scale, curves[m])
+        deflection[m] = compliance * carried
+        total[0] += pads[m, 0] * carried
+        total[1] += pads[m, 1] * carried
+    return total
+
+
+@njit(**JIT)
+def _tabulated(a: float, clearance: float, scale: float, curve: FloatArray) -> float:
+    room = clearance - a
+    ratio = a / room
+    key = math.sqrt(abs(ratio)) * (1.0 if ratio >= 0 else -1.0)
+    keys, loads = curve[0], curve[1]
+    if key <= keys[0]:
+        return 0.0
+    i = np.searchsorted(keys, key)
+    if i >= len(keys) or not math.isfinite(keys[i]):
+        return scale * loads[i - 1] / room**2
+    share = (key - keys[i - 1]) / (keys[i] - keys[i - 1])
+    return scale * (loads[i - 1] + share * (loads[i] - loads[i - 1])) / room**2
