@@ -30,7 +30,10 @@ TEMPERATURE_TOLERANCE = 3e-5
 #: Below this residual the iteration is accelerated; above it the temperature is held back, because a much hotter
 #: film carries less and heats less: undamped, the two would swing.
 NEAR = 0.3
+NEAR_HEAT = 10.0
 HELD_BACK = 0.6
+#: Largest change of a film temperature in one step [K].
+HEATING_STEP = 15.0
 #: A film may shrink to this share of itself in one step.
 SHRINK = 0.4
 
@@ -119,7 +122,27 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
             return result
         search.films = pad_films(setup)
     _cold_start(search)
-    return _iterate(search)
+    result = _iterate(search)
+    return result if result.converged else _approach_by_steps(search, result)
+
+
+def _approach_by_steps(search: _Search, failed: Equilibrium) -> Equilibrium:
+    """Raise the load in steps, each started from the one before: hot, thin films are far from the isothermal guess."""
+    load, reached, step = search.load.copy(), 0.0, 0.25
+    last: Equilibrium | None = None
+    while reached < 1.0 and step > 0.02:
+        share = min(1.0, reached + step)
+        search.load = share * load
+        search.films = pad_films(search.setup)
+        if last is None or not _warm_start(search, last):
+            _cold_start(search)
+        result = _iterate(search)
+        if result.converged:
+            last, reached = result, share
+        else:
+            step *= 0.5
+    search.load = load
+    return last if last is not None and reached == 1.0 else failed
 
 
 def _warm_start(search: _Search, start: Equilibrium) -> bool:
@@ -181,7 +204,8 @@ def _iterate(search: _Search) -> Equilibrium:
         if any(not f.idle and f.forces is not None and f.forces.steps < 0 for f in search.films):
             return _result(search, iteration, math.inf, heat_change, ("film lost", "not converged"))
         residual, shift, moves = _newton_step(search)
-        search.relaxation = 1.0 if residual < NEAR else HELD_BACK
+        near = residual < NEAR and heat_change < NEAR_HEAT
+        search.relaxation = 1.0 if near else HELD_BACK
         if residual < FORCE_TOLERANCE and heat_change < TEMPERATURE_TOLERANCE:
             _sharpen(search)
             return _result(search, iteration, residual, heat_change, ())
@@ -191,7 +215,7 @@ def _iterate(search: _Search) -> Equilibrium:
         if before is None:
             continue
         # steps that were cut short, or still far off, say nothing of the iteration's slow modes
-        if whole and residual < NEAR:
+        if whole and near:
             _set_state(search, memory.next(before, _state(search)))
         else:
             memory.reset()
@@ -262,7 +286,7 @@ def _solve_films(search: _Search) -> float:
         a, b = film.approach(search.position)
         film.forces, film.temperature_change, limited = film_step(
             film.grid, film.work, (film.pad.pad_clearance, a, b), search.surface_speed,
-            oil_constants(oil), (oil.specific_heat, oil.conductivity), (film.inlet, 0.0 if isothermal else search.relaxation),
+            oil_constants(oil), (oil.specific_heat, oil.conductivity), (film.inlet, 0.0 if isothermal else search.relaxation, HEATING_STEP),
         )  # fmt: skip
         change = max(change, film.temperature_change)
         search.limited = max(search.limited, limited)

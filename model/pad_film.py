@@ -108,7 +108,7 @@ def film_step(
     speed: float,
     oil: tuple[float, float, float, float],
     heat: tuple[float, float],
-    thermal: tuple[float, float],
+    thermal: tuple[float, float, float],
 ) -> tuple[FilmForces, float, float]:
     """Solve pressure for the present temperature, then the temperature for that pressure.
 
@@ -125,7 +125,7 @@ def film_step(
     heat : tuple of float
         Specific heat and conductivity.
     thermal : tuple of float
-        Inlet temperature [degC] and relaxation of the temperature; 0 leaves it alone (isothermal).
+        Inlet temperature [degC]; relaxation of the temperature, 0 leaves it alone (isothermal); largest step [K].
 
     Returns
     -------
@@ -144,9 +144,11 @@ def film_step(
     change = 0.0
     for i in range(new.shape[0]):
         for j in range(new.shape[1]):
-            difference = new[i, j] - work.temperature[i, j]
-            change = max(change, abs(difference))
-            work.temperature[i, j] += thermal[1] * difference
+            change = max(change, abs(new[i, j] - work.temperature[i, j]))
+    relaxation = thermal[1] * min(1.0, thermal[2] / max(change, 1e-30))
+    for i in range(new.shape[0]):
+        for j in range(new.shape[1]):
+            work.temperature[i, j] += relaxation * (new[i, j] - work.temperature[i, j])
     return forces, change, limited
 
 
