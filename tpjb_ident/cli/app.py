@@ -7,7 +7,11 @@ from typing import Annotated
 import typer
 
 from tpjb_ident.cli.check import check
+from tpjb_ident.cli.export import export
+from tpjb_ident.cli.identify import identify
+from tpjb_ident.cli.pivot import pivot
 from tpjb_ident.cli.predict import predict
+from tpjb_ident.cli.simulate import simulate
 
 # plain help: the markup renderer costs more start-up time than all the rest together
 app = typer.Typer(
@@ -35,5 +39,5 @@ def _common(
     pass
 
 
-for command in (check, predict):
+for command in (check, identify, pivot, predict, simulate, export):
     app.command()(command)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 from tpjb_ident.cli.errors import BadInputError, guarded
+from tpjb_ident.cli.inputs import campaign_place
 from tpjb_ident.cli.options import CampaignPath, Out, out_folder
 from tpjb_ident.cli.outdir import output_folder
 from tpjb_ident.cli.record import write_record
@@ -22,6 +23,7 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
 
     if not campaign.exists():
         raise BadInputError(f"{campaign}: no such file or folder. Give a campaign folder or an HDF5 file.")
+    campaign = campaign_place(campaign)
     with progress(f"reading {campaign.name}"):
         problems = check_campaign(campaign)
     errors = [p for p in problems if p.severity == "error"]

@@ -11,14 +11,17 @@ from tpjb_ident.tables import printable
 if TYPE_CHECKING:
     from rich.console import Console
 
-#: Called with the share done, 0 to 1, and what is being done.
-Progress = Callable[[float, str], None]
+#: Called with what is being done, how many are done, of how many.
+Progress = Callable[[str, int, int], None]
 
 
 def _console(stderr: bool = False) -> Console:
     from rich.console import Console
 
-    return Console(stderr=stderr, highlight=False, soft_wrap=True)
+    console = Console(stderr=stderr, highlight=False, soft_wrap=True)
+    if not console.is_terminal:
+        console.width = 140  # a log file has no edge to fold at
+    return console
 
 
 def say(text: str) -> None:
@@ -46,7 +49,8 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 
     grid = Table(title=Text(printable(title)), box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
     for i, column in enumerate(columns):
-        grid.add_column(Text(printable(column)), justify="left" if i == 0 else "right")
+        last = i == len(columns) - 1
+        grid.add_column(Text(printable(column)), justify="right" if i else "left", no_wrap=not last, overflow="fold")
     for row in rows:
         grid.add_row(*(Text(printable(cell)) for cell in row))
     _console().print(grid)
@@ -71,8 +75,8 @@ def progress(what: str) -> Iterator[Progress]:
     with Bar(*columns, console=console, transient=True) as bar:
         task = bar.add_task(what, total=1.0)
 
-        def show(share: float, text: str) -> None:
-            bar.update(task, completed=share, description=printable(text or what))
+        def show(text: str, done: int, total: int) -> None:
+            bar.update(task, completed=done / max(total, 1), description=f"{what}: {printable(text)}")
 
         yield show
 
@@ -80,7 +84,7 @@ def progress(what: str) -> Iterator[Progress]:
 def _plain_progress(what: str) -> Progress:
     note_line("doing", what)
 
-    def silent(share: float, text: str) -> None:
+    def silent(text: str, done: int, total: int) -> None:
         """A log file has no use for a moving bar."""
 
     return silent

@@ -21,8 +21,8 @@ from model.predict import Prediction, predict  # noqa: E402
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Called with the share done, 0 to 1, and what is being done.
-Progress = Callable[[float, str], None]
+#: Called with what is being done, how many are done, of how many.
+Progress = Callable[[str, int, int], None]
 ENTRIES = ("xx", "xy", "yx", "yy")
 
 
@@ -121,7 +121,7 @@ def predict_points(
         before = prediction if prediction.converged else None
         found[static] = prediction
         if progress is not None:
-            progress((done + 1) / len(groups), f"predicting {static.static_load / 1e3:g} kN")
+            progress(f"{static.static_load / 1e3:g} kN", done + 1, len(groups))
     return tuple(PointPrediction(p, found[_static(p)], groups[_static(p)].index(_excitation(p))) for p in wanted)
 
 

@@ -1,0 +1,80 @@
+"""`tpjb export`: coefficients in the form that rotordynamic programs read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tpjb_ident.cli.errors import BadInputError, NotTrustedError, guarded
+from tpjb_ident.cli.inputs import open_campaign
+from tpjb_ident.cli.options import Method, Norm, Out, out_folder
+from tpjb_ident.cli.outdir import output_folder
+from tpjb_ident.cli.record import sha256, write_record
+from tpjb_ident.cli.show import note_line, progress, say
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TABLES = ("coefficients.csv", "prediction.csv")
+Source = Annotated[
+    Path,
+    typer.Argument(metavar="CAMPAIGN|DIR", help="A campaign (identified first), or results of identify or predict."),
+]
+
+
+@guarded
+def export(
+    source: Source,
+    to: Annotated[str, typer.Option("--to", help="ross, csv or mat.")],
+    method: Method = "mm-eiv",
+    norm: Norm = None,
+    out: Out = None,
+) -> None:
+    """Write coefficients as ROSS bearing elements (one TOML file per static point), a CSV table, or a MATLAB file."""
+    from tpjb_ident.export import WRITERS, static_points
+
+    if to not in WRITERS:
+        raise BadInputError(f"--to: {to!r} is not known. Use {', '.join(WRITERS)}.")
+    frame, name, inputs = _coefficients(source, method, norm)
+    points, left_out = static_points(frame)
+    target = out_folder(out, "export")
+    with output_folder(target, f"export {to}", (source,) if not _result_table(source) else ()) as folder:
+        WRITERS[to](folder, points, f"tpjb-ident: coefficients of {name}")
+        options = {"source": source, "to": to, "method": method, "norm": norm}
+        write_record(folder, target, f"export {to}", options, inputs)
+    say(f"{len(points)} static points, {sum(len(p.frequency) for p in points)} coefficient sets")
+    say(f"Results: {target}")
+    if to == "ross":
+        note_line("note", "ROSS extrapolates outside the frequencies given; K holds Re h, the masses are zero.")
+    if left_out:
+        raise NotTrustedError(f"left out, because their coefficients are not finite: {'; '.join(left_out[:5])}")
+
+
+def _result_table(source: Path) -> Path | None:
+    """Find the table in an output folder of tpjb; None if `source` is not one."""
+    if source.is_file() and source.suffix == ".csv":
+        return source
+    found = [source / name for name in TABLES if (source / name).is_file()]
+    return found[0] if found else None
+
+
+def _coefficients(source: Path, method: str, norm: str | None) -> tuple[pd.DataFrame, str, dict[str, str]]:
+    path = _result_table(source)
+    if path is not None:
+        import pandas as pd
+
+        try:
+            frame = pd.read_csv(path)
+        except (ValueError, UnicodeDecodeError) as error:  # pandas' own errors are ValueErrors
+            raise BadInputError(f"{path}: is no table ({error}). Give the results of tpjb identify.") from error
+        return frame, path.parent.resolve().name, {path.name: sha256(path)}
+    from tpjb_ident.cli.identify import identify_settings
+    from tpjb_ident.dynamic.identify import identify as run_identification
+
+    campaign = open_campaign(source)
+    settings = identify_settings(campaign, method, norm)
+    with progress("identifying") as show:
+        result = run_identification(campaign, settings, show)
+    return result.to_frame(), campaign.id, campaign.fingerprint()

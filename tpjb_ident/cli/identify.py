@@ -1,0 +1,125 @@
+"""`tpjb identify`: dynamic records in, stiffness and damping with intervals out."""
+
+from __future__ import annotations
+
+import difflib
+from typing import TYPE_CHECKING, Any
+
+from tpjb_ident.cli.errors import BadInputError, NotTrustedError, guarded
+from tpjb_ident.cli.inputs import open_bearing, open_campaign
+from tpjb_ident.cli.options import CampaignPath, Method, Norm, Out, out_folder
+from tpjb_ident.cli.outdir import output_folder
+from tpjb_ident.cli.record import write_record
+from tpjb_ident.cli.show import progress, say, table
+from tpjb_ident.tables import write_table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rigdata.campaign import Campaign
+    from tpjb_ident.dynamic.identification import Identification
+
+
+@guarded
+def identify(campaign: CampaignPath, method: Method = "mm-eiv", norm: Norm = None, out: Out = None) -> None:
+    """Identify stiffness and damping with 95 % intervals at every operating point.
+
+    Writes coefficients (chosen method), estimators (every method, statsmodels RLM among them) and windows (rejected
+    ones, with reasons), each as .csv and .parquet. Exit code 3 if a point is not to be trusted.
+    """
+    source = open_campaign(campaign)
+    settings = identify_settings(source, method, norm)
+    from tpjb_ident.dynamic.identify import identify as run_identification
+
+    target = out_folder(out, "identify")
+    with output_folder(target, "identify", (campaign,)) as folder:
+        with progress("identifying") as show:
+            result = run_identification(source, settings, show)
+        write_identification(folder, result)
+        options = {"campaign": campaign, "method": method, "norm": norm}
+        write_record(folder, target, "identify", options, source.fingerprint())
+    show_coefficients(result)
+    say(f"Results: {target}")
+    refuse_untrusted(result)
+
+
+def identify_settings(campaign: Campaign, method: str, norm: str | None) -> Any:
+    """Build `IdentifySettings` from options, with the campaign's clearance for the amplitude check.
+
+    Raises
+    ------
+    BadInputError
+        Unknown method or norm, or a campaign without dynamic runs.
+    """
+    from tpjb_ident.dynamic.estimate import METHODS, NORMS
+    from tpjb_ident.dynamic.identify import IdentifySettings
+
+    _known(method, METHODS, "--method")
+    if norm is not None:
+        _known(norm, tuple(NORMS), "--norm")
+        if method != "rlm":
+            raise BadInputError(f"--norm: belongs to --method rlm, not to {method}.")
+    if not campaign.of_kind("dynamic"):
+        raise BadInputError(f"campaign {campaign.id}: has no dynamic runs; there is nothing to identify.")
+    chosen = f"rlm:{norm or 'huber'}" if method == "rlm" else method
+    return IdentifySettings(method=chosen, clearance=_clearance(campaign))
+
+
+def _known(value: str, known: tuple[str, ...], option: str) -> None:
+    if value not in known:
+        near = difflib.get_close_matches(value, known, n=1)
+        hint = f"Did you mean {near[0]!r}?" if near else f"Use one of {', '.join(known)}."
+        raise BadInputError(f"{option}: {value!r} is not known. {hint}")
+
+
+def _clearance(campaign: Campaign) -> float | None:
+    """Smallest assembled clearance [m], None if the campaign carries no bearing."""
+    if not campaign.bearing_text:
+        return None
+    bearing, _ = open_bearing(campaign, None)
+    return min(pad.assembled_clearance for pad in bearing.pads)
+
+
+def write_identification(folder: Path, result: Identification) -> None:
+    """Write coefficients, estimators and windows."""
+    write_table(folder, "coefficients", result.to_frame())
+    write_table(folder, "estimators", result.estimators_frame())
+    write_table(folder, "windows", result.windows_frame())
+
+
+def show_coefficients(result: Identification) -> None:
+    """Print K and C of every point with half the width of their intervals."""
+    rows = []
+    for p in result.points:
+        half = p.stiffness.half_width()
+        omega = p.stiffness.omega
+        k, c = p.stiffness.k, p.stiffness.c
+        rows.append([
+            f"{p.point.static_load / 1e3:g}", f"{p.point.excitation_hz:g}",
+            f"{k[0, 0] / 1e6:.1f} ±{half[0] / 1e6:.1f}", f"{k[1, 1] / 1e6:.1f} ±{half[3] / 1e6:.1f}",
+            f"{c[0, 0] / 1e3:.0f} ±{half[4] / omega / 1e3:.0f}", f"{c[1, 1] / 1e3:.0f} ±{half[7] / omega / 1e3:.0f}",
+            f"{100 * p.outlier_fraction:.0f}", "; ".join(str(q) for q in p.quality) or "ok",
+        ])  # fmt: skip
+    columns = ["load kN", "exc. Hz", "kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m", "out %", "quality"]
+    table(f"{result.campaign}: {result.method}, 95 % intervals", columns, rows)
+
+
+def refuse_untrusted(result: Identification) -> None:
+    """End with exit code 3 if a point has no answer or one that is not to be trusted.
+
+    Raises
+    ------
+    NotTrustedError
+    """
+    import numpy as np
+
+    from tpjb_ident.report.words import is_serious
+
+    bad = []
+    for p in result.points:
+        serious = [c.sentence() for c in p.quality if is_serious(c)]
+        if serious or not np.isfinite(p.stiffness.h).all():
+            bad.append(f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz: {'; '.join(serious)}")
+    if bad:
+        more = f"\n... and {len(bad) - 5} more" if len(bad) > 5 else ""
+        raise NotTrustedError(f"{len(bad)} of {len(result.points)} points:\n" + "\n".join(bad[:5]) + more)

@@ -1,0 +1,59 @@
+"""`tpjb pivot`: dry load steps in, pivot stiffness curves out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tpjb_ident.cli.errors import NotTrustedError, guarded
+from tpjb_ident.cli.inputs import open_bearing, open_campaign
+from tpjb_ident.cli.options import BearingOption, CampaignPath, Out, out_folder
+from tpjb_ident.cli.outdir import output_folder
+from tpjb_ident.cli.record import write_record
+from tpjb_ident.cli.show import note_line, progress, say, table
+from tpjb_ident.tables import write_table
+
+
+@guarded
+def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None) -> None:
+    """Fit the pivot stiffness curves to the dry tests.
+
+    Writes pivot_curves.csv and .parquet, and pivots.toml, which `tpjb predict --pivots` reads.
+    """
+    from tpjb_ident.compare.pivot_formula import printed_formula
+    from tpjb_ident.pivot import fit_pivots, pivot_table, write_pivots
+
+    source = open_campaign(campaign)
+    drawn, given = open_bearing(source, bearing)
+    target = out_folder(out, "pivot")
+    with output_folder(target, "pivot", (campaign,)) as folder:
+        with progress("fitting pivot curves"):
+            curves = fit_pivots(source, [pad.pivot_angle for pad in drawn.pads])
+        frame = pivot_table(curves, formula=printed_formula(drawn))
+        write_table(folder, "pivot_curves", frame)
+        write_pivots(folder / "pivots.toml", curves, source.id)
+        write_record(folder, target, "pivot", {"campaign": campaign, "bearing": bearing or source.bearing_name},
+                     source.fingerprint() | given)  # fmt: skip
+    show_curves(curves, source.id)
+    say(f"Results: {target}")
+    from tpjb_ident.report.words import is_serious
+
+    for curve in curves:
+        for condition in curve.status:
+            note_line("note", f"pad {curve.pad}: {condition}")
+    bad = [f"pad {c.pad}: {condition}" for c in curves for condition in c.status if is_serious(condition)]
+    if bad:
+        raise NotTrustedError("; ".join(bad))
+
+
+def show_curves(curves: Any, name: str) -> None:
+    """Print the tangent stiffness of every pad at half and at full measured load."""
+    rows = []
+    for curve in curves:
+        cells = [f"#{curve.pad}"]
+        for load in (0.5 * curve.valid_to, curve.valid_to):
+            low, high = (float(v) for v in curve.stiffness_band(load))
+            cells += [f"{load / 1e3:.2f}", f"{float(curve.stiffness(load)) / 1e6:.0f}",
+                      f"{low / 1e6:.0f}..{high / 1e6:.0f}"]  # fmt: skip
+        rows.append([*cells, curve.law.name])
+    headings = ["load kN", "MN/m", "95 %"]
+    table(f"{name}: tangent stiffness of the pivots", ["pad", *headings, *headings, "law"], rows)

@@ -1,0 +1,29 @@
+"""The printed pivot formulas beside a measured curve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tpjb_ident.model_guard import check_model
+
+check_model()
+
+from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
+from model.pivots import formula_pivot  # noqa: E402
+
+#: (pad, load [N]) -> (secant, tangent) stiffness [N/m].
+Formula = Callable[[int, float], tuple[float, float]]
+
+
+def printed_formula(bearing: Bearing) -> Formula | None:
+    """Kirk and Reedy's formula for a bearing's pivots, Eq. (16) or (17); None if its pivots are rigid.
+
+    Returns
+    -------
+    callable or None
+        ``formula(pad, load)`` gives the secant (as printed) and the tangent stiffness [N/m].
+    """
+    if bearing.pivot.kind == "rigid":
+        return None
+    printed = formula_pivot(bearing.pivot, secant_vibrations=True)
+    return lambda pad, load: (printed.vibration_stiffness(load), printed.stiffness(load))

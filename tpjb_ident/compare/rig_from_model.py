@@ -1,0 +1,127 @@
+"""The bearing model as the truth of a virtual rig: what `tpjb simulate` and the recovery tests write campaigns from."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.operating_point import OperatingPoint
+from rigdata.virtual_rig import Instruments, RigTruth
+from tpjb_ident.compare.predictions import ModelSettings
+from tpjb_ident.model_guard import check_model
+
+check_model()
+
+from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
+from model.dynamics import bearing_impedance  # noqa: E402
+from model.effects import Effect, apply_effects  # noqa: E402
+from model.pivots import pivot_laws  # noqa: E402
+from model.predict import Prediction, predict_setup  # noqa: E402
+from model.setup import Setup  # noqa: E402
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+#: Effects that act on the records: which error of the virtual instruments each one is, and its parameter.
+INSTRUMENT_ERRORS = {
+    "probe_gain": ("probe_gain", "factor"),
+    "probe_rotation": ("probe_rotation", "angle"),
+    "loadcell_gain": ("loadcell_gain", "factor"),
+    "loadcell_crosstalk": ("loadcell_crosstalk", "fraction"),
+    "channel_delay": ("channel_delay", "delay"),
+    "housing_mass": ("mass_error", "mass_error"),
+}
+#: Where the rig's temperature sensors sit, as a fraction of the arc.
+SENSOR_POSITION = 0.75
+
+
+class ModelConvergenceError(ValueError):
+    """The model finds no equilibrium at a point of the plan."""
+
+
+def rig_truth(bearing: Bearing, settings: ModelSettings, bearing_text: str = "") -> RigTruth:
+    """Give a bearing's physics to the virtual rig.
+
+    Parameters
+    ----------
+    bearing : Bearing
+        As drawn; this is what the campaign's bearing file says.
+    settings : ModelSettings
+        What it is really like. Effects on the records are left out here: see `erring_instruments`.
+    bearing_text : str
+        Text of the bearing file, for the campaign.
+
+    Returns
+    -------
+    RigTruth
+
+    Raises
+    ------
+    ModelConvergenceError
+        When a campaign is written: no equilibrium at one of its points.
+    """
+    physical = [effect for effect in settings.effects if effect.name not in INSTRUMENT_ERRORS]
+    setup = apply_effects(Setup(bearing, pivot_laws(settings.pivots, bearing), settings.thermal), physical)
+    world = _World(setup)
+    return RigTruth(
+        stiffness=world.stiffness,
+        position=world.position,
+        temperature=world.temperature,
+        pivot_deflection=world.pivot_deflection,
+        pivot_angles=tuple(pad.pivot_angle for pad in bearing.pads),
+        clearance=tuple(pad.assembled_clearance for pad in setup.bearing.pads),
+        bearing_name="bearing.toml",
+        bearing_text=bearing_text,
+    )
+
+
+def erring_instruments(instruments: Instruments, effects: Iterable[Effect]) -> Instruments:
+    """Add the effects that act on the records to a rig's instruments; other effects do nothing here."""
+    for effect in effects:
+        if effect.name in INSTRUMENT_ERRORS:
+            argument, parameter = INSTRUMENT_ERRORS[effect.name]
+            instruments = instruments.with_errors(**{argument: effect.parameters[parameter]})
+    return instruments
+
+
+class _World:
+    """Answers of one set-up, each static point solved once."""
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+        self.solve = functools.lru_cache(maxsize=4096)(self._solve)
+
+    def _solve(self, static: OperatingPoint) -> Prediction:
+        speed = static.shaft_speed
+        prediction = predict_setup(self.setup, static.static_load, static.static_load_direction, speed, speed)
+        if not prediction.converged:
+            where = f"{static.static_load:g} N, {static.static_load_direction_deg:g} deg, {static.shaft_speed_hz:g} Hz"
+            why = "; ".join(prediction.status)
+            raise ModelConvergenceError(f"the model finds no equilibrium at {where} ({why}). Leave that point out.")
+        return prediction
+
+    def _at(self, point: OperatingPoint) -> Prediction:
+        return self.solve(replace(point, excitation=0.0))
+
+    def stiffness(self, point: OperatingPoint) -> ComplexArray:
+        prediction = self._at(point)
+        return bearing_impedance(self.setup, prediction.equilibrium, np.array([point.excitation]))[0]
+
+    def position(self, point: OperatingPoint) -> FloatArray:
+        # what stands in series with the bearing gives way under the static load too
+        load = point.static_load * np.array(
+            [math.cos(point.static_load_direction), math.sin(point.static_load_direction)]
+        )
+        return self._at(point).bearing_position + self.setup.series_compliance * load
+
+    def temperature(self, point: OperatingPoint) -> FloatArray:
+        return self._at(point).pad_temperature(SENSOR_POSITION)
+
+    def pivot_deflection(self, pad: int, load: Any) -> FloatArray:
+        law = self.setup.pivots[pad - 1]
+        return np.array([law.deflection(float(w)) for w in load]) + self.setup.series_compliance * np.asarray(load)

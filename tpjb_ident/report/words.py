@@ -1,0 +1,72 @@
+"""What the named conditions mean, in plain words, and which of them forbid trust."""
+
+from __future__ import annotations
+
+#: Condition name -> what it means to the reader, and what to do.
+MEANING = {
+    "calibration-uncertainty-unstated": "The manifest states no calibration uncertainty for some channels; the "
+    "intervals hold random errors only for them. State `uncertainty` in the manifest.",
+    "directional-rejection": "Rejected windows gather in some excitation directions: that is how physics looks, not "
+    "glitches. Look at these runs before relying on the point.",
+    "fewer-than-two-directions": "All displacements lie along one line; a 2x2 matrix needs two directions. Excite in "
+    "another direction too.",
+    "ill-conditioned": "The displacement directions are almost parallel, so errors are strongly amplified. Excite in "
+    "directions that move the shaft differently.",
+    "iteration-limit": "The estimator stopped before it settled.",
+    "large-amplitude": "The vibration is more than 5 % of the clearance: the film is no longer linear. Excite less.",
+    "low-coherence": "Much of the force is not explained by the displacement: noise, or a wrong channel.",
+    "1x-on-excitation-line": "The excitation stands on the running speed: unbalance and runout cannot be told from it. "
+    "Excite beside the running speed.",
+    "2x-on-excitation-line": "The excitation stands on twice the running speed: runout cannot be told from it.",
+    "mains-on-excitation-line": "The excitation stands on the mains frequency: pick-up cannot be told from signal, and "
+    "the interval allows for it. Excite beside the mains frequency.",
+    "excitation-off-set-point": "The excitation was found at another frequency than the manifest says; the found one "
+    "was used to fit.",
+    "tach-off-set-point": "The tachometer contradicts the set point of the speed; the set point was used.",
+    "many-windows-rejected": "More than 40 % of the windows were rejected as outliers. Look at the records.",
+    "methods-disagree": "Other estimators give another answer beyond both intervals, as they do where glitches or "
+    "displacement noise pull them. See estimators.csv.",
+    "no-repeats": "Too few repeats per direction to measure the noise: displacement noise is not corrected for. "
+    "Record longer.",
+    "no-robust-start": "No robust start was found; outliers may have pulled the answer.",
+    "zero-scale": "The residuals are zero: the records are no measurement, or repeat one another exactly.",
+    "bad-steps": "Some load steps were left out because the record was disturbed there.",
+    "contact-incomplete": "At low load the shaft is not fully in contact with this pad; the curve holds above the "
+    "load named.",
+    "contact-never-complete": "The shaft never came into full contact: this curve is not the pivot's stiffness.",
+    "law-undecided": "Several laws fit about equally well; the band holds their difference.",
+    "load-off-pad": "The load is off the pad's direction; it was projected.",
+    "misfit": "The points scatter more than their noise: something moved during the test.",
+    "no-holds": "The load never stood still, so drift cannot be told from deflection.",
+    "no-physical-law": "No contact law describes the points; a smooth monotone curve stands in.",
+    "runs-refused": "Some dry runs were refused as not what they claim to be.",
+    "samples-lost": "Many samples of the record were missing or disturbed.",
+}
+#: With one of these the number is not to be trusted.
+SERIOUS = frozenset(
+    {
+        "contact-never-complete",
+        "fewer-than-two-directions",
+        "ill-conditioned",
+        "iteration-limit",
+        "low-coherence",
+        "many-windows-rejected",
+        "no-robust-start",
+        "zero-scale",
+    }
+)
+
+
+def condition_name(condition: str) -> str:
+    """Name of a condition that may carry its detail after a colon."""
+    return str(condition).partition(":")[0].strip().lower().replace(" ", "-")
+
+
+def meaning(condition: str) -> str:
+    """Say in plain words what a condition means; the condition itself if nothing is known about it."""
+    return MEANING.get(condition_name(condition), str(condition))
+
+
+def is_serious(condition: str) -> bool:
+    """Whether a number with this condition is not to be trusted."""
+    return condition_name(condition) in SERIOUS
