@@ -1,0 +1,128 @@
+"""What the static tests would show: dry load-deflection curves, the clearance polygon, the locus.
+
+Dry tests and the clearance sweep are cold and without rotation: `clearance_change` does not act on them, the
+pivots, the structure and the instruments do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.equilibrium import Equilibrium
+from model.predict import Prediction, predict_setup
+from model.setup import Setup
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DryCurve:
+    """A dry load-deflection curve as probes and cells read it.
+
+    Attributes
+    ----------
+    pad : int
+        From 1.
+    load : (n,) ndarray
+        Component of the read force on the pad's direction [N].
+    deflection : (n,) ndarray
+        Component of the read displacement on the pad's direction, from zero load [m].
+    """
+
+    pad: int
+    load: FloatArray
+    deflection: FloatArray
+
+
+def dry_curve(setup: Setup, pad: int, load: FloatArray) -> DryCurve:
+    """Predict a dry test on one pad.
+
+    Parameters
+    ----------
+    setup : Setup
+    pad : int
+        From 1.
+    load : (n,) ndarray
+        True load towards the pad [N].
+    """
+    law, angle = setup.pivots[pad - 1], setup.bearing.pads[pad - 1].pivot_angle
+    normal = np.array([math.cos(angle), math.sin(angle)])
+    true = np.array([law.deflection(float(w)) for w in load]) + setup.series_compliance * np.asarray(load)
+    displacement = float(normal @ setup.instruments.displacement_map(0.0).real @ normal)
+    force = float(normal @ setup.instruments.force_map(0.0).real @ normal)
+    return DryCurve(pad, np.asarray(load) * force, true * displacement)
+
+
+@dataclass(frozen=True)
+class PolygonSides:
+    """The clearance polygon as the probes read it: per pad the distance of its side from the bearing centre.
+
+    Attributes
+    ----------
+    clearance : (n_pads,) ndarray
+        At zero push load [m].
+    pushed : (n_pads,) ndarray
+        With the pivots and the structure given way under the push load [m].
+    angle : (n_pads,) ndarray
+        Direction of each side's normal [rad].
+    """
+
+    clearance: FloatArray
+    pushed: FloatArray
+    angle: FloatArray
+
+
+def polygon_sides(setup: Setup, push_load: float) -> PolygonSides:
+    """Predict a cold clearance sweep with a push load [N]."""
+    inverse = np.linalg.inv(setup.instruments.displacement_map(0.0).real)
+    rows = []
+    for pad, law in zip(setup.bearing.pads, setup.pivots, strict=True):
+        normal = inverse.T @ np.array([math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)])
+        size = float(np.hypot(*normal))
+        give = law.deflection(push_load) + setup.series_compliance * push_load
+        rows.append(
+            (
+                pad.assembled_clearance / size,
+                (pad.assembled_clearance + give) / size,
+                math.atan2(normal[1], normal[0]),
+            )
+        )
+    table = np.array(rows)
+    return PolygonSides(table[:, 0], table[:, 1], table[:, 2])
+
+
+def sweep(
+    setup: Setup, points: Sequence[tuple[float, float, float, FloatArray]], start: Equilibrium | None = None
+) -> list[Prediction]:
+    """Predict many operating points, each started from the one before.
+
+    Parameters
+    ----------
+    setup : Setup
+    points : sequence of (load [N], load_direction [rad], speed [rad/s], excitation (n,) [rad/s])
+    start : Equilibrium, optional
+        For the first point.
+    """
+    out = []
+    for load, direction, speed, excitation in points:
+        prediction = predict_setup(setup, load, direction, speed, excitation, start)
+        out.append(prediction)
+        start = prediction.equilibrium if prediction.converged else None
+    return out
+
+
+def locus(setup: Setup, load: float, directions: FloatArray, speed: float) -> FloatArray:
+    """Journal positions over load directions, as read.
+
+    Returns
+    -------
+    (n, 2) ndarray
+        NaN where no equilibrium was found [m].
+    """
+    points = [(load, float(d), speed, np.array([speed])) for d in directions]
+    return np.array([p.position if p.converged else (math.nan, math.nan) for p in sweep(setup, points)])
