@@ -11,6 +11,7 @@ import numpy as np
 from tpjb_ident.dynamic.arrays import FloatArray
 from tpjb_ident.dynamic.calibration_uncertainty import GainDraws, apparent_change, gain_draws
 from tpjb_ident.dynamic.conditions import Condition, merged
+from tpjb_ident.dynamic.corrections import Correction, find_corrections
 from tpjb_ident.dynamic.estimate import REJECTED_WEIGHT, estimate_table
 from tpjb_ident.dynamic.identification import Identification
 from tpjb_ident.dynamic.phasor_table import phasor_table
@@ -38,6 +39,9 @@ class IdentifySettings:
     phasors : PhasorSettings
     clearance : float or None
         Assembled clearance [m], for the amplitude check; None leaves it out.
+    correct : bool
+        Bring every run to its set-point load (measured miss, slope over the campaign's loads) and take
+        mains off the excitation line where its size is known.
     n_calibration : int
         Monte-Carlo draws over the calibration uncertainties.
     seed : int
@@ -48,6 +52,7 @@ class IdentifySettings:
     methods: tuple[str, ...] = ("ols", "rlm:huber", "rlm:tukey", "mm", "mm-eiv")
     phasors: PhasorSettings = field(default_factory=PhasorSettings)
     clearance: float | None = None
+    correct: bool = True
     n_calibration: int = 400
     seed: int = 20190722
 
@@ -107,25 +112,48 @@ def assemble(
 ) -> Identification:
     """Estimate all points from runs already turned to phasors."""
     draws = gain_draws(campaign.channels, settings.n_calibration, settings.seed)
+    gathered = gather(extracted)
+    axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
+    corrections = find_corrections(gathered, extracted, axes, _first_estimates(gathered, settings))
     points, changes = [], []
-    for data in gather(extracted):
-        point = identify_point(data, temperatures, settings)
-        change = apparent_change(data, point.stiffness, draws)
+    for data, correction in zip(gathered, corrections):
+        used = correction if settings.correct else correction.measured_only()
+        point = identify_point(used.apply(data), temperatures, settings)
+        by_method = {name: used.widened(est) for name, est in point.by_method.items()}
+        change = apparent_change(data, by_method[settings.method], draws)
         changes.append(change)
-        points.append(_with_systematic(point, np.cov(change.T, bias=True)))
+        points.append(_completed(point, by_method, np.cov(change.T, bias=True), settings.method, used))
     joint = np.concatenate(changes, axis=1)
     return Identification(
         campaign.id,
         settings.method,
         tuple(points),
-        joint.T @ joint / len(joint) if len(joint) else np.zeros((8 * len(points),) * 2),
+        joint.T @ joint / len(joint),
         _campaign_conditions(draws),
     )
 
 
-def _with_systematic(point: PointResult, systematic: FloatArray) -> PointResult:
-    by_method = {name: replace(est, systematic=systematic) for name, est in point.by_method.items()}
-    return replace(point, stiffness=replace(point.stiffness, systematic=systematic), by_method=by_method)
+def _first_estimates(gathered: list[PointData], settings: IdentifySettings) -> list[DynamicStiffness]:
+    """Estimates before any correction, for how H changes with load and how runs scatter."""
+    method = settings.method.partition(":")[0]
+    return [estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, method) for data in gathered]
+
+
+def _completed(
+    point: PointResult,
+    by_method: dict[str, DynamicStiffness],
+    systematic: FloatArray,
+    method: str,
+    correction: Correction,
+) -> PointResult:
+    with_both = {name: replace(est, systematic=systematic) for name, est in by_method.items()}
+    return replace(
+        point,
+        stiffness=with_both[method],
+        by_method=with_both,
+        load_miss=correction.miss,
+        quality=merged(point.quality, correction.conditions),
+    )
 
 
 def _campaign_conditions(draws: GainDraws) -> tuple[Condition, ...]:

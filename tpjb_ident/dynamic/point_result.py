@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.dynamic.arrays import FloatArray
 from tpjb_ident.dynamic.conditions import Condition
+from tpjb_ident.dynamic.static_load import LoadMiss
 from tpjb_ident.dynamic.stiffness import DynamicStiffness
 
 
@@ -61,6 +62,8 @@ class PointResult:
         Everything that a reader of the numbers should know; empty when all is well.
     rejected : tuple of WindowVerdict
     runs : tuple of str
+    load_miss : LoadMiss or None
+        How far each run's static load was off.
     """
 
     point: OperatingPoint
@@ -78,6 +81,7 @@ class PointResult:
     quality: tuple[Condition, ...]
     rejected: tuple[WindowVerdict, ...] = field(repr=False)
     runs: tuple[str, ...] = field(repr=False)
+    load_miss: LoadMiss | None = field(default=None, repr=False)
 
     @property
     def condition_number(self) -> float:

@@ -1,0 +1,105 @@
+"""What is put right between phasors and estimate, point by point, and what that leaves uncertain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.conditions import Condition
+from tpjb_ident.dynamic.mains import (
+    MAINS_ON_LINE,
+    MainsFit,
+    Pickup,
+    corrected_condition,
+    fit_mains,
+    mains_pickup,
+    relative_scatter,
+    with_mains_uncertainty,
+    without_mains,
+)
+from tpjb_ident.dynamic.point_data import PointData
+from tpjb_ident.dynamic.run_phasors import RunPhasors
+from tpjb_ident.dynamic.static_load import (
+    LoadMiss,
+    load_conditions,
+    load_misses,
+    load_slopes,
+    to_set_point,
+    widened,
+)
+from tpjb_ident.dynamic.stiffness import DynamicStiffness
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Corrections of one operating point.
+
+    Attributes
+    ----------
+    miss : LoadMiss
+        How far each run's static load was off.
+    slope : (2, 2) complex ndarray or None
+        dH/d(ln W), where the campaign tells it.
+    mains : MainsFit or None
+    conditions : tuple of Condition
+    """
+
+    miss: LoadMiss
+    slope: ComplexArray | None
+    mains: MainsFit | None
+    conditions: tuple[Condition, ...]
+
+    def apply(self, data: PointData) -> PointData:
+        """The point's windows as they would be at the set point and without mains."""
+        cleaned = data if self.mains is None else without_mains(data, self.mains)
+        return to_set_point(cleaned, self.miss, self.slope)
+
+    def widened(self, est: DynamicStiffness) -> DynamicStiffness:
+        """The estimate with what the corrections leave uncertain."""
+        wide = widened(est, self.miss, self.slope)
+        return wide if self.mains is None else with_mains_uncertainty(wide, self.mains)
+
+    def measured_only(self) -> Correction:
+        """The same findings, nothing corrected."""
+        kept = tuple(c for c in self.conditions if c != "mains corrected")
+        return replace(self, slope=None, mains=None, conditions=kept)
+
+
+def find_corrections(
+    gathered: list[PointData],
+    runs: list[RunPhasors],
+    probe_axes: FloatArray,
+    first: list[DynamicStiffness],
+) -> list[Correction]:
+    """Work out the corrections of all points of a campaign.
+
+    Parameters
+    ----------
+    gathered : list of PointData
+    runs : list of RunPhasors
+        All dynamic runs.
+    probe_axes : (m,) ndarray
+        Axes of the displacement probes [rad].
+    first : list of DynamicStiffness
+        Estimates without corrections, one per point.
+    """
+    misses, common = load_misses(gathered)
+    slopes = load_slopes(gathered, first)
+    loaded = [to_set_point(data, miss, slope) for data, miss, slope in zip(gathered, misses, slopes)]
+    struck = [any(MAINS_ON_LINE in run.conditions for run in data.runs) for data in gathered]
+    pickup = mains_pickup(runs, probe_axes) if any(struck) else None
+    scatter = relative_scatter(loaded, first) if pickup is not None else np.nan
+    result = []
+    for data, miss, slope, hit in zip(loaded, misses, slopes, struck):
+        mains = fit_mains(data, pickup, scatter) if hit and pickup is not None else None
+        conditions = load_conditions(miss, common) + _mains_conditions(pickup, mains)
+        result.append(Correction(miss, slope, mains, conditions))
+    return result
+
+
+def _mains_conditions(pickup: Pickup | None, mains: MainsFit | None) -> tuple[Condition, ...]:
+    if pickup is None or mains is None:
+        return ()
+    return (corrected_condition(pickup, mains),)

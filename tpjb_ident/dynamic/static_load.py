@@ -1,0 +1,149 @@
+"""The static load of every run against its set point, and what the miss does to the coefficients.
+
+The load misses its set point a little differently in every run, and coefficients depend on load. The
+cells measure the miss of each run; the campaign's other loads tell the slope dH/d(ln W). So every
+run's forces are brought to the set point before the estimate: F - (dH/dlnW) * miss * D.
+
+What the cells say is taken relative to the campaign's own median: a gain error of the cells would
+look like a miss of all runs alike, and the set point is met by the actuators' own transducers.
+Misses in direction are not corrected (their slope cannot be measured by such a campaign); they stay
+in the scatter between runs and so in the interval.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.conditions import Condition
+from tpjb_ident.dynamic.point_data import PointData
+from tpjb_ident.dynamic.stiffness import DynamicStiffness
+
+#: |d ln h / d ln W| that is taken as plausible where the campaign has one load only.
+UNKNOWN_EXPONENT = 0.6
+#: Misses beyond this share are no scatter: the set point or the cells are wrong.
+MAX_MISS = 0.05
+
+
+@dataclass(frozen=True)
+class LoadMiss:
+    """Relative deviation of each run's static load from its set point.
+
+    Attributes
+    ----------
+    size : (n_runs,) ndarray
+        (W - W_set) / W_set along the load direction, relative to the campaign.
+    sideways : (n_runs,) ndarray
+        The same across it [rad].
+    """
+
+    size: FloatArray
+    sideways: FloatArray
+
+
+def load_ratio(data: PointData) -> ComplexArray:
+    """Measured mean load over set point for every run, as a complex number (size, direction)."""
+    loads = data.mean_loads
+    point = data.point
+    if point.static_load <= 0:
+        return np.full(len(loads), np.nan + 0j)
+    return np.asarray((loads[:, 0] + 1j * loads[:, 1]) / (point.static_load * np.exp(1j * point.static_load_direction)))
+
+
+def load_misses(points: list[PointData]) -> tuple[list[LoadMiss], complex]:
+    """Misses of all runs relative to the campaign, and the campaign's own ratio (cell gain, rotation)."""
+    ratios = [load_ratio(data) for data in points]
+    everything = np.concatenate(ratios)
+    known = everything[np.isfinite(everything)]
+    common = complex(np.median(known.real), np.median(known.imag)) if len(known) else complex(1.0)
+    if not 0.5 < abs(common) < 2.0:
+        common = complex(1.0)
+    misses = []
+    for ratio in ratios:
+        relative = np.nan_to_num(ratio / common - 1.0)
+        misses.append(LoadMiss(relative.real, relative.imag))
+    return misses, common
+
+
+def load_slopes(points: list[PointData], first: list[DynamicStiffness]) -> list[ComplexArray | None]:
+    """Slope dH/d(ln W) at every point from the campaign's other loads; None where there are none.
+
+    Stiffness and damping slopes are found at the excitation that was run at several loads and
+    carried over to the others at the same load, direction and speed.
+    """
+    families: dict[tuple[float, ...], list[int]] = {}
+    for i, data in enumerate(points):
+        p = data.point
+        if np.isfinite(first[i].h).all() and p.static_load > 0:
+            key = (p.static_load_direction_deg, p.shaft_speed_hz, p.excitation_hz)
+            families.setdefault(key, []).append(i)
+    slopes: list[ComplexArray | None] = [None] * len(points)
+    for members in families.values():
+        if len(members) >= 2:
+            for i, slope in zip(members, _slopes_over_load(members, points, first)):
+                slopes[i] = slope
+    return [slope if slope is not None else _borrowed(i, points, slopes) for i, slope in enumerate(slopes)]
+
+
+def _slopes_over_load(members: list[int], points: list[PointData], first: list[DynamicStiffness]) -> list[ComplexArray]:
+    members.sort(key=lambda i: points[i].point.static_load)
+    log_load = np.log([points[i].point.static_load for i in members])
+    h = np.array([first[i].h for i in members])
+    return list(np.gradient(h, log_load, axis=0, edge_order=2 if len(members) > 2 else 1))
+
+
+def _borrowed(i: int, points: list[PointData], slopes: list[ComplexArray | None]) -> ComplexArray | None:
+    """Slope of the nearest excitation at the same load; K and C each keep theirs."""
+    p = points[i].point
+    same = [
+        j
+        for j, slope in enumerate(slopes)
+        if slope is not None
+        and points[j].point.static_load == p.static_load
+        and points[j].point.static_load_direction_deg == p.static_load_direction_deg
+        and points[j].point.shaft_speed_hz == p.shaft_speed_hz
+    ]
+    if not same:
+        return None
+    nearest = min(same, key=lambda j: abs(points[j].point.excitation - p.excitation))
+    slope = slopes[nearest]
+    if slope is None:
+        return None
+    return np.asarray(slope.real + 1j * slope.imag * p.excitation / points[nearest].point.excitation)
+
+
+def to_set_point(data: PointData, miss: LoadMiss, slope: ComplexArray | None) -> PointData:
+    """The point's windows with forces as they would be at the set point."""
+    if slope is None or np.abs(miss.size).max(initial=0.0) > MAX_MISS:
+        return data
+    change = miss.size[data.run_index][:, None] * (data.D @ slope.T)
+    return replace(data, F=data.F - change)
+
+
+def widened(est: DynamicStiffness, miss: LoadMiss, slope: ComplexArray | None) -> DynamicStiffness:
+    """Add what a known mean miss may have done where the slope is not known."""
+    if slope is not None or not np.isfinite(est.h).all():
+        return est
+    shift = UNKNOWN_EXPONENT * abs(float(miss.size.mean())) * np.abs(est.vector)
+    return replace(est, covariance=est.covariance + np.diag(shift**2))
+
+
+def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
+    """Point out loads that are off by more than scatter."""
+    found = []
+    worst = float(np.abs(miss.size).max(initial=0.0))
+    if worst > MAX_MISS:
+        found.append(
+            Condition("static-load-off", f"a run's measured static load is {100 * worst:.1f} % off its set point")
+        )
+    if abs(abs(common) - 1) > 0.01:
+        found.append(
+            Condition(
+                "cells-against-set-points",
+                f"the cells read {100 * (abs(common) - 1):+.2f} % against the set points in all runs alike "
+                "(gain of the cells or of the actuators' transducers)",
+            )
+        )
+    return tuple(found)
