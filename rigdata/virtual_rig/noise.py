@@ -194,7 +194,7 @@ class Noise:
             displacement=ChannelNoise(35e-9, 10e-9, 39e-9, 0.15e-6),
             force=ChannelNoise(2.05, 0.8, 0.44, 0.2),
             acceleration=ChannelNoise(3.9e-3, 7e-4, 8e-4, 2e-4),
-            temperature=ChannelNoise(0.062, 0.036, 0.018, 0.02),
+            temperature=ChannelNoise(0.057, 0.036, 0.018, 0.02),
             speed=ChannelNoise(0.122, 0.023, 0.06, 0.002),
             mains_scatter=0.01,
             mains_harmonics=(0.02, 0.05),

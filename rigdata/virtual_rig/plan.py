@@ -197,10 +197,11 @@ class RigPlan:
             *self._dry_runs(pivot_angles),
             *self._clearance_runs(),
         )
-        ids = [run.id for run in runs]
-        twice = sorted({i for i in ids if ids.count(i) > 1}) if len(set(ids)) < len(ids) else []
-        if twice:
-            raise VirtualRigError(f"the plan has two runs with the id {twice[0]!r}; every test only once")
+        seen: set[str] = set()
+        for run in runs:
+            if run.id in seen:
+                raise VirtualRigError(f"the plan has two runs with the id {run.id!r}; every test only once")
+            seen.add(run.id)
         if not runs:
             raise VirtualRigError("the plan is empty; give it at least one test")
         return runs

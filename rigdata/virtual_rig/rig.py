@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from rigdata.virtual_rig.chance import stream
 from rigdata.virtual_rig.dry import dry_physics
@@ -89,6 +90,10 @@ class VirtualRig:
 
     def runs(self) -> tuple[PlannedRun, ...]:
         """All runs, in the order of the test."""
+        return self._runs
+
+    @cached_property
+    def _runs(self) -> tuple[PlannedRun, ...]:
         return self.plan.runs(self.truth.pivot_angles)
 
     def records(self) -> tuple[PlannedRun, ...]:

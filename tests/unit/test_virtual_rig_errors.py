@@ -1,0 +1,152 @@
+"""Instrument errors: their canonical meaning, and the stiffness that the records then show."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigdata.virtual_rig import (
+    Instruments,
+    Noise,
+    RigPlan,
+    RigTruth,
+    Sensor,
+    VirtualRig,
+    VirtualRigError,
+    locus_points,
+    operating_points,
+)
+from rigdata.virtual_rig.apparent import apparent_stiffness, apparent_vector
+from rigdata.virtual_rig.ledger import campaign_truth
+
+K = np.array([[2.0e8, 1.3e7], [-1.1e7, 4.0e8]])
+C = np.array([[4.0e5, 2.0e4], [1.0e4, 6.0e5]])
+OMEGA = 2 * np.pi * 40.0
+H = K + 1j * OMEGA * C
+RIGID = replace(Instruments.like_paper(), cell_stiffness=(math.inf, math.inf))
+
+
+def seen_in_records(instruments: Instruments) -> np.ndarray:
+    """Dynamic stiffness by calibrating the readings as stated: nothing of the generator's own algebra."""
+    plan = RigPlan(dynamic=operating_points([(5000.0, 40.0)]), directions=(0.2, 1.4))
+    rig = VirtualRig(RigTruth.constant(K, C), plan, instruments, Noise.none(), seed=8)
+    columns = {"displacement": [], "force": [], "acceleration": []}
+    for run in rig.runs():
+        readings = rig.simulate(run.id).readings
+        time = readings.time
+        design = np.stack([np.ones(len(time)), np.cos(OMEGA * time), np.sin(OMEGA * time)], axis=1)
+        for quantity, list_ in columns.items():
+            axes, phasors = [], []
+            for sensor in instruments.of(quantity):
+                value = sensor.polarity * readings.columns[sensor.name] / sensor.scale
+                fit = np.linalg.lstsq(design, value, rcond=None)[0]
+                phasors.append(fit[1] - 1j * fit[2])
+                axes.append([math.cos(sensor.axis), math.sin(sensor.axis)])
+            list_.append(np.linalg.solve(np.array(axes), phasors))
+    d, f, a = (np.array(columns[q]) for q in ("displacement", "force", "acceleration"))
+    return np.linalg.solve(d, f + instruments.housing_mass * a).T
+
+
+@pytest.mark.parametrize(
+    "errors",
+    [
+        {},
+        {"probe_gain": 1.03},
+        {"probe_rotation": 0.05},
+        {"loadcell_gain": 0.98},
+        {"loadcell_crosstalk": 0.04},
+        {"channel_delay": 150e-6},
+        {"mass_error": 12.0},
+        {"probe_gain": 0.97, "probe_rotation": -0.03, "loadcell_crosstalk": 0.02, "mass_error": -8.0},
+    ],
+    ids=lambda e: "-".join(e) or "none",
+)
+def test_apparent_stiffness_is_what_the_records_show(errors):
+    instruments = Instruments.like_paper(seed=1).with_errors(**errors)
+    np.testing.assert_allclose(seen_in_records(instruments), apparent_stiffness(H, OMEGA, instruments), rtol=1e-8)
+
+
+def test_without_errors_the_apparent_stiffness_is_the_true_one():
+    np.testing.assert_allclose(apparent_stiffness(H, OMEGA, Instruments.like_paper()), H, rtol=1e-12)
+
+
+# What each effect must do by its definition in physics.md, worked out by hand (rigid cells: no housing motion).
+TURN = np.array([[math.cos(0.05), math.sin(0.05)], [-math.sin(0.05), math.cos(0.05)]])
+BY_HAND = {
+    "probe_gain": (1.03, H / 1.03),
+    "probe_rotation": (0.05, H @ TURN.T),
+    "loadcell_gain": (0.98, 0.98 * H),
+    "loadcell_crosstalk": (0.04, np.array([[1.0, 0.04], [0.04, 1.0]]) @ H),
+    "channel_delay": (150e-6, H * np.exp(1j * OMEGA * 150e-6)),
+}
+
+
+@pytest.mark.parametrize("name", BY_HAND)
+def test_each_effect_means_what_physics_md_says(name):
+    size, expected = BY_HAND[name]
+    instruments = RIGID.with_errors(**{name: size})
+    np.testing.assert_allclose(apparent_stiffness(H, OMEGA, instruments), expected, rtol=1e-10, atol=1.0)
+
+
+def test_housing_mass_error_takes_its_inertia_out_of_the_force():
+    """F_cell + stated mass a_h = F_oil - error a_h, with a_h = -omega^2 F_oil / (k - m omega^2)."""
+    instruments = Instruments.like_paper().with_errors(mass_error=12.0)
+    share = 12.0 * OMEGA**2 / (np.array([4e8, 6e8]) - 42.0 * OMEGA**2)
+    np.testing.assert_allclose(apparent_stiffness(H, OMEGA, instruments), (1 + share)[:, None] * H, rtol=1e-10)
+
+
+def test_probe_rotation_turns_the_mean_position():
+    seen = apparent_vector(np.array([0.0, -50e-6]), "displacement", RIGID.with_errors(probe_rotation=0.02))
+    np.testing.assert_allclose(seen, 50e-6 * np.array([-math.sin(0.02), -math.cos(0.02)]), atol=1e-12)
+
+
+def test_cell_gain_shows_in_the_mean_force_and_probe_gain_in_the_position():
+    plan = RigPlan(locus=locus_points(1))
+    truth = RigTruth.constant(K, C)
+    instruments = RIGID.with_errors(loadcell_gain=1.02, probe_gain=1.05)
+    columns = VirtualRig(truth, plan, instruments, Noise.none()).simulate("l-05000-01").readings.columns
+    assert columns["L1V"].mean() / instruments.named("L1V").scale == pytest.approx(-5100.0)
+    x, y = truth.centre(plan.locus[0])
+    probe = instruments.named("X1A")
+    along = (probe.zero - columns["X1A"].mean()) / probe.scale
+    assert along == pytest.approx(1.05 * (x + y) / math.sqrt(2), rel=1e-9)
+
+
+def test_drawn_errors_follow_the_stated_uncertainty():
+    gains = {"displacement": [], "force": [], "speed": []}
+    for seed in range(300):
+        drawn = Instruments.like_paper().with_drawn_errors(seed, angle=0.01)
+        for quantity, found in gains.items():
+            found += [s.error.gain - 1 for s in drawn.of(quantity)]
+    assert np.std(gains["displacement"]) == pytest.approx(0.005, rel=0.12)
+    assert np.std(gains["force"]) == pytest.approx(0.002, rel=0.12)
+    assert np.ptp(gains["speed"]) == 0.0
+    assert drawn == Instruments.like_paper().with_drawn_errors(299, angle=0.01)
+    assert drawn.named("K1").error.angle == 0.0
+
+
+def test_truth_holds_the_apparent_coefficients_and_the_gap_voltages():
+    instruments = Instruments.like_paper(seed=5).with_errors(probe_gain=1.1)
+    plan = RigPlan(dynamic=operating_points([(5000.0, 40.0)]))
+    truth = campaign_truth(VirtualRig(RigTruth.constant(K, C), plan, instruments), {})
+    point = truth.points[0]
+    np.testing.assert_allclose(point["K"], K)
+    np.testing.assert_allclose(point["C"], C)
+    np.testing.assert_allclose(point["K_apparent"], K / 1.1)
+    assert truth.gap_voltage_V == {s.name: s.zero for s in instruments.of("displacement")}
+
+
+def test_instruments_refuse_what_cannot_be():
+    probe = Sensor.probe("A", 0.0)
+    with pytest.raises(VirtualRigError, match="must differ"):
+        Instruments((probe, probe))
+    with pytest.raises(VirtualRigError, match="in pairs"):
+        Instruments((probe,))
+    with pytest.raises(VirtualRigError, match="no channel 'B'"):
+        RIGID.named("B")
+    truth = RigTruth.constant(K, C, pivot_angles=(0.0, 1.5, 3.0, 4.5))
+    with pytest.raises(VirtualRigError, match="pads 1 to 4"):
+        VirtualRig(truth, RigPlan(locus=locus_points(1)), Instruments.like_paper(5))

@@ -1,0 +1,250 @@
+"""Campaigns on disk: the same bytes for the same seed, whole or not at all, and never over something else."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rigdata
+from rigdata.virtual_rig import (
+    ClearanceSweep,
+    CsvLayout,
+    DryTest,
+    Hdf5Layout,
+    Instruments,
+    Noise,
+    RigPlan,
+    RigTruth,
+    Timing,
+    VirtualRig,
+    VirtualRigError,
+    locus_points,
+    operating_points,
+    write_campaign,
+)
+
+SAMPLES = Path(__file__).parents[2].parent / "shared" / "samples"
+TRUTH = RigTruth.constant(np.diag([2e8, 4e8]), np.diag([4e5, 6e5]))
+
+
+def rig(seed: int = 1, **changes) -> VirtualRig:
+    plan = RigPlan(
+        dynamic=operating_points([(2500.0, 25.0)]),
+        directions=(0.0, 1.5),
+        locus=locus_points(2),
+        dry=(DryTest(1, levels=(500.0,)),),
+        timing=Timing(dynamic_seconds=0.5, locus_seconds=0.5),
+    )
+    return replace(VirtualRig(TRUTH, plan, Instruments.like_paper(seed=seed), seed=seed), **changes)
+
+
+def digest(path: Path) -> dict[str, str]:
+    files = [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.is_file())
+    return {p.relative_to(path).as_posix(): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
+
+
+@pytest.mark.parametrize("layout", ["hdf5", "csv-german"])
+def test_same_seed_same_bytes_other_seed_other_bytes(tmp_path, layout):
+    for name, seed in (("a", 7), ("b", 7), ("c", 8)):
+        write_campaign(tmp_path / name, rig(seed), layout)
+    assert digest(tmp_path / "a") == digest(tmp_path / "b")
+    other = digest(tmp_path / "c")
+    assert all(other[name] != code for name, code in digest(tmp_path / "a").items() if "run" in name or name == ".")
+
+
+def test_both_forms_hold_the_same_readings(tmp_path):
+    write_campaign(tmp_path / "c.h5", rig())
+    write_campaign(tmp_path / "c", rig(), "csv-german")
+    one, other = rigdata.load_campaign(tmp_path / "c.h5"), rigdata.load_campaign(tmp_path / "c")
+    for run in one.runs:
+        for name in ("X1A", "L1V", "A1H", "T5", "K1"):
+            first, second = run.record(name).values, other.run(run.id).record(name).values
+            assert np.abs(first - second).max() <= 0.02 * np.min(np.diff(np.unique(first)))
+
+
+def test_an_existing_target_is_replaced_only_on_request_and_only_if_it_is_a_campaign(tmp_path):
+    for layout, name in (("hdf5", "c.h5"), ("csv", "c")):
+        target = tmp_path / name
+        write_campaign(target, rig(1), layout)
+        before = digest(target)
+        with pytest.raises(VirtualRigError, match="exists"):
+            write_campaign(target, rig(2), layout)
+        assert digest(target) == before
+        write_campaign(target, rig(2), layout, overwrite=True)
+        assert digest(target) != before
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "thesis.tex").write_text("mine")
+    (tmp_path / "link").symlink_to(tmp_path / "c")
+    for name, layout in (("notes.txt", "hdf5"), ("folder", "csv"), ("c", "hdf5"), ("c.h5", "csv"), ("link", "csv")):
+        with pytest.raises(VirtualRigError, match=r"not replaced|not followed"):
+            write_campaign(tmp_path / name, rig(), layout, overwrite=True)
+    assert (tmp_path / "folder" / "thesis.tex").read_text() == "mine"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["c", "c.h5", "folder", "link", "notes.txt"]
+
+
+@pytest.mark.parametrize("layout", ["hdf5", "csv"])
+def test_a_failure_on_the_way_leaves_nothing_behind(tmp_path, layout):
+    def broken(point):
+        return np.full((2, 2), np.nan) if point.static_load_direction > -1.0 else np.diag([2e8, 4e8])
+
+    truth = replace(TRUTH, stiffness=broken)
+    with pytest.raises(VirtualRigError, match=r"stiffness\(.*finite"):
+        write_campaign(tmp_path / "c", rig(truth=truth), layout)
+    assert list(tmp_path.iterdir()) == []
+    write_campaign(tmp_path / "c", rig(), layout)
+    before = digest(tmp_path / "c")
+    with pytest.raises(VirtualRigError, match="finite"):
+        write_campaign(tmp_path / "c", rig(truth=truth), layout, overwrite=True)
+    assert digest(tmp_path / "c") == before
+    with pytest.raises(VirtualRigError, match="not a folder"):
+        write_campaign(tmp_path / "no" / "c", rig(), layout)
+
+
+def test_the_truth_is_not_in_the_campaign(tmp_path):
+    hidden = rig(instruments=Instruments.like_paper(seed=1).with_errors(probe_gain=1.0437, mass_error=7.31))
+    truth = write_campaign(tmp_path / "c", hidden, "csv")
+    text = (tmp_path / "c" / "campaign.toml").read_text()
+    assert "1.0437" not in text
+    assert tomllib.loads(text)["housing"] == {"mass": "30 kg"}
+    truth.write(tmp_path / "truth.json")
+    stored = json.loads((tmp_path / "truth.json").read_text())
+    assert stored["schema"] == "tpjb-truth/1"
+    assert stored["housing_mass_kg"] == 37.31
+    assert stored["sensor_errors"]["X1A"]["gain"] == 1.0437
+    assert set(stored["runs"]) == {run.id for run in hidden.runs()}
+    assert stored["runs"]["d-02500-25-01"]["lines"][0]["frequency_Hz"] == 25.0
+    np.testing.assert_allclose(stored["pivot_curves"][0]["stiffness_N_per_m"], 6e8, rtol=1e-9)
+
+
+def test_float32_holds_16_bit_readings_exactly(tmp_path):
+    import h5py
+
+    write_campaign(tmp_path / "c.h5", rig())
+    write_campaign(tmp_path / "wide.h5", rig(), Hdf5Layout(precision="float64"))
+    with h5py.File(tmp_path / "c.h5") as narrow, h5py.File(tmp_path / "wide.h5") as wide:
+        first, second = (f["runs/d-02500-25-01/X1A"] for f in (narrow, wide))
+        assert (first.dtype, second.dtype) == (np.float32, np.float64)
+        np.testing.assert_array_equal(np.rint(first[:] / (20 / 2**16)), np.rint(second[:] / (20 / 2**16)))
+        assert narrow["runs/d-02500-25-01"].attrs["sample_rate_hz"] == 1000.0
+
+
+def test_layouts_refuse_what_cannot_be_read_back():
+    with pytest.raises(VirtualRigError, match="must differ"):
+        CsvLayout(delimiter=",", decimal=",")
+    with pytest.raises(VirtualRigError, match="precision"):
+        Hdf5Layout(precision="float16")
+    with pytest.raises(VirtualRigError, match="no layout 'tdms'"):
+        write_campaign("x", rig(), "tdms")
+
+
+def test_plans_refuse_what_cannot_be_run():
+    with pytest.raises(VirtualRigError, match="empty"):
+        RigPlan().runs(TRUTH.pivot_angles)
+    with pytest.raises(VirtualRigError, match="pads 1 to 5"):
+        RigPlan(dry=(DryTest(6),)).runs(TRUTH.pivot_angles)
+    with pytest.raises(VirtualRigError, match="two runs with the id 'p-1-up'"):
+        RigPlan(dry=(DryTest(1), DryTest(1, ramp=1.0))).runs(TRUTH.pivot_angles)
+    with pytest.raises(VirtualRigError, match="one clearance per pad"):
+        RigTruth.constant(np.eye(2), np.eye(2), clearance=(1e-4,))
+    singular = RigTruth.constant(np.ones((2, 2)) * 1e8, np.zeros((2, 2)), position=lambda point: np.zeros(2))
+    with pytest.raises(VirtualRigError, match="singular"):
+        rig(truth=singular).simulate("d-02500-25-01")
+
+
+def test_ids_tell_speeds_and_load_directions_apart():
+    points = (
+        *operating_points([(2500.0, 25.0)]),
+        *operating_points([(2500.0, 25.0)], speed=200.0),
+        *operating_points([(2500.0, 25.0)], direction=0.0),
+    )
+    plan = RigPlan(dynamic=points, directions=(0.0,), repeats=2)
+    ids = [run.id for run in plan.runs(TRUTH.pivot_angles)]
+    assert len(set(ids)) == 6
+    assert ids[0] == "d-02500-w-90-n22-25-01-r1"
+
+
+@pytest.mark.samples
+def test_manifest_has_the_shape_of_the_samples(tmp_path):
+    if not SAMPLES.is_dir():
+        pytest.skip("no samples beside the checkout")
+    sample = tomllib.loads((SAMPLES / "rocker-baseline" / "campaign.toml").read_text())
+    ours = VirtualRig(TRUTH, RigPlan.short(), Instruments.like_paper(), seed=1)
+    brief = Timing(dynamic_seconds=0.01, locus_seconds=0.01)
+    dry = tuple(DryTest(pad, levels=(500.0,), hold=0.01) for pad in range(1, 6))
+    short = replace(ours, plan=replace(ours.plan, timing=brief, dry=dry, clearance=(ClearanceSweep(seconds=0.1),)))
+    write_campaign(tmp_path / "c", short, "csv-german")
+    made = tomllib.loads((tmp_path / "c" / "campaign.toml").read_text())
+    for manifest in (sample, made):
+        for key in ("id", "bearing", "description"):
+            del manifest[key]
+    for run in made["runs"]:
+        assert run.pop("sample_rate", "500 Hz") == "500 Hz"
+    assert made == sample
+
+
+@pytest.mark.samples
+def test_csv_has_the_shape_of_the_samples(tmp_path):
+    if not SAMPLES.is_dir():
+        pytest.skip("no samples beside the checkout")
+    plan = RigPlan(dynamic=operating_points([(2500.0, 25.0)]), directions=(0.0,))
+    write_campaign(tmp_path / "c", rig(plan=plan), "csv-german")
+    sample = (SAMPLES / "rocker-baseline" / "runs" / "d-02500-25-01.csv").read_bytes()
+    made = (tmp_path / "c" / "runs" / "d-02500-25-01.csv").read_bytes()
+    assert sample.splitlines()[:7] == made.splitlines()[:7]
+    for line in (8, 1000, 2006):
+        first, second = (text.splitlines()[line].split(b";") for text in (sample, made))
+        # as many decimals in the columns that count: time, probes, cells, accelerometers
+        assert [len(f.split(b",")[1]) for f in first[:7]] == [len(f.split(b",")[1]) for f in second[:7]]
+    assert sample.count(b"\r\n") == made.count(b"\r\n")
+
+
+@pytest.mark.samples
+def test_noise_is_of_the_samples_kind_and_size(tmp_path):
+    """White floor, 1/f, runout and unbalance of `Noise.like_samples` against a sample campaign's locus runs."""
+    import h5py
+
+    path = SAMPLES / "spherical-baseline.h5"
+    if not path.is_file():
+        pytest.skip("no samples beside the checkout")
+    noise = replace(Noise.like_samples(), bits=16)
+    ours = VirtualRig(TRUTH, RigPlan(locus=locus_points(20)), Instruments.like_paper(), noise, seed=3)
+    write_campaign(tmp_path / "c.h5", ours)
+    found = []
+    for file in (path, tmp_path / "c.h5"):
+        with h5py.File(file) as handle:
+            runs = [handle[f"runs/l-05000-{i:02d}"] for i in range(1, 21)]
+            found.append({n: np.median([residual(run[n][:], run["K1"][:]) for run in runs], axis=0) for n in CHANNELS})
+    for name in CHANNELS:
+        high, low, total = found[1][name] / found[0][name]
+        assert 0.85 < high < 1.15, name
+        assert 0.7 < low < 1.4, name
+        assert 0.85 < total < 1.15, name
+
+
+CHANNELS = ("X1A", "X1B", "L1H", "L1V", "A1H", "T1", "K1")
+
+
+def residual(values: np.ndarray, tacho: np.ndarray) -> np.ndarray:
+    """Density above 200 Hz, density at 2-10 Hz and robust rms of what is left without lines and drift."""
+    time = np.arange(len(values)) / 1000
+    running = 10 * float(tacho.mean())
+    columns = [np.ones(len(time)), time]
+    for frequency in (running, 2 * running, 50.0, 100.0, 150.0):
+        columns += [np.cos(2 * np.pi * frequency * time), np.sin(2 * np.pi * frequency * time)]
+    design, keep = np.stack(columns, axis=1), np.ones(len(time))
+    series = values.astype(float)
+    for _ in range(6):
+        rest = series - design @ np.linalg.lstsq(design * keep[:, None], series * keep, rcond=None)[0]
+        scale = np.median(np.abs(rest)) / 0.6745
+        keep = (np.abs(rest) < 5 * scale).astype(float)
+    spectrum = np.abs(np.fft.rfft(rest * keep)) ** 2
+    frequency = np.fft.rfftfreq(len(time), 1e-3)
+    band = [np.sqrt(np.mean(spectrum[(frequency > a) & (frequency < b)])) for a, b in ((200, 500), (1.5, 10))]
+    return np.array([*band, scale])
