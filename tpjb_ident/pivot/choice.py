@@ -1,9 +1,9 @@
 """Which law: evidence per pad, with the pads of one bearing learning from each other.
 
-The pads of a bearing are of one make, so a law that four pads favour is likely on the fifth. The prior
-share of each law is therefore itself estimated, as the mean of the pads' posterior shares (expectation-
-maximisation of a mixture), with one pseudo-pad spread evenly over the laws, so that a pad of its own kind
-keeps its own law. Contact loss is each pad's own affair.
+The pads of a bearing are of one make, so a law that four pads favour is likely on the fifth. The prior share of
+each law on a pad is therefore the mean of the other pads' posterior shares (an empirical-Bayes mixture, iterated),
+with one pseudo-pad spread over the laws, so that a pad of its own kind keeps its own law. Contact loss is each
+pad's own affair.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ FloatArray = NDArray[np.float64]
 
 PSEUDO_PADS = 1.0
 CONTACT_LOSS_PRIOR = 0.3  # share of pads with incomplete contact at low load: two of five in the paper
+SPLINE_PRIOR = 0.02  # of a physical law's prior: a spline takes contact loss for a soft pivot, so physics goes first
 SMALLEST_WEIGHT = 1e-3  # laws below it are dropped
 
 
@@ -36,20 +37,23 @@ def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> tuple[FloatArray, ...
         Shares that sum to one.
     """
     names = sorted({fit.name for pad in fits for fit in pad})
-    share = {name: 1.0 / len(names) for name in names}
-    weights: list[FloatArray] = []
+    prior = {name: SPLINE_PRIOR if name == "spline" else 1.0 for name in names}
+    prior = {name: PSEUDO_PADS * value / sum(prior.values()) for name, value in prior.items()}
+    weights = [_pad_weights(pad, prior) for pad in fits]
     for _ in range(30):
-        weights = [_pad_weights(pad, share) for pad in fits]
-        counted = {
-            name: PSEUDO_PADS / len(names)
-            + sum(float(w[[fit.name == name for fit in pad]].sum()) for pad, w in zip(fits, weights, strict=True))
-            for name in names
-        }
-        total = sum(counted.values())
-        new = {name: value / total for name, value in counted.items()}
-        if max(abs(new[name] - share[name]) for name in names) < 1e-4:
+        held = [
+            {name: float(w[[fit.name == name for fit in pad]].sum()) for name in names}
+            for pad, w in zip(fits, weights, strict=True)
+        ]
+        new = []
+        for own, pad in zip(held, fits, strict=True):
+            # the other pads only: a pad's own evidence must not count twice
+            share = {name: prior[name] + sum(other[name] for other in held) - own[name] for name in names}
+            new.append(_pad_weights(pad, share))
+        moved = max(float(np.max(np.abs(a - b))) for a, b in zip(new, weights, strict=True))
+        weights = new
+        if moved < 1e-4:
             break
-        share = new
     return tuple(weights)
 
 

@@ -20,7 +20,8 @@ FloatArray = NDArray[np.float64]
 OFFSET, FRICTION, SCALE = 0, 1, 2  # places of the parameters that every law has; the shape follows
 CONTACT_GAP = 3.0e-6  # [m], plausible size of the missing contact (prior standard deviation)
 CONTACT_LOAD_SPREAD = 0.6  # of ln F0 about a tenth of the largest load
-ITERATIONS = 60
+ITERATIONS = 40
+CONVERGED = 1e-4  # change of the misfit (chi-square) that no longer matters
 
 
 @dataclass(frozen=True)
@@ -131,8 +132,11 @@ class LawFit:
 
     def reading(self, load: FloatArray, branch: FloatArray) -> FloatArray:
         """Expected displacement reading (n,) [m] at applied loads (n,) [N], contact loss included."""
-        x, _ = _predict(self.law, self.theta, self.contact, load, branch, self.reference_load)
-        return x
+        return self.reading_gradient(load, branch)[0]
+
+    def reading_gradient(self, load: FloatArray, branch: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Expected reading (n,) [m] and its derivative (n, p) with respect to `theta`."""
+        return _predict(self.law, self.theta, self.contact, load, branch, self.reference_load)
 
 
 def _predict(
@@ -266,7 +270,7 @@ def _descend(
             gain = cost - trial_state[0]
             theta, (cost, chi_square, residual, jacobian) = trial, trial_state
             damping = max(damping * 0.2, 1e-9)
-            if gain < 1e-8 * (1.0 + cost):
+            if gain < CONVERGED:
                 break
         else:
             damping *= 8.0

@@ -77,15 +77,16 @@ class NoiseModel:
         return float(np.mean(total))
 
 
-def flicker_kernel(time: FloatArray, duration: FloatArray) -> FloatArray:
-    """Covariance (m, m) of block averages of 1/f noise of unit power density at 1 Hz."""
+def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> FloatArray:
+    """Covariance (m, m) of 1/f noise of unit power density at 1 Hz; of averages where `duration` is given."""
     apart = np.abs(time[:, None] - time[None, :])
     kernel = np.zeros_like(apart)
     for tau in FLICKER_TIMES:
         term = np.exp(-apart / tau)
-        x = duration / tau
-        # variance of the average of an exponentially correlated process over x time constants
-        np.fill_diagonal(term, 2.0 / x * (1.0 + np.expm1(-x) / x))
+        if duration is not None:
+            x = duration / tau
+            # variance of the average of an exponentially correlated process over x time constants
+            np.fill_diagonal(term, 2.0 / x * (1.0 + np.expm1(-x) / x))
         kernel += term
     return kernel / _flicker_gain()
 

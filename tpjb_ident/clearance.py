@@ -1,0 +1,285 @@
+"""Clearance polygon from a sweep: clearance and direction of every pad, centre, corners (paper, Fig. 14)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.problem import Problem, RigDataError
+from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.pivot.noise import NoiseModel
+from tpjb_ident.polygon import Centre, CentreRule, corners, find_centre, normals
+from tpjb_ident.side_fit import SideFit, fit_sides
+from tpjb_ident.sweep import Touch, read_sweep
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from rigdata.campaign import Campaign, Run
+    from rigdata.operating_point import OperatingPoint
+
+FloatArray = NDArray[np.float64]
+
+FEWEST_BLOCKS = 4  # per pad
+IRREGULAR = 3.0  # standard errors
+
+
+@dataclass(frozen=True)
+class ClearancePolygon:
+    """The polygon in which the shaft centre can move, cold or hot.
+
+    Attributes
+    ----------
+    run : str
+        Where it came from.
+    point : OperatingPoint
+        Its set points: push load, shaft speed.
+    angles : (n,) ndarray
+        Nominal pad directions [rad].
+    centre, centre_covariance : (2,), (2, 2) ndarray
+        Reading of the bearing centre [m], by `centre_rule`; see `tpjb_ident.polygon` for what that means.
+    clearance, clearance_se : (n,) ndarray
+        Per pad at zero push load [m]; NaN where the pad was not reached.
+    clearance_pushed, clearance_pushed_se : (n,) ndarray
+        With the pivot pushed by the full load [m], as measured.
+    fitted_angle, fitted_angle_se : (n,) ndarray
+        Directions normal to the sides as swept [rad].
+    corners : (n, 2) ndarray
+        Between pad k and k + 1, from the centre, at zero load [m].
+    push_load : float
+        As measured [N].
+    pivot_scale, pivot_scale_se : float
+        By how much the pivots give in the sweep, over what the curves say; 1 when both tests agree. NaN without curves.
+    noise : NoiseModel
+        Of the displacement channels in this run.
+    centre_rule : str
+        How the centre was chosen.
+    status : tuple of str
+        Named conditions.
+    """
+
+    run: str
+    point: OperatingPoint
+    angles: FloatArray
+    centre: FloatArray
+    centre_covariance: FloatArray
+    clearance: FloatArray
+    clearance_se: FloatArray
+    clearance_pushed: FloatArray
+    clearance_pushed_se: FloatArray
+    fitted_angle: FloatArray
+    fitted_angle_se: FloatArray
+    corners: FloatArray
+    push_load: float
+    pivot_scale: float
+    pivot_scale_se: float
+    noise: NoiseModel = field(repr=False)
+    centre_rule: CentreRule = "least-absolute"
+    status: tuple[str, ...] = ()
+
+    def to_frame(self) -> pd.DataFrame:
+        """Table of `clearance.csv` (outputs.md): one row per pad, SI, angles in degrees."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                "pad": np.arange(1, len(self.angles) + 1),
+                "clearance_m": self.clearance,
+                "clearance_m_se": self.clearance_se,
+                "clearance_pushed_m": self.clearance_pushed,
+                "clearance_pushed_m_se": self.clearance_pushed_se,
+                "pad_angle_deg": np.degrees(self.angles),
+                "fitted_angle_deg": np.degrees(self.fitted_angle),
+                "fitted_angle_deg_se": np.degrees(self.fitted_angle_se),
+                "corner_x_m": self.corners[:, 0],
+                "corner_y_m": self.corners[:, 1],
+                "push_load_N": self.push_load,
+                "run": self.run,
+            }
+        )
+
+    def __str__(self) -> str:
+        pads = ", ".join(
+            f"{1e6 * c:.2f} ({1e6 * s:.2f})" for c, s in zip(self.clearance, self.clearance_se, strict=True)
+        )
+        text = f"clearance polygon {self.run}: per pad {pads} um (se), pushed by {self.push_load:.0f} N"
+        return text + (f"; {', '.join(self.status)}" if self.status else "")
+
+
+def measure_clearance(
+    campaign: Campaign,
+    pivot_angles: Sequence[float],
+    curves: Sequence[PivotCurve] | None = None,
+    rule: CentreRule = "least-absolute",
+) -> ClearancePolygon:
+    """Measure the cold clearance polygon: the first clearance run at rest with the smallest push load.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        With a run of kind ``clearance``.
+    pivot_angles : sequence of float
+        Pad directions [rad], pad #1 first.
+    curves : sequence of PivotCurve, optional
+        What the pivots give under the push load is taken off with them; without them it is extrapolated from the sweep
+        itself, less surely.
+    rule : {"least-absolute", "least-squares"}
+        Convention for the centre, see `tpjb_ident.polygon`.
+
+    Returns
+    -------
+    ClearancePolygon
+
+    Raises
+    ------
+    RigDataError
+        When there is no such run, or it does not go around.
+    """
+    runs = campaign.of_kind("clearance")
+    if not runs:
+        raise RigDataError(
+            Problem("error", "campaign.toml", "runs", "has no run of kind clearance", "Record a clearance sweep")
+        )
+    coldest = min(runs, key=lambda run: (run.point.shaft_speed, run.point.static_load))
+    return measure_run(coldest, pivot_angles, curves, rule)
+
+
+def measure_clearances(
+    campaign: Campaign,
+    pivot_angles: Sequence[float],
+    curves: Sequence[PivotCurve] | None = None,
+    rule: CentreRule = "least-absolute",
+) -> tuple[ClearancePolygon, ...]:
+    """All clearance runs of a campaign (hot and cold, several push loads), each as `measure_clearance`."""
+    return tuple(measure_run(run, pivot_angles, curves, rule) for run in campaign.of_kind("clearance"))
+
+
+def measure_run(
+    run: Run,
+    pivot_angles: Sequence[float],
+    curves: Sequence[PivotCurve] | None = None,
+    rule: CentreRule = "least-absolute",
+) -> ClearancePolygon:
+    """Measure the polygon of one run; parameters as `measure_clearance`."""
+    angles = np.asarray(pivot_angles, dtype=float)
+    touch = read_sweep(run, angles)
+    reached = np.bincount(touch.pad, minlength=len(angles)) >= FEWEST_BLOCKS
+    if reached.sum() < 3:
+        what = f"clearance run {run.id} reaches {int(reached.sum())} of {len(angles)} pads"
+        raise RigDataError(Problem("error", run.file, "record", what, "Check pad angles and channels", run=run.id))
+    fit = fit_sides(touch, angles, reached, curves)
+    pads = np.flatnonzero(reached)
+    centre = find_centre(angles[pads], fit.distance[pads], fit.covariance[np.ix_(pads, pads)], rule)
+    return _polygon(run, touch, angles, fit, centre, rule)
+
+
+def _polygon(
+    run: Run, touch: Touch, angles: FloatArray, fit: SideFit, centre: Centre, rule: CentreRule
+) -> ClearancePolygon:
+    """Clearances about the centre, with the errors of both."""
+    n = normals(angles)
+    pads = np.flatnonzero(np.isfinite(fit.distance))
+    clearance = fit.distance - n @ centre.position
+    # clearance = (I - n G) distance on the reached pads: the centre's error is the same sides' error
+    map_ = np.eye(len(pads)) - n[pads] @ centre.gain[:2]
+    covariance = fit.covariance[np.ix_(pads, pads)]
+    se = np.full(len(angles), np.nan)
+    # a centre that makes clearances equal hides their differences: none is better known than the common clearance
+    common = float(np.sqrt(centre.gain[2] @ covariance @ centre.gain[2]))
+    se[pads] = np.maximum(np.sqrt(np.diag(map_ @ covariance @ map_.T)), common)
+    fitted = angles + fit.tilt
+    found = np.full((len(angles), 2), np.nan)
+    if len(pads) == len(angles):
+        found = corners(fitted, clearance)
+    return ClearancePolygon(
+        run=run.id,
+        point=run.point,
+        angles=angles,
+        centre=centre.position,
+        centre_covariance=centre.gain[:2] @ covariance @ centre.gain[:2].T,
+        clearance=clearance,
+        clearance_se=se,
+        clearance_pushed=clearance + fit.give,
+        clearance_pushed_se=np.hypot(se, fit.give_se),
+        fitted_angle=fitted,
+        fitted_angle_se=fit.tilt_se,
+        corners=found,
+        push_load=touch.push,
+        pivot_scale=fit.scale,
+        pivot_scale_se=fit.scale_se,
+        noise=fit.noise,
+        centre_rule=rule,
+        status=_status(fit, clearance, se, len(pads)),
+    )
+
+
+def _status(fit: SideFit, clearance: FloatArray, se: FloatArray, reached: int) -> tuple[str, ...]:
+    found = []
+    if reached < len(clearance):
+        missing = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(clearance)))
+        found.append(f"pads-not-reached: {missing}")
+    if np.isnan(fit.scale):
+        found.append("give-from-sweep: no pivot curves, zero load extrapolated from the sweep alone")
+    elif abs(fit.scale - 1.0) > IRREGULAR * fit.scale_se:
+        found.append(f"pivots-disagree: they give {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say")
+    spread = np.abs(clearance - np.nanmedian(clearance))
+    # below half a micrometre a difference between pads is of no consequence, however well it is measured
+    odd = np.flatnonzero(spread > np.maximum(IRREGULAR * se, 0.5e-6))
+    if len(odd):
+        found.append("irregular: pads " + ", ".join(str(k + 1) for k in odd))
+    turn = np.nanmean(fit.tilt)
+    if abs(turn) > IRREGULAR * np.sqrt(np.nanmean(fit.tilt_se**2) / reached) and abs(turn) > 5e-3:
+        found.append(f"frame-turned: all sides by {np.degrees(turn):+.2f} deg")
+    if fit.misfit > 4.0:
+        found.append("misfit: the scatter exceeds the noise")
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class RadialStiffness:
+    """Pivot stiffness from two sweeps with different push loads.
+
+    Attributes
+    ----------
+    load : float
+        Middle of the two push loads [N].
+    stiffness, stiffness_se : (n,) ndarray
+        Difference of load over difference of pushed position, per pad [N/m].
+    """
+
+    load: float
+    stiffness: FloatArray
+    stiffness_se: FloatArray
+
+
+def radial_stiffness(light: ClearancePolygon, heavy: ClearancePolygon) -> RadialStiffness:
+    """Secant between two push loads of the same bearing, same condition.
+
+    Parameters
+    ----------
+    light, heavy : ClearancePolygon
+        Measured with the smaller and the larger push load.
+
+    Returns
+    -------
+    RadialStiffness
+
+    Raises
+    ------
+    ValueError
+        When the push loads are not clearly different.
+    """
+    rise = heavy.push_load - light.push_load
+    if rise <= 0.2 * light.push_load:
+        raise ValueError(
+            f"push loads must differ by a fifth at least, got {light.push_load:.0f} and {heavy.push_load:.0f} N"
+        )
+    # one zero for both: the pushed sides move outward from where the light push held them
+    give = heavy.clearance_pushed - light.clearance_pushed + normals(light.angles) @ (heavy.centre - light.centre)
+    se = np.hypot(heavy.clearance_pushed_se, light.clearance_pushed_se)
+    stiffness = rise / give
+    return RadialStiffness(0.5 * (heavy.push_load + light.push_load), stiffness, np.abs(stiffness / give) * se)

@@ -1,0 +1,264 @@
+"""Shaft positions over load direction, from the bearing centre (paper, Fig. 14)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.operating_point import OperatingPoint
+from rigdata.problem import Problem, RigDataError
+from tpjb_ident.clearance import ClearancePolygon
+from tpjb_ident.pivot.glitches import good_samples
+from tpjb_ident.pivot.noise import NoiseModel, NoiseSeries, estimate_noise
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from rigdata.campaign import Campaign, Run
+
+FloatArray = NDArray[np.float64]
+
+DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
+BLOCK = 0.1  # [s], for learning the noise
+SAME_DIRECTION = math.radians(1.0)
+LOAD_MISS = 0.05  # relative, between set point and measured load
+DIRECTION_MISS = math.radians(5.0)
+
+
+@dataclass(frozen=True)
+class LocusPoint:
+    """Mean shaft position under one static load.
+
+    Attributes
+    ----------
+    run : str
+        Where it came from.
+    point : OperatingPoint
+        Set points.
+    load, load_direction : float
+        As the cells measured it [N], [rad].
+    position : (2,) ndarray
+        From the bearing centre [m]; from the probes' own zero where no centre is known.
+    covariance : (2, 2) ndarray
+        [m^2], the centre's own included.
+    """
+
+    run: str
+    point: OperatingPoint
+    load: float
+    load_direction: float
+    position: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True)
+class Locus:
+    """Positions of the shaft centre over load direction.
+
+    Attributes
+    ----------
+    points : tuple of LocusPoint
+        In order of load and direction.
+    centre : (2,) ndarray
+        Reading of the bearing centre that was taken off [m]; zero where none is known.
+    drift : (2,) ndarray
+        Drift taken off, per run in the order of testing [m]; NaN where no direction was repeated.
+    status : tuple of str
+        Named conditions.
+    """
+
+    points: tuple[LocusPoint, ...]
+    centre: FloatArray
+    drift: FloatArray
+    status: tuple[str, ...] = field(default=())
+
+    def to_frame(self) -> pd.DataFrame:
+        """Table of `locus.csv` (outputs.md)."""
+        import pandas as pd
+
+        se = np.sqrt(np.array([np.diag(p.covariance) for p in self.points]))
+        place = np.array([p.position for p in self.points])
+        return pd.DataFrame(
+            {
+                "static_load_N": [p.point.static_load for p in self.points],
+                "static_load_direction_deg": [p.point.static_load_direction_deg for p in self.points],
+                "shaft_speed_Hz": [p.point.shaft_speed_hz for p in self.points],
+                "static_load_measured_N": [p.load for p in self.points],
+                "static_load_direction_measured_deg": [math.degrees(p.load_direction) for p in self.points],
+                "x_m": place[:, 0],
+                "y_m": place[:, 1],
+                "x_m_se": se[:, 0],
+                "y_m_se": se[:, 1],
+                "run": [p.run for p in self.points],
+            }
+        )
+
+    def __str__(self) -> str:
+        radii = [1e6 * float(np.hypot(*p.position)) for p in self.points]
+        text = f"locus: {len(self.points)} positions, {min(radii):.1f} to {max(radii):.1f} um from the centre"
+        return text + (f"; {', '.join(self.status)}" if self.status else "")
+
+
+def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -> Locus:
+    """Measure the mean position of every locus run.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        With runs of kind ``locus``.
+    polygon : ClearancePolygon, optional
+        Gives the bearing centre, and a wall that no position may lie behind.
+
+    Returns
+    -------
+    Locus
+
+    Raises
+    ------
+    RigDataError
+        When the campaign has no locus runs, or one of them holds no usable samples.
+    """
+    runs = campaign.of_kind("locus")
+    if not runs:
+        raise RigDataError(
+            Problem("error", "campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
+        )
+    read = [_read(run) for run in runs]
+    noise = _noise(read)
+    drift, drifts = _drift(read, noise)
+    centre = np.zeros(2) if polygon is None else polygon.centre
+    centre_covariance = np.zeros((2, 2)) if polygon is None else polygon.centre_covariance
+    points = []
+    for order, (run, record) in enumerate(zip(runs, read, strict=True)):
+        position = record.position - drifts * order - centre
+        variance = noise.mean_variance(record.span) * np.eye(2)
+        points.append(
+            LocusPoint(run.id, run.point, record.load, record.direction, position, variance + centre_covariance)
+        )
+    points.sort(key=lambda p: (p.point.static_load, p.point.shaft_speed, _from_down(p.point.static_load_direction)))
+    return Locus(tuple(points), np.asarray(centre), drift, _status(points, polygon, drift))
+
+
+@dataclass(frozen=True)
+class _Read:
+    """One locus run: mean position and load, and block averages (m, 2) for the noise."""
+
+    point: OperatingPoint
+    position: FloatArray
+    load: float
+    direction: float
+    span: float
+    block_time: FloatArray
+    blocks: FloatArray
+
+
+def _from_down(direction: float) -> float:
+    """Angle from straight down, 0 to 2 pi: the order in which a locus is swept."""
+    return (direction + math.pi / 2 + 1e-9) % (2 * math.pi)
+
+
+def _read(run: Run) -> _Read:
+    force, displacement = run.vector("force"), run.vector("displacement")
+    n = min(len(force), len(displacement))
+    good = good_samples(np.hstack([force.values[:n], displacement.values[:n]]))
+    if good.sum() < 50 or good.mean() < 0.5:
+        what = f"locus run {run.id} has only {int(good.sum())} usable samples of {n}"
+        raise RigDataError(Problem("error", run.file, "record", what, "Repeat this direction", run=run.id))
+    time, place = displacement.time[:n][good], displacement.values[:n][good]
+    design = _turning(time, run.point.shaft_speed)
+    mean = np.linalg.lstsq(design, np.hstack([place, force.values[:n][good]]), rcond=None)[0]
+    # what turns with the shaft (runout, unbalance) averages out only over whole turns: take it off
+    still = place - design[:, 1:] @ mean[1:, :2]
+    label = np.floor((time - time[0]) / BLOCK).astype(int)
+    parts = [label == k for k in np.unique(label)]
+    parts = [part for part in parts if part.sum() > 0.5 * np.median([p.sum() for p in parts])]
+    load = mean[0, 2:]
+    return _Read(
+        point=run.point,
+        position=np.asarray(mean[0, :2], dtype=float),
+        load=float(np.hypot(*load)),
+        direction=float(np.arctan2(load[1], load[0])),
+        span=float(time[-1] - time[0]),
+        block_time=np.array([time[part].mean() for part in parts]),
+        blocks=np.array([still[part].mean(axis=0) for part in parts]),
+    )
+
+
+def _turning(time: FloatArray, speed: float) -> FloatArray:
+    """Columns (n, p): one, and cosine and sine of once and twice per turn where the record holds two turns."""
+    columns = [np.ones_like(time)]
+    if speed > 0.0 and speed * (time[-1] - time[0]) > 4.0 * math.pi:
+        for order in (1.0, 2.0):
+            columns += [np.cos(order * speed * time), np.sin(order * speed * time)]
+    return np.column_stack(columns)
+
+
+def _noise(read: list[_Read]) -> NoiseModel:
+    """Noise of the probes, pooled over all runs."""
+    series = []
+    for record in read:
+        m = len(record.block_time)
+        for values in record.blocks.T:
+            series.append(NoiseSeries(record.block_time, np.full(m, BLOCK), values, np.ones((m, 1))))
+    if max(len(s.time) for s in series) <= 3:
+        # records of a few tenths of a second show no noise over seconds: take the scatter within each run
+        scatter = float(np.mean([np.var(s.values) for s in series])) + 1e-18
+        return NoiseModel(scatter * BLOCK, scatter, DRIFT_RATE)
+    return estimate_noise(series, DRIFT_RATE)
+
+
+def _drift(read: list[_Read], noise: NoiseModel) -> tuple[FloatArray, FloatArray]:
+    """Drift per run from repeats of one set point, (2,); NaN and zero where nothing was repeated.
+
+    Runs are evenly spaced in time as far as anyone knows: the drift is taken as proportional to the run's number.
+    """
+    pairs = []
+    for i, first in enumerate(read):
+        for j in range(i + 1, len(read)):
+            other = read[j]
+            turn = abs(
+                math.remainder(first.point.static_load_direction - other.point.static_load_direction, 2 * math.pi)
+            )
+            same = (
+                first.point.static_load == other.point.static_load
+                and first.point.shaft_speed == other.point.shaft_speed
+            )
+            if same and turn < SAME_DIRECTION:
+                pairs.append((j - i, other.position - first.position))
+    if not pairs:
+        return np.full(2, np.nan), np.zeros(2)
+    apart = np.array([p[0] for p in pairs], dtype=float)
+    moved = np.array([p[1] for p in pairs])
+    rate = apart @ moved / (apart @ apart)
+    return rate, rate
+
+
+def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, drift: FloatArray) -> tuple[str, ...]:
+    found = []
+    if polygon is None:
+        found.append("no-centre: positions from the probes' zero, no clearance polygon given")
+    if np.isnan(drift).any():
+        found.append("drift-unknown: no load direction was repeated")
+    missed = [
+        p.run
+        for p in points
+        if abs(p.load - p.point.static_load) > LOAD_MISS * max(p.point.static_load, 1.0)
+        or abs(math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)) > DIRECTION_MISS
+    ]
+    if missed:
+        found.append("load-off-set-point: " + ", ".join(missed))
+    if polygon is not None:
+        behind = [p.run for p in points if _behind(p, polygon)]
+        if behind:
+            found.append("outside-polygon: " + ", ".join(behind))
+    return tuple(found)
+
+
+def _behind(point: LocusPoint, polygon: ClearancePolygon) -> bool:
+    """True where the shaft lies behind a pad's unloaded face by more than any pivot gives."""
+    n = np.column_stack([np.cos(polygon.angles), np.sin(polygon.angles)])
+    return bool(np.nanmax(n @ point.position - 1.5 * polygon.clearance) > 0.0)

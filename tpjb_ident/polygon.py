@@ -1,0 +1,116 @@
+"""Geometry of the clearance polygon: where its centre lies, and where its corners are.
+
+The sweep gives one distance per pad from the probes' zero. Five distances hold five clearances and two
+coordinates of the centre: two too many. A shift of the centre by c changes the clearances by -n_k . c, and
+nothing in the polygon tells such a change from real differences between the pads. So the centre is a
+convention:
+
+``least-absolute`` (default): the centre that makes the clearances as equal as possible in the sense of the
+sum of absolute differences from their common value. A single pad that stands off is then found exactly, and
+all of its offset shows on that pad: which is what `physics.md` means by ``pad_offset``. Differences within
+the measurement error are averaged.
+
+``least-squares``: the centre of the best-fitting regular polygon. A single pad off by D shows as 0.6 D on
+that pad, 0.32 D on the two opposite and -0.12 D on the two beside it (five pads).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+CentreRule = Literal["least-absolute", "least-squares"]
+
+EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
+
+
+@dataclass(frozen=True)
+class Centre:
+    """Centre of a polygon of sides n_k . p = d_k.
+
+    Attributes
+    ----------
+    position : (2,) ndarray
+        [m], in the coordinates of the distances.
+    clearance : float
+        Common clearance [m].
+    gain : (3, n) ndarray
+        Derivative of (position, clearance) with respect to the distances: carries their covariance on.
+    """
+
+    position: FloatArray
+    clearance: float
+    gain: FloatArray
+
+
+def normals(angles: FloatArray) -> FloatArray:
+    """Unit vectors (n, 2) toward the pads at `angles` (n,) [rad]."""
+    return np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def find_centre(
+    angles: FloatArray, distances: FloatArray, covariance: FloatArray, rule: CentreRule = "least-absolute"
+) -> Centre:
+    """Centre of a clearance polygon.
+
+    Parameters
+    ----------
+    angles : (n,) ndarray
+        Pad directions [rad]; at least three pads that surround the shaft.
+    distances : (n,) ndarray
+        Distance of each side from the origin, at zero load [m].
+    covariance : (n, n) ndarray
+        Of the distances [m^2].
+    rule : {"least-absolute", "least-squares"}
+        See the module.
+
+    Returns
+    -------
+    Centre
+
+    Raises
+    ------
+    ValueError
+        When fewer than three pads are given or they do not surround the shaft.
+    """
+    design = np.column_stack([normals(angles), np.ones(len(angles))])
+    if len(angles) < 3 or np.linalg.cond(design) > 1e3:
+        raise ValueError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
+    error = EQUAL_WITHIN * np.sqrt(np.maximum(np.diag(covariance), 1e-20))
+    weights = np.ones(len(angles))
+    solution: FloatArray = np.zeros(3)
+    gain = np.zeros((3, len(angles)), dtype=float)
+    for _ in range(1 if rule == "least-squares" else 400):
+        gain = np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights)
+        new: FloatArray = np.asarray(gain @ distances, dtype=float)
+        moved = float(np.max(np.abs(new - solution)))
+        solution = new
+        if moved < 1e-12:
+            break
+        # Huber's weights with the bend at the measurement error: absolute beyond it, square within
+        weights = 1.0 / np.maximum(np.abs(distances - design @ solution) / error, 1.0)
+    return Centre(solution[:2], float(solution[2]), gain)
+
+
+def corners(angles: FloatArray, clearances: FloatArray) -> FloatArray:
+    """Corners between neighbouring sides.
+
+    Parameters
+    ----------
+    angles, clearances : (n,) ndarray
+        Sides n_k . p = clearance_k, in circular order.
+
+    Returns
+    -------
+    (n, 2) ndarray
+        Corner k lies between side k and side k + 1 [m], from the centre.
+    """
+    n = normals(angles)
+    following = np.roll(n, -1, axis=0)
+    systems = np.stack([n, following], axis=1)
+    sides = np.stack([clearances, np.roll(clearances, -1)], axis=1)
+    return np.asarray(np.linalg.solve(systems, sides[..., None])[..., 0])
