@@ -65,8 +65,8 @@ def conduct(mesh: SectorMesh, convection: float, even: bool = True) -> HeatSolut
         row[i][given, given] = 1.0
         rows.append(row)
     n_surface = theta.n_nodes * n_z
-    coupling = coupling.reshape(theta.n_nodes, n_r * n_z, n_surface)
-    rhs = -coupling
+    to_face: Array = coupling.reshape(theta.n_nodes, n_r * n_z, n_surface)
+    rhs = -to_face
     rhs[:, given] = 0.0
     field = BlockCholesky.factor(rows).solve(rhs)
     field[:, :n_z] = np.eye(n_surface).reshape(theta.n_nodes, n_z, n_surface)
@@ -74,13 +74,13 @@ def conduct(mesh: SectorMesh, convection: float, even: bool = True) -> HeatSolut
     if not even:  # an odd temperature vanishes on the mid-plane: those columns answer to nothing
         field[:, :, 0] = 0.0
         field[..., ::n_z] = 0.0
-        coupling[..., ::n_z] = 0.0
-    heat = np.tensordot(coupling, field.reshape(coupling.shape), ((0, 1), (0, 1)))
+        to_face[..., ::n_z] = 0.0
+    heat: Array = np.tensordot(to_face, field.reshape(to_face.shape), ((0, 1), (0, 1)))
     return HeatSolution(field, heat)
 
 
 def _conduction_rows(mesh: SectorMesh, convection: float) -> Iterator[BlockRow]:
-    """Block rows of the lower triangle of conduction plus convection, slab by slab; blocks (n_r * n_z, n_r * n_z) [W/K]."""
+    """Block rows of the lower triangle of conduction plus convection [W/K], slab by slab."""
     r, theta, z = mesh.r, mesh.theta, mesh.z
     radius = r.gauss[0]
     conductivity = mesh.per_gauss_point([m.conductivity for m in mesh.layers])

@@ -116,10 +116,34 @@ class Line:
         return left.T @ ((factor * weight)[:, None] * right)
 
 
-def graded(start: float, stop: float, count: int, ratio: float = 1.0) -> Array:
-    """Break an interval into `count` elements, each `ratio` times as long as the one before; shape (count + 1,)."""
-    sizes = ratio ** np.arange(count)
-    breaks = start + (stop - start) * np.concatenate(([0.0], np.cumsum(sizes))) / sizes.sum()
+def graded(start: float, stop: float, count: int, first: float, last: float) -> Array:
+    """Break an interval into elements that grow geometrically from both ends, by one factor.
+
+    Parameters
+    ----------
+    start, stop : float
+    count : int
+        Number of elements.
+    first, last : float
+        Largest sizes wanted at the two ends; equal elements if they are not to be had with fewer than uniform ones.
+
+    Returns
+    -------
+    ndarray, shape (count + 1,)
+    """
+    length, steps = stop - start, np.arange(count)
+
+    def sizes(growth: float) -> Array:
+        return np.minimum(first * growth**steps, last * growth ** steps[::-1])
+
+    low, high = 1.0, 2.0
+    while sizes(high).sum() < length and high < 1e3:
+        high *= 2.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if sizes(middle).sum() < length else (low, middle)
+    size = sizes(high) if sizes(1.0).sum() < length else np.ones(count)
+    breaks = start + length * np.concatenate(([0.0], np.cumsum(size))) / size.sum()
     breaks[-1] = stop
     return breaks
 

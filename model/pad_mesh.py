@@ -41,23 +41,28 @@ def pivot_face(pad: Pad, bearing: Bearing) -> PivotFace:
 
     A contact without width would let the FE solution dent without bound (a point or line load on a solid), and
     that dent is in the pivot's own load-deflection law already (Hertz, Kirk and Reedy, or the dry test). So the
-    face is as wide as the region whose squeeze belongs to the pivot law.
+    face is as wide as the region whose squeeze belongs to the pivot law:
 
     - rocker, rigid: a strip `contact_length` long (the whole pad if the file gives none), half the bending
       thickness wide;
     - sphere: a square of the area of a disc whose diameter is the bending thickness.
+
+    Both are cut down where the pad is too short for them.
 
     Returns
     -------
     PivotFace
     """
     thickness = pad.elastic_thickness
+    back = bearing.journal_radius + pad.pad_clearance + thickness
+    shorter_wing = min(-pad.leading_edge, pad.leading_edge + pad.arc)
+    room = 1.6 * shorter_wing * back  # leaves a fifth of the shorter wing beside the face
     if bearing.pivot.kind == "spherical":
         side = 0.5 * math.sqrt(math.pi) * thickness
-        return PivotFace(width=side, length=side)
+        return PivotFace(width=min(side, room), length=min(side, bearing.length))
     contact = bearing.pivot.contact_length
     length = bearing.length if math.isnan(contact) else min(contact, bearing.length)
-    return PivotFace(width=0.5 * thickness, length=length)
+    return PivotFace(width=min(0.5 * thickness, room), length=length)
 
 
 @dataclass(frozen=True)
@@ -91,11 +96,11 @@ class PadGeometry:
 
     def __post_init__(self) -> None:
         half = 0.5 * self.face.width / self.outer_radius
-        if not (self.leading <= -half and half <= self.trailing):
+        if not (self.leading < -half and half < self.trailing):
             raise ValueError(
-                f"The pivot face ({math.degrees(2 * half):.1f} deg wide) overhangs the pad, which spans "
+                f"The pivot face ({math.degrees(2 * half):.1f} deg wide) does not fit on the pad, which spans "
                 f"{math.degrees(self.leading):.1f} to {math.degrees(self.trailing):.1f} deg about its pivot. "
-                "Give a narrower face, a thinner elastic_thickness or a pivot_offset nearer 0.5."
+                "Give a narrower face, or a pivot_offset nearer 0.5."
             )
         if self.face.length > self.length * (1 + 1e-12):
             raise ValueError(f"The pivot face ({self.face.length} m) is longer than the pad ({self.length} m).")
@@ -175,64 +180,88 @@ class SectorMesh:
 
 @dataclass(frozen=True)
 class MeshDensity:
-    """How many elements; the default keeps the deformation within 1 % of the converged one (see the tests).
+    """How many elements, and how small at the places where the stress is singular.
+
+    The default keeps the deformation within 1 % of the converged one (tests/literature/test_pad_analytic.py).
 
     Attributes
     ----------
-    wing : int
-        Along the arc, on each side of the pivot face.
+    arc : int
+        Along the arc, both sides of the pivot face together.
     face : int
         Along the arc, over the pivot face.
-    inner, outer : int
-        Along the half length, beside and beyond the pivot face.
+    half_length : int
+        Along the half length.
     backing, babbitt : int
         Across the layers.
+    rim, edge : float
+        Element size at the rim of the pivot face and at the pad's edges, as parts of the bending thickness.
     degree : int
         Polynomial degree.
     """
 
-    wing: int = 6
+    arc: int = 14
     face: int = 2
-    inner: int = 3
-    outer: int = 3
-    backing: int = 3
+    half_length: int = 7
+    backing: int = 5
     babbitt: int = 1
+    rim: float = 0.035
+    edge: float = 0.16
     degree: int = 2
+
+    def __post_init__(self) -> None:
+        if self.arc < 2 or self.half_length < 3 or min(self.face, self.backing, self.babbitt, self.degree) < 1:
+            raise ValueError(f"A pad needs arc >= 2, half_length >= 3 and every other count >= 1, got {self}.")
 
     def refined(self, factor: int) -> MeshDensity:
         """Return a density of `factor` times as many elements in every direction."""
-        counts = (self.wing, self.face, self.inner, self.outer, self.backing, self.babbitt)
-        return MeshDensity(*(factor * count for count in counts), degree=self.degree)
+        return MeshDensity(
+            arc=factor * self.arc,
+            face=factor * self.face,
+            half_length=factor * self.half_length,
+            backing=factor * self.backing,
+            babbitt=factor * self.babbitt,
+            rim=self.rim / factor,
+            edge=self.edge / factor,
+            degree=self.degree,
+        )
 
 
 def sector_mesh(geometry: PadGeometry, density: MeshDensity) -> SectorMesh:
     """Mesh half a pad.
 
-    The stress is singular along the rim of the held face, so elements grow from there.
+    The stress is singular along the rim of the held face, and steep near the free edges, where the babbitt's larger
+    expansion ends: elements are small there and grow in between.
     """
-    half = 0.5 * geometry.face.width / geometry.outer_radius
+    outer, thickness = geometry.outer_radius, geometry.outer_radius - geometry.inner_radius
+    rim, edge = density.rim * thickness, density.edge * thickness
+    half = 0.5 * geometry.face.width / outer
+    wings = -half - geometry.leading, geometry.trailing - half
+    before, after = _share(density.arc, *wings)
     theta = _join(
-        _toward(geometry.leading, -half, density.wing),
-        graded(-half, half, density.face),
-        _toward(geometry.trailing, half, density.wing)[::-1],
+        graded(geometry.leading, -half, before, edge / outer, rim / outer),
+        np.linspace(-half, half, density.face + 1),
+        graded(half, geometry.trailing, after, rim / outer, edge / outer),
     )
-    rim, end = 0.5 * geometry.face.length, 0.5 * geometry.length
-    if end - rim < 1e-6 * end:  # the strip is as long as the pad: no rim
-        z = graded(0.0, end, density.inner + density.outer)
+    under, end = 0.5 * geometry.face.length, 0.5 * geometry.length
+    if end - under < 1e-6 * end:  # the strip is as long as the pad: no rim
+        z = graded(0.0, end, density.half_length, end, edge)
     else:
-        z = _join(_toward(0.0, rim, density.inner), _toward(end, rim, density.outer)[::-1])
-    r = _toward(geometry.interface_radius, geometry.outer_radius, density.backing)
+        inner, beyond = _share(density.half_length - 1, under, end - under)
+        z = _join(graded(0.0, under, inner, end, rim), graded(under, end, beyond + 1, rim, edge))
+    r = graded(geometry.interface_radius, outer, density.backing, edge, rim)
     layers = (geometry.backing,) * density.backing
     if geometry.babbitt_thickness > 0:
-        r = _join(graded(geometry.inner_radius, geometry.interface_radius, density.babbitt), r)
+        r = _join(np.linspace(geometry.inner_radius, geometry.interface_radius, density.babbitt + 1), r)
         layers = (geometry.babbitt,) * density.babbitt + layers
-    lines = (Line(breaks, density.degree) for breaks in (r, theta, z))
-    return SectorMesh(*lines, layers=layers)
+    lines = [Line(breaks, density.degree) for breaks in (r, theta, z)]
+    return SectorMesh(lines[0], lines[1], lines[2], layers)
 
 
-def _toward(start: float, rim: float, count: int) -> Array:
-    """Elements from `start` to `rim`, the last about a third as long as the first."""
-    return graded(start, rim, count, 3.0 ** (-1.0 / max(count - 1, 1)))
+def _share(count: int, first: float, second: float) -> tuple[int, int]:
+    """Deal `count` elements to two lengths in proportion, at least one each."""
+    share = min(max(round(count * first / (first + second)), 1), count - 1)
+    return share, count - share
 
 
 def _join(*pieces: Array) -> Array:
