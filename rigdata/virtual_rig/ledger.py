@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -63,11 +64,22 @@ class CampaignTruth:
         return {"schema": "tpjb-truth/1", **asdict(self)}
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write as JSON, whole or not at all; never into the campaign itself."""
+        """Write as JSON, whole or not at all; never into the campaign itself. What is infinite becomes null."""
         target = Path(path)
         spare = target.with_name(f".{target.name}.part")
-        spare.write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False), encoding="utf-8")
+        spare.write_text(json.dumps(_finite(self.to_dict()), indent=1, allow_nan=False), encoding="utf-8")
         os.replace(spare, target)
+
+
+def _finite(value: object) -> object:
+    """Copy plain data with None for infinite numbers (rigid pivots, rigid cells), which JSON does not know."""
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    return value
 
 
 def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) -> CampaignTruth:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from math import radians
 
+from rigdata.virtual_rig.truth import VirtualRigError
+
 
 @dataclass(frozen=True)
 class ChannelNoise:
@@ -30,6 +32,10 @@ class ChannelNoise:
     flicker: float = 0.0
     mains: float = 0.0
     drift: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not all(0 <= getattr(self, f.name) < float("inf") for f in fields(self)):
+            raise VirtualRigError(f"noise must be finite and not negative: {self}")
 
     def scaled(self, factor: float) -> ChannelNoise:
         """Return the same noise, `factor` times as strong."""
@@ -115,6 +121,10 @@ class Glitches:
     displacement: float = 65e-6
     force: float = 4000.0
 
+    def __post_init__(self) -> None:
+        if not 0 <= self.share <= 1 or not 1 <= self.shortest <= self.longest:
+            raise VirtualRigError("glitches need a share between 0 and 1, and 1 <= shortest <= longest")
+
 
 @dataclass(frozen=True)
 class DryImperfections:
@@ -181,6 +191,10 @@ class Noise:
     glitches: Glitches = Glitches()
     dry: DryImperfections = DryImperfections()
     bits: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.bits is not None and not 4 <= self.bits <= 32:
+            raise VirtualRigError(f"a converter has between 4 and 32 bits, not {self.bits}")
 
     @classmethod
     def none(cls) -> Noise:

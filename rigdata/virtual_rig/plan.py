@@ -99,6 +99,10 @@ class Timing:
     locus_seconds: float = 1.0
     dry_rate: float = 500.0
 
+    def __post_init__(self) -> None:
+        if min(self.dynamic_rate, self.dynamic_seconds, self.locus_seconds, self.dry_rate) <= 0:
+            raise VirtualRigError("sample rates and record lengths must be positive")
+
 
 @dataclass(frozen=True)
 class PlannedRun:
@@ -208,6 +212,7 @@ class RigPlan:
 
     def _dynamic_runs(self) -> Iterable[PlannedRun]:
         for point in self.dynamic:
+            self._check_dynamic(point)
             together = [p for p in self.dynamic if _unexcited(p) == _unexcited(point)]
             if not self.joint_frequencies:
                 together = [point]
@@ -225,6 +230,15 @@ class RigPlan:
                         record=f"d-{self._name(point)}-{together[0].excitation_hz:g}{tail}",
                         seconds=self.timing.dynamic_seconds,
                     )
+
+    def _check_dynamic(self, point: OperatingPoint) -> None:
+        if not 0 < point.excitation < pi * self.timing.dynamic_rate:
+            raise VirtualRigError(
+                f"an excitation of {point.excitation_hz:g} Hz cannot be sampled at {self.timing.dynamic_rate:g} Hz; "
+                "choose one between zero and half the sample rate"
+            )
+        if point.static_load <= 0 or self.dynamic_fraction <= 0:
+            raise VirtualRigError("dynamic runs need a positive static load and dynamic_fraction")
 
     def _locus_runs(self) -> Iterable[PlannedRun]:
         for number, point in enumerate(self.locus, 1):

@@ -13,9 +13,11 @@ import pytest
 
 import rigdata
 from rigdata.virtual_rig import (
+    ChannelNoise,
     ClearanceSweep,
     CsvLayout,
     DryTest,
+    Glitches,
     Hdf5Layout,
     Instruments,
     Noise,
@@ -123,6 +125,16 @@ def test_the_truth_is_not_in_the_campaign(tmp_path):
     np.testing.assert_allclose(stored["pivot_curves"][0]["stiffness_N_per_m"], 6e8, rtol=1e-9)
 
 
+def test_a_rigid_rig_has_a_truth_file_too(tmp_path):
+    rigid = replace(TRUTH, pivot_deflection=lambda pad, load: 0 * load)
+    cells = replace(Instruments.like_paper(), cell_stiffness=(float("inf"), 6e8))
+    write_campaign(tmp_path / "c.h5", rig(truth=rigid, instruments=cells)).write(tmp_path / "truth.json")
+    stored = json.loads((tmp_path / "truth.json").read_text())
+    assert stored["cell_stiffness_N_per_m"] == [None, 6e8]
+    assert set(stored["pivot_curves"][0]["stiffness_N_per_m"]) == {None}
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["c.h5", "truth.json"]
+
+
 def test_float32_holds_16_bit_readings_exactly(tmp_path):
     import h5py
 
@@ -156,6 +168,25 @@ def test_plans_refuse_what_cannot_be_run():
     singular = RigTruth.constant(np.ones((2, 2)) * 1e8, np.zeros((2, 2)), position=lambda point: np.zeros(2))
     with pytest.raises(VirtualRigError, match="singular"):
         rig(truth=singular).simulate("d-02500-25-01")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Timing(dynamic_rate=0.0), "must be positive"),
+        (lambda: RigPlan(dynamic=operating_points([(5000.0, 600.0)])).runs(()), "600 Hz cannot be sampled at 1000 Hz"),
+        (lambda: RigPlan(dynamic=operating_points([(5000.0, 0.0)])).runs(()), "0 Hz cannot be sampled"),
+        (lambda: RigPlan(dynamic=operating_points([(0.0, 25.0)])).runs(()), "positive static load"),
+        (lambda: Noise.like_samples().scaled(-1.0), "not negative"),
+        (lambda: ChannelNoise(white=float("nan")), "finite"),
+        (lambda: replace(Noise.none(), bits=64), "between 4 and 32 bits"),
+        (lambda: Glitches(share=2.0), "between 0 and 1"),
+        (lambda: ClearanceSweep(push=0.0), "must be positive"),
+    ],
+)
+def test_impossible_numbers_are_refused_where_they_are_given(make, message):
+    with pytest.raises(VirtualRigError, match=message):
+        make()
 
 
 def test_ids_tell_speeds_and_load_directions_apart():
