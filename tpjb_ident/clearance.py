@@ -41,7 +41,8 @@ class ClearancePolygon:
     angles : (n,) ndarray
         Nominal pad directions [rad].
     centre, centre_covariance : (2,), (2, 2) ndarray
-        Reading of the bearing centre [m], by `centre_rule`; see `tpjb_ident.polygon` for what that means.
+        Reading of the bearing centre [m], by `centre_rule`; see `tpjb_ident.polygon` for what that means. The
+        covariance holds the wander of the probes' zero from run to run, as far as this run's drift tells.
     clearance, clearance_se : (n,) ndarray
         Per pad at zero push load [m]; NaN where the pad was not reached.
     clearance_pushed, clearance_pushed_se : (n,) ndarray
@@ -192,6 +193,8 @@ def _polygon(
     common = float(np.sqrt(centre.gain[2] @ covariance @ centre.gain[2]))
     se[pads] = np.maximum(np.sqrt(np.diag(map_ @ covariance @ map_.T)), common)
     fitted = angles + fit.tilt
+    # another run meets the probes' zero elsewhere: by about what it drifts within this one
+    wander = (fit.noise.drift * float(np.ptp(touch.time))) ** 2 * np.eye(2)
     found = np.full((len(angles), 2), np.nan)
     if len(pads) == len(angles):
         found = corners(fitted, clearance)
@@ -200,7 +203,7 @@ def _polygon(
         point=run.point,
         angles=angles,
         centre=centre.position,
-        centre_covariance=centre.gain[:2] @ covariance @ centre.gain[:2].T,
+        centre_covariance=centre.gain[:2] @ covariance @ centre.gain[:2].T + wander,
         clearance=clearance,
         clearance_se=se,
         clearance_pushed=clearance + fit.give,

@@ -25,6 +25,8 @@ IntArray = NDArray[np.int_]
 
 BLOCK = 0.1  # [s]; five mains periods
 CONTACT_DEPTH = 1.0e-6  # [m]: a pad counts as touched within this of its farthest position, plus its own give
+SHORTEST = 5  # samples in a piece
+MOVING = 2.0  # robust standard deviations of the speed in corners above which the shaft is still on its way
 LARGEST_GIVE = 6.0e-6  # [m], of a pivot under the push load where no curve says it
 TURN_NEEDED = 2.0 * np.pi * 0.97
 
@@ -152,8 +154,10 @@ def _carried(load: FloatArray, angles: FloatArray, touched: NDArray[np.bool_]) -
         j = (i + 1) % len(angles)
         both = np.flatnonzero((count == 2) & touched[:, i] & touched[:, j])
         share = np.linalg.solve(n[[i, j]].T, load[both].T)
-        # within the noise of the cells a pad may seem to pull by a few newtons
-        carried[both, i], carried[both, j] = np.maximum(share, 0.0)
+        # past a pad's own direction its neighbour would have to pull: the pad carries all, friction holds the shaft
+        alone_i, alone_j = share[1] < 0.0, share[0] < 0.0
+        carried[both, i] = np.where(alone_i, load[both] @ n[i], np.maximum(share[0], 0.0))
+        carried[both, j] = np.where(alone_j, load[both] @ n[j], np.maximum(share[1], 0.0))
     return carried
 
 
@@ -170,27 +174,45 @@ def _blocks(
     piece = np.floor((time - time[0]) / BLOCK).astype(int)
     cuts = np.flatnonzero((np.diff(state) != 0) | (np.diff(piece) != 0)) + 1
     starts, stops = np.r_[0, cuts], np.r_[cuts, len(time)]
+    long = (stops - starts) >= SHORTEST
+    starts, stops = starts[long], stops[long]
+    count = (stops - starts).astype(float)
+
+    def means(values: FloatArray) -> FloatArray:
+        total = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(values - values[0], axis=0)])
+        return np.asarray((total[stops] - total[starts]) / count[:, None] + values[0])
+
     period = float(time[-1] - time[0]) / (len(time) - 1)
-    rows = []
-    for a, b in zip(starts, stops, strict=True):
-        if b - a < 3:
-            continue
-        for k in np.flatnonzero(touched[a]):
-            load = float(np.mean(carried[a:b, k]))
-            if not np.isfinite(load):
-                continue
-            c, s = np.cos(angles[k]), np.sin(angles[k])
-            along = float(np.mean(position[a:b] @ np.array([c, s])))
-            across = float(np.mean(position[a:b] @ np.array([-s, c])))
-            rows.append((np.mean(time[a:b]), (b - a) * period, k, along, across, load, touched[a].sum() == 1))
-    table = np.array(rows, dtype=float).reshape(-1, 7)
+    moment = means(time[:, None])[:, 0]
+    place = means(position)
+    load = means(np.nan_to_num(carried))
+    lost = means(np.isnan(carried).astype(float)) > 0.0
+    usable = touched[starts] & ~lost & _at_rest(moment, place, touched[starts])[:, None]
+    row, pad = np.nonzero(usable)
+    tangent = np.column_stack([-np.sin(angles), np.cos(angles)])
     return Touch(
-        time=table[:, 0],
-        duration=table[:, 1],
-        pad=table[:, 2].astype(int),
-        along=table[:, 3],
-        across=table[:, 4],
-        load=table[:, 5],
+        time=moment[row],
+        duration=count[row] * period,
+        pad=pad,
+        along=np.sum(place[row] * normals(angles)[pad], axis=1),
+        across=np.sum(place[row] * tangent[pad], axis=1),
+        load=load[row, pad],
         push=push,
-        alone=table[:, 6] > 0,
+        alone=touched[starts][row].sum(axis=1) == 1,
     )
+
+
+def _at_rest(time: FloatArray, place: FloatArray, touched: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """True for pieces (m,) in which the shaft lies in a corner, or slides along one pad.
+
+    A shaft that comes to a corner slowly is near the second pad before it touches it: only when it moves no faster
+    than the pivots give does the corner hold it.
+    """
+    corner = touched.sum(axis=1) == 2
+    if corner.sum() < 8:
+        return np.ones(len(time), dtype=bool)
+    step = np.hypot(*np.diff(place, axis=0).T) / np.maximum(np.diff(time), 1e-9)
+    speed = np.maximum(np.r_[step, 0.0], np.r_[0.0, step])
+    ordinary = float(np.median(speed[corner]))
+    spread = 1.4826 * float(np.median(np.abs(speed[corner] - ordinary)))
+    return np.asarray(~corner | (speed < ordinary + MOVING * spread))
