@@ -204,6 +204,8 @@ def _iterate(search: _Search) -> Equilibrium:
         if any(not f.idle and f.forces is not None and f.forces.steps < 0 for f in search.films):
             return _result(search, iteration, math.inf, heat_change, ("film lost", "not converged"))
         residual, shift, moves = _newton_step(search)
+        if not (math.isfinite(residual) and np.all(np.isfinite(shift)) and np.all(np.isfinite(moves))):
+            return _result(search, iteration, math.inf, heat_change, ("singular", "not converged"))
         near = residual < NEAR and heat_change < NEAR_HEAT
         search.relaxation = 1.0 if near else HELD_BACK
         if residual < FORCE_TOLERANCE and heat_change < TEMPERATURE_TOLERANCE:
@@ -272,25 +274,36 @@ def _wake_or_rest(search: _Search) -> bool:
 
 def _solve_films(search: _Search) -> float:
     """One step of every film at the present geometry; returns the largest temperature change asked for."""
-    setup, oil = search.setup, search.setup.bearing.oil
-    isothermal = setup.thermal == "isothermal"
+    setup = search.setup
     change = 0.0
     search.limited = 0.0
     if setup.carryover:
         _carry_over(search)
-    for film in search.films:
+    for film, table in zip(search.films, search.tables, strict=True):
+        if not film.idle:
+            change = max(change, _solve_film(search, film))
+            assert film.forces is not None
+            if film.forces.steps > 0 and not film.forces.force[0] > 0.0 and setup.rotational_stiffness == 0:
+                # the unloaded attitude, in which nothing holds the pad: the loaded one counts
+                _set_loaded(search, film, table)
+                change = max(change, 0.0 if film.idle else _solve_film(search, film))
+                film.idle = film.idle or not film.forces.force[0] > 0.0
         if film.idle:
             film.forces = None
             film.work.pressure[:] = 0.0
-            continue
-        a, b = film.approach(search.position)
-        film.forces, film.temperature_change, limited = film_step(
-            film.grid, film.work, (film.pad.pad_clearance, a, b), search.surface_speed,
-            oil_constants(oil), (oil.specific_heat, oil.conductivity), (film.inlet, 0.0 if isothermal else search.relaxation, HEATING_STEP),
-        )  # fmt: skip
-        change = max(change, film.temperature_change)
-        search.limited = max(search.limited, limited)
     return change
+
+
+def _solve_film(search: _Search, film: PadFilm) -> float:
+    setup, oil = search.setup, search.setup.bearing.oil
+    relaxation = 0.0 if setup.thermal == "isothermal" else search.relaxation
+    a, b = film.approach(search.position)
+    film.forces, film.temperature_change, limited = film_step(
+        film.grid, film.work, (film.pad.pad_clearance, a, b), search.surface_speed,
+        oil_constants(oil), (oil.specific_heat, oil.conductivity), (film.inlet, relaxation, HEATING_STEP),
+    )  # fmt: skip
+    search.limited = max(search.limited, limited)
+    return film.temperature_change
 
 
 def _sharpen(search: _Search) -> None:

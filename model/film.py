@@ -533,9 +533,7 @@ def _derivatives(
 
 
 @njit(**JIT)
-def _integrate(
-    grid: FilmGrid, work: FilmWork, weight: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _integrate(grid: FilmGrid, work: FilmWork, weight: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Forces and their derivatives; `weight` is the area that a node's perturbed pressure stands for."""
     force = np.zeros(2)
     stiffness = np.zeros((2, 2))

@@ -16,7 +16,7 @@ def apply(setup: Setup, stiffness: float) -> Setup:
 KIND = EffectKind(
     name="housing_flexibility",
     side="structure",
-    parameters=(Parameter("stiffness", "N/m", "stiffness", math.inf, 50000000.0, math.inf, 2000000000.0),),
+    parameters=(Parameter("stiffness", "N/m", "stiffness", math.inf, 50000000.0, math.inf, 2e9, "inverse"),),
     apply=apply,
     source="The paper names it as a likely cause (Sec. 6): 1e9 to 5e9 N/m in rig housings",
 )

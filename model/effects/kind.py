@@ -36,7 +36,12 @@ class Parameter:
     low, high : float
         Physical bounds; a value beyond them is refused.
     typical : float
-        Size one would not be surprised by (one standard deviation of a prior about `neutral`).
+        Size one would not be surprised by (one standard deviation of a prior about `neutral`; for an infinite
+        `neutral`, a value one would not be surprised by).
+    form : {"linear", "inverse", "square"}
+        In which form the parameter acts nearly linearly: fits move ``to_linear(value)``.
+    options : tuple of float
+        For a parameter without a neutral value other than a pad number: what to try.
     """
 
     name: str
@@ -46,6 +51,28 @@ class Parameter:
     low: float
     high: float
     typical: float = math.nan
+    form: Literal["linear", "inverse", "square"] = "linear"
+    options: tuple[float, ...] = ()
+
+    def to_linear(self, value: float) -> float:
+        """Value in the form in which the effect is nearly linear."""
+        if self.form == "inverse":
+            return 1.0 / value
+        return value**2 if self.form == "square" else value
+
+    def from_linear(self, form: float) -> float:
+        """Undo `to_linear`."""
+        if self.form == "inverse":
+            return 1.0 / form if form else math.inf
+        return math.sqrt(max(form, 0.0)) if self.form == "square" else form
+
+    @property
+    def typical_step(self) -> float:
+        """Size of `typical` in the nearly linear form."""
+        if math.isinf(self.neutral):
+            return self.to_linear(self.typical)
+        moved = self.neutral - self.typical if self.form == "inverse" else self.neutral + self.typical
+        return abs(self.to_linear(moved) - self.to_linear(self.neutral))
 
     @property
     def discrete(self) -> bool:

@@ -17,8 +17,10 @@ KIND = EffectKind(
     name="misalignment",
     side="bearing",
     parameters=(
-        Parameter("angle", "rad", "angle", 0.0, 0.0, 0.002, 0.0002),
-        Parameter("direction", "rad", "angle", math.nan, -7.0, 7.0),
+        Parameter("angle", "rad", "angle", 0.0, 0.0, 0.002, 0.0003, "square"),
+        Parameter(
+            "direction", "rad", "angle", math.nan, -7.0, 7.0, options=(0.0, math.pi / 4, math.pi / 2, 3 * math.pi / 4)
+        ),
     ),
     apply=apply,
     source="Half the clearance over half the length is 1e-3 rad",

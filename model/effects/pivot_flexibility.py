@@ -15,7 +15,7 @@ def apply(setup: Setup, stiffness_factor: float) -> Setup:
 KIND = EffectKind(
     name="pivot_flexibility",
     side="bearing",
-    parameters=(Parameter("stiffness_factor", "1", "ratio", 1.0, 0.05, 5.0, 0.5),),
+    parameters=(Parameter("stiffness_factor", "1", "ratio", 1.0, 0.05, 5.0, 0.5, "inverse"),),
     apply=apply,
     source="Measured pivots are 2-3 times softer than the formula (Lubricants 2019, 7, 61, Fig. 12)",
 )

@@ -14,7 +14,7 @@ def apply(setup: Setup, rotational_stiffness: float) -> Setup:
 KIND = EffectKind(
     name="pivot_rotation",
     side="bearing",
-    parameters=(Parameter("rotational_stiffness", "N m/rad", "rotational stiffness", 0.0, 0.0, 1000000.0, 20000.0),),
+    parameters=(Parameter("rotational_stiffness", "N m/rad", "rotational stiffness", 0.0, 0.0, 1000000.0, 1000.0),),
     apply=apply,
     source="Flexure pivots: 1e3 to 1e5 N m/rad; a stuck rocker more",
 )

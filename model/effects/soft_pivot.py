@@ -24,7 +24,7 @@ KIND = EffectKind(
     side="bearing",
     parameters=(
         Parameter("pad", "pad", "ratio", math.nan, 1, 40),
-        Parameter("stiffness_factor", "1", "ratio", 1.0, 0.05, 5.0, 0.5),
+        Parameter("stiffness_factor", "1", "ratio", 1.0, 0.05, 5.0, 0.5, "inverse"),
     ),
     apply=apply,
     source="Pad #5 of the paper is the softest of five (Lubricants 2019, 7, 61, Fig. 12)",
