@@ -17,6 +17,7 @@ from rigdata.virtual_rig import (
     Noise,
     RigPlan,
     RigTruth,
+    Timing,
     VirtualRig,
     VirtualRigError,
     operating_points,
@@ -29,9 +30,12 @@ C = np.array([[4.0e5, 2.0e4], [1.0e4, 6.0e5]])
 FIRST, SECOND = "d-05000-25-01", "d-05000-25-02"
 
 
-def rig(*faults: Fault, noise: Noise | None = None) -> VirtualRig:
+def rig(*faults: Fault, noise: Noise | None = None, seconds: float = 2.0) -> VirtualRig:
     plan = RigPlan(
-        dynamic=operating_points([(5000.0, 25.0)]), directions=(0.3, 1.5), dry=(DryTest(2, levels=(500.0,)),)
+        dynamic=operating_points([(5000.0, 25.0)]),
+        directions=(0.3, 1.5),
+        dry=(DryTest(2, levels=(500.0,)),),
+        timing=Timing(dynamic_seconds=seconds),
     )
     return VirtualRig(
         RigTruth.constant(K, C), plan, Instruments.like_paper(), noise or Noise.like_samples(), faults, seed=6
@@ -140,8 +144,8 @@ def test_wrong_notes_stand_in_the_manifest_only(tmp_path):
         Fault("wrong_frequency", SECOND, value=5.0),
         Fault("wrong_load", SECOND, value=2.0),
     )
-    write_campaign(tmp_path / "wrong.h5", rig(*faults))
-    write_campaign(tmp_path / "right.h5", rig())
+    write_campaign(tmp_path / "wrong.h5", rig(*faults, seconds=0.5))
+    write_campaign(tmp_path / "right.h5", rig(seconds=0.5))
     wrong, right = (rigdata.load_campaign(tmp_path / f"{n}.h5") for n in ("wrong", "right"))
     assert wrong.run("p-2-up").pad == 4
     assert wrong.run(FIRST).excitation_direction == pytest.approx(0.3 + np.pi / 2)
@@ -167,7 +171,7 @@ FILE_FAULTS = [
 @pytest.mark.parametrize(("layout", "fault"), FILE_FAULTS, ids=lambda v: v if isinstance(v, str) else v.kind)
 def test_the_reader_reports_file_faults_of_that_run_only(tmp_path, layout, fault):
     target = tmp_path / ("c.h5" if layout == "hdf5" else "c")
-    write_campaign(target, rig(fault), layout)
+    write_campaign(target, rig(fault, seconds=0.8), layout)
     problems = rigdata.check_campaign(target)
     assert problems
     assert {p.run for p in problems} == {FIRST}

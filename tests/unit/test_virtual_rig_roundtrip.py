@@ -73,7 +73,7 @@ def test_noise_free_records_give_back_the_stiffness(tmp_path, layout):
         np.testing.assert_allclose(fitted_stiffness(pair), K + 1j * omega * C, rtol=LAYOUTS[layout])
 
 
-SLOW = {"csv", "csv-german", "csv-bare"}
+SLOW = {"hdf5", "csv", "csv-german", "csv-bare"}
 
 
 @pytest.mark.parametrize("layout", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in LAYOUTS])

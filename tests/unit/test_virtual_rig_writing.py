@@ -236,6 +236,7 @@ def test_csv_has_the_shape_of_the_samples(tmp_path):
     assert sample.count(b"\r\n") == made.count(b"\r\n")
 
 
+@pytest.mark.slow
 @pytest.mark.samples
 def test_noise_is_of_the_samples_kind_and_size(tmp_path):
     """White floor, 1/f, runout and unbalance of `Noise.like_samples` against a sample campaign's locus runs."""
