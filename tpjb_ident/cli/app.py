@@ -7,8 +7,10 @@ from typing import Annotated
 import typer
 
 from tpjb_ident.cli.check import check
+from tpjb_ident.cli.compare import compare
 from tpjb_ident.cli.export import export
 from tpjb_ident.cli.identify import identify
+from tpjb_ident.cli.locus import locus
 from tpjb_ident.cli.pivot import pivot
 from tpjb_ident.cli.predict import predict
 from tpjb_ident.cli.simulate import simulate
@@ -39,5 +41,5 @@ def _common(
     pass
 
 
-for command in (check, identify, pivot, predict, simulate, export):
+for command in (check, identify, pivot, locus, predict, compare, simulate, export):
     app.command()(command)

@@ -11,8 +11,9 @@ from tpjb_ident.cli.errors import BadInputError, NotTrustedError, guarded
 from tpjb_ident.cli.inputs import open_campaign
 from tpjb_ident.cli.options import Method, Norm, Out, out_folder
 from tpjb_ident.cli.outdir import output_folder
-from tpjb_ident.cli.record import sha256, write_record
+from tpjb_ident.cli.record import write_record
 from tpjb_ident.cli.show import note_line, progress, say
+from tpjb_ident.provenance import sha256
 
 if TYPE_CHECKING:
     import pandas as pd

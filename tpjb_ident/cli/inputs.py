@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.errors import BadInputError
-from tpjb_ident.cli.record import sha256
+from tpjb_ident.provenance import sha256
 
 if TYPE_CHECKING:
     from model.bearing import Bearing

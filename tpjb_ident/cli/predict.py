@@ -12,8 +12,9 @@ from tpjb_ident.cli.errors import BadInputError, NotTrustedError, guarded
 from tpjb_ident.cli.options import BearingPath, EffectsFile, Out, Thermal, out_folder
 from tpjb_ident.cli.outdir import output_folder
 from tpjb_ident.cli.quantities import MAX_VALUES, parse_value, parse_values
-from tpjb_ident.cli.record import sha256, write_record
+from tpjb_ident.cli.record import write_record
 from tpjb_ident.cli.show import progress, say, table
+from tpjb_ident.provenance import sha256
 from tpjb_ident.tables import write_table
 
 NAMED_PIVOTS = ("rigid", "kirk", "kirk-secant")
@@ -136,7 +137,7 @@ def model_settings(pivots: Any, thermal: str, effects: Path | None) -> Any:
 def show_predictions(frame: Any, name: str) -> None:
     """Print the direct coefficients, at most 20 rows."""
     columns = ["load kN", "dir deg", "speed Hz", "exc. Hz", "kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m",
-               "h_min um"]  # fmt: skip
+               "h_min µm"]  # fmt: skip
     rows = [
         [f"{r.static_load_N / 1e3:g}", f"{r.static_load_direction_deg:g}", f"{r.shaft_speed_Hz:g}",
          f"{r.excitation_Hz:g}", f"{r.kxx_N_per_m / 1e6:.1f}", f"{r.kyy_N_per_m / 1e6:.1f}",

@@ -3,35 +3,14 @@
 from __future__ import annotations
 
 import datetime
-import hashlib
-import importlib.metadata
 import json
-import platform
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from tpjb_ident.cli.outdir import RECORD, former_runs
+from tpjb_ident.provenance import versions
 from tpjb_ident.tables import write_text
-
-PACKAGES = ("tpjb-ident", "numpy", "scipy", "pandas", "statsmodels", "h5py", "numba", "matplotlib")
-
-
-def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that results depend on."""
-    found = {"python": platform.python_version(), "platform": platform.system()}
-    for package in PACKAGES:
-        try:
-            found[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            found[package] = "not installed"
-    return found
-
-
-def sha256(path: Path) -> str:
-    """SHA-256 of a file, in hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def write_record(

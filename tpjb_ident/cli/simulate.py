@@ -13,8 +13,9 @@ from tpjb_ident.cli.errors import BadInputError, guarded
 from tpjb_ident.cli.options import BearingPath, EffectsFile, Out, Thermal, out_folder
 from tpjb_ident.cli.outdir import output_folder
 from tpjb_ident.cli.predict import model_settings, operating_points, pivot_choice
-from tpjb_ident.cli.record import sha256, write_record
+from tpjb_ident.cli.record import write_record
 from tpjb_ident.cli.show import progress, say
+from tpjb_ident.provenance import sha256
 
 PLANS = ("paper", "short")
 

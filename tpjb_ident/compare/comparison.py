@@ -1,0 +1,213 @@
+"""Prediction beside measurement, with rigid, Kirk and measured pivots: the paper's Sec. 6 on any campaign."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from rigdata.campaign import Campaign
+from tpjb_ident.compare.measured_pivots import measured_laws
+from tpjb_ident.compare.predictions import ModelSettings, PointPrediction, Progress, predict_points
+from tpjb_ident.dynamic.identify import IdentifySettings, identify
+from tpjb_ident.model_guard import check_model
+
+check_model()
+
+from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
+from model.effects import Effect  # noqa: E402
+
+if TYPE_CHECKING:
+    from tpjb_ident.clearance import ClearancePolygon
+    from tpjb_ident.dynamic.identification import Identification
+    from tpjb_ident.locus import Locus
+    from tpjb_ident.pivot import PivotCurve
+
+#: Pivot models that are compared, in the order of the tables.
+VARIANTS = ("rigid", "kirk", "kirk-secant", "measured")
+DEFAULT_VARIANTS = ("rigid", "kirk", "measured")
+
+
+class ComparisonError(ValueError):
+    """The campaign does not hold what a comparison needs; says what and what to do."""
+
+
+@dataclass(frozen=True)
+class CompareSettings:
+    """What is compared.
+
+    Attributes
+    ----------
+    variants : tuple of str
+        Pivot models out of `VARIANTS`.
+    thermal : {"isothermal", "adiabatic", "tehd"}
+    effects : tuple of Effect
+        Switched on with every pivot model.
+    identify : IdentifySettings
+    """
+
+    variants: tuple[str, ...] = DEFAULT_VARIANTS
+    thermal: str = "adiabatic"
+    effects: tuple[Effect, ...] = ()
+    identify: IdentifySettings = field(default_factory=IdentifySettings)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Predictions with one pivot model.
+
+    Attributes
+    ----------
+    name : str
+        Out of `VARIANTS`.
+    points : tuple of PointPrediction
+        At the identified points, in their order.
+    locus : tuple of PointPrediction
+        At the points of the measured locus, in its order.
+    """
+
+    name: str
+    points: tuple[PointPrediction, ...] = field(repr=False)
+    locus: tuple[PointPrediction, ...] = field(repr=False, default=())
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Everything measured and predicted for one campaign.
+
+    Attributes
+    ----------
+    campaign : Campaign
+    bearing : Bearing
+    settings : CompareSettings
+    identification : Identification
+    curves : tuple of PivotCurve
+        Empty without dry tests.
+    clearance : ClearancePolygon or None
+    locus : Locus or None
+    variants : tuple of Variant
+    remarks : tuple of str
+        What the campaign lacks, and what was left out for it.
+    """
+
+    campaign: Campaign
+    bearing: Bearing = field(repr=False)
+    settings: CompareSettings
+    identification: Identification = field(repr=False)
+    curves: tuple[PivotCurve, ...] = field(repr=False)
+    clearance: ClearancePolygon | None = field(repr=False)
+    locus: Locus | None = field(repr=False)
+    variants: tuple[Variant, ...] = field(repr=False)
+    remarks: tuple[str, ...] = ()
+
+    def variant(self, name: str) -> Variant:
+        """The predictions with one pivot model."""
+        return next(v for v in self.variants if v.name == name)
+
+    def __str__(self) -> str:
+        from tpjb_ident.compare.summary import summary_sentences
+
+        return "\n".join(summary_sentences(self))
+
+
+def compare_campaign(
+    campaign: Campaign,
+    bearing: Bearing,
+    settings: CompareSettings | None = None,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Identify a campaign, measure its pivots, locus and clearance, and predict the same with every pivot model.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    bearing : Bearing
+        As drawn.
+    settings : CompareSettings, optional
+    progress : callable, optional
+        Called as progress(text, done, total).
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    ComparisonError
+        No dynamic runs, or an unknown pivot model.
+    rigdata.problem.RigDataError
+        Records that are not what they claim to be.
+    """
+    settings = settings or CompareSettings()
+    unknown = [name for name in settings.variants if name not in VARIANTS]
+    if unknown or not settings.variants:
+        raise ComparisonError(f"pivot model {unknown[:1]} is not known; use some of {', '.join(VARIANTS)}")
+    if not campaign.of_kind("dynamic"):
+        raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to compare")
+    tell = progress or (lambda text, done, total: None)
+    tell("identifying", 0, 1)
+    least = min(pad.assembled_clearance for pad in bearing.pads)
+    chosen = replace(settings.identify, clearance=settings.identify.clearance or least)
+    identification = identify(campaign, chosen, progress)
+    tell("measuring pivots", 0, 1)
+    curves, clearance, locus = measure_dry(campaign, bearing, "measured" in settings.variants)
+    names, remarks = _possible(settings, curves, bearing)
+    if clearance is None:
+        remarks.append("No clearance run: positions cannot be given from the bearing centre.")
+    if locus is None:
+        remarks.append("No locus runs: the shaft centre locus is not compared.")
+    points = [p.point for p in identification.points]
+    stations = [] if locus is None else [p.point for p in locus.points]
+    variants = []
+    for name in names:
+        pivots = measured_laws(curves, len(bearing.pads), campaign.id) if name == "measured" else name
+        model = ModelSettings(pivots, settings.thermal, settings.effects)
+        both = predict_points(bearing, [*points, *stations], model, _labelled(tell, f"predicting, {name} pivots"))
+        variants.append(Variant(name, both[: len(points)], both[len(points) :]))
+    return Comparison(
+        campaign, bearing, settings, identification, curves, clearance, locus, tuple(variants), tuple(remarks)
+    )
+
+
+def _labelled(progress: Progress, label: str) -> Progress:
+    return lambda text, done, total: progress(f"{label}, {text}", done, total)
+
+
+def measure_dry(
+    campaign: Campaign, bearing: Bearing, with_pivots: bool = True
+) -> tuple[tuple[PivotCurve, ...], ClearancePolygon | None, Locus | None]:
+    """Measure what the campaign holds of pivot curves, clearance polygon and locus.
+
+    Returns
+    -------
+    curves : tuple of PivotCurve
+        Empty without dry tests, or if not asked for.
+    clearance : ClearancePolygon or None
+    locus : Locus or None
+    """
+    from tpjb_ident.clearance import measure_clearance
+    from tpjb_ident.locus import measure_locus
+    from tpjb_ident.pivot import fit_pivots
+
+    angles = [pad.pivot_angle for pad in bearing.pads]
+    curves = fit_pivots(campaign, angles) if with_pivots and campaign.of_kind("dry_pivot") else ()
+    clearance = measure_clearance(campaign, angles, curves or None) if campaign.of_kind("clearance") else None
+    locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
+    return curves, clearance, locus
+
+
+def _possible(
+    settings: CompareSettings, curves: tuple[PivotCurve, ...], bearing: Bearing
+) -> tuple[list[str], list[str]]:
+    """Pivot models that this campaign and bearing allow, and remarks about the others."""
+    names, remarks = list(settings.variants), []
+    missing = sorted(set(range(1, len(bearing.pads) + 1)) - {c.pad for c in curves})
+    if "measured" in names and missing:
+        names.remove("measured")
+        pads = ", ".join(f"#{n}" for n in missing)
+        remarks.append(f"Measured pivots are left out: no dry test of pad {pads}.")
+    if bearing.pivot.kind == "rigid":
+        printed = [name for name in names if name.startswith("kirk")]
+        names = [name for name in names if name not in printed]
+        if printed:
+            remarks.append("The bearing file says rigid pivots: there is no printed formula to compare.")
+    return names or ["rigid"], remarks

@@ -1,0 +1,145 @@
+"""The comparison in words and in one small table: what is how far off, with which pivots."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tpjb_ident.compare.pivot_formula import printed_formula
+from tpjb_ident.compare.tables import DIRECT, comparison_frame
+from tpjb_ident.report.numbers import percent, signed
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tpjb_ident.compare.comparison import Comparison
+
+SAID = {
+    "rigid": "rigid pivots",
+    "kirk": "Kirk pivots (printed formula, tangent)",
+    "kirk-secant": "Kirk pivots (printed formula as printed, secant)",
+    "measured": "measured pivots",
+}
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How one pivot model does on one direct coefficient.
+
+    Attributes
+    ----------
+    pivots : str
+    coefficient : str
+        ``"kxx"``, ``"kyy"``, ``"cxx"`` or ``"cyy"``.
+    median, worst : float
+        Median, and largest in size, of predicted / measured - 1 over the points.
+    n : int
+        Points compared.
+    inside : int
+        Points whose 95 % interval holds the prediction.
+    """
+
+    pivots: str
+    coefficient: str
+    median: float
+    worst: float
+    n: int
+    inside: int
+
+
+def deviations(comparison: Comparison, frame: pd.DataFrame | None = None) -> tuple[Deviation, ...]:
+    """Deviation of every pivot model in every direct coefficient."""
+    table = comparison_frame(comparison) if frame is None else frame
+    found = []
+    for variant in comparison.variants:
+        rows = table[table["pivots"] == variant.name]
+        for name in DIRECT:
+            off = (rows[f"{name}_ratio"] - 1.0).to_numpy()
+            off = off[np.isfinite(off)]
+            predicted = rows[f"{name}_predicted"]
+            inside = int(((predicted >= rows[f"{name}_lo"]) & (predicted <= rows[f"{name}_hi"])).sum())
+            worst = float(off[np.argmax(np.abs(off))]) if len(off) else math.nan
+            median = float(np.median(off)) if len(off) else math.nan
+            found.append(Deviation(variant.name, name[:3], median, worst, len(off), inside))
+    return tuple(found)
+
+
+def closest(found: tuple[Deviation, ...]) -> str | None:
+    """Pivot model with the smallest mean size of its four medians; None if nothing could be compared."""
+    scores: dict[str, list[float]] = {}
+    for d in found:
+        if math.isfinite(d.median):
+            scores.setdefault(d.pivots, []).append(abs(d.median))
+    return min(scores, key=lambda name: sum(scores[name]) / len(scores[name])) if scores else None
+
+
+def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None) -> tuple[str, ...]:
+    """Say what the comparison found, the answer first."""
+    found = deviations(comparison, frame)
+    best = closest(found)
+    said = []
+    if best is None:
+        said.append("No coefficient could be compared: see the quality flags.")
+    else:
+        own = [d for d in found if d.pivots == best]
+        worst = max((d for d in own if math.isfinite(d.worst)), key=lambda d: abs(d.worst))
+        said.append(
+            f"The prediction comes closest with {SAID[best]}: {_medians(own)} (median over "
+            f"{max(d.n for d in own)} points); the largest single deviation is {percent(worst.worst)} in "
+            f"{worst.coefficient}."
+        )
+    said += [
+        f"With {SAID[v.name]}: {_medians([d for d in found if d.pivots == v.name])}."
+        for v in comparison.variants
+        if v.name != best
+    ]
+    said += _pivot_sentence(comparison) + _clearance_sentence(comparison) + _locus_sentence(comparison)
+    return (*said, *comparison.remarks)
+
+
+def _medians(found: list[Deviation]) -> str:
+    return ", ".join(f"{d.coefficient} {percent(d.median)}" for d in found)
+
+
+def _pivot_sentence(comparison: Comparison) -> list[str]:
+    formula = printed_formula(comparison.bearing)
+    if not comparison.curves or formula is None:
+        return []
+    ratios = {}
+    for curve in comparison.curves:
+        load = 0.8 * curve.valid_to
+        ratios[curve.pad] = float(curve.stiffness(load)) / formula(curve.pad, load)[1]
+    low, high = min(ratios, key=lambda k: ratios[k]), max(ratios, key=lambda k: ratios[k])
+    load = 0.8 * comparison.curves[0].valid_to
+    return [
+        f"At {load / 1e3:.1f} kN the measured pivots have {100 * ratios[low]:.0f} % (pad #{low}) to "
+        f"{100 * ratios[high]:.0f} % (pad #{high}) of the stiffness that the printed formula gives."
+    ]
+
+
+def _clearance_sentence(comparison: Comparison) -> list[str]:
+    if comparison.clearance is None:
+        return []
+    drawn = np.array([pad.assembled_clearance for pad in comparison.bearing.pads])
+    off = comparison.clearance.clearance - drawn
+    if not np.isfinite(off).any():
+        return []
+    pad = int(np.nanargmax(np.abs(off)))
+    return [
+        f"The measured clearance differs from the drawing by {signed(1e6 * float(np.nanmedian(off)))} µm in the median, most at "
+        f"pad #{pad + 1} ({signed(1e6 * off[pad])} µm)."
+    ]
+
+
+def _locus_sentence(comparison: Comparison) -> list[str]:
+    from tpjb_ident.compare.positions import locus_distance
+
+    distances = {v.name: locus_distance(comparison, v) for v in comparison.variants}
+    known = {name: d for name, d in distances.items() if math.isfinite(d)}
+    if not known:
+        return []
+    parts = ", ".join(f"{1e6 * d:.1f} µm with {name} pivots" for name, d in known.items())
+    return [f"The predicted shaft centre locus is off the measured one by (root mean square) {parts}."]

@@ -1,0 +1,167 @@
+"""The report of a comparison: answer, figures, tables, flags, and how it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from tpjb_ident.compare.pivot_formula import printed_formula
+from tpjb_ident.compare.positions import measured_locus, predicted_locus
+from tpjb_ident.compare.summary import Deviation, deviations, summary_sentences
+from tpjb_ident.compare.tables import comparison_frame
+from tpjb_ident.report.coefficient_panels import coefficient_panels
+from tpjb_ident.report.comparison_tables import (
+    clearance_table,
+    flag_table,
+    measured_table,
+    pivot_points_table,
+    predicted_table,
+)
+from tpjb_ident.report.figure import VARIANT_LABEL, Panel, save_panels
+from tpjb_ident.report.numbers import percent
+from tpjb_ident.report.page import Page, Section, Table, render_page
+from tpjb_ident.report.pivot_panels import pivot_panels
+from tpjb_ident.report.position_panels import position_panels
+from tpjb_ident.tables import write_text
+
+if TYPE_CHECKING:
+    from tpjb_ident.compare.comparison import Comparison
+
+
+def write_comparison_report(
+    folder: Path,
+    comparison: Comparison,
+    settings: Mapping[str, Any] | None = None,
+    inputs: Mapping[str, str] | None = None,
+) -> Path:
+    """Write report.html and its figures.
+
+    Parameters
+    ----------
+    folder : Path
+        Existing folder.
+    comparison : Comparison
+    settings : mapping, optional
+        How it was made, for the reader; default: the comparison's own settings.
+    inputs : mapping of str to str, optional
+        SHA-256 of the inputs; default: of the campaign's files.
+
+    Returns
+    -------
+    Path
+        report.html; the figures lie beside it in ``figures`` as SVG and PNG.
+    """
+    page = comparison_page(comparison, settings, inputs)
+    panels = [panel for section in page.sections for panel in section.panels]
+    texts = save_panels(panels, folder / "figures")
+    path = folder / "report.html"
+    write_text(path, render_page(page, texts))
+    return path
+
+
+def comparison_page(
+    comparison: Comparison, settings: Mapping[str, Any] | None = None, inputs: Mapping[str, str] | None = None
+) -> Page:
+    """Gather the content of the report; see `write_comparison_report`."""
+    frame = comparison_frame(comparison)
+    answer, *more = summary_sentences(comparison, frame)
+    campaign, bearing = comparison.campaign, comparison.bearing
+    described = f": {campaign.description}" if campaign.description else ""
+    return Page(
+        title=f"{campaign.id}: predicted and measured dynamic coefficients",
+        subtitle=f"{bearing.name}{described}",
+        answer=answer,
+        more=more,
+        key_table=_key_table(deviations(comparison, frame)),
+        sections=_sections(comparison, frame),
+        settings={name: str(value) for name, value in (settings or _own_settings(comparison)).items()},
+        inputs=dict(campaign.fingerprint() if inputs is None else inputs),
+    )
+
+
+def _own_settings(comparison: Comparison) -> dict[str, str]:
+    chosen = comparison.settings
+    return {
+        "campaign": comparison.campaign.id,
+        "pivot models": ", ".join(v.name for v in comparison.variants),
+        "thermal": chosen.thermal,
+        "effects": ", ".join(str(e) for e in chosen.effects) or "none",
+        "estimator": comparison.identification.method,
+    }
+
+
+def _key_table(found: tuple[Deviation, ...]) -> Table:
+    names = ("kxx", "kyy", "cxx", "cyy")
+    rows = []
+    for variant in dict.fromkeys(d.pivots for d in found):
+        own = {d.coefficient: d for d in found if d.pivots == variant}
+        cells = [f"{percent(own[n].median)} ({percent(own[n].worst)})" for n in names]
+        inside, n = sum(own[name].inside for name in names), sum(own[name].n for name in names)
+        rows.append([VARIANT_LABEL[variant], *cells, f"{inside} of {n}"])
+    return Table(
+        "Predicted against measured: median deviation (largest single one)",
+        ["", *names, "inside the 95 % interval"],
+        rows,
+    )
+
+
+def _sections(comparison: Comparison, frame: pd.DataFrame) -> list[Section]:
+    panels = coefficient_panels(frame)
+    groups: dict[str, list[Panel]] = {}
+    for panel in panels:
+        groups.setdefault(panel.group, []).append(panel)
+    sections = [Section(heading, panels=group) for heading, group in groups.items()]
+    sections += _pivot_sections(comparison) + _position_sections(comparison)
+    sections.append(
+        Section(
+            "Operating points",
+            notes=[
+                "Intervals are 95 %, random and calibration errors together. Outliers is the share of record windows "
+                "that got no weight."
+            ],
+            tables=[measured_table(comparison.identification), predicted_table(frame)],
+        )
+    )
+    flags = flag_table(comparison)
+    text = [] if flags.rows else ["No flags: nothing about the records calls for caution."]
+    sections.append(Section("Quality flags", notes=text, tables=[flags] if flags.rows else []))
+    return sections
+
+
+def _pivot_sections(comparison: Comparison) -> list[Section]:
+    if not comparison.curves:
+        return []
+    from tpjb_ident.pivot import pivot_table
+
+    formula = printed_formula(comparison.bearing)
+    table = pivot_table(comparison.curves, formula=formula)
+    note = (
+        "The dry test sees pivot, pad back and housing seat together. Its tangent stiffness is what small vibrations "
+        "feel; the formula as printed is a secant, about 10 % below its own tangent for line contact, a third below it "
+        "for a sphere."
+    )
+    return [
+        Section(
+            "Pivots, from the dry tests",
+            notes=[note],
+            panels=pivot_panels(comparison.curves, table),
+            tables=[pivot_points_table(comparison.curves, formula)],
+        )
+    ]
+
+
+def _position_sections(comparison: Comparison) -> list[Section]:
+    drawn = (
+        np.array([pad.pivot_angle for pad in comparison.bearing.pads]),
+        np.array([pad.assembled_clearance for pad in comparison.bearing.pads]),
+    )
+    predicted = {v.name: predicted_locus(comparison, v) for v in comparison.variants if len(v.locus)}
+    panels = position_panels(comparison.clearance, drawn, measured_locus(comparison), predicted)
+    if not panels:
+        return []
+    tables = [] if comparison.clearance is None else [clearance_table(comparison.clearance, drawn[1])]
+    return [Section("Clearance and shaft centre locus", panels=panels, tables=tables)]

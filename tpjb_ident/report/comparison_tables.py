@@ -1,0 +1,120 @@
+"""Tables of the comparison's report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from tpjb_ident.report.figure import VARIANT_LABEL
+from tpjb_ident.report.numbers import fixed, percent, signed, with_interval
+from tpjb_ident.report.page import Table
+from tpjb_ident.report.words import meaning
+
+if TYPE_CHECKING:
+    from tpjb_ident.clearance import ClearancePolygon
+    from tpjb_ident.compare.comparison import Comparison
+    from tpjb_ident.compare.pivot_formula import Formula
+    from tpjb_ident.dynamic.identification import Identification
+    from tpjb_ident.dynamic.point_result import PointResult
+    from tpjb_ident.pivot import PivotCurve
+
+ENTRIES = ("xx", "xy", "yx", "yy")
+#: Loads at which pivot stiffness is tabled [N].
+PIVOT_LOADS = (2000.0, 4000.0)
+
+
+def point_label(p: PointResult) -> str:
+    """Load and excitation of a point, in words."""
+    return f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz"
+
+
+def measured_table(result: Identification) -> Table:
+    """K and C of every point with intervals."""
+    rows = []
+    for p in result.points:
+        lo, hi = p.stiffness.interval()
+        omega = p.stiffness.omega
+        cells = [with_interval(p.stiffness.vector[i], lo[i], hi[i], 1e6) for i in range(4)]
+        cells += [with_interval(p.stiffness.vector[i] / omega, lo[i] / omega, hi[i] / omega, 1e3) for i in range(4, 8)]
+        share = f"{100 * p.outlier_fraction:.0f} %"
+        flags = ", ".join(str(c) for c in p.quality) or "ok"
+        rows.append([point_label(p), *cells, str(p.n_windows), share, flags])
+    columns = [
+        "point", *(f"k{e}, MN/m" for e in ENTRIES), *(f"c{e}, kN s/m" for e in ENTRIES), "windows", "outliers", "flags",
+    ]  # fmt: skip
+    return Table(f"Measured ({result.method})", columns, rows, frozenset({0, len(columns) - 1}))
+
+
+def predicted_table(frame: pd.DataFrame) -> Table:
+    """Direct coefficients predicted with every pivot model, and how far off each is."""
+    names = {"kxx": ("N_per_m", 1e6), "kyy": ("N_per_m", 1e6), "cxx": ("Ns_per_m", 1e3), "cyy": ("Ns_per_m", 1e3)}
+    rows = []
+    ordered = frame.sort_values(["static_load_N", "excitation_Hz"], kind="stable")
+    for _, row in ordered.iterrows():
+        cells = []
+        for name, (suffix, scale) in names.items():
+            cells.append(fixed(row[f"{name}_{suffix}_predicted"] / scale))
+            cells.append(percent(row[f"{name}_{suffix}_ratio"] - 1.0))
+        remark = "beyond the measured pivot load" if row["pivot_extrapolated"] else row["status"]
+        label = f"{row['static_load_N'] / 1e3:g} kN, {row['excitation_Hz']:g} Hz"
+        rows.append([label, VARIANT_LABEL[row["pivots"]], *cells, remark or ""])
+    units = {"k": "MN/m", "c": "kN s/m"}
+    columns = ["point", "pivots"]
+    for name in names:
+        columns += [f"{name}, {units[name[0]]}", "off by"]
+    columns.append("remark")
+    return Table("Predicted", columns, rows, frozenset({0, 1, len(columns) - 1}))
+
+
+def flag_table(comparison: Comparison) -> Table:
+    """Every flag of points, pivot curves, polygon and locus, in plain words."""
+    rows = []
+    for p in comparison.identification.points:
+        rows += [[point_label(p), str(c), getattr(c, "detail", ""), meaning(c)] for c in p.quality]
+    rows += [["campaign", str(c), c.detail, meaning(c)] for c in comparison.identification.conditions]
+    parts: list[tuple[str, Sequence[str]]] = [(f"pivot of pad #{c.pad}", c.status) for c in comparison.curves]
+    if comparison.clearance is not None:
+        parts.append(("clearance", comparison.clearance.status))
+    if comparison.locus is not None:
+        parts.append(("locus", comparison.locus.status))
+    for where, status in parts:
+        for condition in status:
+            name, _, detail = condition.partition(":")
+            rows.append([where, name, detail.strip(), meaning(condition)])
+    return Table("Flags", ["where", "flag", "found", "what it means"], rows, frozenset(range(4)))
+
+
+def pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -> Table:
+    """Tangent stiffness of every pad at two loads beside the printed formula's."""
+    columns = ["pad", "law"]
+    for load in PIVOT_LOADS:
+        columns += [f"at {load / 1e3:g} kN, MN/m", "of Kirk's tangent"]
+    rows = []
+    for curve in curves:
+        cells = []
+        for load in PIVOT_LOADS:
+            value = float(curve.stiffness(load))
+            low, high = (float(v) for v in curve.stiffness_band(load))
+            beyond = " (extrapolated)" if bool(curve.is_extrapolated(load)) else ""
+            cells.append(with_interval(value, low, high, 1e6) + beyond)
+            cells.append(f"{100 * value / formula(curve.pad, load)[1]:.0f} %" if formula else "–")
+        rows.append([f"#{curve.pad}", curve.law.name, *cells])
+    return Table("Measured tangent stiffness, 95 %", columns, rows, frozenset({0, 1}))
+
+
+def clearance_table(polygon: ClearancePolygon, drawn: NDArray[np.float64]) -> Table:
+    """Clearance per pad beside the drawing's, in µm."""
+    rows = []
+    for k, drawing in enumerate(drawn):
+        value, half = polygon.clearance[k], 1.96 * polygon.clearance_se[k]
+        rows.append([
+            f"#{k + 1}", fixed(1e6 * drawing), with_interval(value, value - half, value + half, 1e-6),
+            signed(1e6 * (value - drawing)),
+            fixed(1e6 * polygon.clearance_pushed[k], 2),
+        ])  # fmt: skip
+    columns = ["pad", "drawing, µm", "measured, µm", "difference, µm", f"under {polygon.push_load:.0f} N, µm"]
+    return Table("Assembled clearance, cold, 95 %", columns, rows)

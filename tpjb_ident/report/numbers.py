@@ -1,0 +1,50 @@
+"""Numbers as a reader wants them: as many digits as the interval allows, minus signs that do not break."""
+
+from __future__ import annotations
+
+import math
+
+MINUS = "\N{MINUS SIGN}"
+
+
+def plain(value: float, digits: int) -> str:
+    """A number with `digits` decimals; never a negative zero.
+
+    >>> plain(-0.004, 1)
+    '0.0'
+    """
+    text = f"{value:.{digits}f}"
+    return text.replace("-", MINUS) if float(text) else text.lstrip("-")
+
+
+def with_interval(value: float, low: float, high: float, scale: float = 1.0) -> str:
+    """Value and half the width of its interval, both to the digit that the interval allows.
+
+    >>> with_interval(163.2841e6, 162.0e6, 164.6e6, 1e6)
+    '163.3 ± 1.3'
+    """
+    if not math.isfinite(value):
+        return "no answer"
+    half = 0.5 * (high - low) / scale
+    if not math.isfinite(half) or half <= 0:
+        return f"{value / scale:.4g}".replace("-", MINUS)
+    digits = max(0, 1 - math.floor(math.log10(half)))
+    return f"{plain(value / scale, digits)} ± {plain(half, digits)}"
+
+
+def percent(share: float, digits: int = 1) -> str:
+    """A share as a signed percentage; a dash if there is none."""
+    return f"{signed(100 * share, digits)}\N{NO-BREAK SPACE}%" if math.isfinite(share) else "–"
+
+
+def signed(value: float, digits: int = 1) -> str:
+    """A number with its sign, none if it rounds to zero; a dash if there is none."""
+    if not math.isfinite(value):
+        return "–"
+    text = plain(value, digits)
+    return text if text.startswith(MINUS) or not float(text) else f"+{text}"
+
+
+def fixed(value: float, digits: int = 1) -> str:
+    """A plain number; a dash if there is none."""
+    return plain(value, digits) if math.isfinite(value) else "–"

@@ -1,0 +1,122 @@
+"""One self-contained HTML page from headings, sentences, tables and figures; everything from outside is escaped."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import jinja2
+import markupsafe
+
+from tpjb_ident.provenance import versions
+from tpjb_ident.report.figure import Panel, inline_svg
+from tpjb_ident.tables import printable
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of ready-made text cells.
+
+    Attributes
+    ----------
+    caption : str
+    columns : sequence of str
+    rows : sequence of sequence of str
+    text_columns : frozenset of int
+        Columns of words; the others are numbers, set right.
+    """
+
+    caption: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    text_columns: frozenset[int] = frozenset({0})
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading with what stands under it.
+
+    Attributes
+    ----------
+    heading : str
+    notes : sequence of str
+        Paragraphs.
+    panels : sequence of Panel
+    tables : sequence of Table
+    """
+
+    heading: str
+    notes: Sequence[str] = ()
+    panels: Sequence[Panel] = ()
+    tables: Sequence[Table] = ()
+
+
+@dataclass(frozen=True)
+class Page:
+    """A report.
+
+    Attributes
+    ----------
+    title, subtitle : str
+    answer : str
+        The first sentence: what came out.
+    more : sequence of str
+        Further findings.
+    key_table : Table or None
+        The answer in numbers.
+    sections : sequence of Section
+    settings, inputs : mapping of str to str
+        How it was made; SHA-256 of what it was made from.
+    """
+
+    title: str
+    subtitle: str
+    answer: str
+    more: Sequence[str] = ()
+    key_table: Table | None = None
+    sections: Sequence[Section] = ()
+    settings: Mapping[str, str] = field(default_factory=dict)
+    inputs: Mapping[str, str] = field(default_factory=dict)
+
+
+def render_page(page: Page, svg: Mapping[str, str]) -> str:
+    """Render a report as HTML.
+
+    Parameters
+    ----------
+    page : Page
+    svg : mapping of str to str
+        Text of every panel's SVG file, by its name.
+
+    Returns
+    -------
+    str
+        One file: no script, nothing loaded from anywhere.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        finalize=_printable_cell,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    drawn = {p.name: _element(svg[p.name], p) for section in page.sections for p in section.panels}
+    return environment.get_template("report.html").render(
+        page=page,
+        drawn=drawn,
+        style=markupsafe.Markup(environment.get_template("style.css").render()),  # our own text, no data in it
+        versions=versions(),
+        finished=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
+    )
+
+
+def _element(svg: str, panel: Panel) -> markupsafe.Markup:
+    # matplotlib has escaped the labels inside the drawing already; the title is ours to escape
+    return markupsafe.Markup(inline_svg(svg, panel.name, str(markupsafe.escape(printable(panel.title)))))
+
+
+def _printable_cell(value: object) -> object:
+    return printable(value) if isinstance(value, str) and not isinstance(value, markupsafe.Markup) else value
