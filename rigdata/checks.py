@@ -2,40 +2,89 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from rigdata.campaign import Campaign, Run, load_campaign
+from rigdata.campaign import Campaign, load_campaign
+from rigdata.checking.findings import Finding, merge
+from rigdata.checking.observation import Observation, observe
+from rigdata.checking.positions import check_positions
+from rigdata.checking.response import check_accelerometers, check_responses
+from rigdata.checking.set_points import check_excitation, check_speed, check_static_load
+from rigdata.checking.slow_tests import check_dry, check_locus, check_sweeps
 from rigdata.problem import Problem, RigDataError
+from rigdata.run import Run
+
+_ORDER = {"error": 0, "warning": 1, "note": 2}
+Progress = Callable[[int, int], None]
 
 
-def check_campaign(path: str | Path) -> list[Problem]:
-    """Read every channel of every run.
+def check_campaign(path: str | Path, progress: Progress | None = None) -> list[Problem]:
+    """Read every channel of every run and judge it, alone and beside the others.
 
     Parameters
     ----------
     path : str or Path
         As for `rigdata.load_campaign`.
+    progress : callable, optional
+        Called with the number of runs read so far and of all runs.
 
     Returns
     -------
     list of Problem
-        Empty where nothing was found. Never raises for bad input: it is then in the list.
+        Errors first; empty where nothing was found. Bad input never raises: it is in the list. A problem
+        with a `run` concerns that run alone; one without concerns the campaign.
     """
     try:
         campaign = load_campaign(path)
     except RigDataError as error:
-        return list(error.problems)
-    problems = list(campaign.notes)
-    for run in campaign.runs:
-        problems.extend(_check_run(campaign, run))
-    return problems
+        return _sorted(error.problems)
+    seen: list[Observation] = []
+    for count, run in enumerate(campaign.runs, start=1):
+        seen.append(observe(run))
+        if progress is not None:
+            progress(count, len(campaign.runs))
+    return _sorted([*campaign.notes, *_judge(campaign, seen)])
 
 
-def _check_run(campaign: Campaign, run: Run) -> list[Problem]:
-    found: list[Problem] = []
-    for name in campaign.channels:
-        try:
-            run.record(name)
-        except RigDataError as error:
-            found.extend(p for p in error.problems if p not in found)
-    return found
+def _judge(campaign: Campaign, seen: Sequence[Observation]) -> list[Problem]:
+    of_kind = {k: [s for s in seen if s.run.kind == k] for k in ("dynamic", "dry_pivot", "locus", "clearance")}
+    for one in seen:
+        check_static_load(one)
+        check_speed(one)
+    check_positions(seen)
+    check_excitation(of_kind["dynamic"], campaign.housing_mass)
+    check_responses(of_kind["dynamic"], campaign.housing_mass)
+    check_accelerometers(of_kind["dynamic"])
+    check_dry(of_kind["dry_pivot"])
+    check_sweeps(of_kind["clearance"])
+    check_locus(of_kind["locus"])
+    _check_duplicates(seen)
+    findings: list[Finding] = [f for one in seen for f in one.report.found]
+    return merge(findings, campaign.path.name, len(campaign.runs))
+
+
+def _check_duplicates(seen: Sequence[Observation]) -> None:
+    first: dict[str, Observation] = {}
+    for one in seen:
+        other = first.setdefault(one.digest, one) if one.digest else one
+        if other is one:
+            continue
+        if _shared_record(one.run, other.run):
+            what = f"shares its record with run {other.run.id}, at another excitation frequency"
+            one.report.say("shared", "note", "", what, "Nothing, if both lines were excited at once")
+            continue
+        what = f"holds the very samples of run {other.run.id} ({other.run.file})"
+        cure = "One of the two is a copy: find the right file, or delete the run"
+        one.report.say("duplicate", "error", "", what, cure)
+
+
+def _shared_record(one: Run, other: Run) -> bool:
+    """Whether one record excited at several frequencies serves both runs."""
+    same = replace(one.point, excitation=other.point.excitation) == other.point
+    return one.kind == other.kind == "dynamic" and same and one.point != other.point
+
+
+def _sorted(problems: Sequence[Problem]) -> list[Problem]:
+    return sorted(dict.fromkeys(problems), key=lambda p: _ORDER[p.severity])

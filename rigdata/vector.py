@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 #: Below this smallest singular value two directions count as one (about 3 deg apart).
 _COLLINEAR = 0.035
+
+
+@functools.lru_cache(maxsize=256)
+def inverse_directions(axes: tuple[float, ...]) -> FloatArray:
+    """(2, m) matrix from components along `axes` [rad] to X and Y; NaN where they span no plane."""
+    directions = np.stack([np.cos(axes), np.sin(axes)], axis=1)
+    if len(axes) < 2 or np.linalg.svd(directions, compute_uv=False)[-1] < _COLLINEAR:
+        return np.full((2, len(axes)), np.nan)
+    inverse = np.linalg.pinv(directions)
+    inverse.setflags(write=False)
+    return np.asarray(inverse)
 
 
 def solve_vector(axes: FloatArray, values: FloatArray) -> FloatArray:
@@ -26,22 +39,12 @@ def solve_vector(axes: FloatArray, values: FloatArray) -> FloatArray:
         Exact for two directions, least squares over those with a value for more; NaN where the
         directions with a value do not span the plane.
     """
-    directions = np.stack([np.cos(axes), np.sin(axes)], axis=1)
     present = np.isfinite(values)
+    if present.all():
+        return values @ inverse_directions(tuple(axes)).T
     result = np.full((len(values), 2), np.nan)
-    patterns, which = (
-        np.unique(present, axis=0, return_inverse=True)
-        if not present.all()
-        else (
-            np.ones((1, len(axes)), dtype=bool),
-            np.zeros(len(values), dtype=np.intp),
-        )
-    )
+    patterns, which = np.unique(present, axis=0, return_inverse=True)
     for index, pattern in enumerate(patterns):
-        matrix = directions[pattern]
-        if len(matrix) < 2 or np.linalg.svd(matrix, compute_uv=False)[-1] < _COLLINEAR:
-            continue
         rows = which.ravel() == index
-        # An inverse, not lstsq on all samples: two rows by thousands of right-hand sides.
-        result[rows] = values[np.ix_(rows, pattern)] @ np.linalg.pinv(matrix).T
+        result[rows] = values[np.ix_(rows, pattern)] @ inverse_directions(tuple(axes[pattern])).T
     return result

@@ -1,0 +1,122 @@
+"""Statistics of one channel's raw readings, gathered block by block."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+_OVERFLOW = 1e30
+_LEVELS = 100
+
+
+@dataclass
+class ChannelStatistics:
+    """Counts over all samples seen so far; feed it with `add`.
+
+    Attributes
+    ----------
+    samples, missing : int
+        Seen, and of these without a value.
+    low, high : float
+        Extreme readings.
+    repeats : int
+        Samples equal to the one before.
+    longest_flat : int
+        Longest stretch of equal readings.
+    flat_start : int
+        Sample at which it begins.
+    blocks : list of ndarray
+        A thinned copy, for the distribution of readings near the extremes.
+    """
+
+    samples: int = 0
+    missing: int = 0
+    low: float = math.inf
+    high: float = -math.inf
+    repeats: int = 0
+    longest_flat: int = 0
+    flat_start: int = 0
+    blocks: list[FloatArray] = field(default_factory=list, repr=False)
+    _last: float = math.nan
+    _flat: int = 0
+
+    def add(self, readings: FloatArray) -> None:
+        """Take the next block, (n,) readings as the file holds them."""
+        if len(readings) == 0:
+            return
+        valid = np.isfinite(readings) & (np.abs(np.nan_to_num(readings)) < _OVERFLOW)
+        self.missing += int(len(readings) - np.count_nonzero(valid))
+        values = readings if valid.all() else readings[valid]
+        if len(values):
+            self.low = min(self.low, float(values.min()))
+            self.high = max(self.high, float(values.max()))
+            self._stretches(readings)
+            self.blocks.append(values if not self.samples else values[:: max(1, len(values) // 10_000)])
+        self.samples += len(readings)
+
+    def _stretches(self, readings: FloatArray) -> None:
+        """Extend the count of equal neighbours; a missing value ends a stretch."""
+        previous = np.concatenate([[self._last], readings[:-1]])
+        same = readings == previous
+        self.repeats += int(np.count_nonzero(same))
+        breaks = np.flatnonzero(~same)
+        starts = np.concatenate([[0], breaks]) if same[0] else breaks
+        ends = np.append(starts[1:], len(readings))
+        lengths = ends - starts
+        if same[0]:
+            lengths[0] += self._flat
+        best = int(np.argmax(lengths))
+        if int(lengths[best]) > self.longest_flat:
+            self.longest_flat = int(lengths[best])
+            self.flat_start = self.samples + int(ends[best]) - self.longest_flat
+        self._flat = int(lengths[-1])
+        self._last = float(readings[-1])
+
+    @property
+    def values(self) -> int:
+        """Samples with a value."""
+        return self.samples - self.missing
+
+    @property
+    def constant(self) -> bool:
+        """Whether all readings are equal."""
+        return self.values > 0 and self.low == self.high
+
+    def expected_flat(self) -> float:
+        """Longest stretch of equal readings that the other samples let one expect.
+
+        Coarse converters repeat readings: with a share p of repeats, the longest stretch among n samples
+        is about log(n) / -log(p).
+        """
+        others = max(self.values - self.longest_flat, 1)
+        share = min(max((self.repeats - self.longest_flat + 1) / others, 1e-6), 1.0 - 1.0 / others)
+        return math.log(max(self.values, 2)) / -math.log(share) if share > 0 else 1.0
+
+    def clipped_share(self) -> float:
+        """Share of samples that sit flat at an extreme reading, 0 where nothing looks clipped.
+
+        Clipping shows as several separate stretches of equal readings right at the highest or lowest
+        level, much more of them than in the level next to it; a sine has about 2.4 times as many in
+        its last level as in the one before.
+        """
+        if self.high <= self.low or not self.blocks:
+            return 0.0
+        readings = np.concatenate(self.blocks)
+        width = (self.high - self.low) / _LEVELS
+        return max(
+            _flat_share(readings, self.high, self.high - width), _flat_share(-readings, -self.low, -self.low - width)
+        )
+
+
+def _flat_share(readings: FloatArray, top: float, below: float) -> float:
+    at_top = readings == top
+    count = int(np.count_nonzero(at_top))
+    near = int(np.count_nonzero(readings >= below)) - count
+    starts = np.flatnonzero(at_top & ~np.concatenate([[False], at_top[:-1]]))
+    if count < 12 or len(starts) < 3 or count < 3 * len(starts) or count < 4 * near:
+        return 0.0
+    return count / len(readings)

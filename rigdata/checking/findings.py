@@ -1,0 +1,83 @@
+"""Findings of the check, those that many runs share told once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from rigdata.problem import Problem, Severity
+from rigdata.run import Run
+
+_LISTED = 4
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A problem of one run, with a key that equal problems of other runs share.
+
+    Attributes
+    ----------
+    problem : Problem
+    key : str
+        E.g. ``"dead X1A"``.
+    """
+
+    problem: Problem
+    key: str
+
+
+@dataclass(frozen=True)
+class Reporter:
+    """Gathers the findings of one run.
+
+    Attributes
+    ----------
+    run : Run
+    found : list of Finding
+    doubts : set of str
+        Quantities that an error of this run makes useless for further conclusions.
+    """
+
+    run: Run
+    found: list[Finding] = field(default_factory=list)
+    doubts: set[str] = field(default_factory=set)
+
+    def say(self, key: str, severity: Severity, place: str, what: str, cure: str) -> None:
+        """Note a finding; `key` is the same for equal findings in other runs."""
+        self.found.append(Finding(Problem(severity, self.run.file, place, what, cure, self.run.id), key))
+
+    def take(self, problems: Sequence[Problem]) -> None:
+        """Note problems that a reader raised."""
+        self.found.extend(Finding(p, f"{p.place} {p.what}") for p in problems)
+
+
+def merge(findings: Sequence[Finding], file: str, runs: int) -> list[Problem]:
+    """Tell a finding once that at least half of `runs` (and three or more) share.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+    file : str
+        Display name of the campaign's manifest or file.
+    runs : int
+        How many runs could have had it.
+
+    Returns
+    -------
+    list of Problem
+        In the order of first appearance.
+    """
+    groups: dict[tuple[str, str], list[Problem]] = {}
+    for finding in findings:
+        groups.setdefault((finding.key, finding.problem.severity), []).append(finding.problem)
+    merged: list[Problem] = []
+    for group in groups.values():
+        concerned = list(dict.fromkeys(p.run for p in group if p.run))
+        if len(concerned) < 3 or 2 * len(concerned) < runs:
+            merged.extend(group)
+            continue
+        first = group[0]
+        listed = ", ".join(concerned[:_LISTED]) + (", ..." if len(concerned) > _LISTED else "")
+        what = f"{first.what}; and so in {len(concerned)} runs ({listed})"
+        merged.append(Problem(first.severity, file, first.place, what, first.cure))
+    return merged

@@ -1,0 +1,197 @@
+"""What one pass over a run's samples leaves for the checks that compare runs."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.calibration import VECTOR_QUANTITIES, Channel
+from rigdata.checking.channel_statistics import ChannelStatistics
+from rigdata.checking.clock import check_clock
+from rigdata.checking.findings import Reporter
+from rigdata.checking.lines import Lines, fit_lines
+from rigdata.checking.signals import check_signal, needed
+from rigdata.problem import Problem, RigDataError
+from rigdata.run import Run
+
+FloatArray = NDArray[np.float64]
+#: Samples read at a time; signs and lines are judged on the first block [samples].
+BLOCK = 2**19
+_FITTED = 2**16
+_DECIMATED = 4000
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One run, seen once.
+
+    Attributes
+    ----------
+    run : Run
+    channels : tuple of Channel
+        Displacement, force and acceleration channels that could be read and live.
+    lines : Lines or None
+        Mean, phasor at the excitation, noise of `channels`, SI.
+    time : (n,) ndarray
+        Of the thinned samples.
+    samples : (n, m) ndarray
+        Thinned to a few thousand, SI, for slow tests.
+    speed : float
+        Mean of the speed channel [rad/s]; NaN where there is none.
+    digest : str
+        Of all displacement and force readings; "" where none could be read.
+    report : Reporter
+        Findings so far.
+    """
+
+    run: Run
+    channels: tuple[Channel, ...]
+    lines: Lines | None = field(repr=False)
+    time: FloatArray = field(repr=False)
+    samples: FloatArray = field(repr=False)
+    speed: float
+    digest: str
+    report: Reporter = field(repr=False)
+
+    def pick(self, quantity: str) -> list[int]:
+        """Places of the channels of `quantity` in `channels`."""
+        return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
+
+
+def observe(run: Run) -> Observation:
+    """Read every channel of `run` once, block by block, and judge each by itself."""
+    report = Reporter(run)
+    try:
+        length = run.length
+        report.take(run.reader.problems())
+    except RigDataError as error:
+        report.take(error.problems)
+        return _blind(run, report)
+    time = _usable_time(report, run, length)
+    statistics, first, digest = _scan(report, run, length)
+    readable = {n: run.channels[n] for n in first}
+    if not readable:
+        return _blind(run, report)
+    live = tuple(c for n, c in readable.items() if c.quantity in VECTOR_QUANTITIES and not _is_dead(statistics[n]))
+    used = np.stack([first[c.name] for c in live], axis=1) if live else np.empty((length, 0))
+    lines = _lines(run, time[:_FITTED], used[:_FITTED]) if time is not None and live else None
+    noise_free = _is_noise_free(run, live, used, lines)
+    if noise_free:
+        report.say("no noise", "note", "", "the readings show no noise", "Nothing, if the data are computed")
+    for name, channel in readable.items():
+        others = [n for n, c in readable.items() if c.quantity == channel.quantity and n != name]
+        alone = all(_is_dead(statistics[n]) for n in others)
+        check_signal(report, channel, statistics[name], noise_free, alone)
+    if time is None or not live:
+        return replace(_blind(run, report), digest=digest, speed=_mean_speed(readable, first))
+    thin = slice(None, None, max(1, len(time) // _DECIMATED))
+    return Observation(
+        run=run,
+        channels=live,
+        lines=lines,
+        time=time[thin],
+        samples=used[thin],
+        speed=_mean_speed(readable, first),
+        digest=digest,
+        report=report,
+    )
+
+
+def _usable_time(report: Reporter, run: Run, length: int) -> FloatArray | None:
+    try:
+        time = run.reader.time(0, min(length, BLOCK))
+        check_clock(report, time)
+    except RigDataError as error:
+        report.take(error.problems)
+        return None
+    return time if len(time) > 2 else None
+
+
+def _scan(
+    report: Reporter, run: Run, length: int
+) -> tuple[dict[str, ChannelStatistics], dict[str, FloatArray], str]:
+    """Read all blocks: statistics per channel, the first block in SI, a digest of the main readings."""
+    channels = {n: c for n, c in run.channels.items() if c.quantity != "time"}
+    statistics = {name: ChannelStatistics() for name in channels}
+    digests = {n: hashlib.sha256() for n, c in channels.items() if c.quantity in {"displacement", "force"}}
+    first: dict[str, FloatArray] = {}
+    for start in range(0, length, BLOCK):
+        blocks = _read_block(report, run, channels, start, min(start + BLOCK, length))
+        channels = {n: channels[n] for n in blocks}
+        for name, block in blocks.items():
+            statistics[name].add(block)
+            if name in digests:
+                digests[name].update(block.tobytes())
+            if start == 0:
+                first[name] = channels[name].to_si(block)
+    first = {n: v for n, v in first.items() if n in channels}
+    whole = "".join(digests[n].hexdigest() for n in first if n in digests)
+    return statistics, first, hashlib.sha256(whole.encode()).hexdigest() if whole else ""
+
+
+def _read_block(
+    report: Reporter, run: Run, channels: Mapping[str, Channel], start: int, stop: int
+) -> dict[str, FloatArray]:
+    """Read one block; a channel that fails is reported, by what the run needs, and left out."""
+    try:
+        return dict(zip(channels, run.reader.read(list(channels), start, stop)))
+    except RigDataError:
+        blocks: dict[str, FloatArray] = {}  # one by one, to tell all that fail
+    for name, channel in channels.items():
+        try:
+            (blocks[name],) = run.reader.read([name], start, stop)
+        except RigDataError as error:
+            report.take(error.problems if needed(run, channel) else [_milder(p) for p in error.problems])
+    return blocks
+
+
+def _blind(run: Run, report: Reporter) -> Observation:
+    return Observation(run, (), None, np.empty(0), np.empty((0, 0)), math.nan, "", report)
+
+
+def _milder(problem: Problem) -> Problem:
+    """A fault of a channel that the run can do without."""
+    return replace(problem, severity="warning" if problem.severity == "error" else problem.severity)
+
+
+def _is_dead(seen: ChannelStatistics) -> bool:
+    return seen.values == 0 or seen.constant
+
+
+def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: Lines | None) -> bool:
+    """Whether noise stays below the converter's steps, as in records computed without noise."""
+    main = [i for i, c in enumerate(live) if c.quantity in {"displacement", "force"}]
+    if not main:
+        return run.kind != "dynamic"
+    for index in main:
+        column = used[:_FITTED, index]
+        column = column[np.isfinite(column)]
+        if len(column) < 10:
+            return False
+        # Away from steady running nothing fits, but noise shows in the bends from sample to sample.
+        bends = np.diff(column, 2) / math.sqrt(6.0)
+        noise = 1.4826 * float(np.median(np.abs(bends)))
+        if lines is not None and run.kind in {"dynamic", "locus"}:
+            noise = float(lines.scatter[index])
+        steps = np.diff(np.unique(column[:4000]))
+        if not noise <= max(0.5 * float(np.min(steps, initial=np.inf)), 1e-7 * float(np.ptp(column))):
+            return False
+    return True
+
+
+def _lines(run: Run, time: FloatArray, values: FloatArray) -> Lines:
+    excitation = run.point.excitation_hz if run.kind == "dynamic" else 0.0
+    speed = run.point.shaft_speed_hz
+    return fit_lines(time, values, [excitation, speed, 2 * speed, 50.0, 2 * excitation])
+
+
+def _mean_speed(channels: Mapping[str, Channel], first: Mapping[str, FloatArray]) -> float:
+    for name, channel in channels.items():
+        if channel.quantity == "speed" and np.isfinite(first[name]).any():
+            return float(np.nanmedian(first[name]))
+    return math.nan

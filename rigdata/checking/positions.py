@@ -1,0 +1,54 @@
+"""Where the probes say the shaft is: the same neighbourhood in every run of a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigdata.checking.observation import Observation
+
+#: No film bearing lets its shaft travel further [m].
+_MAX_TRAVEL = 1e-3
+#: Runs needed before one can be told apart.
+_MIN_RUNS = 8
+#: Distance from the campaign's median, in units of the range of the middle 80 % of the runs.
+_FAR = 3.0
+_MIN_JUMP = 30e-6
+
+
+def check_positions(runs: Sequence[Observation]) -> None:
+    """Mean readings of the probes (gap voltage included) run against run, and their travel."""
+    places: dict[str, list[tuple[Observation, float]]] = {}
+    for seen in runs:
+        for index in seen.pick("displacement"):
+            column = seen.samples[:, index]
+            known = column[np.isfinite(column)]
+            if len(known) < 10:
+                continue
+            name = seen.channels[index].name
+            low, middle, high = np.quantile(known, [0.02, 0.5, 0.98])
+            places.setdefault(name, []).append((seen, float(middle)))
+            if high - low > _MAX_TRAVEL:
+                what = f"the shaft travels {1e3 * (high - low):.2g} mm, more than a film bearing lets it"
+                cure = "Check the sensitivity of the probe, and for loose cables"
+                seen.report.say(f"travel {name}", "warning", f"channel {name}", what, cure)
+    for name, means in places.items():
+        _check_jumps(name, means)
+
+
+def _check_jumps(name: str, means: Sequence[tuple[Observation, float]]) -> None:
+    if len(means) < _MIN_RUNS:
+        return
+    values = np.array([m for _, m in means])
+    low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
+    allowed = max(_FAR * (high - low), _MIN_JUMP)
+    for seen, mean in means:
+        if abs(mean - middle) > allowed:
+            what = (
+                f"reads {1e6 * mean:.0f} um on average, the other runs {1e6 * low:.0f} to {1e6 * high:.0f} um; "
+                "the gap voltage is constant within a campaign"
+            )
+            cure = "Check the probe: moved, wrong sign, wrong sensitivity in this run?"
+            seen.report.say(f"position {name}", "error", f"channel {name}", what, cure)
+            seen.report.doubts.add("displacement")

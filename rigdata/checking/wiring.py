@@ -1,0 +1,75 @@
+"""Which wiring fault of two sensors would explain what they show: swapped, inverted, ten times off."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.calibration import Channel
+from rigdata.vector import solve_vector
+
+FloatArray = NDArray[np.float64]
+_ALIGNED = math.cos(math.radians(8.0))
+
+
+def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    """Every simple mending of two channels' readings, as a matrix on them, with the fault in words.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+        Two.
+    scales : bool
+        Whether to try factors of ten on one channel too.
+    """
+    first, second = (c.name for c in channels)
+    yield f"{first} and {second} were swapped", np.array([[0.0, 1.0], [1.0, 0.0]])
+    yield f"{first} had the wrong sign", np.diag([-1.0, 1.0])
+    yield f"{second} had the wrong sign", np.diag([1.0, -1.0])
+    yield f"{first} and {second} both had the wrong sign", -np.eye(2)
+    if scales:
+        for factor, word in ((0.1, "ten times too large"), (10.0, "ten times too small")):
+            yield f"{first} read {word}", np.diag([factor, 1.0])
+            yield f"{second} read {word}", np.diag([1.0, factor])
+
+
+def guess_wiring(channels: Sequence[Channel], readings: FloatArray, wanted: FloatArray) -> str:
+    """Say which fault would turn the readings into the direction `wanted`; "" where not just one would.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+    readings : (m,) ndarray
+        SI, one per channel.
+    wanted : (2,) ndarray
+        Unit vector.
+    """
+    if len(channels) != 2 or not np.all(np.isfinite(readings)):
+        return ""
+    axes = np.array([c.axis for c in channels])
+    explanations = []
+    for words, matrix in repairs(channels):
+        vector = solve_vector(axes, (matrix @ readings)[None, :])[0]
+        size = float(np.hypot(*vector))
+        if size > 0 and float(vector @ wanted) > _ALIGNED * size:
+            explanations.append(words)
+    # With the load along one cell's axis a wrong sign of the other one changes nothing: simplest first.
+    return f"; as if {explanations[0]}" if explanations and len(explanations) < 3 else ""
+
+
+def name_fault(channels: Sequence[Channel], quality: Callable[[FloatArray], float]) -> str:
+    """Name the fault of two channels whose mending is clearly the best; "" where none is.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+        Two.
+    quality : callable
+        Of the answer after a repair (2, 2) of the readings: 1 is perfect, 0 or less impossible.
+    """
+    tried = sorted(((quality(matrix), words) for words, matrix in repairs(channels)), reverse=True)
+    best, second = tried[0], tried[1]
+    return f"; as if {best[1]}" if best[0] > 0.15 and best[0] > 2 * second[0] else ""
