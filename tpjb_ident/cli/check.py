@@ -27,7 +27,7 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
     with progress(f"reading {campaign.name}"):
         problems = check_campaign(campaign)
     errors = [p for p in problems if p.severity == "error"]
-    summary = _summary(campaign, problems)
+    summary = check_summary(campaign, problems)
     target = out_folder(out, "check")
     with output_folder(target, "check", (campaign,)) as folder:
         write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")
@@ -43,8 +43,8 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
         )
 
 
-def _summary(path: CampaignPath, problems: list) -> dict:
-    """Content of check.json."""
+def check_summary(path: CampaignPath, problems: list) -> dict:
+    """Gather the content of check.json."""
     from rigdata import RigDataError, load_campaign
 
     try:

@@ -144,11 +144,10 @@ def compare_campaign(
     if not campaign.of_kind("dynamic"):
         raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to compare")
     tell = progress or (lambda text, done, total: None)
-    tell("identifying", 0, 1)
     least = min(pad.assembled_clearance for pad in bearing.pads)
     chosen = replace(settings.identify, clearance=settings.identify.clearance or least)
-    identification = identify(campaign, chosen, progress)
-    tell("measuring pivots", 0, 1)
+    identification = identify(campaign, chosen, _labelled(tell, "identifying"))
+    tell("fitting pivot curves, clearance and locus", 0, 1)
     curves, clearance, locus = measure_dry(campaign, bearing, "measured" in settings.variants)
     names, remarks = _possible(settings, curves, bearing)
     if clearance is None:
@@ -161,7 +160,7 @@ def compare_campaign(
     for name in names:
         pivots = measured_laws(curves, len(bearing.pads), campaign.id) if name == "measured" else name
         model = ModelSettings(pivots, settings.thermal, settings.effects)
-        both = predict_points(bearing, [*points, *stations], model, _labelled(tell, f"predicting, {name} pivots"))
+        both = predict_points(bearing, [*points, *stations], model, _labelled(tell, f"predicting with {name} pivots"))
         variants.append(Variant(name, both[: len(points)], both[len(points) :]))
     return Comparison(
         campaign, bearing, settings, identification, curves, clearance, locus, tuple(variants), tuple(remarks)

@@ -128,9 +128,10 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
     if not np.isfinite(off).any():
         return []
     pad = int(np.nanargmax(np.abs(off)))
+    median, worst = signed(1e6 * float(np.nanmedian(off))), signed(1e6 * float(off[pad]))
     return [
-        f"The measured clearance differs from the drawing by {signed(1e6 * float(np.nanmedian(off)))} µm in the median, most at "
-        f"pad #{pad + 1} ({signed(1e6 * off[pad])} µm)."
+        f"The measured clearance differs from the drawing by {worst} µm at pad #{pad + 1}, where it differs most "
+        f"(median of all pads {median} µm)."
     ]
 
 
