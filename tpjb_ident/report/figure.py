@@ -144,12 +144,18 @@ def inline_svg(text: str, name: str, title: str) -> str:
     body = _FONT.sub(lambda m: f"font-style: {m[1] or 'normal'}; font-weight: {m[2] or 'normal'}; "
                      f"font-size: {m[3]}px", body)  # fmt: skip
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.S)
-    for identity in set(_ID.findall(body)):
-        quoted = re.escape(identity)
-        body = re.sub(rf'(id="|href="#|url\(#){quoted}(["\)])', rf"\g<1>{name}-{identity}\g<2>", body)
+    body = prefixed_ids(body, name)
     head, rest = body.split(">", 1)
     head = re.sub(r'\s(width|height)="[^"]*"', "", head)
     return f'{head} role="img" aria-label="{title}">{rest}'
+
+
+def prefixed_ids(svg: str, prefix: str) -> str:
+    """Rename every id and what refers to it, so that several drawings can share one page."""
+    for identity in set(_ID.findall(svg)):
+        quoted = re.escape(identity)
+        svg = re.sub(rf'(id="|href="#|url\(#){quoted}(["\)])', rf"\g<1>{prefix}-{identity}\g<2>", svg)
+    return svg
 
 
 def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:

@@ -52,7 +52,7 @@ def _stiffness(table: pd.DataFrame) -> Panel:
                 linestyle=dashes, linewidth=1.4, label=label,
             )  # fmt: skip
     axes.set_ylim(bottom=0.0)
-    add_legend(axes, columns=4)
+    add_legend(axes, columns=3)
     return Panel("pivot-stiffness", "Pivot tangent stiffness over load, 95 % bands", figure, GROUP)
 
 
@@ -68,7 +68,7 @@ def _steps(curves: Sequence[PivotCurve]) -> Panel:
         load = np.linspace(0.0, curve.valid_to, 60)[1:]
         deflection = curve.deflection(load) + _onset_shift(curve)
         axes.plot(1e6 * deflection, load / 1e3, color=LIGHT[colour], linestyle=dashes, linewidth=1.1)
-    add_legend(axes, columns=4)
+    add_legend(axes, columns=3)
     return Panel("pivot-steps", "Load steps and fitted laws, pivot and housing together", figure, GROUP)
 
 
