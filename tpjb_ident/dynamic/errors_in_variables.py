@@ -17,11 +17,10 @@ from tpjb_ident.dynamic.phasor_table import PhasorTable
 from tpjb_ident.dynamic.robust_constants import trimming_limits, trimming_weight
 from tpjb_ident.dynamic.uncertainty import (
     DirectionMeans,
-    complex_to_real_covariance,
     direction_covariances,
     direction_effect,
     information,
-    mixed_dof,
+    spread_of,
 )
 
 #: Fewer spare repeats than this cannot give a 4x4 complex covariance worth using.
@@ -151,13 +150,13 @@ def eiv_fit(repeats: Repeats) -> EivFit:
     inverse = np.linalg.inv(V)
     fisher = information(D_true, D_true, inverse)
     bread = np.linalg.inv(fisher)
-    covariance = complex_to_real_covariance(bread)
-    # Repeat noise alone, propagated through the same weights, tells how much of it is direction effect.
     small = window_noise / means.count[:, None, None]
     meat = information(D_true, D_true, inverse @ small @ inverse)
-    repeat_only = np.diag(complex_to_real_covariance(bread @ meat @ bread.conj().T))
-    dof = mixed_dof(np.diag(covariance), repeat_only, 2 * repeats.spare, max(2.0 * (len(means) - 2), 1.0))
-    return EivFit(h, covariance, dof, chi_square, D_true)
+    residual = means.F - means.D @ h.T
+    score = np.einsum("gac,gc,gb->gab", inverse, residual, D_true.conj()).reshape(-1, 4)
+    parts = np.einsum("gac,gb,gd->gabcd", inverse, D_true.conj(), D_true).reshape(-1, 4, 4)
+    spread = spread_of(score, parts, bread @ meat @ bread.conj().T, chi_square, 2 * repeats.spare)
+    return EivFit(h, spread.covariance, spread.dof, chi_square, D_true)
 
 
 def _closed_form(means: DirectionMeans, noise: ComplexArray) -> ComplexArray:

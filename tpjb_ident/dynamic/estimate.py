@@ -17,6 +17,7 @@ from tpjb_ident.dynamic.phasor_table import PhasorTable, displacement_condition,
 from tpjb_ident.dynamic.rlm import NORMS, RlmSettings, rlm_fit
 from tpjb_ident.dynamic.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.uncertainty import homoscedastic, with_repeats
+from tpjb_ident.dynamic.whole_directions import readmitted
 
 METHODS = ("ols", "rlm", "mm", "mm-eiv", "iv")
 #: Condition number of the displacement directions beyond which entries cannot be told apart.
@@ -155,7 +156,7 @@ def _mm(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
 
 def _mm_eiv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
     start = mm_fit(table.D, table.F, table.direction)
-    repeated = repeats(table, start.weights)
+    repeated = repeats(table, readmitted(table, start.weights))
     if repeated is None:
         plain = _mm(table, omega, name)
         missing = Condition(

@@ -15,26 +15,15 @@ from scipy.stats import chi, chi2
 from tpjb_ident.dynamic.arrays import FloatArray
 
 
-def bisquare_rho(u: FloatArray, c: float) -> FloatArray:
-    """Tukey's rho scaled to a maximum of one."""
-    v = np.minimum((u / c) ** 2, 1.0)
-    return np.asarray(1 - (1 - v) ** 3)
-
-
 def bisquare_weight(u: FloatArray, c: float) -> FloatArray:
     """Tukey's weight psi(u) / u."""
     return np.asarray(np.maximum(1 - (u / c) ** 2, 0.0) ** 2)
 
 
-@functools.cache
-def breakdown_constant(dimension: int, breakdown: float = 0.5) -> float:
-    """Constant c with E[rho_c(u)] = breakdown, u of chi with `dimension` degrees of freedom."""
-
-    def excess(c: float) -> float:
-        inside = integrate.quad(lambda u: bisquare_rho(u, c) * chi.pdf(u, dimension), 0, c)[0]
-        return float(inside + chi.sf(c, dimension) - breakdown)
-
-    return float(optimize.brentq(excess, 0.3, 20.0))
+def half_shrinkage(dimension: int, share: float) -> float:
+    """Variance of the innermost `share` of a chi(dimension) population, relative to all of it."""
+    limit = chi2.ppf(share, dimension)
+    return float(chi2.cdf(limit, dimension + 2) / share)
 
 
 @functools.cache

@@ -11,9 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.phasor_table import PhasorTable
+
+#: Significance from which direction effects take part in weighting the directions.
+CLEAR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,7 @@ def direction_effect(residual: ComplexArray, means: DirectionMeans, noise: Compl
     Returns
     -------
     T : (2, 2) complex ndarray
+        Zero unless the chi-square is beyond doubt (weights fitted to noise cost efficiency).
         The residual of direction g has covariance noise / count_g + T |D_g|^2.
     chi_square : float
         Reduced chi-square of the residuals against repeat noise alone; NaN without spare directions.
@@ -102,6 +107,8 @@ def direction_effect(residual: ComplexArray, means: DirectionMeans, noise: Compl
     inverse_root = np.linalg.inv(root)
     white = inverse_root @ moment @ inverse_root.conj().T
     chi_square = float(np.trace(white).real / (2 * (g - 2)))
+    if chi_square * 4 * (g - 2) < chi2.isf(CLEAR, 4 * (g - 2)):
+        return np.zeros((2, 2), dtype=complex), chi_square
     values, vectors = np.linalg.eigh(white - (g - 2) * np.eye(2))
     T_white = (vectors * np.maximum(values, 0.0)) @ vectors.conj().T / gain
     return root @ T_white @ root.conj().T, chi_square
@@ -113,18 +120,79 @@ def direction_covariances(means: DirectionMeans, noise: ComplexArray, T: Complex
     return noise / means.count[:, None, None] + T * power[:, None, None]
 
 
-def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_between: float) -> FloatArray:
+@dataclass(frozen=True)
+class Spread:
+    """Covariance of H, told apart by where it comes from.
+
+    Attributes
+    ----------
+    covariance : (8, 8) ndarray
+    dof : (8,) ndarray
+    """
+
+    covariance: FloatArray
+    dof: FloatArray
+
+
+def spread_of(
+    score: ComplexArray,
+    parts: ComplexArray,
+    repeat: ComplexArray,
+    chi_square: float,
+    dof_repeat: float,
+) -> Spread:
+    """Repeat noise as known, plus what leaving out one direction at a time shows beyond it.
+
+    A direction effect is no circular noise: a static load that is off changes K and hardly C, one entry
+    more than another. So its share is not modelled but taken from the directions themselves
+    (delete-one jackknife, i.e. cluster-robust with its small-sample correction), as far as the
+    chi-square of the direction means says that there is any.
+
+    Parameters
+    ----------
+    score : (g, 4) complex ndarray
+        Contribution of every direction to the estimating equations of h.
+    parts : (g, 4, 4) complex ndarray
+        Contribution of every direction to the matrix of those equations.
+    repeat : (4, 4) complex ndarray
+        E[e e^H] of h from repeat noise alone.
+    chi_square : float
+        Reduced chi-square of the direction means against repeat noise.
+    dof_repeat : float
+    """
+    known = complex_to_real_covariance(repeat)
+    g = len(score)
+    spare = 4.0 * (g - 2)
+    if g <= 2 or not chi_square > 1.0:
+        return Spread(known, np.full(8, max(dof_repeat, 1.0)))
+    moved = np.linalg.solve(parts.sum(axis=0) - parts, score[:, :, None])[:, :, 0]
+    moved = np.concatenate([moved.real, moved.imag], axis=1)
+    jackknife = (g - 1) / g * moved.T @ moved
+    # Beyond repeat noise, in coordinates where that is the unit matrix; never negative.
+    root = np.linalg.cholesky(known)
+    white = np.linalg.solve(root, np.linalg.solve(root, jackknife).T)
+    values, vectors = np.linalg.eigh(0.5 * (white + white.T))
+    certain = min(1.0, (chi_square - 1.0) / (chi2.ppf(0.95, spare) / spare - 1.0))
+    extra = root @ (vectors * (certain * np.maximum(values - 1.0, 0.0))) @ vectors.T @ root.T
+    total = known + extra
+    effective = np.maximum((moved**2).sum(axis=0) ** 2 / (moved**4).sum(axis=0) - 1.0, 1.0)
+    dof = mixed_dof(np.diag(total), np.diag(known), dof_repeat, np.maximum(effective, 0.5 * (g - 1)))
+    return Spread(0.5 * (total + total.T), dof)
+
+
+def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_between: FloatArray) -> FloatArray:
     """Welch-Satterthwaite degrees of freedom of variances made of two parts.
 
     Parameters
     ----------
     total, repeat : (8,) ndarray
         Whole variance, and what repeat noise alone would give.
-    dof_repeat, dof_between : float
+    dof_repeat : float
+    dof_between : (8,) ndarray
         Degrees of freedom behind either part.
     """
     between = np.maximum(total - repeat, 0.0)
-    spread = repeat**2 / max(dof_repeat, 1.0) + between**2 / max(dof_between, 1.0)
+    spread = repeat**2 / max(dof_repeat, 1.0) + between**2 / dof_between
     with np.errstate(divide="ignore", invalid="ignore"):
         dof = total**2 / spread
     return np.where(np.isfinite(dof), np.maximum(dof, 1.0), max(dof_repeat, 1.0))
@@ -186,19 +254,20 @@ def with_repeats(
     if spare < 4.0 or np.linalg.eigvalsh(noise)[0] <= 0:
         return None
     means = DirectionMeans(mean[kept, :2], mean[kept, 2:4], count[kept])
-    T, chi_square = direction_effect(mean[kept, 4:], means, noise)
-    V = direction_covariances(means, correction * noise, T)
-    identity = np.broadcast_to(np.eye(2, dtype=complex), (len(means), 2, 2))
-    bread = np.linalg.inv(
-        information(
-            table.D * np.sqrt(weights)[:, None],
-            table.D * np.sqrt(weights)[:, None],
-            np.broadcast_to(np.eye(2, dtype=complex), (len(table), 2, 2)),
-        )
-    )
+    _, chi_square = direction_effect(mean[kept, 4:], means, noise)
     scaled = means.D * means.count[:, None]
-    covariance = complex_to_real_covariance(bread @ information(scaled, scaled, V) @ bread.conj().T)
-    small = correction * identity @ noise / means.count[:, None, None]
-    repeat_only = np.diag(complex_to_real_covariance(bread @ information(scaled, scaled, small) @ bread.conj().T))
-    dof = mixed_dof(np.diag(covariance), repeat_only, 2 * spare, max(2.0 * (len(means) - 2), 1.0))
-    return covariance, dof, chi_square
+    parts = _regression_parts(table, weights)
+    bread = np.linalg.inv(parts.sum(axis=0))
+    small = correction * noise / means.count[:, None, None]
+    meat = information(scaled, scaled, np.broadcast_to(small, (len(means), 2, 2)))
+    score = np.einsum("ga,gb->gab", mean[kept, 4:] * means.count[:, None], means.D.conj()).reshape(-1, 4)
+    spread = spread_of(score, parts[kept], bread @ meat @ bread.conj().T, chi_square, 2 * spare)
+    return spread.covariance, spread.dof, chi_square
+
+
+def _regression_parts(table: PhasorTable, weights: FloatArray) -> ComplexArray:
+    """Normal matrix of a weighted regression, direction by direction, shape (g, 4, 4)."""
+    gram = np.zeros((table.n_directions, 2, 2), dtype=complex)
+    products = weights[:, None, None] * table.D[:, :, None].conj() * table.D[:, None, :]
+    np.add.at(gram, table.direction, products)
+    return np.asarray(np.kron(np.eye(2), gram))
