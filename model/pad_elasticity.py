@@ -91,17 +91,15 @@ class ElasticSector:
         Fixed rows and columns are replaced by those of the unit matrix.
         """
         theta = self.mesh.theta
-        section = self._sections()
-        arcs = {key: theta.matrix(*key) for key in section}
+        sections = self._sections()
+        section, arcs = np.stack(list(sections.values())), np.stack([theta.matrix(*key) for key in sections])
         free = ~self.fixed.reshape(theta.n_nodes, -1)
         for i in range(theta.n_nodes):
             row = {}
             for j in range(max(0, i - theta.degree), i + 1):
-                weights = {key: arc[i, j] for key, arc in arcs.items()}
-                if any(weights.values()):
-                    block = np.zeros_like(section[0, 0])
-                    for key, weight in weights.items():
-                        block += weight * section[key]
+                weights = arcs[:, i, j]
+                if weights.any():
+                    block = np.tensordot(weights, section, 1)
                     block[~free[i]] = 0.0
                     block[:, ~free[j]] = 0.0
                     row[j] = block
@@ -161,7 +159,7 @@ class ElasticSector:
             load = np.tensordot(mesh.z.matrix(term.z, 0), load, (1, 2))  # (z, theta, r, columns)
             out[:, term.component] += load.transpose(1, 2, 0, 3)
         out[self.fixed] = 0.0
-        return out.reshape(n_theta, -1, n_columns)
+        return out.reshape(n_theta, 3 * n_r * n_z, n_columns)
 
     def surface_response(self, temperature: Array) -> tuple[Array, Array]:
         """Radial displacement of the film face under nodal forces and temperatures.
@@ -205,6 +203,6 @@ class ElasticSector:
             rhs = np.zeros((3, n_r, n_z, n_fields + (i + 1) * n_z))
             rhs[_U, 0, :, -n_z:] = np.eye(n_z)
             rhs[self.fixed[i]] = 0.0
-            rhs = rhs.reshape(3 * n_r * n_z, -1)
+            rhs = rhs.reshape(3 * n_r * n_z, n_fields + (i + 1) * n_z)
             rhs[:, :n_fields] = load
             yield rhs

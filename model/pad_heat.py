@@ -21,62 +21,69 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class HeatSolution:
-    """What a unit temperature rise at each node of the film face does to the half pad.
+    """What temperatures of the film face do to the half pad.
 
     Attributes
     ----------
-    temperature : (n_theta, n_r, n_z, n_surface) ndarray
-        Temperature rise at the nodes [K/K].
-    heat : (n_surface, n_surface) ndarray
-        Heat that enters the pad at the nodes of the film face, weighted by their basis functions [W/K].
+    temperature : (n_theta, n_r, n_z, n_columns) ndarray
+        Temperature rise at the nodes [K], one field for every given one.
+    heat : (n_surface, n_columns) ndarray
+        Heat that enters the pad at the nodes of the film face, weighted by their basis functions [W].
     """
 
     temperature: Array
     heat: Array
 
 
-def conduct(mesh: SectorMesh, convection: float, even: bool = True) -> HeatSolution:
-    """Solve the conduction problem for all nodes of the film face at once.
+def conduct(mesh: SectorMesh, convection: float, face: Array, even: bool = True) -> HeatSolution:
+    """Solve the conduction problem for many temperature fields of the film face at once.
 
     Parameters
     ----------
     mesh : SectorMesh
     convection : float
         Film coefficient on the free faces [W/m^2/K]; zero makes them adiabatic.
+    face : (n_surface, n_columns) ndarray
+        Temperature rises at the nodes of the film face [K].
     even : bool
-        Whether the film temperature is even in z, or odd (then it is zero on the mid-plane).
+        Whether they are even in z, or odd (then they are taken as zero on the mid-plane).
 
     Returns
     -------
     HeatSolution
     """
     theta, n_r, n_z = mesh.theta, mesh.r.n_nodes, mesh.z.n_nodes
-    on_face = np.arange(n_r * n_z) < n_z
-    given = on_face.copy()
+    given = np.arange(n_r * n_z) < n_z
+    prescribed = face.reshape(theta.n_nodes, n_z, -1).copy()
     if not even:
         given[::n_z] = True
-    coupling = np.zeros((theta.n_nodes, n_r * n_z, theta.n_nodes, n_z))
+        prescribed[:, 0] = 0.0
+    known = np.zeros((theta.n_nodes, n_r * n_z, prescribed.shape[2]))
+    known[:, :n_z] = prescribed
+    load = np.zeros_like(known)  # K times the prescribed temperatures
+    to_film: list[BlockRow] = []  # rows of K at the film face
     rows: list[BlockRow] = []
     for i, row in enumerate(_conduction_rows(mesh, convection)):
+        to_film.append({j: block[:n_z].copy() for j, block in row.items()})
         for j, block in row.items():
-            coupling[i, :, j] = block[:, on_face]
-            coupling[j, :, i] = block[on_face].T
+            load[i] += block[:, :n_z] @ prescribed[j]
+            if j != i:  # blocks are symmetric: (j, i) is (i, j)
+                load[j] += block[:, :n_z] @ prescribed[i]
             block[given] = block[:, given] = 0.0
         row[i][given, given] = 1.0
         rows.append(row)
-    n_surface = theta.n_nodes * n_z
-    to_face: Array = coupling.reshape(theta.n_nodes, n_r * n_z, n_surface)
-    rhs = -to_face
+    rhs = -load
     rhs[:, given] = 0.0
-    field = BlockCholesky.factor(rows).solve(rhs)
-    field[:, :n_z] = np.eye(n_surface).reshape(theta.n_nodes, n_z, n_surface)
-    field = field.reshape(theta.n_nodes, n_r, n_z, n_surface)
-    if not even:  # an odd temperature vanishes on the mid-plane: those columns answer to nothing
-        field[:, :, 0] = 0.0
-        field[..., ::n_z] = 0.0
-        to_face[..., ::n_z] = 0.0
-    heat: Array = np.tensordot(to_face, field.reshape(to_face.shape), ((0, 1), (0, 1)))
-    return HeatSolution(field, heat)
+    field = BlockCholesky.factor(rows).solve(rhs) + known
+    heat = np.zeros_like(prescribed)
+    for i, row in enumerate(to_film):
+        for j, block in row.items():
+            heat[i] += block @ field[j]
+            if j != i:
+                heat[j] += block @ field[i]
+    if not even:
+        heat[:, 0] = 0.0
+    return HeatSolution(field.reshape(theta.n_nodes, n_r, n_z, -1), heat.reshape(mesh.n_surface, -1))
 
 
 def _conduction_rows(mesh: SectorMesh, convection: float) -> Iterator[BlockRow]:

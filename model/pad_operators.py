@@ -60,7 +60,7 @@ class PadOperators:
 _RESULTS = ("compliance", "expansion", "flux", "section", "back")
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=12)  # 4 MB each
 def pad_operators(geometry: PadGeometry, density: MeshDensity, even: bool) -> PadOperators:
     """Operators of one pad geometry: from memory, from the cache folder, or by solving (a few seconds).
 
@@ -94,13 +94,12 @@ def _solve(geometry: PadGeometry, density: MeshDensity, even: bool) -> dict[str,
     """Solve conduction, then thermoelasticity; see `PadOperators` for the results."""
     mesh = sector_mesh(geometry, density)
     theta, z = mesh.theta, mesh.z
-    spread = np.kron(Line(theta.breaks, 1).tabulate(theta.nodes), Line(z.breaks, 1).tabulate(z.nodes))
-    solution = conduct(mesh, geometry.back_convection, even)
-    field = solution.temperature @ spread
-    heat = (solution.heat @ spread).reshape(theta.n_nodes, z.n_nodes, -1)
+    spread = np.asarray(np.kron(Line(theta.breaks, 1).tabulate(theta.nodes), Line(z.breaks, 1).tabulate(z.nodes)))
+    solution = conduct(mesh, geometry.back_convection, spread, even)
+    field = solution.temperature
+    heat = solution.heat.reshape(theta.n_nodes, z.n_nodes, -1)
     flux = np.linalg.solve(theta.matrix(0, 0), heat.reshape(theta.n_nodes, -1)).reshape(heat.shape)
     flux = np.linalg.solve(z.matrix(0, 0), flux) / geometry.inner_radius
-    del solution
     body = ElasticSector.held_at(mesh, mesh.held(geometry.face), even)
     compliance, expansion = body.surface_response(field)
     n_temperatures = field.shape[3]

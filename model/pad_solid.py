@@ -248,7 +248,7 @@ def pad_solid(
     return _solid(geometry, density or MeshDensity(), theta.tobytes(), z.tobytes())
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=8)  # a dense matrix of a usual film grid has 3 MB, and there are four
 def _solid(geometry: PadGeometry, density: MeshDensity, theta_bytes: bytes, z_bytes: bytes) -> PadSolid:
     theta, z = (np.frombuffer(raw, dtype=float) for raw in (theta_bytes, z_bytes))
     half = 0.5 * geometry.length

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -199,8 +200,8 @@ class TestHeat:
     def test_heat_in_is_heat_out(self) -> None:
         geometry = PadGeometry.of(PAD, bearing())
         mesh = sector_mesh(geometry, COARSE)
-        solution = conduct(mesh, geometry.back_convection)
-        field = solution.temperature.sum(axis=3)
+        solution = conduct(mesh, geometry.back_convection, np.linspace(5.0, 9.0, mesh.n_surface)[:, None])
+        field = solution.temperature[..., 0]
         r, theta, z = mesh.r, mesh.theta, mesh.z
         whole_r, whole_t, whole_z = (line.matrix(0, 0).sum(axis=0) for line in (r, theta, z))
         weighted_r = r.matrix(0, 0, r.gauss[0]).sum(axis=0)
@@ -216,7 +217,7 @@ class TestHeat:
         )
         mesh = sector_mesh(PadGeometry.of(thin, bearing()), MeshDensity(backing=2))
         middle = mesh.theta.n_nodes // 2
-        rise = conduct(mesh, 2e4).temperature[middle, -1, 0].sum()
+        rise = conduct(mesh, 2e4, np.ones((mesh.n_surface, 1))).temperature[middle, -1, 0, 0]
         inner, outer = mesh.r.breaks[[0, -1]]
         assert rise == pytest.approx(1.0 / (1.0 + 2e4 * outer * math.log(outer / inner) / STEEL.conductivity), rel=1e-3)
 
@@ -225,7 +226,8 @@ class TestHeat:
         rise = 5.0 + body.film_theta[:, None] * np.ones(body.film_z.size)
         total = (body.film_mass @ body.heat_flow(rise).ravel()).sum()
         geometry = body.geometry
-        heat = conduct(sector_mesh(geometry, COARSE), geometry.back_convection).heat
+        mesh = sector_mesh(geometry, COARSE)
+        heat = conduct(mesh, geometry.back_convection, np.ones((mesh.n_surface, 1))).heat
         assert total == pytest.approx(2.0 * heat.sum() * 5.0, rel=1e-9)
         assert body.peak_rise(rise) == rise.max()
         assert body.pad_temperature(rise)[2].max() <= rise.max() * 1.01
@@ -307,6 +309,10 @@ class TestGeometry:
     def test_fields_must_fit_the_grid(self) -> None:
         with pytest.raises(ValueError, match="pressure must have the film grid's shape"):
             solid().bend(np.ones((7, 25)))
+
+    def test_travels_between_processes(self) -> None:
+        copy = pickle.loads(pickle.dumps(solid()))
+        np.testing.assert_array_equal(copy.bend(np.ones((25, 7))), solid().bend(np.ones((25, 7))))
 
     def test_prints_itself(self) -> None:
         text = repr(solid())

@@ -1,0 +1,255 @@
+"""The pad's finite elements against closed solutions: curved beam, bimetal, thick cylinder, and their own limit."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from model.bearing import BABBITT, STEEL, Bearing, Material, load_bearing
+from model.block_cholesky import BlockCholesky, factor_rows
+from model.pad_elasticity import ElasticSector
+from model.pad_line import Line
+from model.pad_mesh import MeshDensity, PivotFace, SectorMesh
+from model.pad_solid import PadSolid, pad_solid
+
+BEARINGS = Path(__file__).parents[2] / "model" / "bearings"
+U_R, U_THETA, U_Z = range(3)
+
+
+@pytest.fixture(autouse=True)
+def _no_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TPJB_CACHE", "off")
+
+
+def strip(
+    radii: tuple[float, ...], arc: float, half_width: float, layers: tuple[Material, ...], n_theta: int = 16
+) -> SectorMesh:
+    """A curved strip from theta = 0 to `arc`, one element per layer and half width."""
+    theta = Line(np.linspace(0.0, arc, n_theta + 1))
+    return SectorMesh(Line(np.array(radii)), theta, Line(np.array([0.0, half_width])), layers)
+
+
+def unfixed(mesh: SectorMesh) -> np.ndarray:
+    fixed = np.zeros((mesh.theta.n_nodes, 3, mesh.r.n_nodes, mesh.z.n_nodes), dtype=bool)
+    fixed[:, U_Z, :, 0] = True  # mid-plane
+    return fixed
+
+
+def pressure_response(body: ElasticSector, pressure: float) -> np.ndarray:
+    """Radial displacement of the film face, (n_theta, n_z), under uniform pressure, by the production path."""
+    mesh = body.mesh
+    none = np.zeros((mesh.theta.n_nodes, mesh.r.n_nodes, mesh.z.n_nodes, 0))
+    compliance, _ = body.surface_response(none)
+    force = np.outer(mesh.theta.matrix(0, 0).sum(axis=1), mesh.z.matrix(0, 0).sum(axis=1))
+    return (compliance @ (pressure * mesh.r.breaks[0] * force).ravel()).reshape(force.shape)
+
+
+def thermal_field(body: ElasticSector, rise: float) -> np.ndarray:
+    """Displacement of all nodes, (n_theta, 3, n_r, n_z), under a uniform temperature rise."""
+    shape = body.fixed.shape
+    load = body.thermal_load(np.full((shape[0], shape[2], shape[3], 1), rise))
+    return BlockCholesky(tuple(factor_rows(body.stiffness_rows()))).solve(load).reshape(shape)
+
+
+class TestCurvedCantilever:
+    """Strip held at theta = 0, uniform pressure p on its inner face (Timoshenko, Strength of Materials II, art. 78).
+
+    Castigliano with bending, stretching and shear about the centroid line, radius R, width b, thickness t, load per
+    radian q = p b R_i:  M = q R (1 - cos s), N = q (1 - cos s), V = q sin s at angle s from the free end; the unit
+    radial force there gives m = R sin s, n = sin s, v = cos s.
+    """
+
+    @staticmethod
+    def by_beam_theory(radius: float, t: float, b: float, arc: float, pressure: float) -> float:
+        e, g = STEEL.youngs_modulus, STEEL.youngs_modulus / 2.6
+        q = pressure * b * (radius - 0.5 * t)
+        area, inertia = b * t, b * t**3 / 12.0
+
+        def work(s: float) -> float:
+            bending = q * radius * (1 - math.cos(s)) * radius * math.sin(s) / (e * inertia)
+            stretching = q * (1 - math.cos(s)) * math.sin(s) / (e * area)
+            shearing = 1.2 * q * math.sin(s) * math.cos(s) / (g * area)
+            return radius * (bending + stretching + shearing)
+
+        return quad(work, 0.0, arc)[0]
+
+    @pytest.mark.parametrize(("slenderness", "tolerance"), [(20, 0.01), (60, 0.005)])
+    def test_tip_displacement(self, slenderness: int, tolerance: float) -> None:
+        radius, arc, pressure = 0.1, math.radians(50.0), 1e5
+        t = radius / slenderness
+        b = 0.5 * t
+        mesh = strip((radius - 0.5 * t, radius + 0.5 * t), arc, 0.5 * b, (STEEL,), 24)
+        body = ElasticSector(mesh, unfixed(mesh))
+        body.fixed[0, U_THETA] = True  # a beam's clamp: no warping hindered, no rotation
+        body.fixed[0, U_R, mesh.r.n_nodes // 2, :] = True
+        tip = pressure_response(body, pressure)[-1, 0]
+        assert tip == pytest.approx(self.by_beam_theory(radius, t, b, arc, pressure), rel=tolerance)
+
+
+class TestThickCylinder:
+    """Sector of a long cylinder under inner pressure, u(r) by Lame in plane strain."""
+
+    INNER, OUTER, PRESSURE = 0.05, 0.066, 1e7
+
+    def error(self, n_r: int) -> float:
+        mesh = SectorMesh(
+            Line(np.linspace(self.INNER, self.OUTER, n_r + 1)),
+            Line(np.linspace(0.0, 0.5, 2)),
+            Line(np.array([0.0, 0.01])),
+            (STEEL,) * n_r,
+        )
+        fixed = unfixed(mesh)
+        fixed[[0, -1], U_THETA] = True
+        fixed[:, U_Z, :, -1] = True
+        got = pressure_response(ElasticSector(mesh, fixed), self.PRESSURE)
+        assert np.ptp(got) < 1e-9 * got.max()
+        return abs(got[0, 0] / self.lame() - 1.0)
+
+    def lame(self) -> float:
+        a2, b2, nu = self.INNER**2, self.OUTER**2, STEEL.poissons_ratio
+        factor = (1.0 + nu) / STEEL.youngs_modulus * self.PRESSURE * a2 / (b2 - a2)
+        return factor * ((1.0 - 2.0 * nu) * self.INNER + b2 / self.INNER)
+
+    def test_one_element_is_close(self) -> None:
+        assert self.error(1) < 1e-3
+
+    def test_fourth_order(self) -> None:
+        """Displacement under its own load is an energy: order 2p = 4 for quadratic elements."""
+        errors = [self.error(n) for n in (1, 2, 4)]
+        orders = [math.log2(errors[i] / errors[i + 1]) for i in range(2)]
+        assert min(orders) > 3.5, orders
+
+    def test_hot_plain_cylinder_grows_like_a_free_one(self) -> None:
+        """Free to slide along z: u_r = alpha T r exactly, whatever the mesh."""
+        mesh = strip((self.INNER, 0.058, self.OUTER), 0.5, 0.01, (STEEL, STEEL), 2)
+        fixed = unfixed(mesh)
+        fixed[[0, -1], U_THETA] = True
+        field = thermal_field(ElasticSector(mesh, fixed), 30.0)
+        np.testing.assert_allclose(field[0, U_R, :, 0], STEEL.thermal_expansion * 30.0 * mesh.r.nodes, rtol=1e-9)
+        np.testing.assert_allclose(field[:, U_Z, :, -1], STEEL.thermal_expansion * 30.0 * 0.01, rtol=1e-9)
+
+
+class TestBimetal:
+    """Free thermal bending of a two-layer strip (Timoshenko, J. Opt. Soc. Am. 11, 1925, 233-255, Eq. 4).
+
+    1/rho = 6 (alpha_2 - alpha_1) T (1 + m)^2 / { h [3 (1 + m)^2 + (1 + m n)(m^2 + 1 / (m n))] },
+    m = a_1 / a_2 (thicknesses), n = E_1 / E_2, h = a_1 + a_2.
+    """
+
+    @staticmethod
+    def curvature(a1: float, one: Material, a2: float, two: Material, rise: float) -> float:
+        m, n, h = a1 / a2, one.youngs_modulus / two.youngs_modulus, a1 + a2
+        mismatch = (two.thermal_expansion - one.thermal_expansion) * rise
+        return 6 * mismatch * (1 + m) ** 2 / (h * (3 * (1 + m) ** 2 + (1 + m * n) * (m**2 + 1 / (m * n))))
+
+    @pytest.mark.parametrize(("lining", "backing"), [(3e-3, 13e-3), (1e-3, 1e-3), (4e-3, 2e-3)])
+    def test_curvature(self, lining: float, backing: float) -> None:
+        """A nearly straight strip (R = 1e4 h); curvature from the middle half, free of end effects."""
+        h, rise = lining + backing, 25.0
+        radius = 1e4 * h
+        arc = 20.0 * h / radius
+        mesh = strip((radius, radius + lining, radius + h), arc, 0.1 * h, (BABBITT, STEEL), 40)
+        fixed = unfixed(mesh)
+        fixed[0, U_THETA] = True  # symmetry plane
+        fixed[0, U_R, -1, :] = True
+        u = thermal_field(ElasticSector(mesh, fixed), rise)[:, U_R, -1, 0]
+        middle = (mesh.theta.nodes < 0.5 * arc) & (mesh.theta.nodes > 0.05 * arc)
+        along = radius * mesh.theta.nodes[middle]
+        got = 2.0 * np.polyfit(along, u[middle], 2)[0]
+        # the babbitt, inside, expands more: the strip opens, its ends move outward
+        assert got == pytest.approx(-self.curvature(lining, BABBITT, backing, STEEL, rise), rel=0.005)
+
+    def test_curved_pad_bends_by_the_same_curvature(self) -> None:
+        """A thin curved strip changes its curvature by as much: u'' + u = R^2 kappa + R eps along the arc."""
+        lining, backing, radius, arc = 0.3e-3, 0.7e-3, 0.05, math.radians(60.0)
+        mesh = strip((radius, radius + lining, radius + 1e-3), arc, 0.1e-3, (BABBITT, STEEL), 60)
+        fixed = unfixed(mesh)
+        fixed[0, U_THETA] = True
+        fixed[0, U_R, -1, :] = True
+        u = thermal_field(ElasticSector(mesh, fixed), 25.0)[:, U_R, -1, 0]
+        theta = mesh.theta.nodes
+        inside = (theta > 0.05 * arc) & (theta < 0.9 * arc)
+        basis = np.stack([np.ones_like(theta), np.cos(theta)], axis=1)[inside]
+        constant, _ = np.linalg.lstsq(basis, u[inside], rcond=None)[0]
+        # u = R^2 kappa + R eps + c cos(theta); eps = hoop strain of the back, from the exact two-layer ring
+        kappa = -self.curvature(lining, BABBITT, backing, STEEL, 25.0)
+        growth = self.back_strain(lining, backing, 25.0)
+        outer = radius + 1e-3
+        assert constant == pytest.approx(outer**2 * kappa + outer * growth, rel=0.02)
+
+    @staticmethod
+    def back_strain(lining: float, backing: float, rise: float) -> float:
+        """Strain of the outer fibre of a free two-layer strip, by force and moment balance."""
+        edges = np.array([0.0, lining, lining + backing])
+        e = np.array([BABBITT.youngs_modulus, STEEL.youngs_modulus])
+        alpha = np.array([BABBITT.thermal_expansion, STEEL.thermal_expansion]) * rise
+        first, second, third = (np.diff(edges**k) / k for k in (1, 2, 3))
+        left = np.array([[e @ first, e @ second], [e @ second, e @ third]])
+        strain, slope = np.linalg.solve(left, [(e * alpha) @ first, (e * alpha) @ second])
+        return strain + slope * edges[-1]
+
+
+def paper_pad(name: str, n_theta: int = 49, n_z: int = 9, **keywords: object) -> tuple[PadSolid, Bearing]:
+    bearing = load_bearing(BEARINGS / f"{name}.toml")
+    pad = bearing.pads[0]
+    theta = pad.leading_edge + pad.arc * np.linspace(0.0, 1.0, n_theta)
+    z = 0.5 * bearing.length * np.linspace(0.0, 1.0, n_z)
+    return pad_solid(pad, bearing, theta, z, **keywords), bearing  # type: ignore[arg-type]
+
+
+def loaded(solid: PadSolid, force: float) -> np.ndarray:
+    """Pressure: half a sine along the arc, a parabola along z, of this resultant towards the pivot."""
+    s = (solid.film_theta - solid.film_theta[0]) / np.ptp(solid.film_theta)
+    z = solid.film_z / solid.film_z[-1]
+    shape = np.sin(np.pi * s)[:, None] * (1.0 - z**2)
+    arm = np.cos(solid.film_theta)[:, None] * np.ones(z.size)
+    return force / (2.0 * arm.ravel() @ solid.film_mass @ shape.ravel()) * shape
+
+
+@pytest.mark.slow
+def test_pad_of_the_paper_deforms_by_microns() -> None:
+    """Fig. 2: the loaded pad of the rocker bearing at 5 kN opens by a few um towards its edges."""
+    solid, _ = paper_pad("rocker")
+    bend = solid.bend(loaded(solid, 4565.0))
+    assert 1e-6 < bend.max() < 4e-6
+    assert bend.min() > 0.0
+    assert bend[0, 0] > 3.0 * bend[24, 0]
+    rise = 5.0 + 10.0 * (solid.film_theta - solid.film_theta[0])[:, None] * np.ones(9) / np.ptp(solid.film_theta)
+    grow = solid.expand(rise)
+    assert 2e-6 < np.ptp(grow) < 10e-6
+    assert grow[24, 0] < 0.0 < grow[0, -1]
+
+
+@pytest.mark.slow
+def test_default_mesh_is_within_one_percent() -> None:
+    """Against a mesh of nearly twice the unknowns, elements at the rim of the pivot face half the size.
+
+    The spherical bearing's pad is the worse of the two, its face having the longer rim.
+    """
+    name = "spherical"
+    fine = MeshDensity(arc=16, face=4, half_length=8, backing=6, rim=0.018, edge=0.14)
+    (default, _), (better, _) = paper_pad(name), paper_pad(name, density=fine)
+    pressure, rise = loaded(default, 4500.0), np.full((49, 9), 10.0)
+    for got, reference in (
+        (default.bend(pressure), better.bend(pressure)),
+        (default.expand(rise), better.expand(rise)),
+    ):
+        difference = got - reference
+        assert np.sqrt(np.mean(difference**2)) < 0.008 * np.sqrt(np.mean(reference**2))
+        assert np.abs(difference).max() < 0.02 * np.abs(reference).max()  # the largest sits in the free corners
+
+
+def test_converges_from_below() -> None:
+    """Displacement elements are too stiff, and nested ones ever less so: energy grows, by ever smaller steps."""
+    energies = []
+    for factor in (1, 2, 3):
+        n = MeshDensity(arc=2 * factor, face=factor, half_length=3, backing=factor, rim=10.0, edge=10.0)
+        solid, _ = paper_pad("rocker", density=n, face=PivotFace(0.02, 69.6e-3))
+        pressure = loaded(solid, 4500.0)
+        energies.append(float(pressure.ravel() @ solid.film_mass @ solid.bend(pressure).ravel()))
+    assert energies[0] < energies[1] < energies[2]
+    assert energies[2] - energies[1] < energies[1] - energies[0]
