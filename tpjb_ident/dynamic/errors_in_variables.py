@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.drive_phase import aligned
 from tpjb_ident.dynamic.phasor_table import PhasorTable
 from tpjb_ident.dynamic.robust_constants import trimming_limits, trimming_weight
 from tpjb_ident.dynamic.uncertainty import (
@@ -40,12 +41,15 @@ class Repeats:
         Effective windows beyond one per direction.
     weights : (n,) ndarray
         Final window weights.
+    wandering : int
+        Directions whose drive phase is not locked; their windows were turned to one phase.
     """
 
     means: DirectionMeans
     noise: ComplexArray
     spare: float
     weights: FloatArray
+    wandering: int = 0
 
 
 @dataclass(frozen=True)
@@ -58,15 +62,15 @@ class EivFit:
     covariance : (8, 8) ndarray
     dof : (8,) ndarray
     chi_square : float
-    D_true : (g, 2) complex ndarray
-        Estimated noise-free displacement of every direction.
+    attenuation : (2,) ndarray
+        Share that a regression of single windows would lose, weaker displacement direction first.
     """
 
     h: ComplexArray
     covariance: FloatArray
     dof: FloatArray
     chi_square: float
-    D_true: ComplexArray
+    attenuation: FloatArray
 
 
 def repeats(table: PhasorTable, weights: FloatArray, rounds: int = 2) -> Repeats | None:
@@ -86,8 +90,8 @@ def repeats(table: PhasorTable, weights: FloatArray, rounds: int = 2) -> Repeats
     Repeats or None
         None when the good repeats are too few for a noise covariance.
     """
-    z = np.concatenate([table.D, table.F], axis=1)
     good = (weights > 0.2).astype(float)
+    z, wandering = aligned(np.concatenate([table.D, table.F], axis=1), table.direction, good)
     state = _pooled(z, table, good, 1.0)
     lower, upper, shrinkage = trimming_limits(8)
     for _ in range(rounds):
@@ -107,7 +111,7 @@ def repeats(table: PhasorTable, weights: FloatArray, rounds: int = 2) -> Repeats
     mean, noise, spare = state
     count = np.bincount(table.direction, weights=good, minlength=len(mean)).astype(float)
     kept = count >= 0.5
-    return Repeats(DirectionMeans(mean[kept, :2], mean[kept, 2:], count[kept]), noise, spare, good)
+    return Repeats(DirectionMeans(mean[kept, :2], mean[kept, 2:], count[kept]), noise, spare, good, wandering)
 
 
 def _pooled(
@@ -156,7 +160,14 @@ def eiv_fit(repeats: Repeats) -> EivFit:
     score = np.einsum("gac,gc,gb->gab", inverse, residual, D_true.conj()).reshape(-1, 4)
     parts = np.einsum("gac,gb,gd->gabcd", inverse, D_true.conj(), D_true).reshape(-1, 4, 4)
     spread = spread_of(score, parts, bread @ meat @ bread.conj().T, chi_square, 2 * repeats.spare)
-    return EivFit(h, spread.covariance, spread.dof, chi_square, D_true)
+    return EivFit(h, spread.covariance, spread.dof, chi_square, _attenuation(means, noise))
+
+
+def _attenuation(means: DirectionMeans, noise: ComplexArray) -> FloatArray:
+    """Noise power over total power of the displacements along their principal directions."""
+    signal = (means.count[:, None] * means.D).T @ means.D.conj() / means.count.sum()
+    total = signal + noise[:2, :2] * (1 - len(means) / means.count.sum())
+    return np.sort(np.linalg.eigvals(np.linalg.solve(total, noise[:2, :2])).real)[::-1]
 
 
 def _closed_form(means: DirectionMeans, noise: ComplexArray) -> ComplexArray:

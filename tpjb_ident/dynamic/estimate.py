@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -165,8 +166,18 @@ def _mm_eiv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
         )
         return _with_status(plain, (missing,))
     fit = eiv_fit(repeated)
+    conditions = start.conditions
+    if repeated.wandering:
+        conditions += (
+            Condition(
+                "drive-not-locked",
+                f"drive phase wanders in {repeated.wandering} of {table.n_directions} directions; "
+                "their windows were turned to one phase",
+            ),
+        )
     numbers = (fit.h, fit.covariance, fit.dof, fit.chi_square)
-    return _result(table, omega, name, numbers, repeated.weights, start.conditions)
+    result = _result(table, omega, name, numbers, repeated.weights, conditions)
+    return replace(result, attenuation=fit.attenuation)
 
 
 def _iv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
@@ -188,8 +199,6 @@ def _regression(table: PhasorTable, h: ComplexArray, weights: FloatArray, correc
 
 
 def _with_status(result: DynamicStiffness, extra: tuple[Condition, ...]) -> DynamicStiffness:
-    from dataclasses import replace
-
     return replace(result, status=merged(result.status, extra))
 
 

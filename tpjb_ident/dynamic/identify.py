@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tpjb_ident.dynamic.amplitude import amplitude_slope
 from tpjb_ident.dynamic.arrays import FloatArray
 from tpjb_ident.dynamic.calibration_uncertainty import GainDraws, apparent_change, gain_draws
 from tpjb_ident.dynamic.conditions import Condition, merged
@@ -180,12 +181,14 @@ def identify_point(
     weights = best.weights.min(axis=1)
     figure = coherence(data.D, data.F, best.h, weights)
     size = amplitude(data, weights)
+    linearity = amplitude_slope(data, best.h, weights)
     pattern = directional_pattern(data, weights)
     conditions = merged(
         *(run.conditions for run in data.runs),
         best.status,
         flags(best, figure, size, settings.clearance),
         () if pattern is None else (pattern,),
+        () if linearity is None else linearity.condition(),
         disagreement(by_method, settings.method),
     )
     loads, positions = data.mean_loads, data.mean_positions
@@ -205,6 +208,7 @@ def identify_point(
         conditions,
         rejected_windows(data, best.h, weights),
         tuple(run.run for run in data.runs),
+        linearity=linearity,
     )
 
 

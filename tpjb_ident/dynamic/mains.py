@@ -196,6 +196,25 @@ class _Problem:
         r = (self.F - (self.D - self.vectors(x)) @ self.h(x).T) / self.sigma[:, None]
         return np.sqrt(2.0) * np.concatenate([r.real.ravel(), r.imag.ravel()])
 
+    def jacobian(self, x: FloatArray) -> FloatArray:
+        """D residual / d x, shape (4 g, 8 + g m)."""
+        g, m = len(self.D), len(self.pickup.size)
+        h, clean = self.h(x), self.D - self.vectors(x)
+        slope = np.zeros((g, 2, 8 + g * m), dtype=complex)
+        for a in range(2):
+            for b in range(2):
+                column = -self.scale * clean[:, b] / self.sigma
+                slope[:, a, 2 * a + b] = column
+                slope[:, a, 4 + 2 * a + b] = 1j * column
+        angle = x[8:].reshape(g, m)
+        turn = 1j * self.pickup.size * np.exp(1j * angle)
+        push = h @ np.linalg.pinv(self.pickup.directions)
+        for k in range(m):
+            rows = np.arange(g)
+            slope[rows, :, 8 + rows * m + k] = turn[:, k, None] * push[:, k] / self.sigma[:, None]
+        flat = slope.reshape(2 * g, -1)
+        return np.sqrt(2.0) * np.concatenate([flat.real, flat.imag])
+
     def start(self, h: ComplexArray) -> FloatArray:
         """Unknowns for a given H: the angles are those of what H leaves of the displacements."""
         left = self.D - np.linalg.solve(h, self.F.T).T
@@ -214,7 +233,7 @@ class _Problem:
         for i in range(_STARTS):
             wobble = rng.standard_normal((2, 2)) + 1j * rng.standard_normal((2, 2))
             guess = h if i == 0 else h * (1 + 0.5 * spread * wobble)
-            fit = least_squares(self.residual, self.start(guess), method="lm", max_nfev=4000)
+            fit = least_squares(self.residual, self.start(guess), self.jacobian, method="lm", max_nfev=400)
             if fit.status > 0 and not any(np.abs(fit.x[:8] - x[:8]).max() < 1e-5 for _, x, _ in found):
                 found.append((2.0 * float(fit.cost), fit.x, fit.jac))
         return sorted(found, key=lambda minimum: minimum[0])

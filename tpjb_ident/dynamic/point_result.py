@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from rigdata.operating_point import OperatingPoint
+from tpjb_ident.dynamic.amplitude import AmplitudeSlope
 from tpjb_ident.dynamic.arrays import FloatArray
 from tpjb_ident.dynamic.conditions import Condition
 from tpjb_ident.dynamic.static_load import LoadMiss
@@ -64,6 +65,8 @@ class PointResult:
     runs : tuple of str
     load_miss : LoadMiss or None
         How far each run's static load was off.
+    linearity : AmplitudeSlope or None
+        Change of h with amplitude, where directions were run at several.
     """
 
     point: OperatingPoint
@@ -82,6 +85,7 @@ class PointResult:
     rejected: tuple[WindowVerdict, ...] = field(repr=False)
     runs: tuple[str, ...] = field(repr=False)
     load_miss: LoadMiss | None = field(default=None, repr=False)
+    linearity: AmplitudeSlope | None = field(default=None, repr=False)
 
     @property
     def condition_number(self) -> float:
