@@ -74,7 +74,7 @@ def fit_pivots(
     """
     chosen = settings or PivotSettings()
     records, problems = _read(campaign, np.asarray(pivot_angles, dtype=float), chosen)
-    problems += check_placement(records, pivot_angles)
+    problems += check_placement(records)
     refused = {problem.run for problem in problems}
     noise = noise_within_holds(records, chosen.drift_rate) if records else NoiseModel(1.0, 1.0, 1.0)
     pads: dict[int, list[tuple[DryRecord, tuple[Direction, Direction]]]] = {}

@@ -13,6 +13,9 @@ from tpjb_ident.pivot.noise import NoiseModel
 from tpjb_ident.pivot.projection import Direction, displacement_direction, load_direction
 from tpjb_ident.pivot.settings import PivotSettings
 
+ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
+ASIDE_SPREAD = 5.0  # robust standard deviations of the campaign's own runs, where they stand less orderly than that
+ALONG = 0.5  # of the clearance: pads may differ, but not by this much
 CURE = "Check the run's pad number, the channels' axes, polarities and order, and the pad angles of the bearing file"
 
 
@@ -57,7 +60,7 @@ def _elsewhere(record: DryRecord, quantity: str, direction: Direction, limit: fl
     return refusal(record.run, f"{quantity} channels", what, CURE)
 
 
-def check_placement(records: Sequence[DryRecord], pad_angles: Sequence[float]) -> list[Problem]:
+def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
     """Where the shaft stood in each run: an absolute check that directions alone cannot make.
 
     Exchanging two probes mirrors the plane. Along the mirror axis a mirrored movement looks right, but the
@@ -69,8 +72,6 @@ def check_placement(records: Sequence[DryRecord], pad_angles: Sequence[float]) -
     ----------
     records : sequence of DryRecord
         One campaign; at least three pads, otherwise nothing can be said.
-    pad_angles : sequence of float
-        Directions of all pads [rad].
 
     Returns
     -------
@@ -82,12 +83,13 @@ def check_placement(records: Sequence[DryRecord], pad_angles: Sequence[float]) -
     starts = np.array([record.blocks.displacement[int(np.argmin(record.projection.load))] for record in records])
     outward = np.array([[math.cos(r.angle), math.sin(r.angle)] for r in records])
     centre, reach = _centre(starts, outward)
-    half_width = reach * math.tan(math.pi / len(pad_angles))
+    tangent = np.column_stack([-outward[:, 1], outward[:, 0]])
+    asides = np.sum((starts - centre) * tangent, axis=1)
+    limit = max(ASIDE * reach, ASIDE_SPREAD * 1.4826 * float(np.median(np.abs(asides))))
     problems = []
-    for record, start, normal in zip(records, starts, outward, strict=True):
+    for record, start, normal, aside in zip(records, starts, outward, asides, strict=True):
         along = float((start - centre) @ normal)
-        aside = float((start - centre) @ np.array([-normal[1], normal[0]]))
-        if abs(aside) > 0.6 * half_width or abs(along - reach) > 0.5 * reach:
+        if abs(aside) > limit or abs(along - reach) > ALONG * reach:
             what = (
                 f"run {record.run.id}: the shaft stands {1e6 * along:.0f} um toward pad {record.pad} and "
                 f"{1e6 * aside:+.0f} um beside it, while the other dry runs of this campaign say "
