@@ -37,6 +37,8 @@ class FrequencyFit:
     n_frequencies : int
     omega_range : tuple of float
         Lowest and highest frequency [rad/s]; outside it the fit is extrapolation.
+    misfit : float
+        Largest ||h_model - h|| / ||h|| over the frequencies: what using the model costs.
     """
 
     model: str
@@ -48,6 +50,7 @@ class FrequencyFit:
     dof: int
     n_frequencies: int
     omega_range: tuple[float, float]
+    misfit: float
 
     @property
     def probability(self) -> float:
@@ -107,6 +110,8 @@ def fit_over_frequency(estimates: list[DynamicStiffness], model: str) -> Frequen
     scale = size * np.repeat([1.0, 1 / middle, 1 / middle**2][: len(x) // 4], 4)
     parameters = (x * scale).reshape(-1, 2, 2)
     mass = parameters[2] if model == "K-C-M" else np.zeros((2, 2))
+    modelled = [parameters[0] - e.omega**2 * mass + 1j * e.omega * parameters[1] for e in usable]
+    misfit = max(float(np.linalg.norm(m - e.h) / np.linalg.norm(e.h)) for m, e in zip(modelled, usable))
     return FrequencyFit(
         model,
         parameters[0],
@@ -117,6 +122,7 @@ def fit_over_frequency(estimates: list[DynamicStiffness], model: str) -> Frequen
         8 * len(usable) - len(x),
         len(usable),
         (float(omegas.min()), float(omegas.max())),
+        misfit,
     )
 
 

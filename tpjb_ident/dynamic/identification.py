@@ -9,6 +9,7 @@ import numpy as np
 
 from tpjb_ident.dynamic.arrays import FloatArray
 from tpjb_ident.dynamic.conditions import Condition
+from tpjb_ident.dynamic.frequency_fit import FrequencyFit, LoadFits, fits_per_load
 from tpjb_ident.dynamic.point_result import PointResult
 from tpjb_ident.dynamic.stiffness import ENTRIES, DynamicStiffness
 
@@ -70,6 +71,16 @@ class Identification:
         ]
         return pd.DataFrame(rows, columns=columns)
 
+    def frequency_fits(self) -> list[LoadFits]:
+        """K-C and K-C-M over the excitation frequencies, for every load that was run at several."""
+        return fits_per_load(self.points)
+
+    def frequency_frame(self) -> pd.DataFrame:
+        """One row per load and model: ``frequency_fits.csv``."""
+        import pandas as pd
+
+        return pd.DataFrame([_fit_row(group, fit) for group in self.frequency_fits() for fit in group.fits.values()])
+
 
 _POINT_COLUMNS = ("static_load_N", "static_load_direction_deg", "shaft_speed_Hz", "excitation_Hz")
 
@@ -102,12 +113,37 @@ def _row(p: PointResult, est: DynamicStiffness) -> dict[str, Any]:
         coherence=p.coherence,
         amplitude_m=p.amplitude,
         chi_square=est.chi_square,
+        attenuation=float(est.attenuation[0]),
         x_m=p.position[0],
         y_m=p.position[1],
         x_m_se=p.position_se[0],
         y_m_se=p.position_se[1],
     )
     row.update({f"temperature_{pad}_K": value for pad, value in p.temperatures.items()})
+    return row
+
+
+def _fit_row(group: LoadFits, fit: FrequencyFit) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        name: value for name, value in _point_columns(group.points[0]).items() if name != "excitation_Hz"
+    }
+    row.update(
+        model=fit.model,
+        supported=group.supported,
+        n_frequencies=fit.n_frequencies,
+        excitation_lowest_Hz=fit.omega_range[0] / (2 * np.pi),
+        excitation_highest_Hz=fit.omega_range[1] / (2 * np.pi),
+        chi_square=fit.chi_square,
+        dof=fit.dof,
+        probability=fit.probability,
+        largest_misfit=fit.misfit,
+    )
+    errors = np.concatenate([fit.standard_error, np.zeros(12 - len(fit.standard_error))])
+    values = np.concatenate([fit.K.ravel(), fit.C.ravel(), fit.M.ravel()])
+    units = ["N_per_m"] * 4 + ["Ns_per_m"] * 4 + ["kg"] * 4
+    for i, (value, error, unit) in enumerate(zip(values, errors, units)):
+        name = f"{'kcm'[i // 4]}{ENTRIES[i % 4]}_{unit}"
+        row[name], row[f"{name}_se"] = value, error
     return row
 
 

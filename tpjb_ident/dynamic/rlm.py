@@ -149,7 +149,7 @@ def _scale(name: str) -> Any:
     if name == "mad":
         return "mad"
     if name == "huber":
-        return scale.HuberScale()
+        return scale.HuberScale(d=1.345, tol=1e-13, maxiter=500)  # as MASS::rlm's proposal 2
     if name == "mass":
         return _mass_scale
     raise ValueError(_unknown("scale", name, ["mad", "mass", "huber"]))
