@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import sys
 import tomllib
@@ -17,7 +18,8 @@ MAY_IMPORT_MODEL = ("compare", "diagnose", "cli", "model_guard.py")
 SOURCES = sorted(p for top in OURS for p in (ROOT / top).rglob("*.py"))
 
 
-def imported_modules(source: str) -> set[str]:
+@functools.cache
+def imported_modules(source: str) -> frozenset[str]:
     """Every module that `source` imports, at any depth, import_module("literal") included."""
     found = set()
     for node in ast.walk(ast.parse(source)):
@@ -29,10 +31,10 @@ def imported_modules(source: str) -> set[str]:
             found.update(f"{node.module}.{alias.name}" for alias in node.names)
         elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "import_module":
             found.update(a.value for a in node.args if isinstance(a, ast.Constant))
-    return found
+    return frozenset(found)
 
 
-def breaches(path: str, modules: set[str]) -> list[str]:
+def breaches(path: str, modules: frozenset[str]) -> list[str]:
     """Imports of the file `path` (relative, with slashes) that go through a wall."""
     parts = path.split("/")
     tops = {m.split(".")[0] for m in modules}

@@ -1,0 +1,129 @@
+"""The output folder: whole or not at all, never over somebody's files."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tpjb_ident.cli.errors import BadInputError
+from tpjb_ident.cli.outdir import former_runs, output_folder
+from tpjb_ident.cli.record import write_record
+
+
+def fill(target, command, names, inputs=()):
+    with output_folder(target, command, inputs) as folder:
+        for name in names:
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_text(command)
+        write_record(folder, target, command, {"a": 1}, {"in.h5": "0" * 64})
+
+
+def fill_half(target, error):
+    with output_folder(target, "pivot") as folder:
+        (folder / "a.csv").write_text("new")
+        raise error
+
+
+def names_in(folder):
+    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
+
+
+def test_a_new_folder_appears_whole(tmp_path):
+    fill(tmp_path / "deep" / "out", "pivot", ["a.csv", "figures/b.svg"])
+    assert names_in(tmp_path / "deep" / "out") == ["a.csv", "figures/b.svg", "run.json"]
+    assert [p.name for p in (tmp_path / "deep").iterdir()] == ["out"]
+
+
+def test_after_an_error_nothing_is_there(tmp_path):
+    with pytest.raises(RuntimeError):
+        fill_half(tmp_path / "out", RuntimeError)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_error_leaves_the_former_results_alone(tmp_path):
+    fill(tmp_path / "out", "pivot", ["a.csv"])
+    before = (tmp_path / "out" / "a.csv").read_bytes()
+    with pytest.raises(KeyboardInterrupt):
+        fill_half(tmp_path / "out", KeyboardInterrupt)
+    assert (tmp_path / "out" / "a.csv").read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
+def test_commands_share_a_folder_and_its_record(tmp_path):
+    fill(tmp_path / "out", "pivot", ["pivots.toml"])
+    fill(tmp_path / "out", "identify", ["coefficients.csv"])
+    data = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert data["schema"] == "tpjb-run/1"
+    assert set(data["commands"]) == {"pivot", "identify"}
+    assert data["commands"]["pivot"]["outputs"] == ["pivots.toml"]
+    assert data["commands"]["identify"]["inputs_sha256"] == {"in.h5": "0" * 64}
+    assert data["commands"]["identify"]["versions"]["numpy"]
+
+
+def test_a_second_run_replaces_and_drops_what_it_no_longer_makes(tmp_path):
+    fill(tmp_path / "out", "compare", ["a.csv", "figures/old.svg"])
+    fill(tmp_path / "out", "identify", ["keep.csv"])
+    fill(tmp_path / "out", "compare", ["a.csv"])
+    assert names_in(tmp_path / "out") == ["a.csv", "keep.csv", "run.json"]
+
+
+def test_a_foreign_file_of_the_same_name_is_not_replaced(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "a.csv").write_text("precious")
+    with pytest.raises(BadInputError, match=r"a\.csv, which tpjb did not write"):
+        fill(tmp_path / "out", "pivot", ["a.csv"])
+    assert (tmp_path / "out" / "a.csv").read_text() == "precious"
+    assert names_in(tmp_path) == ["out/a.csv"]
+
+
+def test_other_foreign_files_stay(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    fill(tmp_path / "out", "pivot", ["a.csv"])
+    assert names_in(tmp_path / "out") == ["a.csv", "notes.txt", "run.json"]
+
+
+@pytest.mark.parametrize("where", [".", "runs", "results/today"])
+def test_a_campaign_folder_is_never_written_to(tmp_path, where):
+    campaign = tmp_path / "campaign"
+    campaign.mkdir()
+    (campaign / "campaign.toml").write_text("")
+    with pytest.raises(BadInputError, match="raw data"):
+        fill(campaign / where, "pivot", ["a.csv"], (campaign,))
+    assert names_in(campaign) == ["campaign.toml"]
+
+
+def test_a_link_into_the_campaign_is_followed_before_the_check(tmp_path):
+    campaign = tmp_path / "campaign"
+    campaign.mkdir()
+    (campaign / "campaign.toml").write_text("")
+    link = tmp_path / "innocent"
+    link.symlink_to(campaign, target_is_directory=True)
+    with pytest.raises(BadInputError, match="raw data"):
+        fill(link / "results", "pivot", ["a.csv"], (campaign,))
+
+
+def test_a_file_is_no_folder(tmp_path):
+    (tmp_path / "out").write_text("x")
+    with pytest.raises(BadInputError, match="is a file"):
+        fill(tmp_path / "out", "pivot", ["a.csv"])
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{", '{"schema": "other"}', '{"schema": "tpjb-run/1", "commands": {"x": 1}}']
+)
+def test_a_broken_record_counts_as_none(tmp_path, text):
+    (tmp_path / "run.json").write_text(text)
+    assert former_runs(tmp_path) == {}
+
+
+def test_a_record_cannot_make_us_delete_outside_the_folder(tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    victim = tmp_path / "victim.txt"
+    victim.write_text("x")
+    lie = {"schema": "tpjb-run/1", "commands": {"pivot": {"outputs": ["../victim.txt"]}}}
+    (out / "run.json").write_text(json.dumps(lie))
+    fill(out, "pivot", ["a.csv"])
+    assert victim.exists()

@@ -1,0 +1,99 @@
+"""Many operating points through the model, and the tables made of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from model.bearing import load_bearing
+from model.effects import Effect
+from model.predict import predict
+from rigdata.operating_point import OperatingPoint
+from tpjb_ident.compare.pivot_formula import printed_formula
+from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
+from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
+
+HZ = 2 * math.pi
+DOWN = -math.pi / 2
+
+
+@pytest.fixture(scope="module")
+def bearing(rocker_file):
+    return load_bearing(rocker_file)
+
+
+def point(load, excitation, direction=DOWN):
+    return OperatingPoint(load, direction, 22 * HZ, excitation * HZ)
+
+
+def test_order_is_kept_and_each_point_equals_a_prediction_of_its_own(bearing):
+    points = [point(5000.0, 25.0), point(2500.0, 25.0), point(5000.0, 10.0)]
+    settings = ModelSettings("kirk", "isothermal")
+    seen = []
+    found = predict_points(bearing, points, settings, lambda text, done, total: seen.append((done, total)))
+    assert [p.point for p in found] == points
+    assert seen == [(1, 2), (2, 2)]
+    for one in found:
+        alone = predict(bearing, one.point.static_load, DOWN, 22 * HZ, one.point.excitation, thermal="isothermal")
+        assert np.allclose(one.k, alone.k, rtol=1e-4, atol=1e-4 * abs(alone.kyy))
+        assert np.allclose(one.c, alone.c, rtol=1e-4, atol=1e-4 * abs(alone.cyy))
+
+
+def test_no_excitation_means_synchronous(bearing):
+    settings = ModelSettings("rigid", "isothermal")
+    none, given = predict_points(bearing, [point(3000.0, 0.0), point(3000.0, 22.0)], settings)
+    assert np.array_equal(none.k, given.k)
+    assert prediction_frame([none], mesh_error=False)["excitation_Hz"].tolist() == [22.0]
+
+
+def test_prediction_table_adds_up(bearing):
+    frame = prediction_frame(predict_points(bearing, [point(4000.0, 25.0)], ModelSettings("kirk", "isothermal")))
+    row = frame.iloc[0]
+    pads = [row[f"pad{k}_load_N"] for k in range(1, 6)]
+    vertical = -sum(load * math.sin(pad.pivot_angle) for load, pad in zip(pads, bearing.pads, strict=True))
+    # film forces carry the load; the rest is what the tilted pads' shear arms leave out
+    assert vertical == pytest.approx(4000.0, rel=0.02)
+    assert row["min_film_m"] == min(row[f"pad{k}_min_film_m"] for k in range(1, 6))
+    assert 0 < row["mesh_error"] < 0.05
+
+
+def test_printed_formula_gives_secant_and_tangent(bearing):
+    formula = printed_formula(bearing)
+    secant, tangent = formula(1, 4000.0)
+    pivot = bearing.pivot
+    line = math.pi * pivot.youngs_modulus * pivot.contact_length / (1 - pivot.poissons_ratio**2)
+    logarithm = math.log(line * (pivot.housing_diameter - pivot.pivot_diameter) / (4 * 4000.0))
+    assert secant == pytest.approx(line / 2 / (2 / 3 + logarithm), rel=1e-12)
+    assert tangent == pytest.approx(line / 2 / (logarithm - 1 / 3), rel=1e-12)
+
+
+def test_rig_and_model_agree_on_what_stands_in_series(bearing):
+    soft = ModelSettings("kirk", "isothermal", (Effect("housing_flexibility", stiffness=4e8),))
+    truth = rig_truth(bearing, soft)
+    (predicted,) = predict_points(bearing, [point(5000.0, 25.0)], soft)
+    assert np.allclose(truth.h(point(5000.0, 25.0)), predicted.prediction.h[0], rtol=1e-6)
+    assert np.allclose(truth.centre(point(5000.0, 0.0)), predicted.prediction.position, rtol=1e-6, atol=1e-12)
+    plain = rig_truth(bearing, ModelSettings("kirk", "isothermal"))
+    load = np.array([1000.0, 4000.0])
+    assert np.allclose(truth.deflection(1, load) - plain.deflection(1, load), load / 4e8)
+
+
+def test_effects_on_records_go_to_the_instruments_only(bearing):
+    from rigdata.virtual_rig import Instruments
+
+    effects = (Effect("probe_gain", factor=1.05), Effect("housing_mass", mass_error=2.0))
+    truth = rig_truth(bearing, ModelSettings("kirk", "isothermal", effects))
+    plain = rig_truth(bearing, ModelSettings("kirk", "isothermal"))
+    assert np.array_equal(truth.h(point(5000.0, 25.0)), plain.h(point(5000.0, 25.0)))
+    erring = erring_instruments(Instruments.like_paper(), effects)
+    assert erring.named("X1A").error.gain == 1.05
+    assert erring.true_mass == erring.housing_mass + 2.0
+
+
+def test_thermal_growth_is_not_seen_by_the_cold_clearance(bearing):
+    hot = rig_truth(bearing, ModelSettings("kirk", "isothermal", (Effect("thermal_growth", clearance_change=-5e-6),)))
+    off = rig_truth(bearing, ModelSettings("kirk", "isothermal", (Effect("pad_offset", pad=2, radial_offset=3e-6),)))
+    assert hot.clearance == pytest.approx([80e-6] * 5)
+    assert off.clearance == pytest.approx([80e-6, 83e-6, 80e-6, 80e-6, 80e-6])
