@@ -1,0 +1,79 @@
+"""Diagnose: observe -> screen -> fit -> decide, in one call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from model.setup import Setup
+from tpjb_ident.diagnose.candidates import candidates
+from tpjb_ident.diagnose.decide import decide
+from tpjb_ident.diagnose.fit import Misfit
+from tpjb_ident.diagnose.forward import Forward
+from tpjb_ident.diagnose.nuisance import Nuisances, nuisances
+from tpjb_ident.diagnose.observe import Observations
+from tpjb_ident.diagnose.search import Progress, Search, search
+from tpjb_ident.diagnose.settings import DiagnoseSettings
+from tpjb_ident.diagnose.split import held_out
+from tpjb_ident.diagnose.verdict import Verdict
+from tpjb_ident.diagnose.workers import workers
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A verdict and everything it rests on (for reports and next tests).
+
+    Attributes
+    ----------
+    verdict : Verdict
+    observations : Observations
+    misfit : Misfit
+    found : Search
+    held : (n,) ndarray of bool
+    nuisances : Nuisances
+    """
+
+    verdict: Verdict
+    observations: Observations = field(repr=False)
+    misfit: Misfit = field(repr=False)
+    found: Search = field(repr=False)
+    held: np.ndarray = field(repr=False)
+    nuisances: Nuisances = field(repr=False)
+
+
+def diagnose(
+    observations: Observations,
+    setup: Setup,
+    settings: DiagnoseSettings | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Find the effects that a baseline lacks to describe a campaign.
+
+    Parameters
+    ----------
+    observations : Observations
+        See `observe`.
+    setup : Setup
+        The baseline model.
+    settings : DiagnoseSettings, optional
+    progress : callable, optional
+        Called with a text and a share done.
+
+    Raises
+    ------
+    NoEquilibrium
+        The baseline itself has no equilibrium at an operating point of the campaign.
+    """
+    settings = settings or DiagnoseSettings()
+    forward = Forward(setup, observations.layout, observations.elements)
+    base = forward()
+    known = nuisances(forward, (), base, settings.certificates)
+    covariance = observations.covariance + np.diag(observations.fine**2) + known.columns @ known.columns.T
+    held = held_out(observations)
+    misfit = Misfit(observations.value, covariance, ~held)
+    pool = candidates(setup.bearing, settings.skip)
+    with workers(forward, settings.workers) as run:
+        found = search(run, misfit, base, pool, settings, progress)
+    verdict = decide(observations, misfit, found, held, settings)
+    return Diagnosis(verdict, observations, misfit, found, held, known)

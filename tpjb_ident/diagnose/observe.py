@@ -1,0 +1,276 @@
+"""Observe: everything a campaign offers as one labelled vector with its covariance.
+
+Families: ``h`` (Re and Im of the four entries per operating point), ``position`` (mean shaft position in the
+dynamic tests), ``locus``, ``load`` (the cells' mean reading against the set point), ``clearance`` (polygon sides and
+their angles), ``dry`` (tangent compliance of every pivot), ``temperature``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpjb_ident.clearance import ClearancePolygon
+from tpjb_ident.diagnose.layout import DryTest, DynamicTest, Layout, LocusTest
+from tpjb_ident.diagnose.tolerance import Tolerance
+from tpjb_ident.dynamic.identification import Identification
+from tpjb_ident.locus import Locus
+from tpjb_ident.pivot.curve import PivotCurve
+
+FloatArray = NDArray[np.float64]
+
+ENTRY_NAMES = ("xx", "xy", "yx", "yy")
+#: Loads at which dry curves are compared, as shares of the range in which contact is complete.
+DRY_SHARES = (0.15, 0.5, 0.95)
+
+
+@dataclass(frozen=True)
+class Element:
+    """What one number of the observation vector is.
+
+    Attributes
+    ----------
+    family : str
+    observable : str
+        ``"kxx"``, ``"cyy"`` (that is omega c), ``"locus_x"``, ``"clearance"``, ..
+    block : str
+        Operating-point block it belongs to; blocks are held out whole.
+    where : tuple of (str, float)
+        Operating point, SI.
+    """
+
+    family: str
+    observable: str
+    block: str
+    where: tuple[tuple[str, float], ...]
+
+    def place(self, name: str) -> float:
+        """Coordinate of the operating point; NaN where it has none."""
+        return dict(self.where).get(name, math.nan)
+
+
+@dataclass(frozen=True)
+class Observations:
+    """A campaign as one vector.
+
+    Attributes
+    ----------
+    layout : Layout
+        What was measured where: what a model must predict.
+    value : (n,) ndarray
+        SI; dry compliances as logarithms, loads as ratios to the set point.
+    covariance : (n, n) ndarray
+        Random part, from identification.
+    sigma : (n,) ndarray
+        Stated model tolerance of every element (for the gap).
+    fine : (n,) ndarray
+        Tolerance of single elements for inference, smaller: what two programs differ by, point by point.
+    elements : tuple of Element
+    """
+
+    layout: Layout
+    value: FloatArray
+    covariance: FloatArray = field(repr=False)
+    sigma: FloatArray = field(repr=False)
+    fine: FloatArray = field(repr=False)
+    elements: tuple[Element, ...] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+    @property
+    def blocks(self) -> NDArray[np.str_]:
+        """Block of every element."""
+        return np.array([e.block for e in self.elements])
+
+    @property
+    def families(self) -> NDArray[np.str_]:
+        """Family of every element."""
+        return np.array([e.family for e in self.elements])
+
+    @property
+    def total_sigma(self) -> FloatArray:
+        """Measurement and stated model tolerance together: the sigma of the gap."""
+        return np.sqrt(np.diag(self.covariance) + self.sigma**2)
+
+
+@dataclass
+class _Builder:
+    value: list[float] = field(default_factory=list)
+    sigma: list[float] = field(default_factory=list)
+    fine: list[float] = field(default_factory=list)
+    elements: list[Element] = field(default_factory=list)
+    covariance: list[FloatArray] = field(default_factory=list)
+
+    def add(
+        self,
+        elements: Sequence[Element],
+        value: FloatArray,
+        covariance: FloatArray,
+        tolerance: tuple[FloatArray | float, FloatArray | float],
+    ) -> None:
+        value = np.atleast_1d(value)
+        keep = np.isfinite(value) & np.isfinite(np.diag(covariance))
+        sigma, fine = (np.broadcast_to(np.asarray(t, float), value.shape) for t in tolerance)
+        self.value += list(value[keep])
+        self.sigma += list(sigma[keep])
+        self.fine += list(fine[keep])
+        self.elements += [e for e, k in zip(elements, keep, strict=True) if k]
+        self.covariance.append(covariance[np.ix_(keep, keep)])
+        self.kept = keep
+
+
+def observe(
+    identification: Identification,
+    curves: Sequence[PivotCurve] = (),
+    locus: Locus | None = None,
+    polygon: ClearancePolygon | None = None,
+    tolerance: Tolerance | None = None,
+) -> Observations:
+    """Gather a campaign's results into one vector.
+
+    Parameters
+    ----------
+    identification : Identification
+    curves : sequence of PivotCurve
+    locus : Locus, optional
+    polygon : ClearancePolygon, optional
+    tolerance : Tolerance, optional
+        What the model is trusted to.
+    """
+    tolerance = tolerance or Tolerance()
+    builder = _Builder()
+    dynamic = _add_dynamic(builder, identification, locus, tolerance)
+    locus_tests = _add_locus(builder, locus, tolerance) if locus is not None else ()
+    dry = tuple(_add_dry(builder, c, tolerance) for c in curves if _usable(c))
+    push = _add_clearance(builder, polygon, tolerance) if polygon is not None else None
+    n = len(builder.value)
+    covariance = np.zeros((n, n))
+    at = 0
+    for part in builder.covariance:
+        covariance[at : at + len(part), at : at + len(part)] = part
+        at += len(part)
+    layout = Layout(dynamic, locus_tests, tuple(d for d in dry), push)
+    return Observations(
+        layout, np.array(builder.value), covariance, np.array(builder.sigma), np.array(builder.fine),
+        tuple(builder.elements),
+    )  # fmt: skip
+
+
+def _add_dynamic(
+    builder: _Builder, identification: Identification, locus: Locus | None, tolerance: Tolerance
+) -> tuple[DynamicTest, ...]:
+    tests: dict[tuple[float, float, float], list[int]] = {}
+    points = identification.points
+    for i, p in enumerate(points):
+        key = (p.point.static_load, p.point.static_load_direction, p.point.shaft_speed)
+        tests.setdefault(key, []).append(i)
+    out = []
+    for (load, direction, speed), members in tests.items():
+        base = (("load", load), ("direction", direction), ("speed", speed))
+        for i in members:
+            _add_stiffness(builder, points[i], base, tolerance)
+        temperature = _mean_temperatures([points[i].temperatures for i in members])
+        names = [
+            Element(
+                "temperature", "pad_temperature", _block(points[members[0]], len(members)), (*base, ("pad", float(k)))
+            )
+            for k in temperature
+        ]
+        if temperature:
+            builder.add(
+                names,
+                np.array(list(temperature.values())),
+                np.eye(len(names)) * 0.05**2,
+                (tolerance.temperature, tolerance.fine_temperature),
+            )
+        out.append(
+            DynamicTest(load, direction, speed, tuple(points[i].point.excitation for i in members), tuple(temperature))
+        )
+    return tuple(out)
+
+
+def _block(point, members: int) -> str:  # type: ignore[no-untyped-def]
+    """Blocks are loads, and at the load with a frequency sweep, frequencies."""
+    load = f"load {point.point.static_load:.0f} N"
+    return load if members == 1 else f"{load}, {point.point.excitation_hz:g} Hz"
+
+
+def _add_stiffness(builder: _Builder, result, base: tuple, tolerance: Tolerance) -> None:  # type: ignore[no-untyped-def, type-arg]
+    omega = result.point.excitation
+    h = result.stiffness.h
+    direct_k = float(np.mean(np.abs(np.diag(h.real))))
+    direct_c = float(np.mean(np.abs(np.diag(h.imag))))
+    block = f"load {result.point.static_load:.0f} N, {result.point.excitation_hz:g} Hz"
+    where = (*base, ("excitation", omega))
+    elements = [Element("h", f"k{e}", block, where) for e in ENTRY_NAMES]
+    elements += [Element("h", f"c{e}", block, where) for e in ENTRY_NAMES]
+    scale = np.repeat([direct_k, direct_c], 4)
+    value = np.concatenate([h.real.ravel(), h.imag.ravel()])
+    builder.add(
+        elements,
+        value,
+        np.asarray(result.stiffness.covariance),
+        (tolerance.stiffness * scale, tolerance.fine_stiffness * scale),
+    )
+
+
+def _mean_temperatures(rows: Sequence[dict[int, float]]) -> dict[int, float]:
+    pads = sorted({pad for row in rows for pad in row})
+    mean = {pad: float(np.mean([row[pad] for row in rows if pad in row])) for pad in pads}
+    return {pad: t - 273.15 for pad, t in mean.items()}
+
+
+def _add_locus(builder: _Builder, locus: Locus, tolerance: Tolerance) -> tuple[LocusTest, ...]:
+    out = []
+    for i, p in enumerate(locus.points):
+        where = (
+            ("load", p.point.static_load), ("direction", p.point.static_load_direction), ("speed", p.point.shaft_speed),
+        )  # fmt: skip
+        block = f"locus {i % 5}"
+        builder.add(
+            [Element("locus", "locus_x", block, where), Element("locus", "locus_y", block, where)],
+            p.position, p.covariance, (tolerance.position, tolerance.fine_position),
+        )  # fmt: skip
+        miss = p.load_direction - p.point.static_load_direction
+        turn = math.remainder(miss, 2 * math.pi)
+        spread = np.diag([tolerance.load_miss**2, tolerance.direction_miss**2])
+        builder.add(
+            [Element("load", "load_ratio", block, where), Element("load", "load_turn", block, where)],
+            np.array([p.load / p.point.static_load, turn]), spread, (0.003, 0.001),
+        )  # fmt: skip
+        out.append(LocusTest(p.point.static_load, p.point.static_load_direction, p.point.shaft_speed))
+    return tuple(out)
+
+
+def _usable(curve: PivotCurve) -> bool:
+    return curve.valid_to > curve.valid_from and math.isfinite(curve.valid_to)
+
+
+def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryTest:
+    load = np.array([curve.valid_from + s * (curve.valid_to - curve.valid_from) for s in DRY_SHARES])
+    value = -np.log(np.asarray(curve.stiffness(load), float))
+    se = np.asarray(curve.relative_stiffness_se(load), float)
+    elements = [Element("dry", "dry_compliance", "dry", (("pad", float(curve.pad)), ("load", float(w)))) for w in load]
+    builder.add(elements, value, np.diag(se**2), (tolerance.dry, tolerance.fine_dry))
+    kept = load[builder.kept]
+    return DryTest(curve.pad, tuple(float(w) for w in kept))
+
+
+def _add_clearance(builder: _Builder, polygon: ClearancePolygon, tolerance: Tolerance) -> float:
+    n = len(polygon.angles)
+    elements = [Element("clearance", "clearance_pushed", "clearance", (("pad", k + 1.0),)) for k in range(n)]
+    builder.add(
+        elements, polygon.clearance_pushed, np.diag(np.asarray(polygon.clearance_pushed_se) ** 2),
+        (tolerance.position, tolerance.fine_position),
+    )  # fmt: skip
+    elements = [Element("clearance", "side_angle", "clearance", (("pad", k + 1.0),)) for k in range(n)]
+    turn = np.array([math.remainder(t, 2 * math.pi) for t in polygon.fitted_angle - polygon.angles])
+    builder.add(
+        elements, turn, np.diag(np.asarray(polygon.fitted_angle_se) ** 2), (tolerance.angle, tolerance.fine_angle)
+    )
+    return float(polygon.push_load)
