@@ -24,9 +24,8 @@ from model.start import LoadedAttitude, first_position, loaded_attitude
 FloatArray = NDArray[np.float64]
 
 MAX_ITERATIONS = 80
-#: Residuals that count as equilibrium: share of the load; metres of the pivots; kelvin of the film.
-FORCE_TOLERANCE = 1e-7
-TEMPERATURE_TOLERANCE = 3e-5
+#: Film temperatures count as settled when one more step would change them by this times `Setup.accuracy` [K].
+HEAT_PER_FORCE = 300.0
 #: Below this residual the iteration is accelerated; above it the temperature is held back, because a much hotter
 #: film carries less and heats less: undamped, the two would swing.
 NEAR = 0.3
@@ -195,6 +194,7 @@ def _set_loaded(search: _Search, film: PadFilm, table: LoadedAttitude) -> None:
 def _iterate(search: _Search) -> Equilibrium:
     best, residual, stalled = math.inf, math.inf, 0
     memory = Anderson()
+    accuracy = search.setup.accuracy
     isothermal = search.setup.thermal == "isothermal" and not search.setup.flexible_pads
     for iteration in range(1, MAX_ITERATIONS + 1):
         if _wake_or_rest(search):
@@ -208,7 +208,7 @@ def _iterate(search: _Search) -> Equilibrium:
             return _result(search, iteration, math.inf, heat_change, ("singular", "not converged"))
         near = residual < NEAR and heat_change < NEAR_HEAT
         search.relaxation = 1.0 if near else HELD_BACK
-        if residual < FORCE_TOLERANCE and heat_change < TEMPERATURE_TOLERANCE:
+        if residual < accuracy and heat_change < HEAT_PER_FORCE * accuracy:
             _sharpen(search)
             return _result(search, iteration, residual, heat_change, ())
         stalled = 0 if residual < 0.7 * best else stalled + 1

@@ -133,6 +133,9 @@ class Setup:
     added_mass : float
         [kg]
     instruments : Instruments
+    accuracy : float
+        Unbalanced share of the load at which an equilibrium counts as found; 1e-5 is plenty where many models are
+        compared.
     clearance_change : float
         Change of Cb in running conditions only [m]: dry tests are cold.
     """
@@ -152,6 +155,7 @@ class Setup:
     added_mass: float = 0.0
     instruments: Instruments = field(default_factory=Instruments)
     clearance_change: float = 0.0
+    accuracy: float = 1e-7
 
     def __post_init__(self) -> None:
         if self.thermal not in THERMAL:

@@ -19,6 +19,9 @@ from tpjb_ident.diagnose.split import held_out
 from tpjb_ident.diagnose.verdict import Verdict
 from tpjb_ident.diagnose.workers import workers
 
+#: Of equilibria while models are compared: far below any tolerance, and a third faster than the default.
+ACCURACY = 1e-5
+
 
 @dataclass(frozen=True)
 class Diagnosis:
@@ -66,7 +69,7 @@ def diagnose(
         The baseline itself has no equilibrium at an operating point of the campaign.
     """
     settings = settings or DiagnoseSettings()
-    forward = Forward(setup, observations.layout, observations.elements)
+    forward = Forward(setup.change(accuracy=ACCURACY), observations.layout, observations.elements)
     base = forward()
     known = nuisances(forward, (), base, settings.certificates)
     covariance = observations.covariance + np.diag(observations.fine**2) + known.columns @ known.columns.T

@@ -1,0 +1,115 @@
+"""Plan: what a campaign could and could not tell, before it is run.
+
+Detection floor per effect (the size at which it stands three standard deviations out of noise, tolerance and
+nuisances) and the isolability matrix: how far effect A, at a size seen with d' = 6, stays from everything that B
+can imitate, d_AB = 6 |(I - P_B) s_A| / |s_A|. Below 3 the two are confusable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.setup import Setup
+from tpjb_ident.diagnose.candidates import Candidate, candidates
+from tpjb_ident.diagnose.fit import slope
+from tpjb_ident.diagnose.forward import Forward
+from tpjb_ident.diagnose.layout import Layout
+from tpjb_ident.diagnose.nuisance import Certificates, nuisances, whitener
+from tpjb_ident.diagnose.planned import planned_observations
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+SEEN = 6.0
+CONFUSABLE = 3.0
+
+
+@dataclass(frozen=True)
+class CampaignPlan:
+    """What a layout can tell.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+    detectable : (k,) ndarray
+        Whitened size of every candidate's typical step.
+    separation : (k, k) ndarray
+        d_AB at d' = 6 of A; NaN on the diagonal and where A has no effect at all.
+    """
+
+    candidates: tuple[Candidate, ...]
+    detectable: FloatArray = field(repr=False)
+    separation: FloatArray = field(repr=False)
+
+    @property
+    def floor(self) -> FloatArray:
+        """Smallest change of every parameter that would be seen (3 standard deviations), in its nearly linear form."""
+        with np.errstate(divide="ignore"):
+            return 3.0 * np.array([c.step for c in self.candidates]) / self.detectable
+
+    @property
+    def confusable(self) -> tuple[tuple[str, str], ...]:
+        """Pairs that the campaign could not tell apart."""
+        n = len(self.candidates)
+        return tuple(
+            (self.candidates[i].label, self.candidates[j].label)
+            for i in range(n)
+            for j in range(i + 1, n)
+            if min(self.separation[i, j], self.separation[j, i]) < CONFUSABLE
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per effect: detection floor and what it could be mistaken for."""
+        import pandas as pd
+
+        rows = []
+        for i, c in enumerate(self.candidates):
+            like = [o.label for j, o in enumerate(self.candidates) if j != i and self.separation[i, j] < CONFUSABLE]
+            at = c.parameter.from_linear(c.neutral + self.floor[i]) if np.isfinite(self.floor[i]) else np.nan
+            rows.append(
+                {
+                    "effect": c.label,
+                    "parameter": c.parameter.name,
+                    "unit": c.parameter.unit,
+                    "typical_size_sigma": self.detectable[i],
+                    "seen_from": at if c.bounds[0] <= c.neutral + self.floor[i] <= c.bounds[1] else np.nan,
+                    "mistaken_for": ", ".join(like),
+                }
+            )
+        return pd.DataFrame(rows)
+
+
+def plan(
+    setup: Setup, layout: Layout, known: Certificates | None = None, pool: Sequence[Candidate] | None = None
+) -> CampaignPlan:
+    """Work out what a layout of tests could tell.
+
+    Raises
+    ------
+    NoEquilibrium
+        The baseline has none at some point of the layout.
+    """
+    known = known or Certificates()
+    observations = planned_observations(setup, layout)
+    forward = Forward(setup, layout, observations.elements)
+    base = forward()
+    factor = whitener(observations, nuisances(forward, (), base, known).columns)
+    chosen = tuple(pool if pool is not None else candidates(setup.bearing))
+    columns = []
+    for c in chosen:
+        one = slope(forward.fresh(), [c], np.array([c.neutral]), base, 0, 0.5 * c.step)
+        columns.append(np.linalg.solve(factor, one * c.step))
+    table = np.column_stack(columns)
+    size = np.linalg.norm(table, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        unit = table / size
+    cosine = np.clip(unit.T @ unit, -1.0, 1.0)
+    separation = SEEN * np.sqrt(1.0 - cosine**2)
+    np.fill_diagonal(separation, np.nan)
+    return CampaignPlan(chosen, size, separation)
