@@ -133,12 +133,14 @@ def _pooled(
     return mean, noise, spare
 
 
-def eiv_fit(repeats: Repeats) -> EivFit:
+def eiv_fit(repeats: Repeats, directions_differ: bool = False) -> EivFit:
     """Errors-in-variables fit of the direction means with their direction effects.
 
     Parameters
     ----------
     repeats : Repeats
+    directions_differ : bool
+        See `PhasorTable`.
     """
     means, noise = repeats.means, repeats.noise
     h = _closed_form(means, noise)
@@ -159,7 +161,7 @@ def eiv_fit(repeats: Repeats) -> EivFit:
     residual = means.F - means.D @ h.T
     score = np.einsum("gac,gc,gb->gab", inverse, residual, D_true.conj()).reshape(-1, 4)
     parts = np.einsum("gac,gb,gd->gabcd", inverse, D_true.conj(), D_true).reshape(-1, 4, 4)
-    spread = spread_of(score, parts, bread @ meat @ bread.conj().T, chi_square, 2 * repeats.spare)
+    spread = spread_of(score, parts, bread @ meat @ bread.conj().T, chi_square, 2 * repeats.spare, directions_differ)
     return EivFit(h, spread.covariance, spread.dof, chi_square, _attenuation(means, noise))
 
 

@@ -165,7 +165,7 @@ def _mm_eiv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
             "too few repeats per direction for a noise covariance: plain MM, not corrected for displacement noise",
         )
         return _with_status(plain, (missing,))
-    fit = eiv_fit(repeated)
+    fit = eiv_fit(repeated, table.directions_differ)
     conditions = start.conditions
     if repeated.wandering:
         conditions += (
@@ -228,6 +228,7 @@ def _result(
         merged(conditions, tuple(found)),
         condition,
         chi_square,
+        4 * (len(np.unique(table.direction[joint > 0])) - 2),
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
 from tpjb_ident.dynamic.amplitude import amplitude_slope
 from tpjb_ident.dynamic.arrays import FloatArray
@@ -115,11 +116,13 @@ def assemble(
     draws = gain_draws(campaign.channels, settings.n_calibration, settings.seed)
     gathered = gather(extracted)
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
-    corrections = find_corrections(gathered, extracted, axes, _first_estimates(gathered, settings))
+    first = _first_estimates(gathered, settings)
+    corrections = find_corrections(gathered, extracted, axes, first)
+    differ = directions_differ(first)
     points, changes = [], []
     for data, correction in zip(gathered, corrections):
         used = correction if settings.correct else correction.measured_only()
-        point = identify_point(used.apply(data), temperatures, settings)
+        point = identify_point(used.apply(data), temperatures, settings, differ)
         by_method = {name: used.widened(est) for name, est in point.by_method.items()}
         change = apparent_change(data, by_method[settings.method], draws)
         changes.append(change)
@@ -138,6 +141,18 @@ def _first_estimates(gathered: list[PointData], settings: IdentifySettings) -> l
     """Estimates before any correction, for how H changes with load and how runs scatter."""
     method = settings.method.partition(":")[0]
     return [estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, method) for data in gathered]
+
+
+def directions_differ(first: list[DynamicStiffness]) -> bool:
+    """Whether runs differ by more than their windows do, judged over all points of the campaign.
+
+    Few runs per point tell little about it; the cause (set points that are missed a little) is the same
+    at all points. Beyond doubt means: the summed chi-square has a probability below 1e-4.
+    """
+    known = [est for est in first if np.isfinite(est.chi_square) and est.spare_equations > 0]
+    dof = sum(est.spare_equations for est in known)
+    total = sum(est.chi_square * est.spare_equations for est in known)
+    return dof > 0 and float(chi2.sf(total, dof)) < 1e-4
 
 
 def _completed(
@@ -169,10 +184,23 @@ def _campaign_conditions(draws: GainDraws) -> tuple[Condition, ...]:
 
 
 def identify_point(
-    data: PointData, temperatures: dict[str, dict[int, float]], settings: IdentifySettings
+    data: PointData,
+    temperatures: dict[str, dict[int, float]],
+    settings: IdentifySettings,
+    differ: bool = False,
 ) -> PointResult:
-    """All methods on one operating point, and the figures that go with it."""
-    table = phasor_table(data.D, data.F, data.run_index)
+    """All methods on one operating point, and the figures that go with it.
+
+    Parameters
+    ----------
+    data : PointData
+    temperatures : dict
+        Mean temperature per run and pad [K].
+    settings : IdentifySettings
+    differ : bool
+        Whether runs are known to differ by more than their windows do.
+    """
+    table = replace(phasor_table(data.D, data.F, data.run_index), directions_differ=differ)
     by_method: dict[str, DynamicStiffness] = {}
     for name in dict.fromkeys((*settings.methods, settings.method)):
         method, _, norm = name.partition(":")

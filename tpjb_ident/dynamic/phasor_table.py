@@ -29,6 +29,8 @@ class PhasorTable:
         Instruments, scaled likewise.
     valid : (n_given,) ndarray of bool
         Which of the given windows are in the table (finite ones).
+    directions_differ : bool
+        Whether directions are known (from elsewhere in the campaign) to differ by more than their repeats.
     """
 
     D: ComplexArray
@@ -38,6 +40,7 @@ class PhasorTable:
     f_scale: float
     reference: ComplexArray | None
     valid: BoolArray
+    directions_differ: bool = False
 
     def __len__(self) -> int:
         return len(self.D)

@@ -13,8 +13,10 @@ in the scatter between runs and so in the interval.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.conditions import Condition
@@ -91,7 +93,23 @@ def _slopes_over_load(members: list[int], points: list[PointData], first: list[D
     members.sort(key=lambda i: points[i].point.static_load)
     log_load = np.log([points[i].point.static_load for i in members])
     h = np.array([first[i].h for i in members])
-    return list(np.gradient(h, log_load, axis=0, edge_order=2 if len(members) > 2 else 1))
+    return list(_log_gradient(h.real, log_load) + 1j * _log_gradient(h.imag, log_load))
+
+
+def _log_gradient(values: NDArray[np.float64], log_load: NDArray[np.float64]) -> FloatArray:
+    """Slope over ln W; entries that keep their sign are taken as power laws between loads.
+
+    Parameters
+    ----------
+    values : (n, 2, 2) ndarray
+    log_load : (n,) ndarray
+    """
+    order: Literal[1, 2] = 2 if len(log_load) > 2 else 1
+    plain = np.asarray(np.gradient(values, log_load, axis=0, edge_order=order))
+    one_sign = (np.abs(np.sign(values).sum(axis=0)) == len(values)) & (np.abs(values).min(axis=0) > 0)
+    logarithm = np.log(np.where(one_sign, np.abs(values), 1.0))
+    power = values * np.gradient(logarithm, log_load, axis=0, edge_order=order)
+    return np.where(one_sign, power, plain)
 
 
 def _borrowed(i: int, points: list[PointData], slopes: list[ComplexArray | None]) -> ComplexArray | None:

@@ -47,6 +47,9 @@ class DynamicStiffness:
     chi_square : float
         Reduced chi-square of the direction means about F = h D against the repeats' own noise; NaN
         without repeats.
+    spare_equations : int
+        Real equations of the direction means beyond the eight unknowns: degrees of freedom of the
+        chi-square.
     attenuation : (2,) ndarray
         Share by which noise on the displacements would pull a plain regression of F on X towards
         zero, along the weaker displacement direction first; NaN when not known.
@@ -63,6 +66,7 @@ class DynamicStiffness:
     status: tuple[Condition, ...] = ()
     condition: float = np.nan
     chi_square: float = np.nan
+    spare_equations: int = 0
     attenuation: FloatArray = field(default_factory=lambda: np.full(2, np.nan), repr=False)
     systematic: FloatArray | None = field(default=None, repr=False)
 

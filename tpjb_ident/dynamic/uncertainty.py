@@ -140,6 +140,7 @@ def spread_of(
     repeat: ComplexArray,
     chi_square: float,
     dof_repeat: float,
+    known_effect: bool = False,
 ) -> Spread:
     """Repeat noise as known, plus what leaving out one direction at a time shows beyond it.
 
@@ -159,11 +160,13 @@ def spread_of(
     chi_square : float
         Reduced chi-square of the direction means against repeat noise.
     dof_repeat : float
+    known_effect : bool
+        That directions differ is known from elsewhere; then this point's own chi-square is not asked.
     """
     known = complex_to_real_covariance(repeat)
     g = len(score)
     spare = 4.0 * (g - 2)
-    if g <= 2 or not chi_square > 1.0:
+    if g <= 2 or not (known_effect or chi_square > 1.0):
         return Spread(known, np.full(8, max(dof_repeat, 1.0)))
     moved = np.linalg.solve(parts.sum(axis=0) - parts, score[:, :, None])[:, :, 0]
     moved = np.concatenate([moved.real, moved.imag], axis=1)
@@ -172,7 +175,7 @@ def spread_of(
     root = np.linalg.cholesky(known)
     white = np.linalg.solve(root, np.linalg.solve(root, jackknife).T)
     values, vectors = np.linalg.eigh(0.5 * (white + white.T))
-    certain = min(1.0, (chi_square - 1.0) / (chi2.ppf(0.95, spare) / spare - 1.0))
+    certain = min(1.0, (chi_square - 1.0) / (chi2.ppf(0.95, spare) / spare - 1.0)) if not known_effect else 1.0
     extra = root @ (vectors * (certain * np.maximum(values - 1.0, 0.0))) @ vectors.T @ root.T
     total = known + extra
     effective = np.maximum((moved**2).sum(axis=0) ** 2 / (moved**4).sum(axis=0) - 1.0, 1.0)
@@ -261,7 +264,9 @@ def with_repeats(
     small = correction * noise / means.count[:, None, None]
     meat = information(scaled, scaled, np.broadcast_to(small, (len(means), 2, 2)))
     score = np.einsum("ga,gb->gab", mean[kept, 4:] * means.count[:, None], means.D.conj()).reshape(-1, 4)
-    spread = spread_of(score, parts[kept], bread @ meat @ bread.conj().T, chi_square, 2 * spare)
+    spread = spread_of(
+        score, parts[kept], bread @ meat @ bread.conj().T, chi_square, 2 * spare, table.directions_differ
+    )
     return spread.covariance, spread.dof, chi_square
 
 

@@ -22,7 +22,7 @@ REJECTED = 0.2
 #: Share of its windows that must agree with one another for it to be a candidate.
 AGREEING = 0.6
 #: How improbable its distance must be for the rejection to stand.
-SIGNIFICANCE = 1e-3
+SIGNIFICANCE = 1e-4
 MIN_OTHERS = 4
 
 
