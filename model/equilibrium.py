@@ -16,10 +16,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from model.acceleration import Anderson
+from model.carrying import find_branch, longest_step, set_loaded, shorten, torn_pads, wake_or_rest
 from model.film import JIT, solve_film
 from model.pad_film import PadFilm, film_step, least_share, oil_constants, pad_films
 from model.setup import Setup
-from model.start import LoadedAttitude, first_position, loaded_attitude
+from model.start import first_position
 
 FloatArray = NDArray[np.float64]
 
@@ -77,7 +78,6 @@ class _Search:
     load: FloatArray
     speed: float
     films: list[PadFilm]
-    tables: list[LoadedAttitude]
     position: FloatArray = field(default_factory=lambda: np.zeros(2))
     limited: float = 0.0
     relaxation: float = HELD_BACK
@@ -106,15 +106,7 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
     Equilibrium
         ``status`` names what is wrong, if anything is.
     """
-    films = pad_films(setup)
-    tables = [
-        loaded_attitude(
-            round(float(f.grid.angle[0]), 12), round(float(f.grid.angle[-1]), 12),
-            setup.bearing.journal_radius, setup.bearing.length,
-        )
-        for f in films
-    ]  # fmt: skip
-    search = _Search(setup, np.asarray(load, float), speed, films, tables)
+    search = _Search(setup, np.asarray(load, float), speed, pad_films(setup))
     if start is not None and _warm_start(search, start):
         result = _iterate(search)
         if result.converged:
@@ -163,32 +155,16 @@ def _warm_start(search: _Search, start: Equilibrium) -> bool:
 
 def _cold_start(search: _Search) -> None:
     """Balance the load with the tabulated isothermal films, then put every pad on its loaded attitude."""
-    setup, oil = search.setup, search.setup.bearing.oil
-    viscosity = float(oil.viscosity(setup.inlet_temperature + (0.0 if setup.thermal == "isothermal" else 3.0)))
-    scale = viscosity * search.surface_speed * setup.bearing.journal_radius**2 * setup.bearing.length
-    size = float(np.hypot(*search.load))
-    give = np.array([law.deflection(0.5 * size) / max(0.5 * size, 1e-30) for law in setup.pivots])
-    search.position, deflection = first_position(search.load, scale, give, search.films, search.tables)
-    for film, table, eta in zip(search.films, search.tables, deflection, strict=True):
-        film.deflection = float(eta)
+    warmer = 0.0 if search.setup.thermal == "isothermal" else 3.0
+    branches = []
+    for film in search.films:
         film.work.temperature[:] = film.inlet
-        film.work.ruptured[:] = False
-        _set_loaded(search, film, table)
-
-
-def _set_loaded(search: _Search, film: PadFilm, table: LoadedAttitude) -> None:
-    """Put a pad on its loaded attitude for its present approach, or let it idle."""
-    a, _ = film.approach(search.position)
-    room = film.pad.pad_clearance - a
-    curvature = a / room if room > 0 else math.inf
-    film.idle = curvature <= table.least + 1e-9
-    if film.idle:
-        film.deflection = 0.0
-        film.tilt = 0.0
-        return
-    b, _ = table.at(film.pad.pad_clearance, a)
-    film.tilt = (b - float(film.tangent @ search.position)) / film.pivot_radius
-    film.work.ruptured[:] = False
+        film.branch = find_branch(search.setup, film, search.surface_speed, warmer)
+        branches.append(film.branch)
+    normals, gaps = np.array([f.normal for f in search.films]), np.array([f.gap for f in search.films])
+    search.position = first_position(search.load, normals, gaps, branches)
+    for film in search.films:
+        set_loaded(film, search.position)
 
 
 def _iterate(search: _Search) -> Equilibrium:
@@ -197,7 +173,7 @@ def _iterate(search: _Search) -> Equilibrium:
     accuracy = search.setup.accuracy
     isothermal = search.setup.thermal == "isothermal" and not search.setup.flexible_pads
     for iteration in range(1, MAX_ITERATIONS + 1):
-        if _wake_or_rest(search):
+        if wake_or_rest(search.setup, search.films, search.position, search.surface_speed):
             memory.reset()
         before = None if isothermal else _state(search)
         heat_change = _solve_films(search)
@@ -209,6 +185,10 @@ def _iterate(search: _Search) -> Equilibrium:
         near = residual < NEAR and heat_change < NEAR_HEAT
         search.relaxation = 1.0 if near else HELD_BACK
         if residual < accuracy and heat_change < HEAT_PER_FORCE * accuracy:
+            torn = torn_pads(search.films, search.position)
+            if torn:
+                name = f"pads {', '.join(map(str, torn))} can neither carry nor idle"
+                return _result(search, iteration, residual, heat_change, (name, "not converged"))
             _sharpen(search)
             return _result(search, iteration, residual, heat_change, ())
         stalled = 0 if residual < 0.7 * best else stalled + 1
@@ -255,23 +235,6 @@ def _set_state(search: _Search, state: FloatArray) -> None:
             at += size
 
 
-def _wake_or_rest(search: _Search) -> bool:
-    """Give pads that have come near enough to carry their loaded attitude, let others idle; True if any changed."""
-    changed = False
-    for film, table in zip(search.films, search.tables, strict=True):
-        a, _ = film.approach(search.position)
-        room = film.pad.pad_clearance - a
-        if film.idle:
-            if room <= 0 or a / room > table.least + 1e-7:
-                _set_loaded(search, film, table)
-                changed = True
-        elif room > 0 and a / room <= table.least and search.setup.rotational_stiffness == 0:
-            film.deflection = 0.0
-            _set_loaded(search, film, table)
-            changed = True
-    return changed
-
-
 def _solve_films(search: _Search) -> float:
     """One step of every film at the present geometry; returns the largest temperature change asked for."""
     setup = search.setup
@@ -279,13 +242,13 @@ def _solve_films(search: _Search) -> float:
     search.limited = 0.0
     if setup.carryover:
         _carry_over(search)
-    for film, table in zip(search.films, search.tables, strict=True):
+    for film in search.films:
         if not film.idle:
             change = max(change, _solve_film(search, film))
             assert film.forces is not None
             if film.forces.steps > 0 and not film.forces.force[0] > 0.0 and setup.rotational_stiffness == 0:
                 # the unloaded attitude, in which nothing holds the pad: the loaded one counts
-                _set_loaded(search, film, table)
+                set_loaded(film, search.position)
                 change = max(change, 0.0 if film.idle else _solve_film(search, film))
                 film.idle = film.idle or not film.forces.force[0] > 0.0
         if film.idle:
@@ -430,7 +393,7 @@ def eliminate(load: FloatArray, pads: FloatArray) -> tuple[float, FloatArray, Fl
 def _apply(search: _Search, step: tuple[FloatArray, FloatArray], damping: float) -> bool:
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
     shift, moves = step
-    scale = damping
+    scale = min(damping, longest_step(search.films, shift))
     for film, move in zip(search.films, moves, strict=True):
         if film.forces is not None:
             da = float(film.normal @ shift) - move[1]
@@ -438,6 +401,7 @@ def _apply(search: _Search, step: tuple[FloatArray, FloatArray], damping: float)
             worst = least_share(film.grid, film.work, da, db)
             if worst * damping < SHRINK - 1.0:
                 scale = min(scale, (SHRINK - 1.0) / worst)
+    scale = shorten(search.films, search.position, shift, scale)
     search.position = search.position + scale * shift
     for film, move in zip(search.films, moves, strict=True):
         film.tilt += float(scale * move[0])

@@ -18,7 +18,7 @@ where the film is symmetric about mid-length.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -29,7 +29,12 @@ BoolArray = NDArray[np.bool_]
 
 MAX_ACTIVE_SET_STEPS = 60
 #: How the inner loops are compiled: cached on disk; sums may be reordered, but NaN and infinity keep their meaning.
-JIT = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "reassoc", "arcp", "nsz"}, "nogil": True}
+JIT: dict[str, Any] = {
+    "cache": True,
+    "error_model": "numpy",
+    "fastmath": {"contract", "reassoc", "arcp", "nsz"},
+    "nogil": True,
+}
 
 
 class FilmGrid(NamedTuple):

@@ -13,6 +13,7 @@ from model.bearing import Oil, Pad
 from model.energy import solve_energy
 from model.film import JIT, FilmForces, FilmGrid, FilmWork, film_grid, film_work, solve_film
 from model.setup import Setup
+from model.start import Branch
 
 FloatArray = NDArray[np.float64]
 
@@ -56,11 +57,18 @@ class PadFilm:
     deflection: float = 0.0
     idle: bool = False
     forces: FilmForces | None = None
+    branch: Branch | None = None
+    flips: int = 0
+    held: int = 0
     temperature_change: float = field(default=math.inf)
+
+    def reach(self, position: FloatArray) -> float:
+        """Approach a of the film if the pivot did not give way [m]."""
+        return self.gap + float(self.normal @ position)
 
     def approach(self, position: FloatArray) -> tuple[float, float]:
         """(a, b) of the film for a journal position and the pad's present tilt and deflection [m]."""
-        a = self.gap + float(self.normal @ position) - self.deflection
+        a = self.reach(position) - self.deflection
         b = float(self.tangent @ position) + self.pivot_radius * self.tilt
         return a, b
 

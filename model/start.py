@@ -1,14 +1,16 @@
-"""A first guess of the equilibrium: the loaded attitude of an isothermal film, tabulated once per pad shape.
+"""A first guess of the equilibrium: the loaded attitudes of an isothermal film, tabulated once per pad shape.
 
 With h = (Cp - a) [1 + A (1 - cos alpha) - B sin alpha], A = a / (Cp - a), B = b / (Cp - a), the film force is
-mu U R^2 L / (Cp - a)^2 times a function of (A, B), and the attitude that tilts freely is a function B(A). A
-central pivot has a loaded attitude for A > 0 only; below it the film cannot carry.
+mu U R^2 L / (Cp - a)^2 times a function of (A, B), and the attitudes that tilt freely are a curve A(B). A central
+pivot carries for A > 0 only. A pivot behind the middle carries down to a fold at A < 0; on a pivot that gives way
+it carries somewhat beyond, because a pad that sheds load also comes closer.
 """
 
 from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,22 +18,48 @@ from numba import njit
 from numpy.typing import NDArray
 
 from model.film import JIT, film_grid, film_work, solve_film
-from model.pad_film import PadFilm
 
 FloatArray = NDArray[np.float64]
 _TABLE_MESH = (32, 4)
+#: (A, B) -> tilting force and load over mu U R^2 L; the tilting force is infinite where the film is gone.
+_Force = Callable[[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Loaded attitudes of one pad on its pivot, against the reach of the journal.
+
+    The reach is Cp - Cb + n . (x, y): the approach `a` if the pivot did not give way. It rises along the branch.
+
+    Attributes
+    ----------
+    reach, approach, wedge : (n,) ndarray
+        Reach, a and b [m]; below the first reach the pad has no loaded attitude.
+    load : (n,) ndarray
+        [N]
+    """
+
+    reach: FloatArray
+    approach: FloatArray
+    wedge: FloatArray
+    load: FloatArray
+
+    def at(self, reach: float) -> tuple[float, float]:
+        """Guess (a, b) [m] at a reach."""
+        a = float(np.interp(reach, self.reach, self.approach))
+        return a, float(np.interp(reach, self.reach, self.wedge))
 
 
 @dataclass(frozen=True)
 class LoadedAttitude:
-    """Free-tilt attitude and load of an isothermal film against its relative curvature A.
+    """Attitudes that tilt freely, and their load, along the wedge.
 
     Attributes
     ----------
     curvature : (n,) ndarray
-        A, increasing; the first one is where the pad just stops carrying.
+        A(B).
     wedge : (n,) ndarray
-        B(A).
+        B, rising from 0.
     load : (n,) ndarray
         Radial force over mu U R^2 L / (Cp - a)^2.
     """
@@ -40,36 +68,36 @@ class LoadedAttitude:
     wedge: FloatArray
     load: FloatArray
 
-    @property
-    def least(self) -> float:
-        """Smallest A with a loaded attitude."""
-        return float(self.curvature[0])
+    def branch(self, clearance: float, scale: float, give: Callable[[float], float]) -> Branch:
+        """The loaded attitudes of a pad.
 
-    def at(self, clearance: float, a: float) -> tuple[float, float]:
-        """Guess b [m] and the load factor (times mu U R^2 L [N]) at an approach a."""
-        room = clearance - a
-        curvature = a / room if room > 0 else math.inf
-        if curvature > self.curvature[-1]:
-            if room <= 0:
-                return float(self.wedge[-1] / math.sqrt(self.curvature[-1])) * math.sqrt(abs(a) * clearance), math.inf
-            growth = math.sqrt(curvature / self.curvature[-1])
-            return float(self.wedge[-1]) * growth * room, float(self.load[-1]) / room**2
-        # wedge and load grow like the square root of A where a central pivot begins to carry
-        key, keys = _root(curvature), _root(self.curvature)
-        b = float(np.interp(key, keys, self.wedge)) * room
-        return b, float(np.interp(key, keys, self.load)) / room**2
-
-
-def _root(curvature: FloatArray | float) -> FloatArray:
-    return np.sign(curvature) * np.sqrt(np.abs(curvature))
+        Parameters
+        ----------
+        clearance : float
+            Cp [m].
+        scale : float
+            mu U R^2 L [N m^2].
+        give : callable
+            Pivot deflection [m] by load [N].
+        """
+        room = clearance / (1.0 + self.curvature)
+        load = scale * self.load / room**2
+        approach = clearance - room
+        some = load[::4]
+        order = np.argsort(some)
+        deflection = np.array([give(w) for w in some[order].tolist()])
+        reach = approach + np.interp(load, some[order], deflection)
+        falling = np.flatnonzero(np.diff(reach) <= 0.0)
+        rising = slice(int(falling[-1]) + 1 if len(falling) else 0, None)
+        return Branch(reach[rising], approach[rising], (self.wedge * room)[rising], load[rising])
 
 
 @functools.lru_cache(maxsize=64)
 def loaded_attitude(start: float, end: float, radius: float, length: float) -> LoadedAttitude:
-    """Tabulate the loaded attitude of a film from `start` to `end` [rad from the pivot].
+    """Tabulate the loaded attitudes of a film from `start` to `end` [rad from the pivot].
 
-    The film is solved at unit minimum-clearance scale; only ratios enter, so one table serves every clearance,
-    speed and viscosity.
+    The film is solved at unit clearance scale; only ratios enter, so one table serves every clearance, speed and
+    viscosity.
     """
     grid = film_grid(start, end, radius, length, _TABLE_MESH, True)
     work = film_work(grid, 40.0)
@@ -77,183 +105,158 @@ def loaded_attitude(start: float, end: float, radius: float, length: float) -> L
     work.density[:] = 1.0
     unit = radius**2 * length
 
-    def force(curvature: float, wedge: float) -> tuple[float, float, float]:
+    def force(curvature: float, wedge: float) -> tuple[float, float]:
         # (Cp - a) = 1: Cp = 1 + A
         work.ruptured[:] = False
         f = solve_film(grid, work, (1.0 + curvature, curvature, wedge), 1.0, False)
-        return (f.force[0] / unit, f.force[1] / unit, f.steps)
+        return (f.force[1] / unit, f.force[0] / unit) if f.steps > 0 else (math.inf, math.inf)
 
-    rows = []
-    for curvature in _curvatures(start, end):
-        wedge = _free_wedge(force, curvature, start, end)
+    rows = [(0.0, 0.0)]
+    gentle = _free_wedge(force, _CURVATURES[0], end)
+    if gentle is not None:
+        rows += [(_free_curvature(force, share * gentle), share * gentle) for share in _SHARES]
+    for curvature in _CURVATURES:
+        wedge = _free_wedge(force, curvature, end)
         if wedge is not None:
-            rows.append((curvature, wedge, force(curvature, wedge)[0]))
+            rows.append((curvature, wedge))
     if len(rows) < 4:
-        raise ValueError(
-            f"a pad from {math.degrees(start):.1f} to {math.degrees(end):.1f} deg about its pivot has no loaded attitude"
-        )
-    table = np.array(rows)
-    if table[0, 0] == min(_POSITIVE):  # central pivot: carries from A = 0 on, in proportion to A
-        table = np.vstack([[0.0, 0.0, 0.0], table])
-    return LoadedAttitude(table[:, 0], table[:, 1], table[:, 2])
+        edges = f"{math.degrees(start):.1f} to {math.degrees(end):.1f} deg"
+        raise ValueError(f"a pad from {edges} about its pivot has no loaded attitude; move the pivot downstream")
+    coarse = np.array([(*row, force(*row)[1]) for row in rows])
+    coarse[0, 2] = 0.0
+    return LoadedAttitude(*_refined(coarse).T)
 
 
-_POSITIVE = (
-    1e-3,
-    0.02,
-    0.06,
-    0.12,
-    0.2,
-    0.35,
-    0.6,
-    1.0,
-    1.6,
-    2.5,
-    4.0,
-    6.5,
-    10.0,
-    16.0,
-    25.0,
-    40.0,
-    65.0,
-    100.0,
-)
+def _refined(rows: FloatArray) -> FloatArray:
+    """Four times as many rows, between them smooth in the wedge."""
+    from scipy.interpolate import PchipInterpolator
+
+    at = np.arange(len(rows))
+    fine = np.interp(np.arange(4 * len(rows) - 3) / 4.0, at, rows[:, 1])
+    return np.asarray(PchipInterpolator(rows[:, 1], rows)(fine))
 
 
-def _curvatures(start: float, end: float) -> list[float]:
-    if abs(start + end) < 1e-6 * (end - start):
-        return list(_POSITIVE)
-    return [-0.8, -0.5, -0.3, -0.2, -0.1, -0.05, *_POSITIVE]
+_CURVATURES = (0.2, 0.35, 0.6, 1.0, 1.6, 2.5, 4.0, 6.5, 10.0, 16.0, 25.0, 40.0, 65.0, 100.0)
+#: Wedges below that of the first curvature, as shares of it.
+_SHARES = (0.03, 0.06, 0.1, 0.16, 0.23, 0.31, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+#: Attitudes beyond this are of no concern: the journal would stand clearances away.
+_LEAST_CURVATURE = -0.8
 
 
-def _free_wedge(force, curvature: float, start: float, end: float) -> float | None:  # type: ignore[no-untyped-def]
-    """Root of the tilting force in B, the loaded one: where it rises through zero."""
-    touch = (1.0 + curvature * (1.0 - math.cos(end))) / math.sin(end)  # film gone at the trailing edge
-    if curvature > 0 and math.atan2(math.sqrt(1.0 + 2.0 * curvature), curvature) < end:
-        touch = math.sqrt(1.0 + 2.0 * curvature)  # ... or before it
-    upper = 0.98 * touch
-    f_upper = force(curvature, upper)
-    if f_upper[2] < 0 or f_upper[1] <= 0:
-        return None
-    lower = upper
-    while lower > 1e-3 * abs(curvature) * touch + 1e-6:
-        lower *= 0.7
-        f_lower = force(curvature, lower)
-        if f_lower[1] < 0:
-            break
-        upper, f_upper = lower, f_lower
-    else:
-        return None
+def _free_curvature(force: _Force, wedge: float) -> float:
+    """A at which a pad with this B tilts freely: more A takes the pressure upstream."""
     from scipy.optimize import brentq
 
-    return float(brentq(lambda w: force(curvature, w)[1], lower, upper, xtol=1e-6 * upper, rtol=1e-6))
+    if not force(_LEAST_CURVATURE, wedge)[0] > 0.0:
+        return _LEAST_CURVATURE
+    low, high = _LEAST_CURVATURE, _CURVATURES[0]
+    while math.isinf(force(low, wedge)[0]):  # the film is gone at the trailing edge
+        low = 0.5 * (low + high)
+    return float(brentq(lambda c: force(c, wedge)[0], low, high, xtol=1e-5))
 
 
-def first_position(
-    load: FloatArray, scale: float, give: FloatArray, films: list[PadFilm], tables: list[LoadedAttitude]
-) -> tuple[FloatArray, FloatArray]:
-    """Journal position and pivot deflections that balance a load on tabulated isothermal films.
+def _free_wedge(force: _Force, curvature: float, end: float) -> float | None:
+    """Root of the tilting force in B for A > 0, the loaded one: where it rises through zero."""
+    touch = (1.0 + curvature * (1.0 - math.cos(end))) / math.sin(end)  # film gone at the trailing edge
+    if math.atan2(math.sqrt(1.0 + 2.0 * curvature), curvature) < end:
+        touch = math.sqrt(1.0 + 2.0 * curvature)  # ... or before it
+    upper = 0.98 * touch
+    if not 0.0 < force(curvature, upper)[0] < math.inf:
+        return None
+    lower = 0.7 * upper
+    while force(curvature, lower)[0] >= 0.0:
+        upper, lower = lower, 0.7 * lower
+        if lower < 1e-3 * curvature * touch:
+            return None
+    from scipy.optimize import brentq
+
+    return float(brentq(lambda w: force(curvature, w)[0], lower, upper, xtol=1e-6 * upper, rtol=1e-6))
+
+
+def first_position(load: FloatArray, normals: FloatArray, gaps: FloatArray, branches: list[Branch]) -> FloatArray:
+    """Journal position that balances a load on tabulated isothermal films.
 
     Parameters
     ----------
     load : (2,) ndarray
         [N]
-    scale : float
-        mu U R^2 L [N m^2].
-    give : (n_pads,) ndarray
-        Secant compliance of every pivot [m/N].
+    normals : (n_pads, 2) ndarray
+        Unit vectors at the pivots.
+    gaps : (n_pads,) ndarray
+        Cp - Cb [m].
+    branches : list of Branch
 
     Returns
     -------
-    position : (2,) ndarray
-        [m]
-    deflection : (n_pads,) ndarray
+    (2,) ndarray
         [m]
     """
-    pads = np.array([[*f.normal, f.gap, f.pad.pad_clearance, c] for f, c in zip(films, give, strict=True)])
-    longest = max(len(t.curvature) for t in tables)
-    curves = np.full((len(tables), 2, longest), math.inf)
-    for row, t in zip(curves, tables, strict=True):
-        row[0, : len(t.curvature)] = _root(t.curvature)
-        row[1, : len(t.load)] = t.load
-    return _first_position(np.asarray(load, float), scale, pads, curves)
+    longest = max(len(b.reach) for b in branches)
+    curves = np.full((len(branches), 2, longest), math.nan)
+    for row, branch in zip(curves, branches, strict=True):
+        row[0, : len(branch.reach)] = branch.reach
+        row[1, : len(branch.load)] = branch.load
+    lengths = np.array([len(b.reach) for b in branches])
+    room = min(float(b.approach[-1]) - g for b, g in zip(branches, gaps, strict=True))
+    return _first_position(np.asarray(load, float), np.column_stack([normals, gaps]), curves, lengths, room)
 
 
 @njit(**JIT)
 def _first_position(
-    load: FloatArray, scale: float, pads: FloatArray, curves: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    n = pads.shape[0]
-    room = np.min(pads[:, 3] - pads[:, 2])
+    load: FloatArray, pads: FloatArray, curves: FloatArray, lengths: NDArray[np.int64], room: float
+) -> FloatArray:
     size = math.hypot(load[0], load[1])
-    deflection = np.zeros(n)
     position = np.zeros(2)
     if size == 0.0:
-        _pull(position, scale, pads, curves, deflection)
-        return position, deflection
+        return position
     position = load / size * 0.4 * room
-    step = 1e-3 * room
-    for _ in range(40):
-        residual = load - _pull(position, scale, pads, curves, deflection)
-        error = math.hypot(residual[0], residual[1])
-        if error < 0.005 * size:
+    residual = load - _pull(position, pads, curves, lengths)
+    error = math.hypot(residual[0], residual[1])
+    step = 1e-4 * room
+    for _ in range(60):
+        if error < 0.002 * size:
             break
         jacobian = np.zeros((2, 2))
         for axis in range(2):
             ahead, behind = position.copy(), position.copy()
             ahead[axis] += step
             behind[axis] -= step
-            slope = _pull(ahead, scale, pads, curves, deflection) - _pull(behind, scale, pads, curves, deflection)
+            slope = _pull(ahead, pads, curves, lengths) - _pull(behind, pads, curves, lengths)
             jacobian[:, axis] = slope / (2 * step)
         det = jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0]
         if abs(det) <= 1e-9 * np.sum(jacobian**2):  # nothing carries in some direction: go where the load pushes
-            position = position + 0.1 * room * residual / error
-            continue
-        move = np.array(
-            [
-                (residual[0] * jacobian[1, 1] - jacobian[0, 1] * residual[1]) / det,
-                (jacobian[0, 0] * residual[1] - jacobian[1, 0] * residual[0]) / det,
-            ]
-        )
-        position = position + move * min(1.0, 0.2 * room / max(math.hypot(move[0], move[1]), 1e-30))
-    _pull(position, scale, pads, curves, deflection)
-    return position, deflection
+            move = 0.1 * room * residual / error
+        else:
+            move = np.array(
+                [
+                    (residual[0] * jacobian[1, 1] - jacobian[0, 1] * residual[1]) / det,
+                    (jacobian[0, 0] * residual[1] - jacobian[1, 0] * residual[0]) / det,
+                ]
+            )
+            move *= min(1.0, 0.2 * room / max(math.hypot(move[0], move[1]), 1e-30))
+        for halving in range(8):  # a pad that takes up or sheds its load on the way bends the force sharply
+            trial = position + move * 0.5**halving
+            missing = load - _pull(trial, pads, curves, lengths)
+            left = math.hypot(missing[0], missing[1])
+            if left < error or halving == 7:
+                position, residual, error = trial, missing, left
+                break
+    return position
 
 
 @njit(**JIT)
-def _pull(
-    position: FloatArray, scale: float, pads: FloatArray, curves: FloatArray, deflection: FloatArray
-) -> FloatArray:
-    """Force of all tabulated films at a position; also sets every pivot's deflection."""
+def _pull(position: FloatArray, pads: FloatArray, curves: FloatArray, lengths: NDArray[np.int64]) -> FloatArray:
+    """Force of all tabulated films at a position."""
     total = np.zeros(2)
     for m in range(pads.shape[0]):
         reach = pads[m, 2] + pads[m, 0] * position[0] + pads[m, 1] * position[1]
-        clearance, compliance = pads[m, 3], pads[m, 4]
-        low, high = -0.9 * clearance, min(reach, 0.999 * clearance)
-        if compliance > 0.0:  # a + c W(a) rises with a
-            for _ in range(30):
-                middle = 0.5 * (low + high)
-                if middle + compliance * _tabulated(middle, clearance, scale, curves[m]) > reach:
-                    high = middle
-                else:
-                    low = middle
-        carried = _tabulated(high, clearance, scale, curves[m])
-        deflection[m] = compliance * carried
+        reaches, loads = curves[m, 0], curves[m, 1]
+        if reach < reaches[0]:
+            continue
+        i = min(np.searchsorted(reaches[: lengths[m]], reach), lengths[m] - 1)  # beyond the end: the last slope
+        i = max(i, 1)
+        slope = (loads[i] - loads[i - 1]) / (reaches[i] - reaches[i - 1])
+        carried = loads[i - 1] + slope * (reach - reaches[i - 1])
         total[0] += pads[m, 0] * carried
         total[1] += pads[m, 1] * carried
     return total
-
-
-@njit(**JIT)
-def _tabulated(a: float, clearance: float, scale: float, curve: FloatArray) -> float:
-    room = clearance - a
-    ratio = a / room
-    key = math.sqrt(abs(ratio)) * (1.0 if ratio >= 0 else -1.0)
-    keys, loads = curve[0], curve[1]
-    if key <= keys[0]:
-        return 0.0
-    i = np.searchsorted(keys, key)
-    if i >= len(keys) or not math.isfinite(keys[i]):
-        return scale * loads[i - 1] / room**2
-    share = (key - keys[i - 1]) / (keys[i] - keys[i - 1])
-    return scale * (loads[i - 1] + share * (loads[i] - loads[i - 1])) / room**2
