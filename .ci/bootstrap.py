@@ -165,16 +165,13 @@ def _advice() -> str:
 def _install(command: list[str]) -> None:
     """Run the installer with its output in a log, one changing line for the person who waits."""
     show = sys.stdout.isatty()
-    with LOG.open("w", encoding="utf-8") as log:
-        process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=_environment()
-        )
-        assert process.stdout is not None
-        for line in process.stdout:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    with LOG.open("w", encoding="utf-8") as log, subprocess.Popen(command, **pipes, env=_environment()) as process:
+        for line in process.stdout or ():
             log.write(line)
             if show and line.startswith(SHOWN):
                 print(f"\r  {line.strip()[:76]:<76}", end="", flush=True)
-        code = process.wait()
+    code = process.returncode
     if show:
         print(f"\r{'':<78}\r", end="", flush=True)
     if code != 0:

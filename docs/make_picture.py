@@ -31,7 +31,8 @@ def main(demo_out: Path) -> None:
         _, _, width, height = (float(v) for v in re.search(r'viewBox="([^"]+)"', body)[1].split())
         shown = width * HEIGHT / height
         pieces.append(f'<text x="{x + 8:.1f}" y="18" font-family="sans-serif" font-size="15">{title}</text>')
-        head = f'<svg x="{x:.1f}" y="{TITLE:.1f}" width="{shown:.1f}" height="{HEIGHT:.1f}" viewBox="0 0 {width} {height}">'
+        box = f'viewBox="0 0 {width} {height}"'
+        head = f'<svg x="{x:.1f}" y="{TITLE:.1f}" width="{shown:.1f}" height="{HEIGHT:.1f}" {box}>'
         pieces.append(head + body[body.index(">") + 1 :])
         x += shown + GAP
     width = x - GAP

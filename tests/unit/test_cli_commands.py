@@ -171,6 +171,7 @@ def test_predict_takes_an_effects_file(rocker_file, tmp_path):
     assert b == pytest.approx(a / 1.25, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_compare_writes_a_report(small_campaign, tmp_path):
     out = tmp_path / "out"
     result = tpjb(
@@ -195,6 +196,7 @@ def test_export_from_results(identified, tmp_path, form):
     assert len(list((tmp_path / "out").iterdir())) >= 2
 
 
+@pytest.mark.slow
 def test_simulate_is_repeatable_and_readable(rocker_file, tmp_path):
     arguments = ("simulate", rocker_file, "--plan", "short", "--load", "3 kN", "--thermal", "isothermal", "--seed", "5")
     for name in "ab":
