@@ -62,7 +62,7 @@ def _judge(campaign: Campaign, seen: Sequence[Observation]) -> list[Problem]:
     check_locus(of_kind["locus"])
     _check_duplicates(seen)
     findings: list[Finding] = [f for one in seen for f in one.report.found]
-    return merge(findings, campaign.path.name, len(campaign.runs))
+    return merge(findings, campaign.path.name, campaign.runs)
 
 
 def _check_duplicates(seen: Sequence[Observation]) -> None:

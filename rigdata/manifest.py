@@ -6,7 +6,6 @@ import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any
 
 from rigdata.calibration import Channel
@@ -115,7 +114,7 @@ def parse_manifest(text: str, file: str = "campaign.toml") -> Manifest:
         housing_mass=math.nan if mass is None else mass,
         sample_rate=rate,
         csv=_read_csv(top.subtable("csv"), findings),
-        channels=MappingProxyType(channels),
+        channels=channels,
         runs=runs,
         notes=tuple(p for p in findings.problems if p.severity != "error"),
     )

@@ -49,6 +49,7 @@ _SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": 
 _ALIASES = {"%": "percent", "degC": "kelvin", "celsius": "kelvin", "degF": "degR", "kp": "kgf"}
 _ALIASES_BY_DIMENSION = {
     "acceleration": {"g": "standard_gravity", "gn": "standard_gravity", "g_n": "standard_gravity"},
+    "length": {"mil": "thou"},
     "temperature": {"C": "kelvin"},
     "temperature difference": {"C": "kelvin"},
     "speed": {"U": "revolution"},

@@ -51,16 +51,16 @@ class Reporter:
         self.found.extend(Finding(p, f"{p.place} {p.what}") for p in problems)
 
 
-def merge(findings: Sequence[Finding], file: str, runs: int) -> list[Problem]:
-    """Tell a finding once that at least half of `runs` (and three or more) share.
+def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[Problem]:
+    """Tell a finding once that a third (three at least) of the runs of its kinds share.
 
     Parameters
     ----------
     findings : sequence of Finding
     file : str
         Display name of the campaign's manifest or file.
-    runs : int
-        How many runs could have had it.
+    runs : sequence of Run
+        All runs of the campaign.
 
     Returns
     -------
@@ -70,10 +70,13 @@ def merge(findings: Sequence[Finding], file: str, runs: int) -> list[Problem]:
     groups: dict[tuple[str, str], list[Problem]] = {}
     for finding in findings:
         groups.setdefault((finding.key, finding.problem.severity), []).append(finding.problem)
+    kind_of = {run.id: run.kind for run in runs}
     merged: list[Problem] = []
     for group in groups.values():
         concerned = list(dict.fromkeys(p.run for p in group if p.run))
-        if len(concerned) < 3 or 2 * len(concerned) < runs:
+        kinds = {kind_of[r] for r in concerned}
+        alike = sum(run.kind in kinds for run in runs)
+        if len(concerned) < 3 or 3 * len(concerned) < alike:
             merged.extend(group)
             continue
         first = group[0]

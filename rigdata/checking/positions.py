@@ -11,15 +11,16 @@ from rigdata.checking.observation import Observation
 #: No film bearing lets its shaft travel further [m].
 _MAX_TRAVEL = 1e-3
 #: Runs needed before one can be told apart.
-_MIN_RUNS = 8
-#: Distance from the campaign's median, in units of the range of the middle 80 % of the runs.
+_MIN_RUNS = 5
+#: Distance from the median of like runs, in units of the range of the middle 80 % of them.
 _FAR = 3.0
-_MIN_JUMP = 30e-6
+#: A smaller distance is no jump: dry runs press the shaft against pads on all sides [m].
+_MIN_JUMP = {"running": 100e-6, "dry": 300e-6}
 
 
 def check_positions(runs: Sequence[Observation]) -> None:
     """Mean readings of the probes (gap voltage included) run against run, and their travel."""
-    places: dict[str, list[tuple[Observation, float]]] = {}
+    places: dict[tuple[str, str], list[tuple[Observation, float]]] = {}
     for seen in runs:
         for index in seen.pick("displacement"):
             column = seen.samples[:, index]
@@ -28,25 +29,26 @@ def check_positions(runs: Sequence[Observation]) -> None:
                 continue
             name = seen.channels[index].name
             low, middle, high = np.quantile(known, [0.02, 0.5, 0.98])
-            places.setdefault(name, []).append((seen, float(middle)))
+            state = "running" if seen.run.kind in {"dynamic", "locus"} else "dry"
+            places.setdefault((name, state), []).append((seen, float(middle)))
             if high - low > _MAX_TRAVEL:
                 what = f"the shaft travels {1e3 * (high - low):.2g} mm, more than a film bearing lets it"
                 cure = "Check the sensitivity of the probe, and for loose cables"
                 seen.report.say(f"travel {name}", "warning", f"channel {name}", what, cure)
-    for name, means in places.items():
-        _check_jumps(name, means)
+    for (name, state), means in places.items():
+        _check_jumps(name, means, _MIN_JUMP[state])
 
 
-def _check_jumps(name: str, means: Sequence[tuple[Observation, float]]) -> None:
+def _check_jumps(name: str, means: Sequence[tuple[Observation, float]], least: float) -> None:
     if len(means) < _MIN_RUNS:
         return
     values = np.array([m for _, m in means])
     low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
-    allowed = max(_FAR * (high - low), _MIN_JUMP)
+    allowed = max(_FAR * (high - low), least)
     for seen, mean in means:
         if abs(mean - middle) > allowed:
             what = (
-                f"reads {1e6 * mean:.0f} um on average, the other runs {1e6 * low:.0f} to {1e6 * high:.0f} um; "
+                f"reads {1e6 * mean:.0f} um on average, others of its kind {1e6 * low:.0f} to {1e6 * high:.0f} um; "
                 "the gap voltage is constant within a campaign"
             )
             cure = "Check the probe: moved, wrong sign, wrong sensitivity in this run?"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -182,12 +182,27 @@ def _check_agreement(group: Sequence[_Answer], stiffness: ComplexArray) -> None:
     for answer, misfit in zip(group, misfits):
         if misfit <= max(_OUTLIER, 6 * float(np.median(misfits))):
             continue
-        found = [w for w, m in repairs(answer.channels, scales=True) if _misfit(answer, stiffness, m) < misfit / 4]
-        hint = f"; as if {found[0]}" if len(found) == 1 else ""
+        hint = _name_misfit(answer, stiffness, float(misfit))
         severity: Severity = "error" if misfit > 0.5 or (hint and misfit > 0.2) else "warning"
         what = f"differs by {misfit:.0%} from the other runs at this operating point{hint}"
         cure = "Check this run's channels and set points; leave it out or repeat it"
         answer.seen.report.say("disagrees", severity, "displacement and force", what, cure)
+
+
+def _name_misfit(answer: _Answer, stiffness: ComplexArray, misfit: float) -> str:
+    """Name the one fault of probes or cells that explains a run apart from the others."""
+    tried = [(_misfit(answer, stiffness, m), w) for w, m in repairs(answer.channels, scales=True)]
+    seen, where = answer.seen, answer.seen.pick("force")
+    cells = [seen.channels[i] for i in where]
+    if len(cells) == 2 and seen.lines is not None:
+        phasors = seen.lines.phasor[where]
+        for words, matrix in repairs(cells, scales=True):
+            # The inertia part of the force stays: only the cells are supposed to be at fault.
+            force = answer.force + to_plane(cells, matrix @ phasors - phasors)
+            tried.append((_misfit(replace(answer, force=force), stiffness), words))
+    tried.sort()
+    clear = tried[0][0] < misfit / 4 and tried[0][0] < tried[1][0] / 2
+    return f"; as if {tried[0][1]}" if clear else ""
 
 
 def check_accelerometers(runs: Sequence[Observation]) -> None:

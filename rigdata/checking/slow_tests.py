@@ -103,7 +103,7 @@ def _check_follows(seen: Observation, planes: tuple[FloatArray, FloatArray], pus
     channels = [seen.channels[i] for i in where]
     axes = np.array([c.axis for c in channels])
     readings = np.stack([np.cos(axes), np.sin(axes)], axis=1) @ slope
-    guess = guess_wiring(channels, readings, unit)
+    guess = guess_wiring(channels, readings, unit, within=20.0)
     goes, pushed = math.degrees(math.atan2(slope[1], slope[0])), math.degrees(math.atan2(unit[1], unit[0]))
     what = f"the shaft goes toward {goes:.0f} deg while the load pushes toward {pushed:.0f} deg{guess}"
     cure = "Check axis, polarity and cables of the probes"

@@ -12,7 +12,6 @@ from rigdata.calibration import Channel
 from rigdata.vector import solve_vector
 
 FloatArray = NDArray[np.float64]
-_ALIGNED = math.cos(math.radians(8.0))
 
 
 def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple[str, NDArray[np.float64]]]:
@@ -36,7 +35,9 @@ def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple
             yield f"{second} read {word}", np.diag([1.0, factor])
 
 
-def guess_wiring(channels: Sequence[Channel], readings: FloatArray, wanted: FloatArray) -> str:
+def guess_wiring(
+    channels: Sequence[Channel], readings: FloatArray, wanted: FloatArray, within: float = 8.0
+) -> str:
     """Say which fault would turn the readings into the direction `wanted`; "" where not just one would.
 
     Parameters
@@ -46,6 +47,8 @@ def guess_wiring(channels: Sequence[Channel], readings: FloatArray, wanted: Floa
         SI, one per channel.
     wanted : (2,) ndarray
         Unit vector.
+    within : float
+        Largest angle that counts as that direction [deg].
     """
     if len(channels) != 2 or not np.all(np.isfinite(readings)):
         return ""
@@ -54,7 +57,7 @@ def guess_wiring(channels: Sequence[Channel], readings: FloatArray, wanted: Floa
     for words, matrix in repairs(channels):
         vector = solve_vector(axes, (matrix @ readings)[None, :])[0]
         size = float(np.hypot(*vector))
-        if size > 0 and float(vector @ wanted) > _ALIGNED * size:
+        if size > 0 and float(vector @ wanted) > math.cos(math.radians(within)) * size:
             explanations.append(words)
     # With the load along one cell's axis a wrong sign of the other one changes nothing: simplest first.
     return f"; as if {explanations[0]}" if explanations and len(explanations) < 3 else ""

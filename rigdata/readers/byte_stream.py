@@ -61,6 +61,11 @@ def is_ascii_based(encoding: str) -> bool:
     return sample.encode(encoding) == sample.encode("ascii")
 
 
+def codec_of_bytes(encoding: str) -> str:
+    """Codec of the bytes that `open_ascii` gives for a file in `encoding`."""
+    return encoding if is_ascii_based(encoding) and encoding != "utf-8-sig" else "utf-8"
+
+
 class _Transcoder(io.RawIOBase):
     """Reads a file of any encoding as UTF-8."""
 
@@ -142,6 +147,26 @@ def all_lines(path: Path, encoding: str, limit: int = 2**20) -> Iterator[bytes]:
                 text = text[limit:]
         if text:
             yield text.rstrip(b"\r")
+
+
+class AsciiOnly(io.RawIOBase):
+    """A stream in which every byte beyond ASCII has become DEL.
+
+    Numbers, delimiters and line ends are ASCII; pyarrow takes all text for UTF-8 and must not meet other.
+    """
+
+    _TABLE = bytes(range(128)) + b"\x7f" * 128
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+
+    def readable(self) -> bool:
+        """Whether it can be read: always."""
+        return True
+
+    def read(self, size: int = -1) -> bytes:
+        """Read up to `size` bytes."""
+        return self._stream.read(size).translate(self._TABLE)
 
 
 def squeeze_blanks(stream: BinaryIO) -> BinaryIO:

@@ -116,7 +116,7 @@ class CsvReader:
             wanted = [n for n in dialect.names if n in self.channels and self.channels[n].quantity != "ignore"]
             if large:
                 wanted = [n for n in wanted if n in names] or wanted[:1]
-            table = read_table(Source(self.path, self.file, self.run, dialect), wanted)
+            table = read_table(Source(self.path, self.file, self.run, dialect, self._clock_name()), wanted)
             self.cache.put(key, table)
         return table
 
@@ -134,6 +134,9 @@ class CsvReader:
                 cure = f"Did you mean {close[0]!r}?" if close else f"The columns are: {', '.join(known)[:200]}"
                 raise self._error(f"channel {name}", "is missing in the file", cure)
         return [table.columns[n][start:stop] for n in names]
+
+    def _clock_name(self) -> str:
+        return next((c.name for c in self.channels.values() if c.quantity == "time"), "")
 
     def _clock(self) -> Channel | None:
         clock = next((c for c in self.channels.values() if c.quantity == "time"), None)

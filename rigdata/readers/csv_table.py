@@ -11,7 +11,15 @@ import numpy as np
 
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import MAX_SAMPLES, FloatArray
-from rigdata.readers.byte_stream import all_lines, is_ascii_based, open_ascii, skip_to, squeeze_blanks
+from rigdata.readers.byte_stream import (
+    AsciiOnly,
+    all_lines,
+    codec_of_bytes,
+    is_ascii_based,
+    open_ascii,
+    skip_to,
+    squeeze_blanks,
+)
 from rigdata.readers.dialect import Dialect, split_line
 from rigdata.readers.numbers import MISSING, is_missing, is_number, number_pattern
 
@@ -22,12 +30,13 @@ _LISTED = 5
 
 @dataclass(frozen=True)
 class Source:
-    """A CSV file and how to speak of it."""
+    """A CSV file and how to speak of it; `clock` names its time column, if any."""
 
     path: Path
     file: str
     run: str | None
     dialect: Dialect = field(repr=False)
+    clock: str = ""
 
     def problem(self, severity: Any, place: str, what: str, cure: str) -> Problem:
         """Make a finding about this file."""
@@ -79,6 +88,7 @@ def read_table(source: Source, names: Sequence[str]) -> Table:
     except pa.ArrowInvalid:
         # Rare spellings of numbers, or text: as text once more, to mend the first and to locate the second.
         columns, length, odd = _parse(source, names, numbers=False)
+    columns, length = _drop_empty_tail(columns, length, source.clock)
     problems = _judge_odd_rows(source, odd)
     if not odd and length and _cut_inside_last_cell(source):
         columns = {n: c[:-1] for n, c in columns.items()}
@@ -90,6 +100,14 @@ def read_table(source: Source, names: Sequence[str]) -> Table:
     return Table(columns, length, problems)
 
 
+def _drop_empty_tail(columns: dict[str, FloatArray], length: int, clock: str) -> tuple[dict[str, FloatArray], int]:
+    """Leave out lines at the end that hold not even a time, as spreadsheets write them."""
+    kept = length
+    while kept > 0 and clock in columns and all(np.isnan(c[kept - 1]) for c in columns.values()):
+        kept -= 1
+    return ({n: c[:kept] for n, c in columns.items()}, kept) if 0 < kept < length else (columns, length)
+
+
 def _options(source: Source, names: Sequence[str], numbers: bool, odd: list[Any]) -> dict[str, Any]:
     import pyarrow as pa
     import pyarrow.csv as pv
@@ -99,7 +117,7 @@ def _options(source: Source, names: Sequence[str], numbers: bool, odd: list[Any]
     wanted = [labels[dialect.names.index(n)] for n in names]
 
     def note(row: Any) -> str:
-        if len(odd) < 1000:
+        if row.text.strip() and len(odd) < 1000:
             odd.append((row.actual_columns, row.text))
         return "skip"
 
@@ -109,7 +127,7 @@ def _options(source: Source, names: Sequence[str], numbers: bool, odd: list[Any]
             delimiter="\t" if dialect.delimiter == " " else dialect.delimiter, invalid_row_handler=note
         ),
         "convert_options": pv.ConvertOptions(
-            column_types=dict.fromkeys(wanted, pa.float64() if numbers else pa.binary()),
+            column_types=dict.fromkeys(wanted, pa.float64() if numbers else pa.string()),
             include_columns=wanted,
             null_values=list(MISSING),
             strings_can_be_null=False,
@@ -131,7 +149,7 @@ def _parse(
     faults: list[list[str]] = [[] for _ in names]
     with open_ascii(source.path, source.dialect.encoding) as plain:
         skip_to(plain, source.dialect.data_offset)
-        stream = squeeze_blanks(plain) if source.dialect.delimiter == " " else plain
+        stream = AsciiOnly(squeeze_blanks(plain) if source.dialect.delimiter == " " else plain)
         try:
             reader = pv.open_csv(stream, **_options(source, names, numbers, odd))
             for batch in reader:
@@ -157,10 +175,7 @@ def _to_numbers(column: Any, decimal: str, faults: list[str]) -> Any:
     import pyarrow as pa
     import pyarrow.compute as pc
 
-    text = pc.ascii_trim_whitespace(column.cast(pa.string(), safe=False)) if _is_utf8(column) else None
-    if text is None:
-        faults.append("not text")
-        return pa.nulls(len(column), pa.float64())
+    text = pc.ascii_trim_whitespace(column)
     missing = pc.is_in(text, value_set=pa.array(MISSING))
     good = pc.match_substring_regex(text, number_pattern(decimal))
     if not pc.all(pc.or_(missing, good)).as_py():
@@ -169,23 +184,13 @@ def _to_numbers(column: Any, decimal: str, faults: list[str]) -> Any:
     return pc.if_else(good, text, None).cast(pa.float64())
 
 
-def _is_utf8(column: Any) -> bool:
-    import pyarrow as pa
-
-    try:
-        column.cast(pa.string())
-    except pa.ArrowInvalid:
-        return False
-    return True
-
-
 def _locate_text(source: Source, names: Sequence[str]) -> list[Problem]:
     """Name the first lines on which each of the columns `names` holds text."""
     dialect = source.dialect
     found: dict[str, list[tuple[int, str]]] = {n: [] for n in names}
     counts = dict.fromkeys(names, 0)
     where = {n: dialect.names.index(n) for n in names}
-    codec = dialect.encoding if is_ascii_based(dialect.encoding) else "utf-8"
+    codec = codec_of_bytes(dialect.encoding)
     for number, line in enumerate(all_lines(source.path, dialect.encoding), start=1):
         if number < dialect.data_line:
             continue
@@ -215,7 +220,7 @@ def _judge_odd_rows(source: Source, odd: list[tuple[int, str]]) -> tuple[Problem
     dialect = source.dialect
     bad: list[tuple[int, int]] = []
     last = 0
-    codec = dialect.encoding if is_ascii_based(dialect.encoding) else "utf-8"
+    codec = codec_of_bytes(dialect.encoding)
     for number, line in enumerate(all_lines(source.path, dialect.encoding), start=1):
         if number < dialect.data_line:
             continue
@@ -250,8 +255,7 @@ def _cut_inside_last_cell(source: Source) -> bool:
         tail = stream.read()
     if not tail or tail.endswith((b"\n", b"\r")):
         return False
-    codec = "utf-8" if dialect.encoding == "utf-8-sig" else dialect.encoding
-    lines = [t for t in tail.decode(codec, "replace").splitlines() if t.strip()][-6:]
+    lines = [t for t in tail.decode(codec_of_bytes(dialect.encoding), "replace").splitlines() if t.strip()][-6:]
     rows = [split_line(t, dialect.delimiter) for t in lines]
     rows = [r for r in rows if len(r) == len(dialect.names)]
     if len(rows) < 3:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rigdata.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.byte_stream import HEAD, head_lines, text_encoding
+from rigdata.readers.byte_stream import HEAD, codec_of_bytes, head_lines, text_encoding
 from rigdata.readers.numbers import is_missing, is_number, looks_like
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
@@ -77,7 +77,7 @@ class DialectFinder:
         """
         encoding = text_encoding(self.path, self.spec.encoding)
         raw = head_lines(self.path, encoding)
-        lines = [line.decode(encoding if encoding != "utf-8-sig" else "utf-8", "replace") for line, _ in raw]
+        lines = [line.decode(codec_of_bytes(encoding), "replace") for line, _ in raw]
         if not any(line.strip() for line in lines):
             empty = self.path.stat().st_size < HEAD
             what = "the file is empty" if empty else f"no line ends within the first {HEAD >> 10} kB"
@@ -91,7 +91,7 @@ class DialectFinder:
         return Dialect(
             encoding=encoding,
             delimiter=header.delimiter,
-            decimal=self._decimal(sample, header.delimiter),
+            decimal=self._decimal(sample),
             header_line=header.line,
             data_line=first + 1,
             data_offset=raw[first][1],
@@ -178,7 +178,7 @@ class DialectFinder:
             raise self._error(f"line {header.line}", "no samples follow the names", "Export the run again")
         raise self._error(f"line {index}", "is neither names, units nor numbers", "Check [csv] delimiter and decimal")
 
-    def _decimal(self, sample: list[list[str]], delimiter: str) -> str:
+    def _decimal(self, sample: list[list[str]]) -> str:
         cells = [c for row in sample for c in row]
         comma = sum(is_number(c, ",") and "," in c for c in cells)
         point = sum(is_number(c, ".") and "." in c for c in cells)
@@ -187,7 +187,7 @@ class DialectFinder:
             example = next(c for c in cells if is_number(c, seen) and seen in c)
             what = f"decimal is {self.spec.decimal!r} in the manifest, but numbers look like {example!r}"
             raise self._error("", what, f"Set [csv] decimal = {seen!r}, or leave it out")
-        return self.spec.decimal or (seen if delimiter != "," else ".")
+        return self.spec.decimal or seen
 
     def _widen(self, header: _Header, sample: list[list[str]]) -> tuple[str, ...]:
         """Names for every cell of a data line: a trailing delimiter may stand in one line only."""

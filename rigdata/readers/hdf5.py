@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -19,6 +20,8 @@ from rigdata.readers.hdf5_links import has_link, resolve
 _FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}
 _MAX_CHUNK = 256 * 2**20
 _MAX_TEXT = 8 * 2**20
+#: Members of a group that are looked at, and faults that are listed.
+_MAX_MEMBERS, _LISTED = 4096, 20
 
 
 def _refuse(file: str, place: str, what: str, cure: str, run: str | None = None) -> RigDataError:
@@ -198,12 +201,21 @@ class Hdf5Reader:
         return facts
 
     def _length(self, group: Any) -> int:
-        for name in group:
+        """Length that most channels have; one that differs is refused when it is asked for."""
+        lengths: dict[int, int] = {}
+        problems: list[Problem] = []
+        for name in itertools.islice(group, _MAX_MEMBERS):
             try:
-                return int(self._dataset(group, name).shape[0])
-            except RigDataError:  # named when that channel is asked for, or by the check
-                continue
-        raise self._error("", "the group holds no dataset of numbers", "Store one dataset per channel")
+                length = int(self._dataset(group, name).shape[0])
+            except RigDataError as error:  # told again when that channel is asked for
+                problems.extend(error.problems)
+            else:
+                lengths[length] = lengths.get(length, 0) + 1
+        if not lengths and problems:
+            raise RigDataError(problems[:_LISTED])
+        if not lengths:
+            raise self._error("", "the group holds no dataset of numbers", "Store one dataset per channel")
+        return max(lengths, key=lambda n: (lengths[n], n))
 
     def _checked_rate(self, value: object) -> float:
         place, cure = "attribute sample_rate_hz", "Store one positive number, in Hz"
@@ -216,7 +228,7 @@ class Hdf5Reader:
         return rate
 
     def length(self) -> int:
-        """Count the samples per channel: of the first dataset of numbers."""
+        """Count the samples per channel, as most of them have."""
         return self._known().length
 
     def rate(self) -> float:
@@ -237,12 +249,13 @@ class Hdf5Reader:
         """Raw readings; only the chunks of the slice are read."""
         if stop - start > MAX_REQUEST:
             raise self._error("", f"{stop - start} samples asked for at once", "Read the run in slices")
+        length = self._known().length
         with self._group() as group:
             columns = []
             for name in names:
                 dataset = self._dataset(group, name)
-                if dataset.shape[0] < stop:
-                    what = f"has {dataset.shape[0]} samples, the others {self._length(group)}"
+                if dataset.shape[0] != length:
+                    what = f"has {dataset.shape[0]} samples, the others {length}"
                     raise self._error(f"dataset {name}", what, "Store all channels of a run with one length")
                 columns.append(np.asarray(dataset[start:stop], dtype=np.float64))
             return columns

@@ -1,0 +1,92 @@
+"""Readings into SI values, to the letter of the export format."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rigdata.calibration import Channel, reading_gain, reading_zero
+from rigdata.units import UnitError
+
+
+def test_eddy_current_probe():
+    gain = reading_gain("displacement", "V", "7.78 mV/um")
+    channel = Channel("X1A", "displacement", "V", gain=gain, polarity=-1)
+    assert channel.to_si(np.array([7.78, 0.0])) == pytest.approx([-1e-3, 0.0])
+
+
+def test_load_cell_bridge():
+    """F = reading / (sensitivity * excitation) * full_scale."""
+    gain = reading_gain("force", "mV", "2.0 mV/V", "20 kN", "5 V")
+    assert Channel("L1H", "force", "mV", gain=gain).to_si(np.array([2.5])) == pytest.approx([5000.0])
+
+
+def test_bridge_amplifier_that_reads_mv_per_v_needs_no_supply():
+    assert reading_gain("force", "mV/V", "2.0 mV/V", "20 kN") == pytest.approx(10_000.0)
+
+
+def test_accelerometer_g_is_standard_gravity():
+    assert reading_gain("acceleration", "V", "10 mV/g") == pytest.approx(980.665)
+
+
+def test_thermometer():
+    gain = reading_gain("temperature", "V", "15 K/V")
+    channel = Channel("T1", "temperature", "V", gain=gain, zero=reading_zero("temperature", "V", "0 degC"))
+    assert channel.to_si(np.array([2.0])) == pytest.approx([303.15])
+
+
+@pytest.mark.parametrize(
+    ("unit", "zero", "kelvin"),
+    [("degC", None, 293.15), ("K", None, 20.0), ("degF", None, 266.483333), ("V", None, 293.15)],
+)
+def test_temperature_of_reading_twenty(unit, zero, kelvin):
+    gain = reading_gain("temperature", unit, "1 K/V")
+    channel = Channel("T1", "temperature", unit, gain=gain, zero=reading_zero("temperature", unit, zero))
+    assert channel.to_si(np.array([20.0])) == pytest.approx([kelvin])
+
+
+def test_engineering_unit_is_already_converted():
+    assert reading_gain("displacement", "um", "7.78 mV/um") == pytest.approx(1e-6)
+    assert reading_gain("speed", "rpm", None) == pytest.approx(2 * np.pi / 60)
+
+
+def test_zero_is_the_value_at_reading_zero():
+    channel = Channel("L", "force", "V", gain=100.0, zero=reading_zero("force", "V", "50 N"), polarity=-1)
+    assert channel.to_si(np.array([0.0, 1.0])) == pytest.approx([50.0, -50.0])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("force", "mV", None), "needs a sensitivity"),
+        (("force", "mV", "2 mV/V"), "needs full_scale"),
+        (("force", "mV", "2 mV/V", "20 kN"), "needs excitation"),
+        (("force", "mV", "2 mV/V", "20 um", "5 V"), "not one of force"),
+        (("force", "mV", "2 mV/V", "20 kN", "0 V"), "above zero"),
+        (("force", "mV", "0 mV/V", "20 kN", "5 V"), "above zero"),
+        (("displacement", "N", None), "not one of length"),
+    ],
+)
+def test_incomplete_chains_are_refused(arguments, says):
+    with pytest.raises(UnitError, match=says):
+        reading_gain(*arguments)
+
+
+def test_overflow_marks_are_missing():
+    values = Channel("X", "displacement", "V").to_si(np.array([1.0, 1e99, -9.9e37, np.inf, np.nan]))
+    assert np.array_equal(np.isnan(values), [False, True, True, True, True])
+
+
+def test_readings_are_not_changed():
+    readings = np.array([1.0, 2.0], dtype=np.float32)
+    Channel("X", "displacement", "V", gain=2.0).to_si(readings)
+    assert readings.tolist() == [1.0, 2.0]
+
+
+@given(st.floats(1e-6, 1e6), st.floats(-1e3, 1e3), st.sampled_from([1, -1]), st.floats(-1e3, 1e3))
+def test_to_reading_undoes_to_si(gain, zero, polarity, reading):
+    channel = Channel("X", "displacement", "V", gain=gain, zero=zero, polarity=polarity)
+    back = channel.to_reading(channel.to_si(np.array([reading])))
+    assert back == pytest.approx([reading], rel=1e-9, abs=1e-9 * (1 + abs(zero / gain)))

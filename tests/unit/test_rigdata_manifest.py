@@ -1,0 +1,249 @@
+"""The manifest: every problem at once, each with its line and a cure."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigdata.manifest import MAX_MANIFEST, parse_manifest
+from rigdata.problem import Problem, RigDataError
+
+GOOD = """\
+schema = "tpjb-rig/1"
+id = "rocker-A"
+bearing = "rocker.toml"
+description = "free text"
+
+[housing]
+mass = "30 kg"
+
+[acquisition]
+sample_rate = "2 kHz"
+
+[csv]
+delimiter = ";"
+decimal = ","
+encoding = "cp1252"
+header_line = 7
+units_line = 8
+
+[channels.X1A]
+quantity = "displacement"
+axis = "45 deg"
+unit = "V"
+sensitivity = "7.78 mV/um"
+polarity = -1
+uncertainty = "1 %"
+
+[channels.L1H]
+quantity = "force"
+axis = "0 deg"
+unit = "mV"
+sensitivity = "2.0 mV/V"
+full_scale = "20 kN"
+excitation = "5 V"
+
+[channels.T1]
+quantity = "temperature"
+pad = 1
+position = 0.75
+unit = "V"
+sensitivity = "15 K/V"
+zero = "0 degC"
+
+[[runs]]
+id = "d-05000-25-03"
+file = "runs/d-05000-25-03.csv"
+kind = "dynamic"
+shaft_speed = "22 Hz"
+static_load = "5 kN"
+static_load_direction = "-90 deg"
+excitation_frequency = "25 Hz"
+excitation_direction = "54 deg"
+
+[[runs]]
+id = "p-1-up"
+file = "runs/p-1-up.csv"
+kind = "dry_pivot"
+pad = 1
+static_load_direction = "-90 deg"
+branch = "up"
+sample_rate = "500 Hz"
+"""
+
+
+#: Stands for the line on which the replacement was made.
+LINE = "the line"
+
+
+def problems_of(text: str) -> list[str]:
+    with pytest.raises(RigDataError) as caught:
+        parse_manifest(text)
+    return [str(p) for p in caught.value.problems]
+
+
+def test_the_example_of_the_format():
+    manifest = parse_manifest(GOOD)
+    assert (manifest.id, manifest.bearing, manifest.housing_mass, manifest.sample_rate) == (
+        "rocker-A",
+        "rocker.toml",
+        30.0,
+        2000.0,
+    )
+    assert (manifest.csv.delimiter, manifest.csv.decimal, manifest.csv.header_line) == (";", ",", 7)
+    probe = manifest.channels["X1A"]
+    assert (probe.axis, probe.polarity, probe.uncertainty) == (pytest.approx(math.pi / 4), -1, pytest.approx(0.01))
+    thermometer = manifest.channels["T1"]
+    assert (thermometer.pad, thermometer.position, thermometer.zero) == (1, 0.75, pytest.approx(273.15))
+    dynamic, dry = manifest.runs
+    assert dynamic.point.static_load == 5000.0
+    assert dynamic.point.shaft_speed_hz == 22.0
+    assert dynamic.point.excitation_hz == 25.0
+    assert dynamic.excitation_direction == pytest.approx(math.radians(54))
+    assert (dry.pad, dry.branch, dry.sample_rate) == (1, "up", 500.0)
+    assert manifest.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('mass = "30 kg"', 'mas = "30 kg"', [LINE, "'mas'", "Did you mean 'mass'"]),
+        ('axis = "45 deg"', 'axes = "45 deg"', [LINE, "'axes'", "Did you mean 'axis'"]),
+        ("[housing]", "[housng]", [LINE, "'housng'", "Did you mean 'housing'"]),
+        ('kind = "dynamic"', 'kind = "dynamik"', [LINE, "Did you mean 'dynamic'"]),
+        ('quantity = "force"', 'quantity = "forse"', [LINE, "Did you mean 'force'"]),
+        ('shaft_speed = "22 Hz"', 'shaft_sped = "22 Hz"', ["shaft_sped", "Did you mean 'shaft_speed'"]),
+        ('delimiter = ";"', 'delimeter = ";"', ["Did you mean 'delimiter'"]),
+        ('static_load = "5 kN"', 'static_load = "5 um"', [LINE, "static_load", "not one of force"]),
+        ('static_load = "5 kN"', 'static_load = "-5 kN"', [LINE, "not below 0"]),
+        ('static_load = "5 kN"', "static_load = 5000", [LINE, "no unit"]),
+        ('static_load = "5 kN"', 'static_load = "1e400 N"', ["finite"]),
+        ('static_load = "5 kN"', 'static_load = "nan N"', ["not a number"]),
+        ('static_load = "5 kN"\n', "", ["static_load is missing in a dynamic run"]),
+        ('sample_rate = "2 kHz"', 'sample_rate = "0 Hz"', [LINE, "above 0"]),
+        ('sample_rate = "2 kHz"', 'sample_rate = "-2 kHz"', [LINE, "above 0"]),
+        ('sample_rate = "2 kHz"', 'sample_rate = "2 kg"', [LINE, "not one of frequency"]),
+        ('sensitivity = "7.78 mV/um"', 'sensitivity = "0 mV/um"', [LINE, "above zero"]),
+        ('sensitivity = "7.78 mV/um"', 'sensitivity = "-7.78 mV/um"', [LINE, "polarity"]),
+        ('sensitivity = "7.78 mV/um"', 'sensitivity = "7,78 mV/um"', [LINE, "decimal point"]),
+        ('sensitivity = "7.78 mV/um"', 'sensitivity = "7.78 mV/g"', [LINE, "does not lead"]),
+        ('sensitivity = "7.78 mV/um"', "sensitivity = 7.78", [LINE, "no unit"]),
+        ('full_scale = "20 kN"\n', "", ["needs full_scale"]),
+        ('excitation = "5 V"\n', "", ["needs excitation"]),
+        ('axis = "45 deg"\n', "", ["[channels.X1A]", "axis is missing"]),
+        ("polarity = -1", "polarity = 2", [LINE, "Give 1 or -1"]),
+        ("polarity = -1", 'polarity = "-1"', [LINE, "without quotes"]),
+        ("polarity = -1", "polarity = true", [LINE, "without quotes"]),
+        ('uncertainty = "1 %"', 'uncertainty = "-1 %"', [LINE]),
+        ('uncertainty = "1 %"', 'uncertainty = "150 %"', [LINE, "below 100 %"]),
+        ("position = 0.75", "position = 1.75", ["0 to 1"]),
+        ("pad = 1\nposition", "pad = 0\nposition", ["whole number from 1"]),
+        ('id = "p-1-up"', 'id = "d-05000-25-03"', ["used twice", "run no. 1"]),
+        ('id = "p-1-up"', 'id = "../p-1"', ["cannot be used"]),
+        ('id = "p-1-up"', "id = 7", ["not text"]),
+        ("header_line = 7", "header_line = 0", ["whole number from 1"]),
+        ("units_line = 8", "units_line = 6", ["not below header_line"]),
+        ('decimal = ","', 'decimal = ";"', ["Give one character, . or ,"]),
+        ('encoding = "cp1252"', 'encoding = "klingon"', ["encoding", "cp1252"]),
+        ('encoding = "cp1252"', 'encoding = "zip"', ["encoding"]),
+        ('branch = "up"', 'branch = "upp"', ["Did you mean 'up'"]),
+        ("tpjb-rig/1", "tpjb-rig/2", ["tpjb-rig/2"]),
+        ('bearing = "rocker.toml"\n', "", ["bearing is missing"]),
+        ('[housing]\nmass = "30 kg"\n', "", ["mass is missing"]),
+        ('[housing]\nmass = "30 kg"\n', "housing = 3\n", ["not a table"]),
+        ("[[runs]]", "[[ruuns]]", ["Did you mean 'runs'", "no runs are listed"]),
+        ('unit = "mV"', 'unit = "mX"', ["mX"]),
+    ],
+)
+def test_one_fault_is_named_with_its_place(old, new, says):
+    assert old in GOOD
+    text = "\n".join(problems_of(GOOD.replace(old, new)))
+    line = f"line {GOOD[: GOOD.index(old)].count(chr(10)) + 1},"
+    for part in says:
+        assert (line if part is LINE else part) in text
+
+
+def test_every_problem_at_once():
+    text = (
+        GOOD.replace('mass = "30 kg"', 'mas = "30 kg"')
+        .replace("polarity = -1", "polarity = 3")
+        .replace('kind = "dynamic"', 'kind = "dynamik"')
+        .replace('sample_rate = "500 Hz"', 'sample_rate = "500"')
+    )
+    found = "\n".join(problems_of(text))
+    for part in ("'mas'", "mass is missing", "polarity is 3", "dynamik", "has no unit"):
+        if part != "mass is missing":  # not needed while no run is known to be dynamic
+            assert part in found
+    assert len(problems_of(text)) >= 4
+
+
+def test_a_calibration_that_is_not_used_is_said():
+    text = GOOD.replace('unit = "V"\nsensitivity = "7.78 mV/um"', 'unit = "um"\nsensitivity = "7.78 mV/um"')
+    manifest = parse_manifest(text)
+    assert manifest.channels["X1A"].gain == pytest.approx(1e-6)
+    assert [(p.severity, "not used" in p.what) for p in manifest.notes] == [("warning", True)]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "x =", "a = [" * 5000, "i = " + "9" * 10_000, "\0", "[runs]", 'runs = "x"', "channels = 3", "id = 1979-05-27"],
+)
+def test_broken_toml_is_a_problem_not_a_traceback(text):
+    assert problems_of(text)
+
+
+def test_huge_manifests_are_refused_unparsed():
+    assert "larger than" in problems_of("#" * (MAX_MANIFEST + 1))[0]
+
+
+def test_thousands_of_faults_stay_bounded():
+    text = GOOD + "".join(f"[channels.C{i}]\n" for i in range(1200))
+    assert 900 < len(problems_of(text)) <= 1000
+
+
+def test_control_and_right_to_left_characters_do_not_reach_the_message():
+    found = "\n".join(problems_of(GOOD.replace('kind = "dynamic"', 'kind = "dyn\\u202eamic\\u0007"')))
+    assert "\u202e" not in found
+    assert "\u0007" not in found
+
+
+LINES = GOOD.splitlines()
+
+
+@given(st.data())
+@settings(max_examples=150, deadline=None)
+def test_mutated_manifests_parse_or_tell_their_problems(data):
+    """Lines dropped, doubled, swapped or with a piece replaced: a manifest or named problems, nothing else."""
+    lines = list(LINES)
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(lines) - 1))
+        kind = data.draw(st.sampled_from(["drop", "double", "swap", "value", "garbage", "piece"]))
+        if kind == "drop" and len(lines) > 1:
+            del lines[at]
+        elif kind == "double":
+            lines.insert(at, lines[at])
+        elif kind == "swap":
+            other = data.draw(st.integers(0, len(lines) - 1))
+            lines[at], lines[other] = lines[other], lines[at]
+        elif kind == "value" and "=" in lines[at]:
+            values = st.sampled_from(["-1", "0", "nan", "inf", "1e308", '""', '"1e308 N"', "[]", "{}", "true", '"0 V"'])
+            lines[at] = lines[at].split("=")[0] + "= " + data.draw(values)
+        elif kind == "garbage":
+            lines[at] = data.draw(st.text(max_size=30))
+        else:
+            cut = data.draw(st.integers(0, len(lines[at])))
+            lines[at] = lines[at][:cut] + data.draw(st.text(max_size=3)) + lines[at][cut + 1 :]
+    problems: tuple[Problem, ...] = ()
+    try:
+        manifest = parse_manifest("\n".join(lines))
+    except RigDataError as error:
+        problems = error.problems
+    else:
+        assert manifest.runs
+        assert all(c.gain > 0 for c in manifest.channels.values())
+        return
+    assert problems
+    assert all(p.what and p.cure and p.file for p in problems)

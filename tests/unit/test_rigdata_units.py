@@ -1,0 +1,156 @@
+"""Quantities of a rig manifest: strict grammar, SI values, clear refusals."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigdata.units import SI_UNITS, UnitError, is_signal, parse_quantity, parse_unit, sensitivity_gain, unit_factor
+
+TWO_PI = 2 * math.pi
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "value"),
+    [
+        ("54 deg", "angle", math.radians(54)),
+        ("-90 deg", "angle", -math.pi / 2),
+        ("-90°", "angle", -math.pi / 2),
+        ("1.5 rad", "angle", 1.5),
+        ("22 Hz", "speed", 22 * TWO_PI),
+        ("1320 rpm", "speed", 22 * TWO_PI),
+        ("1320 1/min", "speed", 22 * TWO_PI),
+        ("22 1/s", "speed", 22 * TWO_PI),
+        ("138.23 rad/s", "speed", 138.23),
+        ("2 kHz", "frequency", 2000.0),
+        ("5 kN", "force", 5000.0),
+        ("5e3 N", "force", 5000.0),
+        ("30 kg", "mass", 30.0),
+        ("40 degC", "temperature", 313.15),
+        ("40 °C", "temperature", 313.15),
+        ("313.15 K", "temperature", 313.15),
+        ("104 degF", "temperature", 313.15),
+        ("1 %", "ratio", 0.01),
+        (0.01, "ratio", 0.01),
+        ("2.0 mV/V", "ratio", 0.002),
+        ("1 g", "acceleration", 9.80665),
+        ("9.8 m/s^2", "acceleration", 9.8),
+        ("9.8 m/s²", "acceleration", 9.8),
+        ("9.8 m/s2", "acceleration", 9.8),
+        ("80 µm", "length", 80e-6),
+        ("80 μm", "length", 80e-6),
+        ("3 bar", "pressure", 3e5),
+        ("20 ms", "time", 0.02),
+        (".5 V", "voltage", 0.5),
+        ("5. V", "voltage", 5.0),
+    ],
+)
+def test_values(text, dimension, value):
+    assert parse_quantity(text, dimension) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "says"),
+    [
+        ("5", "force", "no unit"),
+        (5, "force", "no unit"),
+        (5.0, "angle", "no unit"),
+        (True, "ratio", "expected a number"),
+        (None, "force", "expected a number"),
+        ([1], "force", "expected a number"),
+        ("7,78 kN", "force", "decimal point"),
+        ("kN", "force", "not a number"),
+        ("5 kN/m", "force", "not one of force"),
+        ("5 Hz", "angle", "not one of angle"),
+        ("54 %", "angle", "not one of angle"),
+        ("54 deg", "ratio", "not one of ratio"),
+        ("5 flurb", "force", "not known"),
+        ("1e400 N", "force", "finite"),
+        ("nan N", "force", "not a number"),
+        ("inf N", "force", "not a number"),
+        ("0x10 N", "force", "cannot be read"),
+        ("1_000 N", "force", "cannot be read|not known"),
+        ("٣ N", "force", "not a number"),
+        ("5 N**99999999", "force", "cannot be read"),
+        ("5 __import__('os')", "force", "cannot be read"),
+        ("5 N/", "force", "ends"),
+        ("5 /N", "force", "where a unit name"),
+        ("5 (N", "force", "parenthesis"),
+        ("5 N)", "force", "parenthesis"),
+        ("5 " + "N*" * 100 + "N", "force", "too long"),
+        (float("nan"), "ratio", "finite"),
+    ],
+)
+def test_refusals(text, dimension, says):
+    with pytest.raises(UnitError, match=says):
+        parse_quantity(text, dimension)
+
+
+@pytest.mark.parametrize(
+    ("sensitivity", "signal", "dimension", "gain"),
+    [
+        ("7.78 mV/um", "V", "length", 1 / 7780.0),
+        ("200 mV/mil", "V", "length", 25.4e-6 / 0.2),
+        ("10 mV/g", "V", "acceleration", 9.80665 / 0.010),
+        ("10 mV/(m/s^2)", "mV", "acceleration", 0.1),
+        ("15 K/V", "V", "temperature difference", 15.0),
+        ("15 degC/V", "mV", "temperature difference", 0.015),
+        ("100 mV/Hz", "V", "speed", TWO_PI / 0.1),
+        ("1 V/rpm", "V", "speed", TWO_PI / 60),
+        ("2 mV/(rad/s)", "mV", "speed", 0.5),
+        ("1.6 mA/mm", "mA", "length", 1e-3 / 1.6),
+        ("0.5 V/bar", "V", "pressure", 2e5),
+        ("2 N/mV", "V", "force", 2000.0),
+    ],
+)
+def test_sensitivities(sensitivity, signal, dimension, gain):
+    assert sensitivity_gain(sensitivity, signal, dimension) == pytest.approx(gain, rel=1e-12)
+
+
+@pytest.mark.parametrize("bad", ["0 mV/um", "-7.78 mV/um", "7.78 mV/g", "7.78 um", "7.78"])
+def test_sensitivity_refused(bad):
+    with pytest.raises(UnitError):
+        sensitivity_gain(bad, "V", "length")
+
+
+def test_signals_and_engineering_units():
+    assert all(is_signal(u) for u in ("V", "mV", "mA", "mV/V"))
+    assert not any(is_signal(u) for u in ("um", "N", "m/s^2", "degC", "Hz", "%"))
+
+
+@given(st.text(max_size=60), st.sampled_from(sorted(SI_UNITS)))
+@settings(max_examples=200, deadline=None)
+def test_any_text_gives_a_finite_number_or_a_unit_error(text, dimension):
+    try:
+        value = parse_quantity(text, dimension)
+    except UnitError:
+        return
+    assert math.isfinite(value)
+
+
+UNITS = st.sampled_from(["m", "V", "mV", "um", "s", "g", "Hz", "K", "kN", "%", "rad", "V/m", "m^2", "1"])
+
+
+@given(UNITS, UNITS, UNITS, st.integers(-6, 6).filter(bool))
+@settings(max_examples=150, deadline=None)
+def test_quotients_and_powers_follow_algebra(a, b, c, power):
+    one, two, three = parse_unit(a), parse_unit(b), parse_unit(c)
+    assert parse_unit(f"({a})/({b})*({c})").powers == (one * two**-1 * three).powers
+    assert parse_unit(f"({a})/({b})*({c})").factor == pytest.approx((one * two**-1 * three).factor, rel=1e-12)
+    assert parse_unit(f"{a.split('/')[0].rstrip('^2')}").factor > 0
+    assert parse_unit(f"kN^{power}").factor == pytest.approx(1000.0**power, rel=1e-12)
+
+
+@given(st.floats(-1e12, 1e12, allow_subnormal=False))
+@settings(max_examples=200, deadline=None)
+def test_numbers_survive_printing(number):
+    assert parse_quantity(f"{number!r} N", "force") == pytest.approx(number, rel=1e-15)
+
+
+def test_si_units_are_their_own_unit():
+    for dimension, unit in SI_UNITS.items():
+        if unit and dimension not in {"frequency"}:
+            assert unit_factor(unit, dimension) == pytest.approx(1.0)
