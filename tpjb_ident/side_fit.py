@@ -30,7 +30,7 @@ DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
 TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
 SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better than a sweep of 200 N
 SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
-GIVE_POWERS = (2.0 / 3.0, 1.0)  # of the load, between which any pivot deflects, where no curve says it
+CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the give, where no curve says it
 CLIP = 5.0  # robust standard deviations
 
 
@@ -117,8 +117,8 @@ def fit_sides(touch: Touch, angles: FloatArray, reached: BoolArray, curves: Sequ
     reached : (n,) ndarray of bool
         Pads with enough data.
     curves : sequence of PivotCurve or None
-        What the pivots give; without them it is fitted, once as W^(2/3) and once as W, and half the
-        difference joins the standard error.
+        What the pivots give; without them it is fitted, in proportion to the load and with one curvature for
+        all pads.
 
     Returns
     -------
@@ -126,7 +126,7 @@ def fit_sides(touch: Touch, angles: FloatArray, reached: BoolArray, curves: Sequ
     """
     system = _system(touch, angles, reached)
     if curves is None:
-        return _between(*(_solve_unknown(system, power) for power in GIVE_POWERS))
+        return _solve_unknown(system)
     return _solve_known(system, curves)
 
 
@@ -236,17 +236,19 @@ def _solve_known(system: _System, curves: Sequence[PivotCurve]) -> SideFit:
     )
 
 
-def _solve_unknown(system: _System, power: float) -> SideFit:
-    """Sides with every pivot's give fitted as a power of its load."""
+def _solve_unknown(system: _System) -> SideFit:
+    """Sides with every pivot's give fitted in proportion to its load, and one curvature for all pads."""
     of_pad = (system.touch.pad[:, None] == system.pads[None, :]).astype(float)
-    shape = (np.maximum(system.touch.load, 0.0) / system.touch.push) ** power
-    design = np.hstack([_design(system), of_pad * shape[:, None]])
-    beta, covariance, misfit = _least_squares(system, design, np.zeros(design.shape[1]), np.zeros(design.shape[1]))
+    w = np.maximum(system.touch.load, 0.0) / system.touch.push
+    design = np.column_stack([_design(system), of_pad * w[:, None], np.cbrt(w) ** 2 - w])
+    prior = np.zeros(design.shape[1])
+    prior[-1] = CURVATURE_SPREAD**-2
+    beta, covariance, misfit = _least_squares(system, design, prior, np.zeros(design.shape[1]))
     part = _part(system, beta, covariance, misfit)
     r = len(system.pads)
     give, se = np.full(system.count, np.nan), np.full(system.count, np.nan)
-    give[system.pads] = beta[2 * r :]
-    se[system.pads] = np.sqrt(np.diag(covariance)[2 * r :])
+    give[system.pads] = beta[2 * r : 3 * r]
+    se[system.pads] = np.sqrt(np.diag(covariance)[2 * r : 3 * r])
     return replace(part, give=give, give_se=se)
 
 
@@ -280,17 +282,3 @@ def _part(system: _System, beta: FloatArray, covariance: FloatArray, misfit: flo
     full = np.full((system.count, system.count), np.nan)
     full[np.ix_(pads, pads)] = covariance[:r, :r]
     return SideFit(distance, tilt, tilt_se, full, empty, empty, np.nan, np.nan, system.noise, misfit)
-
-
-def _between(soft: SideFit, stiff: SideFit) -> SideFit:
-    """Midway between two assumptions about the give, with half their difference in the standard error."""
-    half = 0.5 * (soft.distance - stiff.distance)
-    half_give = 0.5 * (soft.give - stiff.give)
-    return replace(
-        soft,
-        distance=0.5 * (soft.distance + stiff.distance),
-        tilt=0.5 * (soft.tilt + stiff.tilt),
-        covariance=0.5 * (soft.covariance + stiff.covariance) + np.outer(half, half),
-        give=0.5 * (soft.give + stiff.give),
-        give_se=np.hypot(soft.give_se, half_give),
-    )

@@ -25,12 +25,13 @@ MakeData = Callable[[Sequence[DryRecord], Sequence[BoolArray], NoiseModel, Pivot
 
 MOST_BAD = 0.3  # share of the groups that may be dropped
 GROUPS_ON_RAMP = 15
+STICKS_WITHIN = 0.08  # of the load at a reversal: twice the friction of a poor pivot
 
 
 def bad_blocks(
     record: DryRecord, noise: NoiseModel, laws: Mapping[str, Law], make_data: MakeData, settings: PivotSettings
 ) -> BoolArray:
-    """Blocks (m,) that belong to bad steps.
+    """Blocks (m,) that belong to bad steps, or to a reversal.
 
     Parameters
     ----------
@@ -50,15 +51,50 @@ def bad_blocks(
     (m,) ndarray of bool
     """
     groups = _groups(record)
-    bad = np.zeros(len(groups), dtype=bool)
+    bad = sticking(record.projection.load, record.blocks.branch)
     names = [g for g in np.unique(groups) if g >= 0]
     for _ in range(int(MOST_BAD * len(names))):
         data = make_data([record], [~bad], noise, settings)
         worst, size = _worst(fit_law(laws["spline"], True, data), data, groups[~bad])
         if size < settings.bad_hold_limit:
             break
-        bad |= groups == worst
+        bad |= _with_ramps(groups, worst)
     return bad
+
+
+def _with_ramps(groups: IntArray, group: int) -> BoolArray:
+    """A group and the ramps on either side: whatever spoilt the hold need not have kept to its limits."""
+    mine = np.flatnonzero(groups == group)
+    first, last = int(mine[0]), int(mine[-1])
+    while first > 0 and groups[first - 1] < 0:
+        first -= 1
+    while last < len(groups) - 1 and groups[last + 1] < 0:
+        last += 1
+    place = np.arange(len(groups))
+    return np.asarray((place >= first) & (place <= last))
+
+
+def sticking(load: FloatArray, branch: IntArray) -> BoolArray:
+    """Blocks (m,) just after a reversal of the load, where friction holds the pivot and no law applies.
+
+    Parameters
+    ----------
+    load : (m,) ndarray
+        [N], in order of time.
+    branch : (m,) ndarray of int
+        +1 loading, -1 unloading.
+    """
+    stuck = np.zeros(len(load), dtype=bool)
+    turned_at: float | None = None
+    for k in range(1, len(load)):
+        if branch[k] != branch[k - 1]:
+            turned_at = float(load[k - 1])
+        if turned_at is not None:
+            if abs(load[k] - turned_at) < STICKS_WITHIN * abs(turned_at):
+                stuck[k] = True
+            else:
+                turned_at = None
+    return stuck
 
 
 def _groups(record: DryRecord) -> IntArray:

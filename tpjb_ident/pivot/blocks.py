@@ -18,6 +18,7 @@ from tpjb_ident.pivot.steps import Hold
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int_]
 
+TURN = 0.02  # of the load range: a smaller way back is noise
 MOST_BLOCKS = 220  # the covariance is a full matrix: keep it small
 
 
@@ -124,7 +125,7 @@ def cut_blocks(samples: Samples, holds: tuple[Hold, ...], length: float) -> Bloc
         load_spread=_sample_noise(samples.along) / np.sqrt(count),
         rate=np.asarray(rate),
         hold=number,
-        branch=_branches(number, rate, holds),
+        branch=_branches(number, along, holds),
     )
 
 
@@ -151,10 +152,27 @@ def _split(start: float, stop: float, length: float, number: int) -> list[tuple[
     return [(float(a), float(b), number) for a, b in itertools.pairwise(cuts)]
 
 
-def _branches(number: IntArray, rate: FloatArray, holds: tuple[Hold, ...]) -> IntArray:
+def _branches(number: IntArray, along: FloatArray, holds: tuple[Hold, ...]) -> IntArray:
     """+1 loading, -1 unloading."""
     of_hold = np.array([hold.branch for hold in holds] + [0], dtype=int)
-    return np.asarray(np.where(number >= 0, of_hold[number], np.where(rate >= 0, 1, -1)))
+    return np.asarray(np.where(number >= 0, of_hold[number], _directions(along)))
+
+
+def _directions(load: FloatArray) -> IntArray:
+    """Sense of the load's way (m,): it turns only when the load has come back by `TURN` of its range."""
+    turn = TURN * float(np.ptp(load))
+    off = load - load[0]
+    now = 1 if off[int(np.argmax(np.abs(off) > turn))] >= 0.0 else -1
+    sense = np.full(len(load), now)
+    farthest = 0
+    for k in range(len(load)):
+        if now * (load[k] - load[farthest]) >= 0.0:
+            farthest = k
+        elif now * (load[farthest] - load[k]) > turn:
+            now = -now
+            sense[farthest + 1 :] = now
+            farthest = k
+    return sense
 
 
 def _sample_noise(load: FloatArray) -> float:

@@ -13,6 +13,8 @@ from tpjb_ident.pivot.hysteresis import Hysteresis
 from tpjb_ident.pivot.law_fit import SCALE, LawFit
 from tpjb_ident.pivot.projection import Direction
 
+EXTRAPOLATION_SPREAD = 0.04  # of ln(stiffness) per e-fold of load beyond the points: no law is quite the pivot's own
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int_]
 
@@ -191,7 +193,8 @@ class PivotCurve:
             gradient = fit.log_deflection_gradient(flat) if secant else fit.log_compliance_gradient(flat)
             own = np.einsum("ij,jk,ik->i", gradient, fit.covariance, gradient)
             total += weight * (own + (logs - value[0]) ** 2)
-        return np.asarray(np.sqrt(total)).reshape(load.shape)
+        beyond = np.log(np.maximum(np.maximum(flat / self.valid_to, float(np.min(self.steps.load)) / flat), 1.0))
+        return np.asarray(np.sqrt(total + (EXTRAPOLATION_SPREAD * beyond) ** 2)).reshape(load.shape)
 
     def _quantile(self, level: float) -> float:
         if not 0.0 < level < 1.0:

@@ -78,7 +78,11 @@ class SplineLaw:
         total = np.vstack(
             [np.zeros(columns.shape[1]), np.cumsum(0.5 * GRID_STEP * (columns[1:] + columns[:-1]), axis=0)]
         )
-        total += columns[0] / (1.0 + slope)
+        below = columns[0] / (1.0 + slope)
+        # that share changes with the slope, so with the first two nodes (both free: the fixed one lies higher up)
+        turn = below[0] / (1.0 + slope) / (NODES[1] - NODES[0])
+        below[1], below[2] = below[1] + turn, below[2] - turn
+        total += below
         # between grid points the integral is a power of the load: interpolate its logarithm
         x = np.clip((np.log(np.maximum(u, 1e-12)) - GRID[0]) / GRID_STEP, None, len(GRID) - 1.0)
         cell = np.clip(x.astype(int), 0, len(GRID) - 2)
