@@ -9,6 +9,7 @@ import typer
 from tpjb_ident.cli.check import check
 from tpjb_ident.cli.compare import compare
 from tpjb_ident.cli.demo import demo
+from tpjb_ident.cli.diagnose import diagnose
 from tpjb_ident.cli.export import export
 from tpjb_ident.cli.identify import identify
 from tpjb_ident.cli.locus import locus
@@ -42,5 +43,5 @@ def _common(
     pass
 
 
-for command in (check, identify, pivot, locus, predict, compare, simulate, demo, export):
+for command in (check, identify, pivot, locus, predict, compare, diagnose, simulate, demo, export):
     app.command()(command)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from tpjb_ident.diagnose.candidates import candidates
 from tpjb_ident.diagnose.decide import decide
 from tpjb_ident.diagnose.fit import Misfit
 from tpjb_ident.diagnose.forward import Forward
+from tpjb_ident.diagnose.next_test import designs, rank_designs, say
 from tpjb_ident.diagnose.nuisance import Nuisances, nuisances
 from tpjb_ident.diagnose.observe import Observations
 from tpjb_ident.diagnose.search import Progress, Search, search
@@ -65,7 +66,7 @@ def diagnose(
 
     Raises
     ------
-    NoEquilibrium
+    NoEquilibriumError
         The baseline itself has no equilibrium at an operating point of the campaign.
     """
     settings = settings or DiagnoseSettings()
@@ -79,4 +80,25 @@ def diagnose(
     with workers(forward, settings.workers) as run:
         found = search(run, misfit, base, pool, settings, progress)
     verdict = decide(observations, misfit, found, held, settings)
+    verdict = replace(verdict, next_test=_next_test(verdict, found, setup, observations, settings))
     return Diagnosis(verdict, observations, misfit, found, held, known)
+
+
+def _next_test(
+    verdict: Verdict, found: Search, setup: Setup, observations: Observations, settings: DiagnoseSettings
+) -> str:
+    """What one more test would tell, in words."""
+    if verdict.verdict == "consistent":
+        return "none needed"
+    if verdict.verdict == "unexplained":
+        worst = verdict.disagreement[0]
+        return f"repeat {worst.observable} at {worst.where}, where the unknown shows most, with another sensor set"
+    if verdict.verdict == "named":
+        return "none needed to tell these effects from the others in the library"
+    index = next(i for i, c in enumerate(found.model.candidates) if c.name == verdict.indistinguishable[0][0])
+    rival = next(
+        f for f in found.rivals[index] if {c.name for c in f.candidates} & set(verdict.indistinguishable[0][1:])
+    )
+    options = designs(setup, observations.layout)
+    ranked = rank_designs(setup, found.model.effects, rival.effects, options, settings.certificates)
+    return say(ranked[0], found.model.label, rival.label) if ranked else ""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from model.effects import Effect
 from tpjb_ident.diagnose.candidates import Candidate
-from tpjb_ident.diagnose.forward import Forward, NoEquilibrium
+from tpjb_ident.diagnose.forward import Forward, NoEquilibriumError
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -129,7 +129,7 @@ def fit(
     now = np.clip(start, low, high)
     try:
         y = forward(build(chosen, now)) if prediction is None else prediction
-    except NoEquilibrium:
+    except NoEquilibriumError:
         return None
     cost = _cost(misfit, y, now, neutral, width)
     damping = 1e-4
@@ -153,7 +153,7 @@ def fit(
         jacobian = _jacobian(forward, chosen, now, y)
     normal, _ = _normal(misfit, jacobian, y, (now - neutral) / width**2, width)
     inside = (now > low + 1e-9 * np.abs(low)) & (now < high - 1e-9 * np.abs(high))
-    return Fit(tuple(chosen), now, y, jacobian, cost, np.linalg.inv(normal), not bool(np.all(inside)))
+    return Fit(tuple(chosen), now, y, jacobian, cost, np.asarray(np.linalg.inv(normal)), not bool(np.all(inside)))
 
 
 def _cost(misfit: Misfit, y: FloatArray, now: FloatArray, neutral: FloatArray, width: FloatArray) -> float:
@@ -171,7 +171,7 @@ def _normal(
 def _try(forward: Forward, chosen: Sequence[Candidate], amplitudes: FloatArray) -> FloatArray | None:
     try:
         return forward(build(chosen, amplitudes))
-    except NoEquilibrium:
+    except NoEquilibriumError:
         return None
 
 

@@ -21,7 +21,7 @@ Change = Callable[[Setup], Setup]
 StaticPoint = tuple[float, float, float]
 
 
-class NoEquilibrium(ValueError):
+class NoEquilibriumError(ValueError):
     """The model found no equilibrium at an operating point of the campaign."""
 
 
@@ -59,7 +59,7 @@ class Forward:
 
         Raises
         ------
-        NoEquilibrium
+        NoEquilibriumError
             Some operating point has none.
         """
         setup = apply_effects(self.setup, effects)
@@ -87,7 +87,7 @@ class Forward:
     def _solve(self, setup: Setup, point: StaticPoint, excitation: Sequence[float]) -> Prediction:
         prediction = predict_setup(setup, *point, np.array(excitation), self._start.get(point))
         if not prediction.converged:
-            raise NoEquilibrium(f"no equilibrium at {point[0]:.0f} N ({', '.join(prediction.status)})")
+            raise NoEquilibriumError(f"no equilibrium at {point[0]:.0f} N ({', '.join(prediction.status)})")
         self._start[point] = prediction.equilibrium
         return prediction
 

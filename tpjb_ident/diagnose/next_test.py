@@ -17,7 +17,7 @@ import numpy as np
 
 from model.effects import Effect
 from model.setup import Setup
-from tpjb_ident.diagnose.forward import Forward, NoEquilibrium
+from tpjb_ident.diagnose.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnose.layout import Layout
 from tpjb_ident.diagnose.nuisance import Certificates, nuisances, whitener
 from tpjb_ident.diagnose.planned import around, dry, dynamic, planned_observations
@@ -96,7 +96,12 @@ def designs(setup: Setup, layout: Layout) -> tuple[Design, ...]:
     missing = [k for k in range(1, pads + 1) if k not in done]
     out += [Design(f"a dry load-deflection test on pad #{k}, 0.5-5 kN", Layout((), dry=dry([k]))) for k in missing]
     if not missing:
-        out.append(Design("the dry tests repeated up to 8 kN on all pads", Layout((), dry=dry(range(1, pads + 1), (2000.0, 5000.0, 7600.0)))))
+        out.append(
+            Design(
+                "the dry tests repeated up to 8 kN on all pads",
+                Layout((), dry=dry(range(1, pads + 1), (2000.0, 5000.0, 7600.0))),
+            )
+        )
     return tuple(out)
 
 
@@ -121,7 +126,7 @@ def rank_designs(
             mine = forward(one)
             difference = mine - forward(other)
             columns = nuisances(forward, one, mine, known).columns
-        except NoEquilibrium:
+        except NoEquilibriumError:
             continue
         distance = np.linalg.solve(whitener(base, columns), difference)
         out.append(Separation(design, float(np.sqrt(distance @ distance))))

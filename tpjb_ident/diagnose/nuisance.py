@@ -45,6 +45,8 @@ class Certificates:
         How far two programs may be apart in one coefficient at all points alike, relative.
     coherent_dry : float
         The same of all dry compliances.
+    pad_dry : float
+        Of one pad's dry compliances together: incomplete contact and friction bend a whole curve.
     """
 
     probe_axes: tuple[float, float] = (math.pi / 4, 3 * math.pi / 4)
@@ -57,6 +59,7 @@ class Certificates:
     centre: float = 10e-6
     coherent_stiffness: float = 0.004
     coherent_dry: float = 0.01
+    pad_dry: float = 0.015
 
 
 @dataclass(frozen=True)
@@ -89,8 +92,13 @@ def nuisances(forward: Forward, effects: Sequence[Effect], base: FloatArray, kno
         names.append(f"model {observable}")
         mine = np.array([e.observable == observable for e in elements])
         columns.append(np.where(mine, base, 0.0) * known.coherent_stiffness)
+    compliances = np.array([e.observable == "dry_compliance" for e in elements])
     names.append("model dry")
-    columns.append(np.where([e.observable == "dry_compliance" for e in elements], known.coherent_dry, 0.0))
+    columns.append(np.where(compliances, known.coherent_dry, 0.0))
+    pads = np.array([e.place("pad") for e in elements])
+    for pad in sorted(set(pads[compliances])):
+        names.append(f"dry test of pad {pad:.0f}")
+        columns.append(np.where(compliances & (pads == pad), known.pad_dry, 0.0))
     return Nuisances(tuple(names), np.column_stack(columns))
 
 

@@ -26,6 +26,8 @@ FloatArray = NDArray[np.float64]
 ENTRY_NAMES = ("xx", "xy", "yx", "yy")
 #: Loads at which dry curves are compared, as shares of the range in which contact is complete.
 DRY_SHARES = (0.15, 0.5, 0.95)
+#: Standard error of a mean pad temperature [K]: sensors drift and self-heat far more than their noise.
+TEMPERATURE_SE = 0.05
 
 
 @dataclass(frozen=True)
@@ -175,29 +177,16 @@ def _add_dynamic(
         for i in members:
             _add_stiffness(builder, points[i], base, tolerance)
         temperature = _mean_temperatures([points[i].temperatures for i in members])
-        names = [
-            Element(
-                "temperature", "pad_temperature", _block(points[members[0]], len(members)), (*base, ("pad", float(k)))
-            )
-            for k in temperature
-        ]
+        block = f"load {load:.0f} N"
+        names = [Element("temperature", "pad_temperature", block, (*base, ("pad", float(k)))) for k in temperature]
         if temperature:
-            builder.add(
-                names,
-                np.array(list(temperature.values())),
-                np.eye(len(names)) * 0.05**2,
-                (tolerance.temperature, tolerance.fine_temperature),
-            )
+            noise = np.eye(len(names)) * TEMPERATURE_SE**2
+            value = np.array(list(temperature.values()))
+            builder.add(names, value, noise, (tolerance.temperature, tolerance.fine_temperature))
         out.append(
             DynamicTest(load, direction, speed, tuple(points[i].point.excitation for i in members), tuple(temperature))
         )
     return tuple(out)
-
-
-def _block(point, members: int) -> str:  # type: ignore[no-untyped-def]
-    """Blocks are loads, and at the load with a frequency sweep, frequencies."""
-    load = f"load {point.point.static_load:.0f} N"
-    return load if members == 1 else f"{load}, {point.point.excitation_hz:g} Hz"
 
 
 def _add_stiffness(builder: _Builder, result, base: tuple, tolerance: Tolerance) -> None:  # type: ignore[no-untyped-def, type-arg]

@@ -92,7 +92,7 @@ def plan(
 
     Raises
     ------
-    NoEquilibrium
+    NoEquilibriumError
         The baseline has none at some point of the layout.
     """
     known = known or Certificates()

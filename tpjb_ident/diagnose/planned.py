@@ -47,14 +47,14 @@ def planned_observations(
 
     Raises
     ------
-    NoEquilibrium
+    NoEquilibriumError
         The baseline has none at some point of the layout.
     """
     tolerance, noise = tolerance or Tolerance(), noise or ExpectedNoise()
     elements = _elements(layout, len(setup.bearing.pads))
     value = Forward(setup, layout, elements)()
     scale = _direct_scale(elements, value)
-    table = {
+    table: dict[str, tuple[np.ndarray | float, np.ndarray | float, np.ndarray | float]] = {
         "h": (noise.stiffness * scale, tolerance.stiffness * scale, tolerance.fine_stiffness * scale),
         "temperature": (noise.temperature, tolerance.temperature, tolerance.fine_temperature),
         "locus": (noise.position, tolerance.position, tolerance.fine_position),
@@ -96,16 +96,16 @@ def _elements(layout: Layout, pads: int) -> tuple[Element, ...]:
         out += [Element("locus", f"locus_{a}", f"locus {i % 5}", where3) for a in "xy"]
         out += [Element("load", f"load_{a}", f"locus {i % 5}", where3) for a in ("ratio", "turn")]
     for dry in layout.dry:
-        out += [
-            Element("dry", "dry_compliance", "dry", (("pad", float(dry.pad)), ("load", load))) for load in dry.load
-        ]
+        out += [Element("dry", "dry_compliance", "dry", (("pad", float(dry.pad)), ("load", load))) for load in dry.load]
     if layout.push_load is not None:
         out += [Element("clearance", "clearance_pushed", "clearance", (("pad", k + 1.0),)) for k in range(pads)]
         out += [Element("clearance", "side_angle", "clearance", (("pad", k + 1.0),)) for k in range(pads)]
     return tuple(out)
 
 
-def dynamic(loads: Sequence[float], lines: Sequence[float], speed: float, direction: float, pads: int) -> tuple[DynamicTest, ...]:
+def dynamic(
+    loads: Sequence[float], lines: Sequence[float], speed: float, direction: float, pads: int
+) -> tuple[DynamicTest, ...]:
     """Dynamic tests at several loads, all lines at each; `pads` with a temperature sensor (0: none)."""
     sensors = tuple(range(1, pads + 1))
     return tuple(DynamicTest(float(w), direction, speed, tuple(map(float, lines)), sensors) for w in loads)

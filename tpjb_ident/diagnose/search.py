@@ -55,23 +55,23 @@ def search(
     empty = Fit((), np.zeros(0), baseline, np.zeros((len(baseline), 0)), misfit.chi_square(baseline), np.zeros((0, 0)))
     say("every effect of the library", 0.1)
     first = screen(run, misfit, empty, pool)
-    model, scores, singles = empty, first, ()
+    model, scores = empty, first
     rounds: list[tuple[Fit, ...]] = []
     for count in range(settings.most_effects):
-        if scores[0].gain < settings.detect:
+        least = max(settings.detect, settings.further * model.chi_square if rounds else 0.0)
+        if scores[0].gain < 0.8 * least:
             break
         say(f"fits, effect {count + 1}", 0.2 + 0.2 * count)
         fits = _fits(run, misfit, model, _most_promising(scores, settings), settings)
-        if not rounds:
-            singles = fits
-        if not fits or model.chi_square - fits[0].chi_square < settings.detect:
+        if not fits or model.chi_square - fits[0].chi_square < least:
             break
         rounds.append(fits)
         model = fits[0]
         scores = screen(run, misfit, model, [c for c in pool if c not in model.candidates])
-    model = _backward(run, misfit, model, empty, settings)
+    model = _backward(run, misfit, model, settings)
+    singles = rounds[0] if rounds else ()
     say("rivals", 0.9)
-    rivals = _rivals(run, misfit, model, empty, singles, pool, settings)
+    rivals = _rivals(run, misfit, model, singles, pool, settings)
     return Search(empty, model, tuple(first), tuple(scores), singles, rivals)
 
 
@@ -105,7 +105,7 @@ def _without(model: Fit, index: int) -> tuple[tuple[Candidate, ...], FloatArray]
     )
 
 
-def _backward(run: Map, misfit: Misfit, model: Fit, empty: Fit, settings: DiagnoseSettings) -> Fit:
+def _backward(run: Map, misfit: Misfit, model: Fit, settings: DiagnoseSettings) -> Fit:
     """Drop effects whose removal costs next to nothing once the others are there."""
     while len(model.candidates) > 1:
         jobs = [(misfit, *_without(model, i)) for i in range(len(model.candidates))]
@@ -120,7 +120,7 @@ def _backward(run: Map, misfit: Misfit, model: Fit, empty: Fit, settings: Diagno
 
 
 def _rivals(
-    run: Map, misfit: Misfit, model: Fit, empty: Fit, singles: tuple[Fit, ...], pool: Sequence[Candidate],
+    run: Map, misfit: Misfit, model: Fit, singles: tuple[Fit, ...], pool: Sequence[Candidate],
     settings: DiagnoseSettings,
 ) -> tuple[tuple[Fit, ...], ...]:  # fmt: skip
     """For every effect, fits in which another candidate takes its place."""
@@ -128,7 +128,7 @@ def _rivals(
         return ()
     if len(model.candidates) == 1:
         return (tuple(f for f in singles if f.candidates != model.candidates),)
-    out = []
+    out: list[tuple[Fit, ...]] = []
     for index, gone in enumerate(model.candidates):
         chosen, start = _without(model, index)
         (rest,) = tuple(run(fit, [(misfit, chosen, start)]))

@@ -18,6 +18,8 @@ class DiagnoseSettings:
     certificates : Certificates
     detect : float
         Drop of chi-square below which no effect is added (32 candidates are tried: 20 is far out on their maximum).
+    further : float
+        Share of the chi-square that is left which every effect after the first must take away.
     rivals : float
         Rescaled difference of chi-square below which two explanations count as alike.
     tried : int
@@ -35,6 +37,7 @@ class DiagnoseSettings:
     tolerance: Tolerance = field(default_factory=Tolerance)
     certificates: Certificates = field(default_factory=Certificates)
     detect: float = 20.0
+    further: float = 0.3
     rivals: float = 12.0
     tried: int = 8
     most_effects: int = 3

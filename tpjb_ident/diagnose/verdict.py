@@ -38,6 +38,11 @@ class FoundEffect:
     probability: float
     parameters: dict[str, FoundParameter]
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, as in the contract."""
+        parameters = {k: vars(p) for k, p in self.parameters.items()}
+        return {"name": self.name, "probability": self.probability, "parameters": parameters}
+
     @property
     def effect(self) -> Effect:
         """The effect itself."""
@@ -116,9 +121,18 @@ class Verdict:
         """Serialise as JSON text; not-a-number becomes null, as JSON knows no other."""
         return json.dumps(_plain(self.to_dict()), indent=2, allow_nan=False) + "\n"
 
-    def effects_toml(self) -> str:
-        """Serialise as ``updated.effects.toml``, which ``predict --effects`` reads."""
+    def effects_toml(self, before: tuple[Effect, ...] = ()) -> str:
+        """Serialise as ``updated.effects.toml``, which ``predict --effects`` reads.
+
+        Parameters
+        ----------
+        before : tuple of Effect
+            Effects that the baseline had already; they stay in the model.
+        """
         lines = ['schema = "tpjb-effects/1"', ""]
+        for known in before:
+            values = [f"{k} = {v!r}" for k, v in known.parameters.items()]
+            lines += ["[[effects]]", f'name = "{known.name}"', *values, ""]
         for e in self.effects:
             kind = kind_of(e.name)
             lines += ["[[effects]]", f'name = "{e.name}"']

@@ -1,0 +1,113 @@
+"""From a campaign to a diagnosis: identify, measure the static tests, observe, diagnose."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from tpjb_ident.compare.comparison import ComparisonError, measure_dry
+from tpjb_ident.compare.measured_pivots import measured_laws
+from tpjb_ident.diagnose.diagnose import Diagnosis, diagnose
+from tpjb_ident.diagnose.nuisance import Certificates
+from tpjb_ident.diagnose.observe import observe
+from tpjb_ident.diagnose.settings import DiagnoseSettings
+from tpjb_ident.dynamic.identify import IdentifySettings, identify
+
+from model.effects import Effect, apply_effects  # isort: skip
+from model.pivots import pivot_laws  # isort: skip
+from model.setup import Setup  # isort: skip
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from model.bearing import Bearing
+    from rigdata.campaign import Campaign
+    from tpjb_ident.dynamic.identification import Identification
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Where a diagnosis starts from.
+
+    Attributes
+    ----------
+    pivots : object
+        ``"kirk"``, ``"rigid"``, ``"measured"``, a path or laws.
+    thermal : str
+    effects : tuple of Effect
+        Already in the model.
+    """
+
+    pivots: Any = "kirk"
+    thermal: str = "adiabatic"
+    effects: tuple[Effect, ...] = ()
+
+
+@dataclass(frozen=True)
+class CampaignDiagnosis:
+    """A diagnosis with what it was made from."""
+
+    diagnosis: Diagnosis
+    identification: Identification
+    setup: Setup
+
+
+def diagnose_campaign(
+    campaign: Campaign,
+    bearing: Bearing,
+    baseline: Baseline | None = None,
+    settings: DiagnoseSettings | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+    estimator: IdentifySettings | None = None,
+) -> CampaignDiagnosis:
+    """Identify a campaign and find what its model lacks.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    bearing : Bearing
+    baseline : Baseline, optional
+    settings : DiagnoseSettings, optional
+        Certificates of probes and cells are read from the campaign's manifest.
+    progress : callable, optional
+        ``progress(text, done, total)``.
+    estimator : IdentifySettings, optional
+
+    Raises
+    ------
+    ComparisonError
+        The campaign has no dynamic runs.
+    """
+    baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
+    tell = progress or (lambda text, done, total: None)
+    if not campaign.of_kind("dynamic"):
+        raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to diagnose")
+    least = min(pad.assembled_clearance for pad in bearing.pads)
+    chosen = replace(estimator or IdentifySettings(), clearance=least)
+    found = identify(campaign, chosen, lambda text, done, total: tell(f"identifying, {text}", 20 * done, 100 * total))
+    tell("pivot curves, clearance and locus", 20, 100)
+    curves, polygon, locus = measure_dry(campaign, bearing)
+    measured = baseline.pivots == "measured"
+    laws = measured_laws(curves, len(bearing.pads), campaign.id) if measured else pivot_laws(baseline.pivots, bearing)
+    setup = apply_effects(Setup(bearing, laws, baseline.thermal), baseline.effects)
+    # curves that the model was given cannot testify about it
+    observations = observe(found, () if measured else curves, locus, polygon, settings.tolerance)
+    certain = replace(settings, certificates=certificates(campaign, settings.certificates))
+    result = diagnose(
+        observations, setup, certain, lambda text, share: tell(f"diagnosing, {text}", 30 + int(70 * share), 100)
+    )
+    return CampaignDiagnosis(result, found, setup)
+
+
+def certificates(campaign: Campaign, known: Certificates) -> Certificates:
+    """Calibration uncertainties that a manifest states; where it is silent the defaults stay."""
+    probes = [c for c in campaign.channels.values() if c.quantity == "displacement" and c.axis is not None]
+    cells = [c for c in campaign.channels.values() if c.quantity == "force" and c.uncertainty]
+    if len(probes) == 2 and abs(math.sin(float(probes[0].axis or 0.0) - float(probes[1].axis or 0.0))) > 0.05:
+        axes = (float(probes[0].axis or 0.0), float(probes[1].axis or 0.0))
+        gains = tuple(float(p.uncertainty or g) for p, g in zip(probes, known.probe_gain, strict=True))
+        known = replace(known, probe_axes=axes, probe_gain=(gains[0], gains[1]))
+    if cells:
+        known = replace(known, cell_gain=max(float(c.uncertainty or 0.0) for c in cells))
+    return known
