@@ -207,7 +207,7 @@ class MeshDensity:
     """
 
     arc: int = 14
-    face: int = 2
+    face: int = 4
     half_length: int = 7
     backing: int = 5
     babbitt: int = 1
@@ -246,7 +246,7 @@ def sector_mesh(geometry: PadGeometry, density: MeshDensity) -> SectorMesh:
     before, after = _share(density.arc, *wings)
     theta = _join(
         graded(geometry.leading, -half, before, edge / outer, rim / outer),
-        np.linspace(-half, half, density.face + 1),
+        graded(-half, half, density.face, rim / outer, rim / outer),
         graded(half, geometry.trailing, after, rim / outer, edge / outer),
     )
     under, end = 0.5 * geometry.face.length, 0.5 * geometry.length

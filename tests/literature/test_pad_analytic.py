@@ -224,23 +224,39 @@ def test_pad_of_the_paper_deforms_by_microns() -> None:
     assert grow[24, 0] < 0.0 < grow[0, -1]
 
 
-@pytest.mark.slow
-def test_default_mesh_is_within_one_percent() -> None:
-    """Against a mesh of nearly twice the unknowns, elements at the rim of the pivot face half the size.
+# Radial displacement [um] at three angles (leading edge, a quarter of the arc, pivot) x four places along the half
+# length (0, 1/2, 7/8, 1), on meshes that resolve the rim of the pivot face and the lining's free edges: for the
+# spherical bearing 41 x 25 x 40 nodes (123,000 unknowns, cubic across and along z), for the rocker 55 x 16 x 22 nodes
+# (cubic; too coarse at the lining's corners to serve for heat). They pin this code against its own limit.
+FINEST = {
+    ("rocker", "4.5 kN"): [
+        [2.1803, 2.1023, 2.0044, 1.9827],
+        [1.2603, 1.2390, 1.1857, 1.1514],
+        [0.5347, 0.5850, 0.6964, 0.6754],
+    ],
+    ("spherical", "4.5 kN"): [
+        [0.8901, 0.9967, 1.1695, 1.2376],
+        [0.7597, 0.9662, 1.1719, 1.2306],
+        [0.5819, 0.8927, 1.1499, 1.2103],
+    ],
+    ("spherical", "10 K"): [
+        [-0.387, -0.137, 0.364, 0.883],
+        [-2.525, -2.100, -1.414, -0.759],
+        [-3.311, -2.689, -1.916, -1.241],
+    ],
+}
 
-    The spherical bearing's pad is the worse of the two, its face having the longer rim.
-    """
-    name = "spherical"
-    fine = MeshDensity(arc=16, face=4, half_length=8, backing=6, rim=0.018, edge=0.14)
-    (default, _), (better, _) = paper_pad(name), paper_pad(name, density=fine)
-    pressure, rise = loaded(default, 4500.0), np.full((49, 9), 10.0)
-    for got, reference in (
-        (default.bend(pressure), better.bend(pressure)),
-        (default.expand(rise), better.expand(rise)),
-    ):
-        difference = got - reference
-        assert np.sqrt(np.mean(difference**2)) < 0.008 * np.sqrt(np.mean(reference**2))
-        assert np.abs(difference).max() < 0.02 * np.abs(reference).max()  # the largest sits in the free corners
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["rocker", "spherical"])
+def test_default_mesh_is_within_one_percent(name: str) -> None:
+    solid, _ = paper_pad(name, 97, 33)
+    got = {"4.5 kN": solid.bend(loaded(solid, 4500.0)), "10 K": solid.expand(np.full((97, 33), 10.0))}
+    for case, field in got.items():
+        if (name, case) in FINEST:
+            finest = np.array(FINEST[name, case])
+            difference = 1e6 * field[np.ix_([0, 24, 48], [0, 16, 28, 32])] - finest
+            assert np.abs(difference).max() < 0.01 * np.abs(finest).max(), (case, difference)
 
 
 def test_converges_from_below() -> None:
