@@ -105,9 +105,18 @@ def shorten(films: list[PadFilm], position: FloatArray, shift: FloatArray, scale
     return scale
 
 
-def torn_pads(films: list[PadFilm], position: FloatArray) -> list[int]:
-    """Pads that were left idle although they have a loaded attitude here: carrying, they would lose it."""
-    return [f.number for f in films if f.idle and f.branch is not None and spare(f, position) > EDGE]
+def shed_pads(films: list[PadFilm], position: FloatArray) -> tuple[list[int], list[int]]:
+    """Pads that were left idle although they have a loaded attitude here: carrying, they would push the journal away.
+
+    Returns
+    -------
+    resting, torn : list of int
+        Numbers of pads that stay unloaded when left alone (a < 0: the film opens towards both edges), and of those
+        that would take up load again at once.
+    """
+    shed = [f for f in films if f.idle and f.branch is not None and spare(f, position) > EDGE]
+    resting = [f.number for f in shed if f.reach(position) <= 0.0]
+    return resting, [f.number for f in shed if f.number not in resting]
 
 
 def longest_step(films: list[PadFilm], shift: FloatArray) -> float:

@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from model.acceleration import Anderson
-from model.carrying import find_branch, longest_step, set_loaded, shorten, torn_pads, wake_or_rest
+from model.carrying import find_branch, longest_step, set_loaded, shed_pads, shorten, wake_or_rest
 from model.film import JIT, solve_film
 from model.pad_film import PadFilm, film_step, least_share, oil_constants, pad_films
 from model.setup import Setup
@@ -185,12 +185,13 @@ def _iterate(search: _Search) -> Equilibrium:
         near = residual < NEAR and heat_change < NEAR_HEAT
         search.relaxation = 1.0 if near else HELD_BACK
         if residual < accuracy and heat_change < HEAT_PER_FORCE * accuracy:
-            torn = torn_pads(search.films, search.position)
+            resting, torn = shed_pads(search.films, search.position)
             if torn:
                 name = f"pads {', '.join(map(str, torn))} can neither carry nor idle"
                 return _result(search, iteration, residual, heat_change, (name, "not converged"))
             _sharpen(search)
-            return _result(search, iteration, residual, heat_change, ())
+            names = (f"pads {', '.join(map(str, resting))} cannot keep their load",) if resting else ()
+            return _result(search, iteration, residual, heat_change, names)
         stalled = 0 if residual < 0.7 * best else stalled + 1
         best = min(best, residual)
         whole = _apply(search, (shift, moves), 0.5 if stalled > 12 else 1.0)
