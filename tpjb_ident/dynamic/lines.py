@@ -7,7 +7,8 @@ that none leaks into the excitation line, however short the window.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,6 +58,14 @@ class LineSet:
         """All frequencies [Hz], excitation first, shape (n_lines,)."""
         return np.array([line.frequency for line in self.excitation + self.nuisance])
 
+    def at_speed(self, speed: float) -> LineSet:
+        """The same lines with 1X, 2X.. at another shaft speed [Hz]."""
+        moved = tuple(
+            replace(line, frequency=speed * int(line.name[:-1])) if re.fullmatch(r"\d+X", line.name) else line
+            for line in self.nuisance
+        )
+        return replace(self, nuisance=moved)
+
 
 @dataclass(frozen=True)
 class LineSettings:
@@ -81,7 +90,11 @@ class LineSettings:
 
 
 def known_lines(
-    excitation: tuple[float, ...], speed: float, rate: float, settings: LineSettings | None = None
+    excitation: tuple[float, ...],
+    speed: float,
+    rate: float,
+    settings: LineSettings | None = None,
+    extra: tuple[float, ...] = (),
 ) -> LineSet:
     """Collect the lines of one run; those that coincide are merged and reported.
 
@@ -94,6 +107,8 @@ def known_lines(
     rate : float
         Sample rate [Hz]; lines above 0.45 of it are left out (the anti-alias filter has them).
     settings : LineSettings, optional
+    extra : tuple of float
+        Other lines that were found in the record [Hz].
 
     Raises
     ------
@@ -109,7 +124,8 @@ def known_lines(
     driven = tuple(Line("excitation", float(f)) for f in sorted(set(excitation)))
     conditions: list[Condition] = []
     nuisance: list[Line] = []
-    for line in _candidates(driven, speed, settings):
+    others = [Line("found", f, 1e-6) for f in extra]
+    for line in _candidates(driven, speed, settings) + others:
         if not 0.0 < line.frequency < top:
             continue
         struck = [e for e in driven if abs(e.frequency - line.frequency) <= line.wander]

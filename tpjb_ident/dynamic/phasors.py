@@ -64,11 +64,12 @@ class LineFitter:
         self.length, self.rate = length, rate
         self.frequencies = np.asarray(frequencies, dtype=float)
         self.design = line_design(np.arange(length) / rate, self.frequencies)
-        self.inverse = np.linalg.pinv(self.design)
+        # Lines that a window tells apart leave a well-conditioned Gram matrix; its size is a dozen.
+        self.inverse = np.linalg.pinv(self.design.T @ self.design, rcond=1e-12, hermitian=True) @ self.design.T
         # The scale of the residual needs no more than a few hundred samples.
         self._stride = max(1, length // 512)
 
-    def fit(self, values: FloatArray, start: FloatArray) -> PhasorBlock:
+    def fit(self, values: FloatArray, start: FloatArray, usual: FloatArray | None = None) -> PhasorBlock:
         """Fit windows of a vector record.
 
         Parameters
@@ -77,15 +78,17 @@ class LineFitter:
             SI samples, X and Y; NaN where missing.
         start : (n_windows,) ndarray
             Time of each window's first sample [s] after the start of the run.
+        usual : (2,) ndarray, optional
+            Residual scale that windows of the run have; default the median of those given.
         """
         stack = np.ascontiguousarray(values.transpose(0, 2, 1)).reshape(-1, self.length)
-        offset = np.nanmean(stack[:, :: self._stride], axis=1, keepdims=True) if stack.size else 0.0
-        stack = stack - np.where(np.isfinite(offset), offset, 0.0)
+        offset = _mean_of_present(stack[:, :: self._stride])
+        stack = stack - offset
         coefficients = stack @ self.inverse.T
         residual = np.abs(stack - coefficients @ self.design.T)
         scale = 1.4826 * np.median(residual[:, :: self._stride], axis=1)
         scale, largest = scale.reshape(-1, 2), residual.max(axis=1).reshape(-1, 2)
-        usual = np.nanmedian(scale, axis=0) if np.isfinite(scale).any() else np.full(2, np.nan)
+        usual = usual_scale(scale) if usual is None else usual
         # A long glitch pulls the whole fit and hides in the window's own scale: the run's tells.
         # A NaN in the window makes both comparisons false: refit those too.
         clean = ((largest <= GLITCH_LIMIT * scale) & (scale <= SCALE_LIMIT * usual)).all(axis=1)
@@ -101,6 +104,19 @@ class LineFitter:
         n = 2 * len(self.frequencies)
         local = coefficients[:, :, 0:n:2] + 1j * coefficients[:, :, 1:n:2]
         return to_run_origin(local.transpose(0, 2, 1), self.frequencies, start)
+
+
+def usual_scale(scale: FloatArray) -> FloatArray:
+    """Median over the windows with a scale, X and Y; infinite where none has."""
+    known = scale[np.isfinite(scale).all(axis=1)]
+    return np.median(known, axis=0) if len(known) else np.full(2, np.inf)
+
+
+def _mean_of_present(rows: FloatArray) -> FloatArray:
+    """Mean of the finite values of every row, (n, 1); zero where a row has none."""
+    present = np.isfinite(rows)
+    total = np.where(present, rows, 0.0).sum(axis=1, keepdims=True)
+    return np.asarray(total / np.maximum(present.sum(axis=1, keepdims=True), 1))
 
 
 def to_run_origin(local: ComplexArray, frequencies: FloatArray, start: FloatArray) -> ComplexArray:
@@ -131,7 +147,7 @@ def fit_uneven(values: FloatArray, time: FloatArray, frequencies: FloatArray, or
     origin : float
         Time of the start of the run [s].
     """
-    offset = np.nanmean(values, axis=0) if np.isfinite(values).any() else np.zeros(2)
+    offset = _mean_of_present(values.T)[:, 0]
     local_time = time - time[0]
     coefficients, scale, lost = _refit(line_design(local_time, frequencies), values - offset, np.full(2, np.inf))
     n = 2 * len(frequencies)

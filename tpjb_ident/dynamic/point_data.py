@@ -43,12 +43,18 @@ class PointData:
     @property
     def mean_loads(self) -> FloatArray:
         """Mean cell force of every run, shape (n_runs, 2) [N]."""
-        return np.array([np.nanmean(run.cell_force.mean, axis=0) for run in self.runs])
+        return np.array([_finite_mean(run.cell_force.mean) for run in self.runs])
 
     @property
     def mean_positions(self) -> FloatArray:
         """Mean displacement of every run, shape (n_runs, 2) [m]."""
-        return np.array([np.nanmean(run.displacement.mean, axis=0) for run in self.runs])
+        return np.array([_finite_mean(run.displacement.mean) for run in self.runs])
+
+
+def _finite_mean(rows: FloatArray) -> FloatArray:
+    """Mean of the complete rows, (2,); NaN where there is none."""
+    good = rows[np.isfinite(rows).all(axis=1)]
+    return good.mean(axis=0) if len(good) else np.full(2, np.nan)
 
 
 def gather(runs: list[RunPhasors]) -> list[PointData]:

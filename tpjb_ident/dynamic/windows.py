@@ -38,6 +38,10 @@ class WindowSettings:
     min_cycles: float = 4.0
 
 
+#: Samples per window, where a shorter one resolves the lines.
+MAX_SAMPLES = 2**16
+
+
 class RecordTooShortError(ValueError):
     """The record cannot resolve its lines; `needed` [s] says how long it has to be."""
 
@@ -131,7 +135,8 @@ def plan_windows(n_samples: int, rate: float, lines: LineSet, settings: WindowSe
     """
     shortest = shortest_window(lines, rate, settings)
     available = n_samples / rate
-    wanted = settings.length or max(shortest, available / settings.target_count)
+    # Very long records are cut into more windows, not into windows that fill the memory.
+    wanted = settings.length or max(shortest, min(available / settings.target_count, MAX_SAMPLES / rate))
     if settings.length and settings.length < shortest * 0.999:
         raise RecordTooShortError(
             f"a window of {settings.length:g} s cannot tell the lines apart "

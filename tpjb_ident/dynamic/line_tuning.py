@@ -1,0 +1,150 @@
+"""Second thoughts about the lines of a run, from a first fit: whether their frequencies are right.
+
+Set points are not frequencies: the shaft creeps and the generator has a clock of its own. The phase
+advance from window to window tells a frequency error to a fraction of the line's width.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.conditions import Condition
+from tpjb_ident.dynamic.lines import LineSet, known_lines
+from tpjb_ident.dynamic.run_data import PhasorSettings, RunPhasors
+
+#: Phase advance over a run [cycles] that a frequency may be off before the fit is repeated.
+MAX_SLIP = 0.01
+#: Phase [cycles] by which the shaft may run ahead or behind within one window.
+MAX_WINDOW_SLIP = 0.005
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What to do better in a second fit.
+
+    Attributes
+    ----------
+    lines : LineSet
+    follow : (n_windows,) ndarray or None
+        Shaft speeds to follow window by window [Hz].
+    conditions : tuple of Condition
+    """
+
+    lines: LineSet
+    follow: FloatArray | None
+    conditions: tuple[Condition, ...]
+
+
+def frequency_slip(phasors: ComplexArray, start: FloatArray, noise: float) -> float:
+    """Frequency error that the phase advance of window phasors shows [Hz].
+
+    Parameters
+    ----------
+    phasors : (n, 2) complex ndarray
+        One line, referred to the start of the run.
+    start : (n,) ndarray
+        [s]
+    noise : float
+        Standard error of a phasor component; a line weaker than ten times this tells nothing.
+
+    Returns
+    -------
+    float
+        0.0 where nothing can be told.
+    """
+    good = np.isfinite(phasors).all(axis=1)
+    if good.sum() < 3:
+        return 0.0
+    z, t = phasors[good], start[good]
+    size = float(np.median(np.linalg.norm(z, axis=1)))
+    if not size > 10 * noise:
+        return 0.0
+    # Phase steps between neighbours, each weighted by what both show: robust through the median.
+    steps = np.angle(np.einsum("ni,ni->n", z[1:], z[:-1].conj())) / (2 * np.pi * np.diff(t))
+    slip = float(np.median(steps))
+    spread = 1.4826 * float(np.median(np.abs(steps - slip)))
+    return slip if abs(slip) > 4 * spread / np.sqrt(len(steps)) else 0.0
+
+
+def tuned(
+    run: Any, result: RunPhasors, driven: tuple[float, ...], speed: float, settings: PhasorSettings
+) -> Tuning | None:
+    """Compare a first fit with what it assumed; None where it was good enough.
+
+    Parameters
+    ----------
+    run : rigdata.campaign.Run
+    result : RunPhasors
+        The first fit.
+    driven : tuple of float
+        Excitation frequencies as set [Hz].
+    speed : float
+        Shaft speed assumed [Hz].
+    settings : PhasorSettings
+    """
+    exact, off_set_point = _excitations(result, driven, run.sample_rate)
+    slip = _shaft_slip(result, run.sample_rate)
+    span = result.start[-1] - result.start[0] + result.length
+    follow = _drifting(result)
+    if not off_set_point and follow is None and abs(slip) * span <= 5 * MAX_SLIP:
+        return None
+    extra = tuple(line.frequency for line in result.lines.nuisance if line.name == "found")
+    lines = known_lines(exact, speed + slip, run.sample_rate, settings.lines, extra)
+    drift: tuple[Condition, ...] = ()
+    if follow is not None:
+        drift = (
+            Condition(
+                "speed drifts",
+                f"shaft speed between {np.nanmin(follow):.4g} and {np.nanmax(follow):.4g} Hz; followed by window",
+            ),
+        )
+    return Tuning(lines, follow, off_set_point + drift)
+
+
+def _excitations(
+    result: RunPhasors, driven: tuple[float, ...], rate: float
+) -> tuple[tuple[float, ...], tuple[Condition, ...]]:
+    """Excitation frequencies as the phases show them."""
+    span = result.start[-1] - result.start[0] + result.length
+    noise = _typical(result.cell_force.noise) / np.sqrt(result.length * rate)
+    slips = [
+        frequency_slip(result.cell_force.phasors[:, i], result.start, noise)
+        for i in range(len(result.lines.excitation))
+    ]
+    off = [s if abs(s) * span > MAX_SLIP else 0.0 for s in slips]
+    exact = tuple(line.frequency + s for line, s in zip(result.lines.excitation, off))
+    if not any(off):
+        return exact, ()
+    found, stated = ", ".join(f"{f:.5g}" for f in exact), ", ".join(f"{f:g}" for f in driven)
+    return exact, (
+        Condition(
+            "excitation off set point",
+            f"excitation found at {found} Hz, set point {stated} Hz; the found one was used for the fit",
+        ),
+    )
+
+
+def _shaft_slip(result: RunPhasors, rate: float) -> float:
+    names = [line.name for line in result.lines.nuisance]
+    if "1X" not in names:
+        return 0.0
+    noise = _typical(result.displacement.noise) / np.sqrt(result.length * rate)
+    index = len(result.lines.excitation) + names.index("1X")
+    return frequency_slip(result.displacement.phasors[:, index], result.start, noise)
+
+
+def _drifting(result: RunPhasors) -> FloatArray | None:
+    """Window speeds, where the shaft's phase runs away within a window."""
+    known = result.speeds[np.isfinite(result.speeds)]
+    if len(known) < 2 or np.ptp(known) / 2 * result.length <= MAX_WINDOW_SLIP:
+        return None
+    return result.speeds
+
+
+def _typical(noise: FloatArray) -> float:
+    finite = noise[np.isfinite(noise)]
+    return float(np.median(finite)) if len(finite) else 0.0

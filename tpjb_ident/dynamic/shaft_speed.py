@@ -1,0 +1,44 @@
+"""Shaft speed of a run, as a whole and window by window, from its tachometer channel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tpjb_ident.dynamic.arrays import FloatArray
+from tpjb_ident.dynamic.conditions import Condition
+
+#: Samples from which the speed of the run is taken.
+FIRST_LOOK = 2**17
+#: A tachometer this far from the set point is not believed.
+MAX_DEPARTURE = 0.05
+
+
+def shaft_speed(run: Any) -> tuple[float, tuple[Condition, ...]]:
+    """Shaft speed of a run [Hz]: the tachometer's, or the set point where it gives nothing usable."""
+    nominal = run.point.shaft_speed_hz
+    record = run.speed(0, FIRST_LOOK)
+    if record is None:
+        return nominal, ()
+    values = record.values[np.isfinite(record.values)]
+    measured = float(values.mean()) / (2 * np.pi) if len(values) else np.nan
+    if abs(measured - nominal) <= MAX_DEPARTURE * max(nominal, 1.0):
+        return measured, ()
+    return nominal, (
+        Condition("tach off set point", f"tachometer says {measured:.4g} Hz, set point {nominal:g} Hz; set point used"),
+    )
+
+
+def window_speeds(run: Any, first: int, stop: int, length: int) -> FloatArray:
+    """Mean speed in windows first..stop-1 [Hz]; NaN where the tachometer gives nothing usable."""
+    record = run.speed(first * length, stop * length)
+    if record is None:
+        return np.full(stop - first, np.nan)
+    values = record.values.reshape(stop - first, length) / (2 * np.pi)
+    complete = np.isfinite(values).all(axis=1)
+    speeds = np.full(stop - first, np.nan)
+    speeds[complete] = values[complete].mean(axis=1)
+    nominal = run.point.shaft_speed_hz
+    believable = np.abs(np.nan_to_num(speeds) - nominal) <= MAX_DEPARTURE * max(nominal, 1.0)
+    return np.where(believable, speeds, np.nan)
