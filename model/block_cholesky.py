@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cholesky
+from scipy.linalg.blas import dgemm, dsyrk, dtrsm
 
 Array = NDArray[np.float64]
 BlockRow = dict[int, Array]  # block row i of a lower triangle: column j <= i -> block (i, j); absent ones are zero
@@ -40,16 +41,18 @@ def factor_rows(rows: Iterable[BlockRow]) -> Iterator[BlockRow]:
     for i, row in enumerate(rows):
         first = min(row)
         known = {j: known[j] for j in range(first, i)}  # the band: nothing before `first` is needed again
+        row = {j: np.asfortranarray(block) for j, block in row.items()}
         for j in range(first, i):
             for k in range(first, j):
                 if k in row and k in known[j]:
-                    row[j] = row.get(j, 0.0) - row[k] @ known[j][k].T
+                    sum_so_far = row[j] if j in row else np.zeros_like(row[k])
+                    row[j] = dgemm(-1.0, row[k], known[j][k], 1.0, sum_so_far, trans_b=1, overwrite_c=1)
             if j in row:
-                row[j] = solve_triangular(known[j][j], row[j].T, lower=True, check_finite=False).T
+                row[j] = dtrsm(1.0, known[j][j], row[j], side=1, lower=1, trans_a=1, overwrite_b=1)
         for k in range(first, i):
             if k in row:
-                row[i] = row[i] - row[k] @ row[k].T
-        row[i] = cholesky(row[i], lower=True, check_finite=False)
+                row[i] = dsyrk(-1.0, row[k], 1.0, row[i], lower=1, overwrite_c=1)
+        row[i] = cholesky(row[i], lower=True, overwrite_a=True, check_finite=False)
         known[i] = row
         yield row
 
@@ -73,11 +76,12 @@ def forward_rows(factor: Iterable[BlockRow], rhs: Iterable[Array]) -> Iterator[A
     known: dict[int, Array] = {}
     for i, (row, given) in enumerate(zip(factor, rhs)):
         known = {j: known[j] for j in range(min(row), i)}
-        block = given.copy()
+        block = np.array(given, dtype=float, order="F")
         for j, solution in known.items():
             if j in row:
-                block[:, : solution.shape[1]] -= row[j] @ solution
-        known[i] = solve_triangular(row[i], block, lower=True, check_finite=False)
+                width = solution.shape[1]
+                block[:, :width] = dgemm(-1.0, row[j], solution, 1.0, block[:, :width], overwrite_c=1)
+        known[i] = dtrsm(1.0, row[i], block, lower=1, overwrite_b=1)
         yield known[i]
 
 
@@ -112,7 +116,7 @@ class BlockCholesky:
         out = np.stack(list(forward_rows(self.rows, rhs)))
         for i in reversed(range(len(self.rows))):
             row = self.rows[i]
-            out[i] = solve_triangular(row[i], out[i], lower=True, trans="T", check_finite=False)
+            out[i] = dtrsm(1.0, row[i], out[i], lower=1, trans_a=1)
             for j in row:
                 if j < i:
                     out[j] -= row[j].T @ out[i]
