@@ -215,20 +215,26 @@ def _concentrate(
     weights = np.zeros(distance2.shape)
     np.put_along_axis(weights, nearest, 1.0, axis=-1)
     B = _weighted_fit(X, Y, weights)
-    return B, _scatter(Y - X @ np.swapaxes(B, -1, -2), weights) + 1e-28 * metric
+    return B, _regular(_scatter(Y - X @ np.swapaxes(B, -1, -2), weights), metric)
+
+
+def _regular(scatter: ComplexArray, metric: ComplexArray) -> ComplexArray:
+    """A scatter that can be inverted: with a trace of `metric`, relative to its own size."""
+    size = np.einsum("...ii->...", scatter).real / np.trace(metric).real
+    return np.asarray(scatter + (1e-28 + 1e-13 * size)[..., None, None] * metric)
 
 
 def _reweighted(X: ComplexArray, Y: ComplexArray, B: ComplexArray, share: float) -> tuple[ComplexArray, ComplexArray]:
     """Fit and scatter of the windows that belong together, from the concentrated core."""
     n, q = Y.shape
     h = _core_size(Y, share)
-    residual = Y - X @ B.T
-    scatter = _scatter(residual, np.ones(n))
+    residual, metric = Y - X @ B.T, _scatter(Y, np.ones(n))
+    scatter = _regular(_scatter(residual, np.ones(n)), metric)
     # The core's own scatter is self-consistent after a few looks at which windows it holds.
     for _ in range(4):
         core = np.zeros(n)
         core[np.argpartition(_distance2(residual, scatter), h - 1)[:h]] = 1.0
-        scatter = _scatter(residual, core)
+        scatter = _regular(_scatter(residual, core), metric)
     scatter = scatter / half_shrinkage(2 * q, h / n)
     lower, upper, shrinkage = trimming_limits(2 * q)
     for _ in range(2):
@@ -236,7 +242,7 @@ def _reweighted(X: ComplexArray, Y: ComplexArray, B: ComplexArray, share: float)
         B = _weighted_fit(X, Y, weights)
         residual = Y - X @ B.T
         freedom = (weights.sum() - 2) / weights.sum()
-        scatter = _scatter(residual, weights) / (shrinkage * freedom)
+        scatter = _regular(_scatter(residual, weights) / (shrinkage * freedom), metric)
     return B, scatter
 
 

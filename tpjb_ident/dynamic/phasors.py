@@ -91,7 +91,12 @@ class LineFitter:
         usual = usual_scale(scale) if usual is None else usual
         # A long glitch pulls the whole fit and hides in the window's own scale: the run's tells.
         # A NaN in the window makes both comparisons false: refit those too.
-        clean = ((largest <= GLITCH_LIMIT * scale) & (scale <= SCALE_LIMIT * usual)).all(axis=1)
+        # (The rounding of a noise-free record is no glitch either.)
+        rounding = 1e-10 * np.abs(stack).max(axis=1).reshape(-1, 2)
+        clean = (largest <= np.maximum(GLITCH_LIMIT * scale, rounding)) & (
+            scale <= np.maximum(SCALE_LIMIT * usual, rounding)
+        )
+        clean = clean.all(axis=1)
         lost = np.zeros(len(start))
         coefficients = coefficients.reshape(-1, 2, coefficients.shape[1])
         for i in np.flatnonzero(~clean):

@@ -111,7 +111,9 @@ def shortest_window(lines: LineSet, rate: float, settings: WindowSettings) -> fl
     n_driven = len(lines.excitation)
     start = settings.min_cycles / min(line.frequency for line in lines.excitation)
     length = start
-    while length < 1e4 * start:
+    # A dozen beats between neighbours separate any two lines; what is not resolved then never is.
+    longest = max(start, 12.0 / _gap(lines)) if np.isfinite(_gap(lines)) else 2 * start
+    while length <= longest:
         if variance_inflation(frequencies, n_driven, length, rate) <= settings.max_inflation:
             return length
         length *= 1.05
