@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-MAX_ACTIVE_SET_STEPS = 60
+#: A cold start moves the rupture line by one node a step, so that fine meshes need many.
+MAX_ACTIVE_SET_STEPS = 2000
 #: How the inner loops are compiled: cached on disk; sums may be reordered, but NaN and infinity keep their meaning.
 JIT: dict[str, Any] = {
     "cache": True,

@@ -292,8 +292,8 @@ def main() -> None:
         case = cases[number]
         pad = case.bearing.pads[0]
         print(
-            f"  case {number}: {len(case.bearing.pads)} pads of {math.degrees(pad.arc):.0f} deg, preload {pad.preload:.2f}, "
-            f"offset {pad.pivot_offset:.2f}, S {case.sommerfeld:.3f}, pivot give / Cb "
+            f"  case {number}: {len(case.bearing.pads)} pads of {math.degrees(pad.arc):.0f} deg, "
+            f"preload {pad.preload:.2f}, offset {pad.pivot_offset:.2f}, S {case.sommerfeld:.3f}, pivot give / Cb "
             f"{case.load / case.stiffness / pad.assembled_clearance:.2f}"
         )
     print("largest errors of the converged: " + ", ".join(f"{k} {v:.1e}" for k, v in out.worst.items()))
