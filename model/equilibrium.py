@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from model.acceleration import Anderson
 from model.carrying import find_branch, longest_step, set_loaded, shed_pads, shorten, wake_or_rest
 from model.film import JIT, solve_film
+from model.pad_bending import bend
 from model.pad_film import PadFilm, film_step, least_share, oil_constants, pad_films
 from model.setup import Setup
 from model.start import first_position
@@ -148,7 +149,8 @@ def _warm_start(search: _Search, start: Equilibrium) -> bool:
         film.work.ruptured[:] = other.work.ruptured
         film.work.pressure[:] = other.work.pressure
         if search.setup.flexible_pads:
-            film.work.extra[:] = other.work.extra
+            film.bent[:] = other.bent
+            film.work.extra[:] += other.bent
     search.position = start.position.copy()
     return True
 
@@ -216,7 +218,7 @@ def _state(search: _Search) -> FloatArray:
         parts.append(np.array([film.tilt * film.pivot_radius, film.deflection]) / _MICRO)
         parts.append(film.work.temperature.ravel() * (0.0 if film.idle else 1.0))
         if search.setup.flexible_pads:
-            parts.append(film.work.extra.ravel() / _MICRO)
+            parts.append(film.bent.ravel() / _MICRO)
     return np.concatenate(parts)
 
 
@@ -232,7 +234,9 @@ def _set_state(search: _Search, state: FloatArray) -> None:
             film.work.temperature.ravel()[:] = state[at : at + size]
         at += size
         if search.setup.flexible_pads:
-            film.work.extra.ravel()[:] = state[at : at + size] * _MICRO
+            bent = state[at : at + size].reshape(film.bent.shape) * _MICRO
+            film.work.extra[:] += bent - film.bent
+            film.bent[:] = bent
             at += size
 
 
@@ -267,7 +271,10 @@ def _solve_film(search: _Search, film: PadFilm) -> float:
         oil_constants(oil), (oil.specific_heat, oil.conductivity), (film.inlet, relaxation, HEATING_STEP),
     )  # fmt: skip
     search.limited = max(search.limited, limited)
-    return film.temperature_change
+    if not setup.flexible_pads or film.forces.steps < 0:
+        return film.temperature_change
+    # a deformation counts like a temperature change of the same weight in the film's resistance
+    return max(film.temperature_change, HEAT_PER_FORCE * bend(setup, film))
 
 
 def _sharpen(search: _Search) -> None:

@@ -42,6 +42,8 @@ class PadFilm:
     idle : bool
         No loaded attitude: carries nothing.
     forces : FilmForces or None
+    bent : (nt + 1, nz + 1) ndarray
+        The pad's deformation, part of `work.extra` [m].
     """
 
     number: int
@@ -53,6 +55,7 @@ class PadFilm:
     grid: FilmGrid
     work: FilmWork
     inlet: float
+    bent: FloatArray
     tilt: float = 0.0
     deflection: float = 0.0
     idle: bool = False
@@ -98,6 +101,7 @@ def pad_films(setup: Setup) -> list[PadFilm]:
                 grid=grid,
                 work=work,
                 inlet=setup.inlet_temperature,
+                bent=np.zeros_like(work.extra),
             )
         )
     return films
