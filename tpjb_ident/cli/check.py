@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.errors import BadInputError, guarded
 from tpjb_ident.cli.inputs import campaign_place
@@ -11,6 +13,10 @@ from tpjb_ident.cli.outdir import output_folder
 from tpjb_ident.cli.record import write_record
 from tpjb_ident.cli.show import progress, say
 from tpjb_ident.tables import write_text
+
+if TYPE_CHECKING:
+    from rigdata.campaign import Campaign
+    from rigdata.problem import Problem
 
 
 @guarded
@@ -27,7 +33,7 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
     with progress(f"reading {campaign.name}"):
         problems = check_campaign(campaign)
     errors = [p for p in problems if p.severity == "error"]
-    summary = check_summary(campaign, problems)
+    summary = check_summary(campaign, problems, _opened(campaign))
     target = out_folder(out, "check")
     with output_folder(target, "check", (campaign,)) as folder:
         write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")
@@ -43,21 +49,26 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
         )
 
 
-def check_summary(path: CampaignPath, problems: list) -> dict:
-    """Gather the content of check.json."""
+def _opened(path: Path) -> Campaign | None:
     from rigdata import RigDataError, load_campaign
 
     try:
-        campaign = load_campaign(path)
+        return load_campaign(path)
     except RigDataError:  # what it says is among the problems already
-        identity, kinds, files = path.name, {}, {}
-    else:
+        return None
+
+
+def check_summary(path: Path, problems: list[Problem], campaign: Campaign | None) -> dict[str, Any]:
+    """Gather the content of check.json; without a campaign, where it could not even be opened."""
+    kinds: dict[str, int] = {}
+    files: dict[str, str] = {}
+    if campaign is not None:
         kinds = {kind: len(campaign.of_kind(kind)) for kind in ("dynamic", "dry_pivot", "locus", "clearance")}
-        identity, files = campaign.id, campaign.fingerprint()
+        files = campaign.fingerprint()
     severities = ("error", "warning", "note")
     return {
         "schema": "tpjb-check/1",
-        "campaign": identity,
+        "campaign": path.name if campaign is None else campaign.id,
         "ok": not any(p.severity == "error" for p in problems),
         "runs": kinds,
         "counts": {s: sum(p.severity == s for p in problems) for s in severities},

@@ -26,25 +26,25 @@ def demo(out: Out = None) -> None:
     The campaign is computed (docs/make_demo_campaign.py): the paper's rocker-backed bearing with pivots softer than the
     printed formula, recorded with noise and glitches.
     """
+    from model.bearing import parse_bearing
     from rigdata import check_campaign, load_campaign
     from tpjb_ident.compare.comparison import compare_campaign
     from tpjb_ident.compare.predictions import prediction_frame
+    from tpjb_ident.compare.warm_up import warming_up
 
     path = sample("demo.h5")
     target = out_folder(out, "demo")
     options = {"campaign": path, "thermal": "adiabatic", "pivots": ["rigid", "kirk", "measured"], "method": "mm-eiv"}
     with output_folder(target, "demo") as folder:
-        with progress("demo") as show:
+        campaign = load_campaign(path)
+        with progress("demo") as show, warming_up(campaign.bearing_text) as compiled:
             show("reading and checking every record", 0, 1)
-            summary = check_summary(path, check_campaign(path))
+            summary = check_summary(path, check_campaign(path), campaign)
             write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")
-            campaign = load_campaign(path)
-            from model.bearing import parse_bearing
-
             bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
-            result = compare_campaign(campaign, bearing, progress=show)
+            result = compare_campaign(campaign, bearing, progress=show, before_predicting=compiled)
             write_table(folder, "prediction", prediction_frame(result.variant("measured").points))
-            inputs = campaign.fingerprint()
+            inputs = summary["files_sha256"]
             write_comparison(folder, result, options, inputs, show)
         write_record(folder, target, "demo", options, inputs)
     counts = summary["counts"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -114,6 +115,7 @@ def compare_campaign(
     bearing: Bearing,
     settings: CompareSettings | None = None,
     progress: Progress | None = None,
+    before_predicting: Callable[[], object] | None = None,
 ) -> Comparison:
     """Identify a campaign, measure its pivots, locus and clearance, and predict the same with every pivot model.
 
@@ -125,6 +127,8 @@ def compare_campaign(
     settings : CompareSettings, optional
     progress : callable, optional
         Called as progress(text, done, total).
+    before_predicting : callable, optional
+        Called once between measuring and predicting, for instance to wait for `warm_up.warming_up`.
 
     Returns
     -------
@@ -150,6 +154,9 @@ def compare_campaign(
     tell("fitting pivot curves, clearance and locus", 0, 1)
     curves, clearance, locus = measure_dry(campaign, bearing, "measured" in settings.variants)
     names, remarks = _possible(settings, curves, bearing)
+    if before_predicting is not None:
+        tell("compiling the film solver (once on a machine)", 0, 1)
+        before_predicting()
     if clearance is None:
         remarks.append("No clearance run: positions cannot be given from the bearing centre.")
     if locus is None:

@@ -54,9 +54,9 @@ PAD_STYLE = (
 )
 WIDTH, HEIGHT = 5.2, 3.4  # inches: legible in one column of a phone
 FONT_SIZE = 9.0
-PNG_DPI = 200
+PNG_DPI = 160
 _FONT = re.compile(r"font: (?:(italic|oblique) )?(?:(bold|\d+) )?([\d.]+)px [^;\"]*")
-_ID = re.compile(r"\bid=\"([^\"]+)\"")
+_ID = re.compile(r"(\bid=\"|href=\"#|url\(#)([^\")]+)")
 
 
 @dataclass(frozen=True)
@@ -152,10 +152,7 @@ def inline_svg(text: str, name: str, title: str) -> str:
 
 def prefixed_ids(svg: str, prefix: str) -> str:
     """Rename every id and what refers to it, so that several drawings can share one page."""
-    for identity in set(_ID.findall(svg)):
-        quoted = re.escape(identity)
-        svg = re.sub(rf'(id="|href="#|url\(#){quoted}(["\)])', rf"\g<1>{prefix}-{identity}\g<2>", svg)
-    return svg
+    return _ID.sub(rf"\g<1>{prefix}-\g<2>", svg)
 
 
 def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:
@@ -175,4 +172,4 @@ def _on_white(svg: str) -> str:
 
 
 def _save_png(figure: Figure, path: Path) -> None:
-    figure.savefig(path, format="png", dpi=PNG_DPI, facecolor="white")
+    figure.savefig(path, format="png", dpi=PNG_DPI, facecolor="white", pil_kwargs={"compress_level": 4})
