@@ -135,6 +135,6 @@ class _Answers:
         for k, (pad, pushed, angle) in enumerate(
             zip(self.setup.bearing.pads, sides.pushed, sides.angle, strict=True), start=1
         ):
-            self.table[("clearance_pushed", float(k))] = float(pushed)
+            self.table[("clearance_pushed", float(k), pad.pivot_angle)] = float(pushed)
             turn = angle - pad.pivot_angle
-            self.table[("side_angle", float(k))] = float(np.arctan2(np.sin(turn), np.cos(turn)))
+            self.table[("side_angle", float(k), pad.pivot_angle)] = float(np.arctan2(np.sin(turn), np.cos(turn)))

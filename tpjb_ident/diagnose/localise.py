@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from tpjb_ident.diagnose.gap import residuals
 from tpjb_ident.diagnose.observe import Observations
 from tpjb_ident.diagnose.verdict import Disagreement
 
@@ -24,7 +25,7 @@ def localise(observations: Observations, prediction: FloatArray, most: int = 12)
     most : int
         Rows at the most.
     """
-    z = (observations.value - prediction) / observations.total_sigma
+    z = residuals(observations, prediction)
     total = float(np.sum(z**2))
     rows: list[Disagreement] = []
     for name in dict.fromkeys(e.observable for e in observations.elements):

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from model.effects import Effect
 from model.setup import Setup
 from tpjb_ident.diagnose.forward import Forward
-from tpjb_ident.diagnose.observe import Element, Observations
+from tpjb_ident.diagnose.gap import centre_shifts
+from tpjb_ident.diagnose.observe import Observations
 
 FloatArray = NDArray[np.float64]
 
@@ -85,9 +86,10 @@ def nuisances(forward: Forward, effects: Sequence[Effect], base: FloatArray, kno
         names.append(name)
         columns.append(forward(effects, change) - base)
     elements = forward.elements
+    shifts = centre_shifts(elements)
     for axis, letter in enumerate("xy"):
         names.append(f"centre {letter}")
-        columns.append(_centre_column(elements, forward.setup, axis) * known.centre)
+        columns.append(shifts[:, axis] * known.centre)
     for observable in ("kxx", "kyy", "cxx", "cyy"):
         names.append(f"model {observable}")
         mine = np.array([e.observable == observable for e in elements])
@@ -140,18 +142,6 @@ def _oil(change: float):  # type: ignore[no-untyped-def]
         return s.change(bearing=replace(s.bearing, oil=oil))
 
     return one
-
-
-def _centre_column(elements: Sequence[Element], setup: Setup, axis: int) -> FloatArray:
-    """Positions and clearances seen from a centre moved by one metre along an axis."""
-    out = np.zeros(len(elements))
-    for i, e in enumerate(elements):
-        if e.observable == f"locus_{'xy'[axis]}":
-            out[i] = -1.0
-        elif e.observable == "clearance_pushed":
-            angle = setup.bearing.pads[int(e.place("pad")) - 1].pivot_angle
-            out[i] = -(math.cos(angle), math.sin(angle))[axis]
-    return out
 
 
 def whitener(observations: Observations, columns: FloatArray) -> FloatArray:

@@ -252,12 +252,13 @@ def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryT
 
 def _add_clearance(builder: _Builder, polygon: ClearancePolygon, tolerance: Tolerance) -> float:
     n = len(polygon.angles)
-    elements = [Element("clearance", "clearance_pushed", "clearance", (("pad", k + 1.0),)) for k in range(n)]
+    places = [(("pad", k + 1.0), ("angle", float(polygon.angles[k]))) for k in range(n)]
+    elements = [Element("clearance", "clearance_pushed", "clearance", where) for where in places]
     builder.add(
         elements, polygon.clearance_pushed, np.diag(np.asarray(polygon.clearance_pushed_se) ** 2),
         (tolerance.position, tolerance.fine_position),
     )  # fmt: skip
-    elements = [Element("clearance", "side_angle", "clearance", (("pad", k + 1.0),)) for k in range(n)]
+    elements = [Element("clearance", "side_angle", "clearance", where) for where in places]
     turn = np.array([math.remainder(t, 2 * math.pi) for t in polygon.fitted_angle - polygon.angles])
     builder.add(
         elements, turn, np.diag(np.asarray(polygon.fitted_angle_se) ** 2), (tolerance.angle, tolerance.fine_angle)

@@ -51,7 +51,7 @@ def planned_observations(
         The baseline has none at some point of the layout.
     """
     tolerance, noise = tolerance or Tolerance(), noise or ExpectedNoise()
-    elements = _elements(layout, len(setup.bearing.pads))
+    elements = _elements(layout, [pad.pivot_angle for pad in setup.bearing.pads])
     value = Forward(setup, layout, elements)()
     scale = _direct_scale(elements, value)
     table: dict[str, tuple[np.ndarray | float, np.ndarray | float, np.ndarray | float]] = {
@@ -79,7 +79,7 @@ def _direct_scale(elements: Sequence[Element], value: np.ndarray) -> np.ndarray:
     return np.array([np.mean(sums[(e.observable[0], e.where)]) if e.family == "h" else 1.0 for e in elements])
 
 
-def _elements(layout: Layout, pads: int) -> tuple[Element, ...]:
+def _elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:
     out: list[Element] = []
     for test in layout.dynamic:
         base = (("load", test.load), ("direction", test.direction), ("speed", test.speed))
@@ -98,8 +98,10 @@ def _elements(layout: Layout, pads: int) -> tuple[Element, ...]:
     for dry in layout.dry:
         out += [Element("dry", "dry_compliance", "dry", (("pad", float(dry.pad)), ("load", load))) for load in dry.load]
     if layout.push_load is not None:
-        out += [Element("clearance", "clearance_pushed", "clearance", (("pad", k + 1.0),)) for k in range(pads)]
-        out += [Element("clearance", "side_angle", "clearance", (("pad", k + 1.0),)) for k in range(pads)]
+        places = [(("pad", k + 1.0), ("angle", angle)) for k, angle in enumerate(angles)]
+        out += [
+            Element("clearance", name, "clearance", p) for name in ("clearance_pushed", "side_angle") for p in places
+        ]
     return tuple(out)
 
 
