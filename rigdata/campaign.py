@@ -208,11 +208,12 @@ def _load_hdf5(path: Path) -> Campaign:
         problems.append(Problem("warning", path.name, "root attribute bearing", "is missing or too long", cure))
         bearing = ""
     channels = {n: c for n, c in manifest.channels.items() if c.quantity != "ignore"}
+    described = frozenset(manifest.channels)
     clock = next((c for c in channels.values() if c.quantity == "time"), None)
     runs = []
     for entry in manifest.runs:
         rate = entry.sample_rate or manifest.sample_rate
-        reader = Hdf5Reader(path, entry.id, path.name, rate, clock)
+        reader = Hdf5Reader(path, entry.id, path.name, rate, described, clock)
         runs.append(_make_run(entry, channels, reader))
     return _finish(manifest, path, bearing, channels, runs, problems, {path.name: path})
 

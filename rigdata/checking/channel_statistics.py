@@ -51,10 +51,12 @@ class ChannelStatistics:
         valid = np.isfinite(readings) & (np.abs(np.nan_to_num(readings)) < _OVERFLOW)
         self.missing += int(len(readings) - np.count_nonzero(valid))
         values = readings if valid.all() else readings[valid]
-        if len(values):
+        if not len(values):
+            self._last, self._flat = math.nan, 0
+        else:
             self.low = min(self.low, float(values.min()))
             self.high = max(self.high, float(values.max()))
-            self._stretches(readings)
+            self._stretches(np.where(valid, readings, np.nan))
             self.blocks.append(values if not self.samples else values[:: max(1, len(values) // 10_000)])
         self.samples += len(readings)
 
@@ -100,23 +102,23 @@ class ChannelStatistics:
         """Share of samples that sit flat at an extreme reading, 0 where nothing looks clipped.
 
         Clipping shows as several separate stretches of equal readings right at the highest or lowest
-        level, much more of them than in the level next to it; a sine has about 2.4 times as many in
+        level, much more of them than in the levels next to it; a sine has about 2.4 times as many in
         its last level as in the one before.
         """
         if self.high <= self.low or not self.blocks:
             return 0.0
         readings = np.concatenate(self.blocks)
         width = (self.high - self.low) / _LEVELS
-        return max(
-            _flat_share(readings, self.high, self.high - width), _flat_share(-readings, -self.low, -self.low - width)
-        )
+        return max(_flat_share(readings, self.high, width), _flat_share(-readings, -self.low, width))
 
 
-def _flat_share(readings: FloatArray, top: float, below: float) -> float:
+def _flat_share(readings: FloatArray, top: float, width: float) -> float:
     at_top = readings == top
     count = int(np.count_nonzero(at_top))
-    near = int(np.count_nonzero(readings >= below)) - count
     starts = np.flatnonzero(at_top & ~np.concatenate([[False], at_top[:-1]]))
-    if count < 12 or len(starts) < 3 or count < 3 * len(starts) or count < 4 * near:
+    if count < 20 or len(starts) < 3 or 2 * count < 3 * len(starts) or count < 0.005 * len(readings):
         return 0.0
-    return count / len(readings)
+    # At least the next level that occurs, however coarse the converter.
+    below = min(top - width, float(np.max(readings[~at_top])))
+    near = int(np.count_nonzero(readings >= below)) - count
+    return count / len(readings) if count >= 4 * near else 0.0

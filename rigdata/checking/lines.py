@@ -107,7 +107,9 @@ def _solve(design: FloatArray, values: FloatArray, used: NDArray[np.bool_]) -> F
     for column in range(values.shape[1]):
         out = design[~used[:, column]]
         if len(out) <= len(design) - 3 * design.shape[1]:
-            result[:, column] = np.linalg.solve(gram - np.einsum("nk,nl->kl", out, out), right[:, column])
+            normal = gram - np.einsum("nk,nl->kl", out, out)
+            # Lines beyond the reach of the record make it singular: the shortest answer is as good as any.
+            result[:, column] = np.linalg.lstsq(normal, right[:, column], rcond=1e-12)[0]
     return result
 
 

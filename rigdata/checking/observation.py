@@ -179,7 +179,7 @@ def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: L
         if lines is not None and run.kind in {"dynamic", "locus"}:
             noise = float(lines.scatter[index])
         steps = np.diff(np.unique(column[:4000]))
-        if not noise <= max(0.5 * float(np.min(steps, initial=np.inf)), 1e-7 * float(np.ptp(column))):
+        if not noise <= max(0.7 * float(np.min(steps, initial=np.inf)), 1e-7 * float(np.ptp(column))):
             return False
     return True
 

@@ -41,7 +41,7 @@ def _planes(seen: Observation) -> tuple[FloatArray, FloatArray] | None:
 
 
 def check_dry(runs: Sequence[Observation]) -> None:
-    """Dry pivot runs: direction of the load, and the shaft following it; pads told apart."""
+    """Dry pivot runs: a load that rises, its direction, pads told apart."""
     directions: list[tuple[Observation, float]] = []
     for seen in runs:
         planes = _planes(seen)
@@ -55,9 +55,16 @@ def check_dry(runs: Sequence[Observation]) -> None:
         directions.append((seen, shows))
         if "static_load_direction" in seen.run.stated:
             _check_push(seen, shows, push)
-        if "force" not in seen.report.doubts:
-            _check_follows(seen, planes, push)
     _check_pads(directions)
+
+
+def check_shaft_follows(runs: Sequence[Observation]) -> None:
+    """Dry pivot runs: the shaft goes toward the pad, where the force can be trusted."""
+    for seen in runs:
+        planes = _planes(seen)
+        push = None if planes is None or "force" in seen.report.doubts else _main_move(planes[0])
+        if planes is not None and push is not None:
+            _check_follows(seen, planes, push)
 
 
 def _main_move(force: FloatArray) -> FloatArray | None:
@@ -159,7 +166,7 @@ def check_locus(runs: Sequence[Observation]) -> None:
                 where = seen.pick(quantity)
                 into.append(to_plane([seen.channels[i] for i in where], seen.lines.mean[where]))
         force, shaft = np.array(loads), np.array(places)
-        rows = np.isfinite(force).all(axis=1) & np.isfinite(shaft).all(axis=1)
+        rows = np.isfinite(np.hstack([force, shaft])).all(axis=1)
         if np.count_nonzero(rows) < 4:
             continue
         force, shaft = force[rows] - force[rows].mean(axis=0), shaft[rows] - shaft[rows].mean(axis=0)
@@ -168,6 +175,17 @@ def check_locus(runs: Sequence[Observation]) -> None:
             gain = np.linalg.lstsq(force, shaft, rcond=None)[0].T
             for seen in group:
                 _judge_gain(seen, gain)
+            _judge_places([group[i] for i in np.flatnonzero(rows)], shaft, shaft - force @ gain.T)
+
+
+def _judge_places(group: Sequence[Observation], shaft: FloatArray, off: FloatArray) -> None:
+    """A position that lies elsewhere than the others of its load and speed let one expect."""
+    size, misfit = float(np.median(np.hypot(*shaft.T))), np.hypot(*off.T)
+    for seen, distance in zip(group, misfit):
+        if len(group) >= 6 and distance > max(0.7 * size, 5 * float(np.median(misfit))):
+            what = f"the mean position lies {1e6 * distance:.0f} um from where the other directions let one expect it"
+            cure = "Check the probes of this run: sign, sensitivity, moved?"
+            seen.report.say("place", "warning", "displacement", what, cure)
 
 
 def _judge_gain(seen: Observation, gain: FloatArray) -> None:

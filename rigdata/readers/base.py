@@ -43,6 +43,15 @@ class RunReader(Protocol):
         """Tell what reading found that does not stop the run from being used."""
 
 
+def undescribed(names: Sequence[str], what: str, file: str, run: str) -> tuple[Problem, ...]:
+    """Note columns or datasets that the manifest does not describe."""
+    if not names:
+        return ()
+    listed = ", ".join(ascii(n)[1:-1][:40] for n in names[:6]) + (", ..." if len(names) > 6 else "")
+    cure = "Nothing, or describe them in the manifest"
+    return (Problem("note", file, what, f"{len(names)} {what} are not described: {listed}", cure, run),)
+
+
 def rate_of_time(time: FloatArray) -> float:
     """Nominal sample rate of a time column [Hz].
 

@@ -14,7 +14,7 @@ import numpy as np
 from rigdata.calibration import Channel
 from rigdata.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import FloatArray, rate_of_time
+from rigdata.readers.base import FloatArray, rate_of_time, undescribed
 from rigdata.readers.csv_table import Source, Table, read_table
 from rigdata.readers.dialect import Dialect, DialectFinder
 
@@ -178,5 +178,6 @@ class CsvReader:
         return time
 
     def problems(self) -> tuple[Problem, ...]:
-        """Tell what was mended while parsing."""
-        return self._table(()).problems
+        """Tell what was mended while parsing, and which columns nobody describes."""
+        extra = [n for n in self.names() if n and n not in self.channels]
+        return (*self._table(()).problems, *undescribed(extra, "columns", self.file, self.run))

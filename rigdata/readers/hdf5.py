@@ -13,7 +13,7 @@ import numpy as np
 
 from rigdata.calibration import Channel
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, FloatArray, rate_of_time
+from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, FloatArray, rate_of_time, undescribed
 from rigdata.readers.hdf5_links import has_link, resolve
 
 #: Filters that the HDF5 library brings along; any other would load foreign code.
@@ -103,6 +103,7 @@ class _Facts:
     length: int
     rate: float | None
     has_time: bool
+    members: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -118,6 +119,8 @@ class Hdf5Reader:
         Display name of the file.
     stated_rate : float or None
         From the manifest [Hz]; the attribute ``sample_rate_hz`` wins over it.
+    described : frozenset of str
+        Names of all channels of the manifest.
     clock : Channel or None
         The manifest's time channel; not every file has its dataset.
     """
@@ -126,6 +129,7 @@ class Hdf5Reader:
     run: str
     base: str
     stated_rate: float | None = None
+    described: frozenset[str] = field(default=frozenset(), repr=False)
     clock: Channel | None = field(default=None, repr=False)
     facts: dict[str, _Facts] = field(default_factory=dict, repr=False, compare=False)
 
@@ -196,7 +200,8 @@ class Hdf5Reader:
                 attribute = group.attrs.get("sample_rate_hz")
                 rate = None if attribute is None else self._checked_rate(attribute)
                 clock = self.clock is not None and has_link(group, self.clock.name)
-                facts = _Facts(signature, self._length(group), rate, clock)
+                members = tuple(itertools.islice(group, _MAX_MEMBERS))
+                facts = _Facts(signature, self._length(group), rate, clock, members)
             self.facts[""] = facts
         return facts
 
@@ -267,8 +272,9 @@ class Hdf5Reader:
         return np.arange(start, stop) / self.rate()
 
     def problems(self) -> tuple[Problem, ...]:
-        """None: what is wrong in HDF5 stops the channel from being used."""
-        return ()
+        """Tell which datasets nobody describes."""
+        extra = [n for n in self._known().members if n not in self.described]
+        return undescribed(extra, "datasets", self.file, self.run)
 
 
 def _names(group: Any) -> str:

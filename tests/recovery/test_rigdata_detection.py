@@ -1,0 +1,153 @@
+"""Faults put into good campaigns of the virtual rig: each is found and named; good campaigns raise no alarm."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import rigdata
+from rigdata.problem import Problem
+from rigdata.virtual_rig import (
+    ClearanceSweep,
+    DryTest,
+    Fault,
+    Noise,
+    RigPlan,
+    RigTruth,
+    Timing,
+    VirtualRig,
+    locus_points,
+    operating_points,
+    write_campaign,
+)
+
+pytestmark = pytest.mark.slow
+
+STIFFNESS = np.array([[3.0e8, 0.2e8], [-0.3e8, 4.5e8]])
+DAMPING = np.array([[5e5, 2e4], [1e4, 7e5]])
+PLAN = RigPlan(
+    dynamic=operating_points([(5000.0, 25.0)]),
+    directions=tuple(math.radians(30.0 * i) for i in range(6)),
+    locus=locus_points(6),
+    dry=tuple(DryTest(p, levels=(1000.0, 3000.0), hold=0.3) for p in range(1, 6)),
+    clearance=(ClearanceSweep(seconds=6.0),),
+    timing=Timing(locus_seconds=1.0),
+)
+RUN = "d-05000-25-03"
+
+
+def check(folder, *faults: Fault, seed: int = 1, noise: Noise | None = None, layout: str = "hdf5") -> list[Problem]:
+    rig = VirtualRig(
+        RigTruth.constant(STIFFNESS, DAMPING),
+        PLAN,
+        noise=Noise.like_samples() if noise is None else noise,
+        faults=faults,
+        seed=seed,
+    )
+    path = folder / ("c.h5" if layout == "hdf5" else "c")
+    write_campaign(path, rig, layout)
+    return rigdata.check_campaign(path)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_good_campaigns_raise_no_alarm(tmp_path, seed):
+    assert check(tmp_path, seed=seed) == []
+
+
+@pytest.mark.parametrize("factor", [0.3, 3.0])
+def test_quiet_and_noisy_campaigns_raise_no_alarm(tmp_path, factor):
+    found = check(tmp_path, noise=Noise.like_samples().scaled(factor))
+    assert [p for p in found if p.severity != "note"] == []
+
+
+ONE_RUN = {
+    "dead probe": (Fault("dead", RUN, "X1A"), "error", "channel X1A", "is dead"),
+    "dead cell": (Fault("dead", RUN, "L1H"), "error", "channel L1H", "is dead"),
+    "dead accelerometer": (Fault("dead", RUN, "A1V"), "error", "channel A1V", "is dead"),
+    "stuck": (Fault("stuck", RUN, "X1A", start=0.5, length=0.2), "warning", "channel X1A", "200 samples from sample 500"),
+    "stuck for long": (Fault("stuck", RUN, "L1V", start=0.5), "error", "channel L1V", "stands still"),
+    "clipped": (Fault("clipped", RUN, "L1H"), "error", "channel L1H", "clipped"),
+    "slightly clipped": (Fault("clipped", RUN, "X1A", value=0.9), "warning", "channel X1A", "clipped"),
+    "probes swapped": (Fault("swapped", RUN, "X1A", other="X1B"), "error", "displacement", "X1A and X1B were swapped"),
+    "cells swapped": (Fault("swapped", RUN, "L1H", other="L1V"), "error", "mean force", "L1H and L1V were swapped"),
+    "probe inverted": (Fault("inverted", RUN, "X1A"), "error", "displacement", "X1A had the wrong sign"),
+    "cell across the load inverted": (Fault("inverted", RUN, "L1H"), "error", "force", "excitation shows along"),
+    "cell along the load inverted": (Fault("inverted", RUN, "L1V"), "error", "mean force", "L1V had the wrong sign"),
+    "probe ten times": (Fault("scaled", RUN, "X1A", value=10.0), "error", "displacement", "X1A read ten times too large"),
+    "cell a tenth": (Fault("scaled", RUN, "L1H", value=0.1), "error", "displacement", "L1H read ten times too small"),
+    "gap without values": (Fault("nan_gap", RUN, "X1A", start=0.5, length=0.2), "warning", "channel X1A", "200 of 2000"),
+    "one probe late": (Fault("delayed", RUN, "X1A", value=3e-3), "warning", "displacement", "differs by"),
+    "crosstalk": (Fault("crosstalk", RUN, "L1H", value=0.3), "warning", "mean force", "points to"),
+    "no excitation": (Fault("missing_excitation", RUN), "error", "force", "no line at the excitation frequency"),
+    "other frequency": (Fault("wrong_frequency", RUN, value=3.0), "error", "force", "other line is near 25 Hz"),
+    "other direction": (Fault("wrong_direction", RUN, value=0.4), "warning", "force", "excitation_direction says"),
+    "other load": (Fault("wrong_load", RUN, value=1.6), "error", "mean force", "static_load says 8000 N"),
+    "copied run": (Fault("duplicate_run", RUN, other="d-05000-25-02"), "error", "", "very samples of run d-05000-25-02"),
+    "wrong pad direction": (Fault("wrong_direction", "p-2-up", value=1.2), "error", "force", "the load rises toward"),
+    "probe inverted, dry": (Fault("inverted", "p-2-up", "X1A"), "error", "channels", "X1A had the wrong sign"),
+    "probes swapped, dry": (Fault("swapped", "p-2-up", "X1A", other="X1B"), "error", "channels", "were swapped"),
+    "probes swapped, sweep": (Fault("swapped", "c-1", "X1A", other="X1B"), "warning", "channels", "does not go to the side"),
+    "channel missing": (Fault("missing_channel", RUN, "X1A"), "error", "dataset X1A", "missing"),
+    "thermometer missing": (Fault("missing_channel", RUN, "T1"), "warning", "dataset T1", "missing"),
+    "short channel": (Fault("short_channel", RUN, "X1A"), "error", "dataset X1A", "the others 2000"),
+    "group missing": (Fault("missing_file", RUN), "error", "", "group is missing"),
+    "no samples": (Fault("empty_file", RUN), "error", "time", "only 0 samples"),
+}
+
+
+@pytest.mark.parametrize("name", ONE_RUN)
+def test_fault_in_one_run(tmp_path, name):
+    fault, severity, place, says = ONE_RUN[name]
+    found = check(tmp_path, fault)
+    hits = [p for p in found if p.severity == severity and p.place.startswith(place) and says in p.what]
+    assert [p.run for p in hits] == [fault.run], [str(p) for p in found]
+    # Nothing is said of other runs.
+    assert {p.run for p in found} == {fault.run}
+
+
+def test_wrong_pad_number_is_named_in_one_of_the_two_runs(tmp_path):
+    found = check(tmp_path, Fault("wrong_pad", "p-2-up", value=3.0))
+    assert any(p.severity == "error" and p.place == "pad" for p in found)
+    assert {p.run for p in found} <= {"p-2-up", "p-3-up"}
+
+
+ALL_RUNS = {
+    "probes swapped": (Fault("swapped", "*", "X1A", other="X1B"), "X1A and X1B were swapped"),
+    "cells swapped": (Fault("swapped", "*", "L1H", other="L1V"), "L1H and L1V were swapped"),
+    "probe A inverted": (Fault("inverted", "*", "X1A"), "X1A had the wrong sign"),
+    "probe B inverted": (Fault("inverted", "*", "X1B"), "X1B had the wrong sign"),
+    "vertical cell inverted": (Fault("inverted", "*", "L1V"), "L1V had the wrong sign"),
+    "horizontal cell inverted": (Fault("inverted", "*", "L1H"), "L1H had the wrong sign"),
+    "cells a tenth": (Fault("scaled", "*", "L1*", value=0.1), "10 times too large"),
+    "probe ten times": (Fault("scaled", "*", "X1A", value=10.0), "one sensitivity were ten times off"),
+    "accelerometer inverted": (Fault("inverted", "*", "A1H"), "in phase with the cell force"),
+    "accelerometer dead": (Fault("dead", "*", "A1H"), "is dead"),
+    "speed doubled": (Fault("scaled", "*", "K1", value=2.0), "shaft_speed says 22 Hz"),
+}
+
+
+@pytest.mark.parametrize("name", ALL_RUNS)
+def test_fault_in_all_runs_is_told_once_for_the_campaign(tmp_path, name):
+    fault, says = ALL_RUNS[name]
+    found = check(tmp_path, fault)
+    assert any(p.run is None and says in p.what for p in found), [str(p) for p in found]
+
+
+CSV_ONLY = {
+    "time gap": (Fault("time_gap", RUN, start=0.5, length=0.2), "warning", "about 200 samples lost"),
+    "jitter": (Fault("time_jitter", RUN), "warning", "jitters"),
+    "column twice": (Fault("duplicate_column", RUN, "X1A"), "error", "'X1A' stands in columns 2, 14"),
+    "last line cut": (Fault("truncated_line", RUN), "warning", "cut off"),
+    "file missing": (Fault("missing_file", RUN), "error", "not there"),
+    "file empty": (Fault("empty_file", RUN), "error", "no samples"),
+}
+
+
+@pytest.mark.parametrize("name", CSV_ONLY)
+def test_fault_in_a_csv_file(tmp_path, name):
+    fault, severity, says = CSV_ONLY[name]
+    found = check(tmp_path, fault, layout="csv-german")
+    assert [p.run for p in found if p.severity == severity and says in p.what] == [RUN], [str(p) for p in found]
+    assert {p.run for p in found} == {RUN}
