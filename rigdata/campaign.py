@@ -129,6 +129,8 @@ def load_campaign(path: str | Path) -> Campaign:
         return _load_folder(given, manifest)
     if given.suffix.lower() == ".toml":
         return _load_folder(given.parent, given)
+    if given.suffix.lower() in {".csv", ".txt", ".asc", ".dat"}:
+        raise _cannot(str(path), "is a record, not a campaign", "Give the folder that holds campaign.toml")
     return _load_hdf5(given)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,7 +18,10 @@ from rigdata.toml_lines import key_lines
 
 SCHEMA = "tpjb-rig/1"
 #: Larger manifests are refused before they are parsed [bytes].
-MAX_MANIFEST = 8 * 2**20
+MAX_MANIFEST = 4 * 2**20
+#: Longer lines, and lines with more dots outside quotes, are refused.
+MAX_LINE, MAX_DOTS = 40_000, 100
+_QUOTED = re.compile(r'"[^"\\]*"|\'[^\']*\'')
 _TOP = ("schema", "id", "bearing", "description", "housing", "acquisition", "csv", "channels", "runs")
 _CSV = ("delimiter", "decimal", "encoding", "header_line", "units_line")
 
@@ -134,6 +138,11 @@ def _load_toml(text: str, file: str) -> dict[str, Any]:
                 "Is it the right file?",
             )
         )
+    for number, line in enumerate(text.split("\n"), start=1):
+        # Dotted keys nest as deeply as they are long, and parsing them takes the square of it.
+        if len(line) > MAX_LINE or (line.count(".") > MAX_DOTS and _QUOTED.sub("", line).count(".") > MAX_DOTS):
+            what = "the line is far too long, or nests far too deeply"
+            raise RigDataError(Problem("error", file, f"line {number}", what, "Shorten or break it"))
     cure = "Mend the TOML at this place"
     try:
         return tomllib.loads(text)

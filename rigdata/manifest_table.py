@@ -16,7 +16,12 @@ _MAX_TEXT = 20_000
 
 def shown(value: object, length: int = 60) -> str:
     """`value` as it stands in a message: quoted, short, on one line, controls escaped."""
-    text = ascii(value) if not isinstance(value, str) else _printable(value)
+    if isinstance(value, str):
+        text = _printable(value)
+    elif isinstance(value, (dict, list)):  # may be nested too deeply to be printed
+        text = "a table" if isinstance(value, dict) else "an array"
+    else:
+        text = ascii(value)
     return text if len(text) <= length else text[: length - 3] + "..."
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-_TABLE = re.compile(r"\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
+_TABLE = re.compile(r"\s*(\[\[?)([^\[\]#]+)\]\]?\s*(?:#.*)?$")
+_LONGEST = 1000
 _KEY = re.compile(r"\s*([A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*')\s*=")
 _PART = re.compile(r"\"([^\"]*)\"|'([^']*)'|([^.\s]+)")
 Path = tuple[str | int, ...]
@@ -28,12 +29,14 @@ def key_lines(text: str) -> dict[Path, int]:
     counts: dict[str, int] = {}
     table: Path = ()
     for number, line in enumerate(text.splitlines(), start=1):
+        if len(line) > _LONGEST:
+            continue
         header = _TABLE.match(line)
         if header is not None:
             name = tuple(a or b or c for a, b, c in _PART.findall(header[2]))
             if header[1] == "[[":
-                index = counts.get(header[2], 0)
-                counts[header[2]] = index + 1
+                index = counts.get(header[2].strip(), 0)
+                counts[header[2].strip()] = index + 1
                 table = (*name, index)
             else:
                 table = name

@@ -220,7 +220,7 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
     if not isinstance(value, str):
         if dimension != "ratio":
             raise UnitError(f'{_short(value)} has no unit; write it with one, like "{_short(value)} {example}"')
-        return _finite(float(value)), ""
+        return _to_float(value), ""
     text = value.strip()
     match = _NUMBER.match(text)
     if match is None or (match.end() < len(text) and text[match.end()] in "0123456789.,"):
@@ -229,11 +229,19 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
     unit = text[match.end() :].strip()
     if not unit and dimension != "ratio":
         raise UnitError(f'{_short(value)} has no unit; write it with one, like "{match[0]} {example}"')
-    return _finite(float(match[0])), unit
+    return _to_float(match[0]), unit
+
+
+def _to_float(value: str | float) -> float:
+    try:
+        return _finite(float(value))
+    except OverflowError as error:  # a whole number of hundreds of digits
+        raise UnitError(f"{_short(value)} is not a finite number") from error
 
 
 def _short(value: object) -> str:
-    text = repr(value)
+    # A table or array can be nested too deeply to be printed.
+    text = repr(value) if isinstance(value, (str, int, float)) or value is None else f"a {type(value).__name__}"
     return text if len(text) <= 60 else text[:57] + "..."
 
 

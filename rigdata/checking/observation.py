@@ -14,7 +14,7 @@ from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.checking.channel_statistics import ChannelStatistics
 from rigdata.checking.clock import check_clock
 from rigdata.checking.findings import Reporter
-from rigdata.checking.lines import Lines, fit_lines
+from rigdata.checking.lines import Lines, fit_lines, strongest_line
 from rigdata.checking.signals import check_signal, needed
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
@@ -37,10 +37,12 @@ class Observation:
         Displacement, force and acceleration channels that could be read and live.
     lines : Lines or None
         Mean, phasor at the excitation, noise of `channels`, SI.
-    time : (n,) ndarray
-        Of the thinned samples.
+    spread : (3, m) ndarray
+        2 %, 50 % and 98 % quantiles of `channels`, SI.
+    other_line : float
+        Strongest line of the force in a dynamic run apart from the known ones [Hz]; NaN where none.
     samples : (n, m) ndarray
-        Thinned to a few thousand, SI, for slow tests.
+        Thinned to a few thousand, SI; kept of dry and clearance runs only.
     speed : float
         Mean of the speed channel [rad/s]; NaN where there is none.
     digest : str
@@ -52,7 +54,8 @@ class Observation:
     run: Run
     channels: tuple[Channel, ...]
     lines: Lines | None = field(repr=False)
-    time: FloatArray = field(repr=False)
+    spread: FloatArray = field(repr=False)
+    other_line: float
     samples: FloatArray = field(repr=False)
     speed: float
     digest: str
@@ -94,8 +97,9 @@ def observe(run: Run) -> Observation:
         run=run,
         channels=live,
         lines=lines,
-        time=time[thin],
-        samples=used[thin],
+        spread=_spread(used),
+        other_line=_other_line(run, live, time[:_FITTED], used[:_FITTED]),
+        samples=used[thin] if run.kind in {"dry_pivot", "clearance"} else np.empty((0, len(live))),
         speed=_mean_speed(readable, first),
         digest=digest,
         report=report,
@@ -151,7 +155,7 @@ def _read_block(
 
 
 def _blind(run: Run, report: Reporter) -> Observation:
-    return Observation(run, (), None, np.empty(0), np.empty((0, 0)), math.nan, "", report)
+    return Observation(run, (), None, np.empty((3, 0)), math.nan, np.empty((0, 0)), math.nan, "", report)
 
 
 def _milder(problem: Problem) -> Problem:
@@ -188,6 +192,30 @@ def _lines(run: Run, time: FloatArray, values: FloatArray) -> Lines:
     excitation = run.point.excitation_hz if run.kind == "dynamic" else 0.0
     speed = run.point.shaft_speed_hz
     return fit_lines(time, values, [excitation, speed, 2 * speed, 50.0, 2 * excitation])
+
+
+def _spread(values: FloatArray) -> FloatArray:
+    """Quantiles column by column; NaN where a column has no value."""
+    spread = np.full((3, values.shape[1]), np.nan)
+    for index, column in enumerate(values.T):
+        known = column[np.isfinite(column)]
+        if len(known):
+            spread[:, index] = np.quantile(known, [0.02, 0.5, 0.98])
+    return spread
+
+
+def _other_line(run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray) -> float:
+    where = [i for i, c in enumerate(channels) if c.quantity == "force"]
+    if run.kind != "dynamic" or not where:
+        return math.nan
+    column = values[:, max(where, key=lambda i: _range(values[:, i]))]
+    speed = run.point.shaft_speed_hz
+    return strongest_line(time, column, [speed, 2 * speed, 50.0, run.point.excitation_hz])
+
+
+def _range(values: FloatArray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.std(known)) if len(known) else 0.0
 
 
 def _mean_speed(channels: Mapping[str, Channel], first: Mapping[str, FloatArray]) -> float:

@@ -23,12 +23,10 @@ def check_positions(runs: Sequence[Observation]) -> None:
     places: dict[tuple[str, str], list[tuple[Observation, float]]] = {}
     for seen in runs:
         for index in seen.pick("displacement"):
-            column = seen.samples[:, index]
-            known = column[np.isfinite(column)]
-            if len(known) < 10:
-                continue
             name = seen.channels[index].name
-            low, middle, high = np.quantile(known, [0.02, 0.5, 0.98])
+            low, middle, high = seen.spread[:, index]
+            if not np.isfinite(middle):
+                continue
             state = "running" if seen.run.kind in {"dynamic", "locus"} else "dry"
             places.setdefault((name, state), []).append((seen, float(middle)))
             if high - low > _MAX_TRAVEL:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdata.calibration import Channel
-from rigdata.checking.lines import strongest_line
 from rigdata.checking.observation import Observation
 from rigdata.checking.wiring import guess_wiring, repairs
 from rigdata.problem import Severity
@@ -147,11 +146,7 @@ def check_excitation(runs: Sequence[Observation], mass: float) -> None:
 
 def _missing_line(seen: Observation) -> None:
     point = seen.run.point
-    force = seen.pick("force")
-    spread = [float(np.nanstd(seen.samples[:, i])) for i in force]
-    column = seen.samples[:, force[int(np.argmax(spread))]]
-    apart = [point.shaft_speed_hz, 2 * point.shaft_speed_hz, 50.0, point.excitation_hz]
-    other = strongest_line(seen.time, column, apart)
+    other = seen.other_line
     hint = f"; the strongest other line is near {other:.3g} Hz" if math.isfinite(other) else ""
     what = f"the force shows no line at the excitation frequency of {point.excitation_hz:g} Hz{hint}"
     cure = "Check excitation_frequency, and whether the actuators ran; repeat the run"

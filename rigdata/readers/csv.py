@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,15 +21,17 @@ from rigdata.readers.dialect import Dialect, DialectFinder
 #: Parsed columns kept by a campaign before the oldest run is let go [bytes].
 CACHE_BYTES = 256 * 2**20
 #: A file above this size is parsed column by column, not all channels at once [bytes].
-_LARGE_FILE = 2**30
+_LARGE_FILE = 2**29
+_MAX_DIALECTS = 10_000
 
 
 class TableCache:
-    """Parsed tables of a campaign, the last used ones, up to a number of bytes."""
+    """Parsed tables and dialects of a campaign's files, the last used ones, up to a number of bytes."""
 
     def __init__(self, limit: int = CACHE_BYTES) -> None:
         self._limit = limit
         self._tables: OrderedDict[tuple[object, ...], Table] = OrderedDict()
+        self._dialects: dict[tuple[object, ...], Dialect] = {}
         self._lock = threading.Lock()
 
     def __reduce__(self) -> tuple[type[TableCache], tuple[int]]:
@@ -52,6 +54,17 @@ class TableCache:
             while size > self._limit and len(self._tables) > 1:
                 _, old = self._tables.popitem(last=False)
                 size -= old.nbytes
+
+    def dialect(self, key: tuple[object, ...], find: Callable[[], Dialect]) -> Dialect:
+        """Give the dialect under `key`, found once."""
+        known = self._dialects.get(key)
+        if known is None:
+            known = find()
+            with self._lock:
+                if len(self._dialects) >= _MAX_DIALECTS:
+                    self._dialects.clear()
+                self._dialects[key] = known
+        return known
 
 
 @dataclass(frozen=True)
@@ -96,9 +109,9 @@ class CsvReader:
 
     def dialect(self) -> Dialect:
         """Detect the dialect of the file."""
-        self._signature()
+        finder = DialectFinder(self.path, self.file, self.run, self.spec, self.channels)
         try:
-            return DialectFinder(self.path, self.file, self.run, self.spec, self.channels).find()
+            return self.cache.dialect(self._signature(), finder.find)
         except OSError as error:
             raise self._error("", f"cannot be read ({error.strerror})", "Check the rights of the file") from error
 
@@ -145,10 +158,10 @@ class CsvReader:
         return None if self.stated_rate is not None else clock
 
     def rate(self) -> float:
-        """Sample rate [Hz]: of the time column, else the manifest's."""
+        """Give the sample rate [Hz]: of the time column, else the manifest's."""
         clock = self._clock()
         if clock is not None:
-            rate = rate_of_time(self.time(0, self.length()))
+            rate = rate_of_time(self._times(clock))
             if rate > 0:
                 return rate
         if self.stated_rate is None:
@@ -159,10 +172,16 @@ class CsvReader:
     def time(self, start: int, stop: int) -> FloatArray:
         """Seconds: the time column as it is, missing ones filled in between; else counted from the rate."""
         clock = self._clock()
-        if clock is None:
-            return np.arange(start, stop) / self.rate()
-        (raw,) = self.read([clock.name], 0, self.length())
-        return self._usable_time(clock, clock.to_si(raw))[start:stop]
+        return np.arange(start, stop) / self.rate() if clock is None else self._times(clock)[start:stop].copy()
+
+    def _times(self, clock: Channel) -> FloatArray:
+        key = (*self._signature(), "seconds")
+        table = self.cache.get(key)
+        if table is None:
+            (raw,) = self.read([clock.name], 0, self.length())
+            table = Table({"": self._usable_time(clock, clock.to_si(raw))}, len(raw))
+            self.cache.put(key, table)
+        return table.columns[""]
 
     def _usable_time(self, clock: Channel, time: FloatArray) -> FloatArray:
         known = np.flatnonzero(np.isfinite(time))

@@ -195,6 +195,29 @@ def test_broken_toml_is_a_problem_not_a_traceback(text):
     assert problems_of(text)
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "static_load" + ".a" * 5000 + " = 1",
+        "static_load = " + "[" * 300 + "]" * 300,
+        "pad = 1" + "0" * 400,
+        "shaft_speed = 1" + "0" * 400,
+        "static_load = 1979-05-27",
+        "[" + " " * 30_000,
+        "x" * 100_000 + " = 1",
+        "static_load = {}",
+        'excitation_direction = "' + "9" * 30_000 + ' deg"',
+    ],
+)
+def test_toml_bombs(line):
+    text = GOOD.replace('static_load = "5 kN"', line).replace('shaft_speed = "22 Hz"\n', "")
+    assert all(len(p) < 1000 for p in problems_of(text))
+
+
+def test_uncertainty_of_hundreds_of_digits():
+    assert "finite" in problems_of(GOOD.replace('"1 %"', "1" + "0" * 400))[0]
+
+
 def test_huge_manifests_are_refused_unparsed():
     assert "larger than" in problems_of("#" * (MAX_MANIFEST + 1))[0]
 
