@@ -36,9 +36,20 @@ class Problem:
     cure: str
     run: str | None = None
 
+    def __post_init__(self) -> None:
+        # Names and cells come from strangers' files: control and direction marks must not steer a terminal.
+        for name in ("file", "place", "what", "cure"):
+            text = getattr(self, name)
+            if not text.isprintable():
+                object.__setattr__(self, name, "".join(c if c.isprintable() else _escaped(c) for c in text))
+
     def __str__(self) -> str:
         where = f"{self.file}, {self.place}" if self.place else self.file
         return f"{where}: {self.what}. {self.cure}"
+
+
+def _escaped(character: str) -> str:
+    return character if character == "\n" else character.encode("unicode_escape").decode("ascii")
 
 
 class RigDataError(ValueError):
@@ -49,3 +60,6 @@ class RigDataError(ValueError):
             (problems,) if isinstance(problems, Problem) else tuple(problems)
         )
         super().__init__("\n".join(str(p) for p in self.problems))
+
+    def __reduce__(self) -> tuple[type[RigDataError], tuple[tuple[Problem, ...]]]:
+        return RigDataError, (self.problems,)  # so that it travels back whole from a worker process
