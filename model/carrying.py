@@ -85,9 +85,31 @@ def _holds(setup: Setup, film: PadFilm, room: float) -> bool:
     """Whether a pad can go on carrying: near its edge, whether the film would push a small change back."""
     if room > 0.0 or room < -EDGE or film.forces is None:
         return room > 0.0
+    return _stable(setup, film)
+
+
+def _stable(setup: Setup, film: PadFilm) -> bool:
+    """Whether film and pivot push a pad back from a small change of tilt and deflection."""
+    assert film.forces is not None
     (kaa, kab), (kba, kbb) = film.forces.stiffness
     give = 1.0 / setup.pivots[film.number - 1].stiffness(max(float(film.forces.force[0]), 1e-6))
     return bool(kbb * (1.0 + give * kaa) > give * kba * kab)
+
+
+def leave_unstable(setup: Setup, films: list[PadFilm], position: FloatArray) -> bool:
+    """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any."""
+    found = False
+    for film in films:
+        if film.forces is None or setup.rotational_stiffness > 0 or _stable(setup, film):
+            continue
+        found = True
+        film.flips += 1
+        if spare(film, position) > EDGE and film.flips < MAX_FLIPS:
+            set_loaded(film, position)
+        else:
+            film.idle, film.flips = True, MAX_FLIPS
+            film.deflection = film.tilt = 0.0
+    return found
 
 
 def shorten(films: list[PadFilm], position: FloatArray, shift: FloatArray, scale: float) -> float:

@@ -18,9 +18,10 @@ from model.film import JIT, FilmGrid, FilmWork
 
 FloatArray = NDArray[np.float64]
 
-#: Least share of the Couette flow that is taken to run downstream. A pressure peak right at a leading edge can
-#: push oil back; what then enters is fresh oil, and the march stays well posed.
-LEAST_FLOW = 0.05
+#: Least share of the Couette flow that is taken to run downstream. A pressure peak near a leading edge pushes oil
+#: back there; what the journal drags in mixes with what returns, so that the net flow is no measure of the heat
+#: carried along, and with less than this the temperature there runs away. Bearings as they are run stay above it.
+LEAST_FLOW = 0.2
 
 
 @njit(**JIT)

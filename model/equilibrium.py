@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from model.acceleration import Anderson
-from model.carrying import find_branch, longest_step, set_loaded, shed_pads, shorten, wake_or_rest
+from model.carrying import find_branch, leave_unstable, longest_step, set_loaded, shed_pads, shorten, wake_or_rest
 from model.film import JIT, solve_film
 from model.pad_bending import bend
 from model.pad_film import PadFilm, film_step, least_share, oil_constants, pad_films
@@ -187,6 +187,9 @@ def _iterate(search: _Search) -> Equilibrium:
         near = residual < NEAR and heat_change < NEAR_HEAT
         search.relaxation = 1.0 if near else HELD_BACK
         if residual < accuracy and heat_change < HEAT_PER_FORCE * accuracy:
+            if leave_unstable(search.setup, search.films, search.position):
+                memory.reset()
+                continue
             resting, torn = shed_pads(search.films, search.position)
             if torn:
                 name = f"pads {', '.join(map(str, torn))} can neither carry nor idle"
