@@ -12,8 +12,8 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-#: Run by test_wheel.py as part of the demo; here only their spelling is checked.
-RUN_ELSEWHERE = ("compare",)
+#: Run by other tests (the demo from the wheel, the recovery tests); here only their spelling is checked.
+RUN_ELSEWHERE = ("compare", "diagnose")
 
 
 def blocks(language: str) -> list[str]:

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from tpjb_ident.cli.app import app
 
-COMMANDS = ("check", "identify", "pivot", "locus", "predict", "compare", "simulate", "demo", "export")
+COMMANDS = ("check", "identify", "pivot", "locus", "predict", "compare", "diagnose", "simulate", "demo", "export")
 
 
 def tpjb(*arguments):

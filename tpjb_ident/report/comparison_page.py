@@ -78,9 +78,15 @@ def comparison_page(
         more=more,
         key_table=_key_table(deviations(comparison, frame)),
         sections=_sections(comparison, frame),
-        settings={name: str(value) for name, value in (settings or _own_settings(comparison)).items()},
+        settings={name: _said(value) for name, value in (settings or _own_settings(comparison)).items()},
         inputs=dict(campaign.fingerprint() if inputs is None else inputs),
     )
+
+
+def _said(value: Any) -> str:
+    if value is None:
+        return "none"
+    return ", ".join(str(v) for v in value) if isinstance(value, (list, tuple)) else str(value)
 
 
 def _own_settings(comparison: Comparison) -> dict[str, str]:
