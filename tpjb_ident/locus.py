@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.clearance import ClearancePolygon
+from tpjb_ident.pivot.flat_channels import refuse_flat_channels
 from tpjb_ident.pivot.glitches import good_samples
 from tpjb_ident.pivot.noise import NoiseModel, NoiseSeries, estimate_noise
 
@@ -163,6 +164,7 @@ def _from_down(direction: float) -> float:
 
 
 def _read(run: Run) -> _Read:
+    refuse_flat_channels(run)
     force, displacement = run.vector("force"), run.vector("displacement")
     n = min(len(force), len(displacement))
     good = good_samples(np.hstack([force.values[:n], displacement.values[:n]]))

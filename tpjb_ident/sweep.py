@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdata.problem import Problem, RigDataError
+from tpjb_ident.pivot.flat_channels import refuse_flat_channels
 from tpjb_ident.pivot.glitches import good_samples
 from tpjb_ident.polygon import normals
 
@@ -97,6 +98,7 @@ def read_sweep(run: Run, angles: FloatArray, give: FloatArray | None = None, lon
     RigDataError
         When the load does not go all around or the shaft does not follow it.
     """
+    refuse_flat_channels(run)
     force, displacement = run.vector("force"), run.vector("displacement")
     n = min(len(force), len(displacement))
     good = good_samples(np.hstack([force.values[:n], displacement.values[:n]]), longest_glitch)

@@ -126,7 +126,7 @@ def test_one_campaign(tmp_path, kind):
 def test_errors_and_coverage(tmp_path):
     kinds = ["rocker", "rocker on housing", "sphere", "sphere on housing"]
     errors, scores, onsets, beyond = [], [], [], []
-    for seed in range(24):
+    for seed in range(16):
         laws = bearing(kinds[seed % 4], 100 + seed)
         source, truth = campaign(tmp_path / "c.h5", laws, 100 + seed)
         for curve, law in zip(fit_pivots(source, ANGLES), laws, strict=True):
@@ -140,9 +140,9 @@ def test_errors_and_coverage(tmp_path):
                 onsets.append(curve.onset_load / true_onset(law, gap) - 1.0)
     errors, inside = np.abs(errors), np.abs(scores) < 1.96
     assert np.all(np.median(errors, axis=0) < 0.03)
-    # 360 values from 120 independent curves: two standard errors of a share of 0.95 are 0.04
-    assert 0.92 < inside.mean() < 0.995
-    assert np.mean(beyond) > 0.90
+    # 240 values from 80 independent curves: two standard errors of a share of 0.95 are 0.04
+    assert 0.91 < inside.mean() < 0.995
+    assert np.mean(beyond) > 0.88
     assert np.median(np.abs(onsets)) < 0.10
     assert np.mean(np.abs(onsets) < 0.25) > 0.9
 
@@ -160,13 +160,14 @@ def refusal_cases():
         run = f"p-{pad}-up"
         for channel, other in (("X1A", "X1B"), ("L1H", "L1V")):
             yield Fault("swapped", run, channel, other=other)
-            yield Fault("inverted", run, channel)
-            yield Fault("inverted", run, other)
-        for step in (1, 3):
-            yield Fault("wrong_pad", run, value=(pad + step - 1) % 5 + 1)
+            yield Fault("inverted", run, channel if pad % 2 else other)
+        yield Fault("wrong_pad", run, value=pad % 5 + 1)
+        yield Fault("wrong_pad", run, value=(pad + 2) % 5 + 1)
     yield Fault("swapped", "p-*", "X1A", other="X1B")
     yield Fault("swapped", "p-*", "L1H", other="L1V")
     yield Fault("dead", "p-2-up", "X1A")
+    yield Fault("stuck", "p-1-up", "X1B", start=6.0)
+    yield Fault("clipped", "p-4-up", "L1V")
 
 
 @pytest.mark.slow
@@ -181,7 +182,7 @@ def test_records_that_are_not_what_they_claim_are_refused(tmp_path):
             if found is not None:
                 assert found[0].stiffness(LOADS) == pytest.approx(clean[0].stiffness(LOADS), rel=2e-3)
             continue
-        with pytest.raises(RigDataError, match=r"wrong pad|dead") as caught:
+        with pytest.raises(RigDataError, match=r"wrong pad|stuck, clipped or dead") as caught:
             fit_pivots(source, ANGLES)
         assert all(p.run and p.cure for p in caught.value.problems), fault
 
@@ -250,6 +251,16 @@ def test_bad_steps_are_left_out(tmp_path):
     assert any(s.startswith("bad-steps") for s in curve.status)
     assert curve.steps.weight[4] == 0.0
     error = np.log(curve.stiffness(LOADS) * law.compliance(LOADS))
+    assert np.all(np.abs(error) < 4 * curve.relative_stiffness_se(LOADS))
+
+
+def test_a_long_false_load_is_left_out(tmp_path):
+    law = Line(0.4)
+    knock = Fault("glitch", "p-1-up", "L1V", value=3000.0, start=5.2, length=0.3)
+    source, _ = campaign(tmp_path / "c.h5", [law] * 5, 21, dry=(DryTest(1),), faults=(knock,))
+    (curve,) = fit_pivots(source, ANGLES)
+    error = np.log(curve.stiffness(LOADS) * law.compliance(LOADS))
+    assert np.abs(error[1:]).max() < 0.06
     assert np.all(np.abs(error) < 4 * curve.relative_stiffness_se(LOADS))
 
 

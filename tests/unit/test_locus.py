@@ -93,6 +93,9 @@ def moved(run):
     class Moved:
         id, file, kind, point, channels = "again", run.file, "locus", run.point, run.channels
 
+        def record(self, name):
+            return run.record(name)
+
         def vector(self, quantity):
             record = run.vector(quantity)
             if quantity == "displacement":

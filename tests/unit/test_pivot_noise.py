@@ -52,12 +52,11 @@ def test_levels_are_recovered():
         assert 0.6 < ratio < 1.6, name
 
 
-def test_a_closure_tells_of_drift_that_the_series_hide():
-    calm = NoiseModel(4e-18, 1e-16, 0.0)
-    series = simulate(calm, 4, 1)
-    small = estimate_noise(series, 1e-8, closures=[(1e-8, 20.0)] * 8)
-    large = estimate_noise(series, 1e-8, closures=[(2e-6, 20.0)] * 8)
-    assert large.drift > 4.0 * small.drift
+def test_drift_is_seen_where_there_is_more_than_usual():
+    calm = estimate_noise(simulate(NoiseModel(4e-18, 1e-16, 1e-9), 8, 1), 1e-8)
+    restless = estimate_noise(simulate(NoiseModel(4e-18, 1e-16, 2e-7), 8, 1), 1e-8)
+    assert restless.drift > 8.0 * calm.drift
+    assert restless.drift == pytest.approx(2e-7, rel=0.6)
 
 
 def test_units_do_not_matter():

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from tpjb_ident.pivot.contact import contact_onset, contact_onset_se
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
@@ -74,6 +74,7 @@ def assemble_curve(choice: Choice, noise: NoiseModel, settings: PivotSettings, r
     -------
     PivotCurve
     """
+    choice = replace(choice, fits=tuple(_widened(fit) for fit in choice.fits))
     law = choice.fits[0]
     first = choice.records[0]
     steps = _all_steps(choice, noise)
@@ -96,6 +97,16 @@ def assemble_curve(choice: Choice, noise: NoiseModel, settings: PivotSettings, r
         status=_status(choice, steps, settings, onset, refused),
         runs=tuple(record.run.id for record in choice.records),
     )
+
+
+def _misfits(fit: LawFit) -> bool:
+    """Whether the points scatter about the law more than their noise allows."""
+    return fit.freedom > 0 and bool(special.chdtrc(fit.freedom, fit.chi_square) < MISFIT_PROBABILITY)
+
+
+def _widened(fit: LawFit) -> LawFit:
+    """The fit with its covariance scaled up where it misfits (Birge's ratio): an interval must not ignore it."""
+    return replace(fit, covariance=fit.covariance * fit.chi_square / fit.freedom) if _misfits(fit) else fit
 
 
 def _all_steps(choice: Choice, noise: NoiseModel) -> PivotSteps:
@@ -178,7 +189,7 @@ def _status(
         )
     if law.name == "spline":
         found.append("no-physical-law")
-    if law.freedom > 0 and stats.chi2.sf(law.chi_square, law.freedom) < MISFIT_PROBABILITY:
+    if _misfits(law):
         found.append("misfit: the scatter exceeds the noise")
     if not any(record.holds for record in choice.records):
         found.append("no-holds: drift cannot be told from deflection")

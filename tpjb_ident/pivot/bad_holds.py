@@ -52,8 +52,7 @@ def bad_blocks(
     """
     groups = _groups(record)
     bad = sticking(record.projection.load, record.blocks.branch)
-    names = [g for g in np.unique(groups) if g >= 0]
-    for _ in range(int(MOST_BAD * len(names))):
+    for _ in range(int(MOST_BAD * len(np.unique(groups)))):
         data = make_data([record], [~bad], noise, settings)
         worst, size = _worst(fit_law(laws["spline"], True, data), data, groups[~bad])
         if size < settings.bad_hold_limit:
@@ -63,15 +62,10 @@ def bad_blocks(
 
 
 def _with_ramps(groups: IntArray, group: int) -> BoolArray:
-    """A group and the ramps on either side: whatever spoilt the hold need not have kept to its limits."""
-    mine = np.flatnonzero(groups == group)
-    first, last = int(mine[0]), int(mine[-1])
-    while first > 0 and groups[first - 1] < 0:
-        first -= 1
-    while last < len(groups) - 1 and groups[last + 1] < 0:
-        last += 1
-    place = np.arange(len(groups))
-    return np.asarray((place >= first) & (place <= last))
+    """A group; a hold with the ramps on either side: whatever spoilt it need not have kept to its limits."""
+    if group % 2 == 0:
+        return np.asarray(groups == group)
+    return np.asarray(np.abs(groups - group) <= 1)
 
 
 def sticking(load: FloatArray, branch: IntArray) -> BoolArray:
@@ -98,11 +92,13 @@ def sticking(load: FloatArray, branch: IntArray) -> BoolArray:
 
 
 def _groups(record: DryRecord) -> IntArray:
-    """Hold numbers; consecutive stretches of a continuous ramp; -1 for ramps between holds."""
-    if record.holds:
-        return record.blocks.hold
-    m = len(record.blocks)
-    return np.asarray(np.arange(m) * GROUPS_ON_RAMP // m)
+    """Number of the stretch that each block belongs to: odd for holds, even for ramps, in order of time."""
+    hold = record.blocks.hold
+    m = len(hold)
+    if not record.holds:
+        return np.asarray(2 * (np.arange(m) * GROUPS_ON_RAMP // m))
+    before = np.maximum.accumulate(hold)
+    return np.asarray(np.where(hold >= 0, 2 * hold + 1, 2 * before + 2))
 
 
 def _worst(fit: LawFit, data: FitData, groups: IntArray) -> tuple[int, float]:
@@ -114,7 +110,7 @@ def _worst(fit: LawFit, data: FitData, groups: IntArray) -> tuple[int, float]:
     inside = data.whitener @ (jacobian * scale)
     hat = fit.covariance / np.outer(scale, scale)
     best, size = -1, 0.0
-    for group in np.unique(groups[groups >= 0]):
+    for group in np.unique(groups):
         shift = data.whitener @ (groups == group).astype(float)
         taken = inside.T @ shift
         room = float(shift @ shift - taken @ hat @ taken)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import optimize, stats
+from scipy import optimize, special
 
 from tpjb_ident.pivot.hysteresis import Hysteresis
 from tpjb_ident.pivot.law_fit import SCALE, LawFit
@@ -199,7 +199,7 @@ class PivotCurve:
     def _quantile(self, level: float) -> float:
         if not 0.0 < level < 1.0:
             raise ValueError(f"level must lie between 0 and 1, got {level}")
-        return float(stats.norm.ppf(0.5 + 0.5 * level))
+        return float(special.ndtri(0.5 + 0.5 * level))
 
     def __str__(self) -> str:
         parameters = ", ".join(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.pivot.blocks import Blocks, Samples, cut_blocks
+from tpjb_ident.pivot.flat_channels import refuse_flat_channels
 from tpjb_ident.pivot.glitches import good_samples
 from tpjb_ident.pivot.projection import Projection, pad_axes, project
 from tpjb_ident.pivot.settings import PivotSettings
@@ -82,6 +83,7 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
             run, "pad", f"names pad {run.pad}, the bearing has pads 1 to {len(pad_angles)}", "Correct the manifest"
         )
     angle = float(pad_angles[run.pad - 1])
+    refuse_flat_channels(run)
     samples = _samples(run, angle, settings)
     load_range = float(np.ptp(samples.along))
     if load_range <= 0.0 or np.ptp(samples.displacement, axis=0).max() <= 0.0:

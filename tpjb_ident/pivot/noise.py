@@ -138,9 +138,7 @@ class _Rotated:
         return 0.5 * float(log_det + yy - xy @ np.linalg.solve(xx, xy))
 
 
-def estimate_noise(
-    series: Sequence[NoiseSeries], drift_rate: float, closures: Sequence[tuple[float, float]] = ()
-) -> NoiseModel:
+def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float) -> NoiseModel:
     """Estimate the noise levels common to several series.
 
     Parameters
@@ -149,9 +147,6 @@ def estimate_noise(
         Any number, of any length above their number of signal columns.
     drift_rate : float
         Centre of the log-normal prior (factor e) of the drift rate [m/s].
-    closures : sequence of (difference, time)
-        Differences [m] between two readings of the same position `time` seconds apart, such as the two ends
-        of a clearance sweep: direct sight of the drift.
 
     Returns
     -------
@@ -173,9 +168,6 @@ def estimate_noise(
     def objective(logs: FloatArray) -> float:
         w, f, d = np.exp(np.clip(logs, -30.0, 30.0))
         total = sum(r.minus_log_likelihood(w, f, d) for r in rotated)
-        for difference, apart in closures:
-            variance = (d * apart) ** 2 + 4.0 * f * np.log1p(apart) + 4.0 * w
-            total += 0.5 * (np.log(variance) + (difference / unit) ** 2 / variance)
         # a level that the data do not feel (no 1/f at all) must not run away to minus infinity
         return total + 0.5 * (logs[2] - prior) ** 2 + 0.5 * (logs[1] / 5.0) ** 2 + 0.5 * (logs[0] / 5.0) ** 2
 
