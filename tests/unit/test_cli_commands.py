@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -246,6 +247,17 @@ def test_bad_input_is_one_message_and_exit_2(arguments, says, small_campaign, ro
     assert "Traceback" not in result.output
     assert list(tmp_path.iterdir()) == []
     assert small_campaign.read_bytes() == before
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes in the file system")
+@pytest.mark.parametrize("command", ["identify", "check", "predict", "simulate", "export"])
+def test_a_pipe_is_refused_not_waited_for(command, tmp_path):
+    pipe = tmp_path / "pipe.h5"
+    os.mkfifo(pipe)
+    extra = ("--to", "csv") if command == "export" else ()
+    result = tpjb(command, pipe, *extra, "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "a pipe" in result.stderr
 
 
 def test_unknown_commands_and_options_get_a_hint():

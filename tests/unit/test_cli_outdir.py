@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -92,6 +93,18 @@ def test_a_campaign_folder_is_never_written_to(tmp_path, where):
     with pytest.raises(BadInputError, match="raw data"):
         fill(campaign / where, "pivot", ["a.csv"], (campaign,))
     assert names_in(campaign) == ["campaign.toml"]
+
+
+def test_not_even_another_campaigns_folder_is_written_to(tmp_path):
+    (tmp_path / "campaign.toml").write_text("")
+    with pytest.raises(BadInputError, match="raw data"):
+        fill(tmp_path / "results", "pivot", ["a.csv"])
+    assert names_in(tmp_path) == ["campaign.toml"]
+
+
+def test_a_folder_that_cannot_be_made_is_named_as_given():
+    with pytest.raises(BadInputError, match=r"--out /proc/nowhere/out: cannot be made"):
+        fill(Path("/proc/nowhere/out"), "pivot", ["a.csv"])
 
 
 def test_a_link_into_the_campaign_is_followed_before_the_check(tmp_path):

@@ -101,7 +101,7 @@ def show_coefficients(result: Identification) -> None:
             f"{100 * p.outlier_fraction:.0f}", "; ".join(str(q) for q in p.quality) or "ok",
         ])  # fmt: skip
     columns = ["load kN", "exc. Hz", "kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m", "out %", "quality"]
-    table(f"{result.campaign}: {result.method}, 95 % intervals", columns, rows)
+    table(f"{result.campaign}: {result.method}, 95 % intervals", columns, rows, words=(6,))
 
 
 def refuse_untrusted(result: Identification) -> None:

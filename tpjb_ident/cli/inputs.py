@@ -16,11 +16,25 @@ HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
 
 
 def campaign_place(path: Path) -> Path:
-    """Return `path`, or the one campaign that lies in it, as in the output folder of `tpjb simulate`."""
+    """Return `path`, or the one campaign that lies in it, as in the output folder of `tpjb simulate`.
+
+    Raises
+    ------
+    BadInputError
+        A device or pipe, which would be waited for without end.
+    """
+    refuse_special(path)
     if not path.is_dir() or (path / "campaign.toml").exists():
         return path
     inside = [p for p in sorted(path.iterdir()) if p.suffix.lower() in HDF5 or (p / "campaign.toml").is_file()]
     return inside[0] if len(inside) == 1 else path
+
+
+def refuse_special(*paths: Path | None) -> None:
+    """Let ordinary files, folders and names of nothing pass; refuse devices and pipes."""
+    for path in paths:
+        if path is not None and path.exists() and not (path.is_file() or path.is_dir()):
+            raise BadInputError(f"{path}: is a device or a pipe, not a file. Give an ordinary file.")
 
 
 def open_campaign(path: Path) -> Campaign:
@@ -58,6 +72,7 @@ def open_bearing(campaign: Campaign, given: Path | None) -> tuple[Bearing, dict[
     """
     from model.bearing import load_bearing, parse_bearing
 
+    refuse_special(given)
     if given is not None:
         return load_bearing(given), {given.name: sha256(given)}
     if not campaign.bearing_text:

@@ -39,8 +39,11 @@ def output_folder(out: Path, command: str, inputs: tuple[Path, ...] = ()) -> Ite
         `out` is a file, lies in a campaign, or holds files of the same names that tpjb did not write.
     """
     target = _checked(out, inputs)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    staging = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}.part-"))
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        staging = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}.part-"))
+    except OSError as error:
+        raise BadInputError(f"--out {out}: cannot be made ({error.strerror or error}). Give another folder.") from error
     try:
         yield staging
         staging.chmod(0o755)
@@ -57,8 +60,9 @@ def _checked(out: Path, inputs: tuple[Path, ...]) -> Path:
     target = out.resolve()
     if target.exists() and not target.is_dir():
         raise BadInputError(f"--out {out}: is a file. Give a folder.")
-    if (target / "campaign.toml").exists():
-        raise BadInputError(f"--out {out}: holds a campaign's raw data. Give another folder.")
+    for folder in (target, *target.parents):
+        if (folder / "campaign.toml").exists():
+            raise BadInputError(f"--out {out}: {folder} holds a campaign's raw data. Give a folder outside it.")
     for source in inputs:
         real = source.resolve()
         if real.is_dir() and (target == real or real in target.parents):

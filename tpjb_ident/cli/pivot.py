@@ -56,4 +56,4 @@ def show_curves(curves: Any, name: str) -> None:
                       f"{low / 1e6:.0f}..{high / 1e6:.0f}"]  # fmt: skip
         rows.append([*cells, curve.law.name])
     headings = ["load kN", "MN/m", "95 %"]
-    table(f"{name}: tangent stiffness of the pivots", ["pad", *headings, *headings, "law"], rows)
+    table(f"{name}: tangent stiffness of the pivots", ["pad", *headings, *headings, "law"], rows, words=(0, 7))

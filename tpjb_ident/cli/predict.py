@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from tpjb_ident.cli.errors import BadInputError, NotTrustedError, guarded
+from tpjb_ident.cli.inputs import refuse_special
 from tpjb_ident.cli.options import BearingPath, EffectsFile, Out, Thermal, out_folder
 from tpjb_ident.cli.outdir import output_folder
 from tpjb_ident.cli.quantities import MAX_VALUES, parse_value, parse_values
@@ -45,6 +46,7 @@ def predict(
     points = operating_points(load, load_direction, speed, excitation)
     choice = pivot_choice(pivots)
     settings = model_settings(choice, thermal, effects)
+    refuse_special(bearing)
     from model.bearing import load_bearing
     from tpjb_ident.compare.predictions import predict_points, prediction_frame
 
@@ -126,6 +128,7 @@ def model_settings(pivots: Any, thermal: str, effects: Path | None) -> Any:
         raise BadInputError(f"--thermal: {thermal!r} is not known. {hint}")
     from tpjb_ident.compare.predictions import ModelSettings
 
+    refuse_special(effects)
     chosen: tuple = ()
     if effects is not None:
         from model.effects import load_effects

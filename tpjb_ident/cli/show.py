@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Iterator, Sequence
+from typing import TYPE_CHECKING, Literal
 
 from tpjb_ident.tables import printable
 
@@ -41,16 +41,16 @@ def note_line(kind: str, text: str) -> None:
     _console(stderr=True).print(f"tpjb: {kind}: {printable(text)}", markup=False)
 
 
-def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table; the first column is text, the others are numbers."""
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int] = (0,)) -> None:
+    """Print a table; columns of words stand left, numbers right."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
     grid = Table(title=Text(printable(title)), box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
     for i, column in enumerate(columns):
-        last = i == len(columns) - 1
-        grid.add_column(Text(printable(column)), justify="right" if i else "left", no_wrap=not last, overflow="fold")
+        side: Literal["left", "right"] = "left" if i in words else "right"
+        grid.add_column(Text(printable(column)), justify=side, no_wrap=i < len(columns) - 1, overflow="fold")
     for row in rows:
         grid.add_row(*(Text(printable(cell)) for cell in row))
     _console().print(grid)

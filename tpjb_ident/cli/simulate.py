@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from tpjb_ident.cli.errors import BadInputError, guarded
+from tpjb_ident.cli.inputs import refuse_special
 from tpjb_ident.cli.options import BearingPath, EffectsFile, Out, Thermal, out_folder
 from tpjb_ident.cli.outdir import output_folder
 from tpjb_ident.cli.predict import model_settings, operating_points, pivot_choice
@@ -53,6 +54,7 @@ def simulate(
     those of a real rig. Effects that act on the records (probe_gain, ..) spoil the instruments.
     """
     settings = model_settings(pivot_choice(pivots), thermal, effects)
+    refuse_special(bearing)
     from rigdata.virtual_rig import write_campaign
 
     rig = _rig(bearing, settings, seed, noise)

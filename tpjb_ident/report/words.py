@@ -4,19 +4,19 @@ from __future__ import annotations
 
 #: Condition name -> what it means to the reader, and what to do.
 MEANING = {
-    "cells-against-set-points": "The load cells and the set points disagree alike in all runs: the gain of one or of the "
-    "other is off.",
+    "cells-against-set-points": "The load cells and the set points disagree alike in all runs: the "
+    "gain of one or of the other is off.",
     "drive-not-locked": "The excitation's phase wandered between windows; they were turned to one phase first.",
-    "drift-unknown": "No load direction was repeated, so a drift of the probes cannot be told from a position. Repeat the "
-    "first direction at the end.",
-    "frame-turned": "All sides of the polygon are turned alike: the probes stand at other angles than stated, or the pads do.",
+    "drift-unknown": "No load direction was repeated, so a drift of the probes cannot be told from a position. "
+    "Repeat the first direction at the end.",
+    "frame-turned": "All sides of the polygon are turned alike: probes or pads stand at other angles than stated.",
     "give-from-sweep": "There are no pivot curves: what the pivots give under the push load was extrapolated.",
     "harmonic-on-excitation-line": "A harmonic of another excitation falls on this one. Excite the two apart.",
     "load-off-set-point": "The measured load of some runs misses its set point in size or direction.",
     "mains-corrected": "Pick-up on the mains frequency was estimated from the other runs and taken off.",
     "no-centre": "Without a clearance run positions count from the probes' zero, not from the bearing centre.",
-    "nonlinear-amplitude": "The coefficients change with the amplitude of vibration: they hold for this amplitude only.",
-    "outside-polygon": "Some positions lie outside the clearance polygon, where the shaft cannot be: check probes and zero.",
+    "nonlinear-amplitude": "The coefficients change with the amplitude of vibration: they hold for this one only.",
+    "outside-polygon": "Some positions lie outside the clearance polygon, where the shaft cannot be. Check the probes.",
     "pads-not-reached": "The sweep never touched some pads; their clearance is unknown.",
     "pivots-disagree": "In the sweep the pivots give another amount than the dry tests say.",
     "speed-drifts": "The shaft speed moved during the record; its lines were followed window by window.",
