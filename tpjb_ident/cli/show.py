@@ -76,7 +76,10 @@ def progress(what: str) -> Iterator[Progress]:
         task = bar.add_task(what, total=1.0)
 
         def show(text: str, done: int, total: int) -> None:
-            bar.update(task, completed=done / max(total, 1), description=f"{what}: {printable(text)}")
+            # a step that cannot be counted pulses; a full bar would stop the clock
+            share = min(done / total, 0.999) if total > 1 else 0.0
+            known = 1.0 if total > 1 else None
+            bar.update(task, total=known, completed=share, description=f"{what}: {printable(text)}")
 
         yield show
 
