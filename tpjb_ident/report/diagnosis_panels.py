@@ -6,13 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tpjb_ident.diagnose.gap import residuals
 from tpjb_ident.report.figure import LIGHT, Panel, add_legend, new_panel
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnose.diagnose import Diagnosis
 
 GROUP = "Where model and measurement part"
-DIRECT = ("kxx", "kyy", "cxx", "cyy", "kxy", "kyx", "cxy", "cyx")
+ENTRIES = tuple(f"{part}{entry}" for part in "kc" for entry in ("xx", "xy", "yx", "yy"))
+#: Coefficients drawn per panel: those that disagree most with the baseline.
+DRAWN = 3
 
 
 def diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
@@ -23,8 +26,8 @@ def diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
 def _residual_panels(diagnosis: Diagnosis) -> list[Panel]:
     panels = []
     for name, title, unit in (
-        ("load", "Residuals over static load, direct coefficients", "static load, kN"),
-        ("excitation", "Residuals over excitation frequency, direct coefficients", "excitation, Hz"),
+        ("load", "Residuals over static load, the coefficients that disagree most", "static load, kN"),
+        ("excitation", "Residuals over excitation frequency, the same coefficients", "excitation, Hz"),
     ):
         figure, axes = new_panel(unit, "(measured - predicted) / sigma")
         drawn = _draw_residuals(axes, diagnosis, name)
@@ -42,9 +45,8 @@ def _draw_residuals(axes, diagnosis: Diagnosis, coordinate: str) -> bool:  # typ
     other = "excitation" if coordinate == "load" else "load"
     values = [round(e.place(other), 6) for e in elements if e.family == "h"]
     common = max(set(values), key=values.count)
-    colours = ("blue", "red", "green", "purple")
     any_drawn = False
-    for observable, colour in zip(DIRECT[:4], colours, strict=True):
+    for observable, colour in zip(_worst(diagnosis), ("blue", "red", "green"), strict=True):
         mine = [
             i for i, e in enumerate(elements)
             if e.observable == observable and round(e.place(other), 6) == common
@@ -57,7 +59,7 @@ def _draw_residuals(axes, diagnosis: Diagnosis, coordinate: str) -> bool:  # typ
         for prediction, marker, style in (
             (diagnosis.found.baseline.prediction, "o", (0, (4, 2))), (diagnosis.found.model.prediction, "D", "-"),
         ):  # fmt: skip
-            z = ((observations.value - prediction) / observations.total_sigma)[mine]
+            z = residuals(observations, prediction)[mine]
             label = observable if style == "-" else f"{observable}, baseline"
             axes.plot(
                 x, z, color=LIGHT[colour], marker=marker, linestyle=style, markersize=4, linewidth=1.2, label=label
@@ -65,11 +67,19 @@ def _draw_residuals(axes, diagnosis: Diagnosis, coordinate: str) -> bool:  # typ
     return any_drawn
 
 
+def _worst(diagnosis: Diagnosis) -> list[str]:
+    z = residuals(diagnosis.observations, diagnosis.found.baseline.prediction)
+    elements = diagnosis.observations.elements
+    size = {name: sum(z[i] ** 2 for i, e in enumerate(elements) if e.observable == name) for name in ENTRIES}
+    return sorted(ENTRIES, key=lambda name: -size[name])[:DRAWN]
+
+
 def _gap_panel(diagnosis: Diagnosis) -> Panel:
     gaps = diagnosis.verdict.gap_by_observable
     names = list(gaps)
     figure, axes = new_panel("gap, sigma", "", height=max(3.0, 0.32 * len(names) + 1.2))
-    figure.subplots_adjust(left=0.3)
+    box = axes.get_position()
+    axes.set_position((0.34, box.y0, box.x1 - 0.34, box.height))  # room for the names
     y = np.arange(len(names))
     for offset, end, colour, label in (
         (0.2, "_before", "orange", "baseline"),

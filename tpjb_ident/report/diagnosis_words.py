@@ -14,10 +14,11 @@ def verdict_sentences(name: str, verdict: Verdict) -> list[str]:
     change = f"{gap['heldout_before']:.2f} to {gap['heldout_after']:.2f} sigma"
     held = f"on points that no fit has seen the gap goes from {change}"
     names = " and ".join(_spoken(e.name) for e in verdict.effects)
+    verb = "explain" if len(verdict.effects) > 1 else "explains"
     first = {
         "consistent": f"{name}: consistent. Model and measurement agree within noise and tolerance "
         f"(gap {gap['before']:.2f} sigma).",
-        "named": f"{name}: {names} explains the disagreement; {held}.",
+        "named": f"{name}: {names} {verb} the disagreement; {held}.",
         "ambiguous": f"{name}: {names} closes the gap, but these data cannot tell it from "
         f"{' or '.join(_spoken(n) for group in verdict.indistinguishable for n in group[1:])}; {held}.",
         "unexplained": f"{name}: unexplained. There is a gap of {gap['before']:.2f} sigma, and nothing in the library "
