@@ -11,10 +11,10 @@ the mass flows used here are those of the full film.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from model.film import JIT, FilmGrid, FilmWork
+from model.film import FilmGrid, FilmWork
+from model.kernel import compiled
 
 FloatArray = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ FloatArray = NDArray[np.float64]
 LEAST_FLOW = 0.2
 
 
-@njit(**JIT)
+@compiled
 def solve_energy(
     grid: FilmGrid, work: FilmWork, inlet: float, speed: float, heat: tuple[float, float], temperature: FloatArray
 ) -> float:
@@ -94,7 +94,7 @@ def solve_energy(
     return limited
 
 
-@njit(**JIT)
+@compiled
 def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
     """Heat made per station of length dx and control-volume height [W], full film; shape (nt + 1, nz + 1)."""
     p, h, mu = work.pressure, work.thickness, work.viscosity
@@ -122,7 +122,7 @@ def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
     return out
 
 
-@njit(**JIT)
+@compiled
 def _tridiagonal(lower: FloatArray, main: FloatArray, upper: FloatArray, right: FloatArray) -> None:
     """Thomas' algorithm in place; the solution is left in `right`."""
     n = len(main)

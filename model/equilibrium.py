@@ -12,12 +12,12 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from model.acceleration import Anderson
 from model.carrying import find_branch, leave_unstable, longest_step, set_loaded, shed_pads, shorten, wake_or_rest
-from model.film import JIT, solve_film
+from model.film import solve_film
+from model.kernel import compiled
 from model.pad_bending import bend
 from model.pad_film import PadFilm, film_step, least_share, oil_constants, pad_films
 from model.setup import Setup
@@ -332,7 +332,7 @@ def _newton_step(search: _Search) -> tuple[float, FloatArray, FloatArray]:
 _COLUMNS = 15
 
 
-@njit(**JIT)
+@compiled
 def eliminate(load: FloatArray, pads: FloatArray) -> tuple[float, FloatArray, FloatArray]:
     """Eliminate every pad's tilt and deflection, and solve for the journal's move.
 

@@ -18,24 +18,18 @@ where the film is symmetric about mid-length.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from model.kernel import compiled
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 #: A cold start moves the rupture line by one node a step, so that fine meshes need many.
 MAX_ACTIVE_SET_STEPS = 2000
-#: How the inner loops are compiled: cached on disk; sums may be reordered, but NaN and infinity keep their meaning.
-JIT: dict[str, Any] = {
-    "cache": True,
-    "error_model": "numpy",
-    "fastmath": {"contract", "reassoc", "arcp", "nsz"},
-    "nogil": True,
-}
 
 
 class FilmGrid(NamedTuple):
@@ -236,7 +230,7 @@ def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:
     )
 
 
-@njit(**JIT)
+@compiled
 def solve_film(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool
 ) -> FilmForces:
@@ -282,7 +276,7 @@ def solve_film(
     return FilmForces(force, stiffness, damping, min_film, steps)
 
 
-@njit(**JIT)
+@compiled
 def _thickness(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float) -> float:
     h = work.thickness
     low = np.inf
@@ -294,7 +288,7 @@ def _thickness(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: fl
     return low
 
 
-@njit(**JIT)
+@compiled
 def _conductances(
     grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float
 ) -> tuple[FloatArray, FloatArray]:
@@ -315,7 +309,7 @@ def _conductances(
     return gx, gz
 
 
-@njit(**JIT)
+@compiled
 def _source(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float, speed: float) -> FloatArray:
     """Couette inflow minus outflow of each control volume (the right-hand side f of A p = f)."""
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
@@ -331,7 +325,7 @@ def _source(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float
     return source
 
 
-@njit(**JIT)
+@compiled
 def _active_set(grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, source: FloatArray) -> int:
     """Solve the complementarity problem; returns the number of factorisations, -2 if it did not settle."""
     p, ruptured = work.pressure, work.ruptured
@@ -355,7 +349,7 @@ def _active_set(grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, 
     return -2
 
 
-@njit(**JIT)
+@compiled
 def _update_active_set(
     p: FloatArray, ruptured: BoolArray, gx: FloatArray, gz: FloatArray, source: FloatArray, first: int
 ) -> int:
@@ -376,7 +370,7 @@ def _update_active_set(
     return changed
 
 
-@njit(**JIT)
+@compiled
 def _assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArray, first: int) -> None:
     nt, nz = gx.shape[0], gz.shape[1]
     width = nz - first
@@ -397,7 +391,7 @@ def _assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolAr
                 band[k, width] -= gx[i, j]
 
 
-@njit(**JIT)
+@compiled
 def _factorise(band: FloatArray) -> None:
     """L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k]."""
     n, width = band.shape[0], band.shape[1] - 1
@@ -412,7 +406,7 @@ def _factorise(band: FloatArray) -> None:
             band[k, r] /= pivot
 
 
-@njit(**JIT)
+@compiled
 def _substitute(band: FloatArray, x: FloatArray) -> None:
     n, width = band.shape[0], band.shape[1] - 1
     for k in range(n):
@@ -425,7 +419,7 @@ def _substitute(band: FloatArray, x: FloatArray) -> None:
         x[k] = total
 
 
-@njit(**JIT)
+@compiled
 def _substitute_four(band: FloatArray, x: FloatArray) -> None:
     """`_substitute` for the four derivatives side by side (n, 4): the inner loop fills a vector register."""
     n, width = band.shape[0], band.shape[1] - 1
@@ -444,7 +438,7 @@ def _substitute_four(band: FloatArray, x: FloatArray) -> None:
                 x[k, m] -= factor * x[k + r, m]
 
 
-@njit(**JIT)
+@compiled
 def _rupture_line(
     grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, source: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -475,7 +469,7 @@ def _rupture_line(
     return diagonal, area
 
 
-@njit(**JIT)
+@compiled
 def _add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
     nt, nz = diagonal.shape[0] - 1, diagonal.shape[1] - 1
     for i in range(1, nt):
@@ -483,7 +477,7 @@ def _add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
             band[(i - 1) * (nz - first) + j - first, 0] += diagonal[i, j]
 
 
-@njit(**JIT)
+@compiled
 def _derivatives(
     grid: FilmGrid,
     work: FilmWork,
@@ -538,7 +532,7 @@ def _derivatives(
     _substitute_four(work.band, rhs)
 
 
-@njit(**JIT)
+@compiled
 def _integrate(grid: FilmGrid, work: FilmWork, weight: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Forces and their derivatives; `weight` is the area that a node's perturbed pressure stands for."""
     force = np.zeros(2)

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from model.bearing import Oil, Pad
 from model.energy import solve_energy
-from model.film import JIT, FilmForces, FilmGrid, FilmWork, film_grid, film_work, solve_film
+from model.film import FilmForces, FilmGrid, FilmWork, film_grid, film_work, solve_film
+from model.kernel import compiled
 from model.setup import Setup
 from model.start import Branch
 
@@ -112,7 +112,7 @@ def oil_constants(oil: Oil) -> tuple[float, float, float, float]:
     return oil.viscosity_40, oil.viscosity_exponent, oil.density_40, oil.thermal_expansion
 
 
-@njit(**JIT)
+@compiled
 def film_step(
     grid: FilmGrid,
     work: FilmWork,
@@ -164,7 +164,7 @@ def film_step(
     return forces, change, limited
 
 
-@njit(**JIT)
+@compiled
 def set_viscosity(work: FilmWork, oil: tuple[float, float, float, float]) -> None:
     """Eq. (4) and (5) at every node."""
     t = work.temperature
@@ -174,7 +174,7 @@ def set_viscosity(work: FilmWork, oil: tuple[float, float, float, float]) -> Non
             work.density[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - t[i, j]))
 
 
-@njit(**JIT)
+@compiled
 def least_share(grid: FilmGrid, work: FilmWork, da: float, db: float) -> float:
     """Most negative relative change of the film thickness for a change of (a, b)."""
     worst = 0.0

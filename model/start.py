@@ -14,10 +14,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from model.film import JIT, film_grid, film_work, solve_film
+from model.film import film_grid, film_work, solve_film
+from model.kernel import compiled
 
 FloatArray = NDArray[np.float64]
 _TABLE_MESH = (32, 4)
@@ -201,7 +201,7 @@ def first_position(load: FloatArray, normals: FloatArray, gaps: FloatArray, bran
     return _first_position(np.asarray(load, float), np.column_stack([normals, gaps]), curves, lengths, room)
 
 
-@njit(**JIT)
+@compiled
 def _first_position(
     load: FloatArray, pads: FloatArray, curves: FloatArray, lengths: NDArray[np.int64], room: float
 ) -> FloatArray:
@@ -244,7 +244,7 @@ def _first_position(
     return position
 
 
-@njit(**JIT)
+@compiled
 def _pull(position: FloatArray, pads: FloatArray, curves: FloatArray, lengths: NDArray[np.int64]) -> FloatArray:
     """Force of all tabulated films at a position."""
     total = np.zeros(2)

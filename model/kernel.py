@@ -1,0 +1,48 @@
+"""How the inner loops are compiled, and kept on disk without going stale.
+
+numba keeps machine code per source file. A loop that was inlined into another file's loop changes without that file
+noticing: after an edit or an upgrade the old code would go on running, without a word. Here every compiled function is
+stamped with the sources of all of them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from numba import njit
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+#: Modules with compiled functions; a test holds the list complete.
+KERNELS = ("energy", "equilibrium", "film", "kernel", "pad_film", "start")
+#: Sums may be reordered, but NaN and infinity keep their meaning.
+OPTIONS: dict[str, Any] = {
+    "error_model": "numpy",
+    "fastmath": {"contract", "reassoc", "arcp", "nsz"},
+    "nogil": True,
+}
+
+
+def _stamp() -> str:
+    digest = hashlib.sha256()
+    for name in KERNELS:
+        digest.update((Path(__file__).parent / f"{name}.py").read_bytes())
+    return digest.hexdigest()
+
+
+STAMP = _stamp()
+
+
+def compiled(function: Function) -> Function:
+    """Compile with numba, cached on disk under the stamp of all kernels."""
+    dispatcher: Any = njit(cache=True, **OPTIONS)(function)
+    store = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    if store is not None and hasattr(store, "_source_stamp"):
+        store._source_stamp = STAMP
+    else:  # a numba whose cache is built otherwise: compile in every process rather than trust it
+        dispatcher = njit(**OPTIONS)(function)
+    kept: Function = dispatcher
+    return kept

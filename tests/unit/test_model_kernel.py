@@ -1,0 +1,44 @@
+"""Compiled loops: one stamp over all their sources, so that no stale machine code survives an edit or an upgrade."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import model.equilibrium
+import model.film
+import model.pad_film
+from model import kernel
+
+FOLDER = Path(kernel.__file__).parent
+
+
+def test_list_of_kernels_is_complete():
+    using = {path.stem for path in FOLDER.rglob("*.py") if "\n@compiled\n" in path.read_text(encoding="utf-8")}
+    assert using | {"kernel"} == set(kernel.KERNELS)
+    assert not [path for path in FOLDER.rglob("*.py") if "njit" in path.read_text("utf-8") and path.stem != "kernel"]
+
+
+def test_stamp_follows_every_source(tmp_path, monkeypatch):
+    for name in kernel.KERNELS:
+        (tmp_path / f"{name}.py").write_bytes((FOLDER / f"{name}.py").read_bytes())
+    monkeypatch.setattr(kernel, "__file__", str(tmp_path / "kernel.py"))
+    assert kernel._stamp() == kernel.STAMP
+    for name in kernel.KERNELS:
+        source = tmp_path / f"{name}.py"
+        kept = source.read_bytes()
+        source.write_bytes(kept + b"\n")
+        assert kernel._stamp() != kernel.STAMP
+        source.write_bytes(kept)
+
+
+def test_cached_code_carries_the_stamp():
+    for function in (model.film.solve_film, model.pad_film.film_step, model.equilibrium.eliminate):
+        assert function._cache._cache_file._source_stamp == kernel.STAMP
+
+
+def test_without_numbas_cache_the_code_is_compiled_anew(monkeypatch):
+    def other(*args, **options):
+        return lambda function: (function.__name__, options.get("cache", False))
+
+    monkeypatch.setattr(kernel, "njit", other)
+    assert kernel.compiled(kernel._stamp) == ("_stamp", False)
