@@ -14,6 +14,7 @@ from tpjb_ident.dynamic.line_tuning import tuned
 from tpjb_ident.dynamic.lines import known_lines
 from tpjb_ident.dynamic.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.dynamic.shaft_speed import shaft_speed
+from tpjb_ident.dynamic.short_record import kept_if_short
 
 
 def run_phasors(run: Any, housing_mass: float, settings: PhasorSettings | None = None) -> RunPhasors:
@@ -34,6 +35,7 @@ def run_phasors(run: Any, housing_mass: float, settings: PhasorSettings | None =
         The file cannot give what the manifest promises.
     """
     settings = settings or PhasorSettings()
+    run = kept_if_short(run)
     speed, conditions = shaft_speed(run)
     driven = settings.excitation_lines or (run.point.excitation_hz,)
     lines = known_lines(driven, speed, run.sample_rate, settings.lines)
