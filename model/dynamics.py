@@ -56,7 +56,7 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
         ]
     )
     offset = mass_centre_offset(setup, film)
-    coupling = pad.mass * offset
+    coupling = -pad.mass * offset  # the centre moves outward by eta - b tilt
     return PadMatrices(
         number=film.number,
         stiffness=frame.T @ film.forces.stiffness @ frame,
@@ -68,7 +68,7 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
 
 
 def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
-    """b_G, the mass centre's tangential distance from the pivot line [m]; zero for a central pivot."""
+    """b_G, the mass centre's distance from the pivot line [m], positive with rotation; zero for a central pivot."""
     pad = film.pad
     middle = (0.5 - pad.pivot_offset) * pad.arc
     inner = setup.bearing.journal_radius + pad.pad_clearance
@@ -96,10 +96,8 @@ def reduce_pads(pads: list[PadMatrices], omega: FloatArray) -> ComplexArray:
     s = omega[:, None, None]
     for pad in pads:
         z = pad.stiffness + 1j * s * pad.damping
-        if math.isinf(pad.pad_stiffness[1, 1]):  # a rigid pivot: eta takes no part
-            keep = slice(2, 3)
-        else:
-            keep = slice(2, 4)
+        rigid = math.isinf(pad.pad_stiffness[1, 1])  # a rigid pivot: eta takes no part
+        keep = slice(2, 3) if rigid else slice(2, 4)
         inner = slice(0, 1) if keep.stop == 3 else slice(0, 2)
         own = (
             -(s**2) * pad.pad_mass[inner, inner]
@@ -124,5 +122,5 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
     if setup.added_mass:
         h = h - (omega**2)[:, None, None] * setup.added_mass * np.eye(2)
     if setup.series_compliance:
-        h = np.linalg.solve(np.eye(2) + setup.series_compliance * h, h)
+        h = np.linalg.solve(np.eye(2) + setup.series_compliance * h, h).astype(np.complex128, copy=False)
     return h
