@@ -438,7 +438,7 @@ def _check_arcs(angles: tuple[float, ...], arc: tuple[float, ...], offset: tuple
         if span > room + 1e-9:
             raise BearingError(
                 f"{name}, [pads]: pad #{number} overlaps pad #{follower[2]} "
-                f"({math.degrees(span):.1f} deg of arc, {math.degrees(room):.1f} deg of room). Check arc and pivot_angles."
+                f"({math.degrees(span):.1f} deg of arc, {math.degrees(room):.1f} deg of room). Check arc, pivot_angles."
             )
 
 

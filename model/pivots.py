@@ -26,7 +26,10 @@ FloatArray = NDArray[np.float64]
 class PivotLaw(Protocol):
     """Load-deflection law of one pivot."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """What the law is called."""
+        ...
 
     def deflection(self, load: float) -> float:
         """delta(W) [m], for W >= 0 [N]."""

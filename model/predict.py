@@ -112,7 +112,7 @@ class Prediction:
 
     @property
     def max_pressure(self) -> float:
-        """[Pa]"""
+        """Highest film pressure [Pa]."""
         return max(float(p.max()) for p in self.pressure)
 
     @property
@@ -123,7 +123,7 @@ class Prediction:
 
     @property
     def min_film(self) -> float:
-        """[m]; infinite if no pad carries."""
+        """Thinnest film [m]; infinite if no pad carries."""
         return min((float(f.work.thickness.min()) for f in self.equilibrium.films if not f.idle), default=math.inf)
 
     @property

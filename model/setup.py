@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 THERMAL = ("isothermal", "adiabatic", "tehd")
 #: A sensor map: excitation frequency [rad/s] -> (2, 2) complex; 0 gives what static readings see.
-SensorMap = Callable[[float], ComplexArray]
+SensorMap = Callable[[float], NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Instruments:
 def _product(maps: tuple[SensorMap, ...], omega: float) -> ComplexArray:
     total = np.eye(2, dtype=complex)
     for one in maps:
-        total = np.asarray(one(omega), dtype=complex) @ total
+        total = np.asarray(np.asarray(one(omega)) @ total, dtype=np.complex128)
     return total
 
 

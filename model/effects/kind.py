@@ -131,9 +131,8 @@ def _number(value: Any, parameter: Parameter, where: str) -> float:
         else:
             raise EffectError(f"{where}: must be a number [{parameter.unit}], got {value!r}.")
     if not parameter.low <= value <= parameter.high:
-        raise EffectError(
-            f"{where}: {value:g} is outside the physical range {parameter.low:g} to {parameter.high:g} [{parameter.unit}]."
-        )
+        bounds = f"{parameter.low:g} to {parameter.high:g} [{parameter.unit}]"
+        raise EffectError(f"{where}: {value:g} is outside the physical range {bounds}.")
     if parameter.discrete:
         if value != int(value):
             raise EffectError(f"{where}: a pad is a whole number, got {value!r}.")

@@ -160,8 +160,9 @@ def main() -> None:
             result = {} if effects is None else run_one(bench, effects, label["seed"], skip)
             with options.out.open("a", encoding="utf-8") as file:
                 file.write(json.dumps({**label, **result}) + "\n")
-            print(label["kind"], label["size"], label["truth"], "->", result.get("verdict"),
-                  [e["name"] for e in result.get("effects", [])], result.get("groups"), result.get("seconds"), flush=True)  # fmt: skip
+            names = [e["name"] for e in result.get("effects", [])]
+            what = (label["kind"], label["size"], label["truth"], "->", result.get("verdict"), names)
+            print(*what, result.get("groups"), result.get("seconds"), flush=True)
 
 
 def judge(row: dict) -> str:
@@ -189,7 +190,7 @@ def print_tables(rows: list[dict]) -> None:
     for row in rows:
         if row["kind"] == "hidden" and judge(row) == "named right":
             for name, true in row["parameters"].items():
-                value, lo, hi = row["effects"][0]["parameters"][name]
+                _, lo, hi = row["effects"][0]["parameters"][name]
                 if lo < hi:
                     total += 1
                     inside += lo <= true <= hi
