@@ -195,7 +195,7 @@ class ScaledPivot:
         return self.law.vibration_stiffness(load) * self.stiffness_factor
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # arrays have no single truth value: a curve equals itself only
 class MeasuredPivot:
     """A measured monotone curve, interpolated with a continuous tangent (PCHIP in load).
 

@@ -1,0 +1,219 @@
+"""Pivot laws: the printed formulas, tangents by differences, measured curves, files."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from model.bearing import Bearing, BearingError, Pivot, load_bearing
+from model.pivots import (
+    ConstantPivot,
+    MeasuredPivot,
+    RigidPivot,
+    RockerPivot,
+    ScaledPivot,
+    SphericalPivot,
+    formula_pivot,
+    load_pivots,
+    pivot_laws,
+)
+
+E, NU = 206e9, 0.3
+ROCKER = Pivot("rocker", E, NU, contact_length=39.6e-3, housing_diameter=132.0e-3, pivot_diameter=119.6e-3)
+SPHERE = Pivot("spherical", E, NU, sphere_diameter=0.4)
+LOADS = [50.0, 500.0, 2000.0, 4375.0, 8750.0]
+
+
+@pytest.fixture(scope="module")
+def rocker(rocker_file) -> Bearing:
+    return load_bearing(rocker_file)
+
+
+def printed_rocker(w: float) -> float:
+    """Eq. (16), as printed [N/m]."""
+    gap = 132.0e-3 - 119.6e-3
+    inside = math.pi * E * 39.6e-3 * gap / (4 * w * (1 - NU**2))
+    return math.pi * E * 39.6e-3 / (2 * (1 - NU**2) * (2 / 3 + math.log(inside)))
+
+
+def printed_sphere(w: float) -> float:
+    """Eq. (17), as printed [N/m]."""
+    return w / (9 * w**2 * (1 - NU**2) ** 2 / (2 * E**2 * 0.4)) ** (1 / 3)
+
+
+@pytest.mark.parametrize("w", LOADS)
+def test_secants_are_the_printed_formulas(w):
+    for pivot, printed in ((ROCKER, printed_rocker), (SPHERE, printed_sphere)):
+        law = formula_pivot(pivot)
+        assert law.secant(w) == pytest.approx(printed(w), rel=1e-12)
+        assert law.deflection(w) == pytest.approx(w / printed(w), rel=1e-12)
+
+
+@pytest.mark.parametrize("w", LOADS)
+@pytest.mark.parametrize(
+    "law",
+    [
+        formula_pivot(ROCKER),
+        formula_pivot(SPHERE),
+        ConstantPivot(7e8),
+        ScaledPivot(formula_pivot(ROCKER), 0.38),
+        MeasuredPivot(np.array([0, 1e3, 3e3, 5e3]), np.array([0, 2e-6, 5e-6, 7.5e-6])),
+    ],
+    ids=["rocker", "sphere", "constant", "scaled", "measured"],
+)
+def test_tangent_is_the_derivative(law, w):
+    step = 1e-4 * w
+    slope = (law.deflection(w + step) - law.deflection(w - step)) / (2 * step)
+    assert law.stiffness(w) == pytest.approx(1.0 / slope, rel=1e-5)
+    assert law.vibration_stiffness(w) == law.stiffness(w)
+
+
+def test_tangents_named_in_physics_md():
+    rocker, sphere = formula_pivot(ROCKER), formula_pivot(SPHERE)
+    for w in LOADS:
+        assert sphere.stiffness(w) == pytest.approx(1.5 * sphere.secant(w), rel=1e-12)
+    assert rocker.stiffness(4375.0) / rocker.secant(4375.0) == pytest.approx(1.10, abs=0.02)
+
+
+def test_kirk_secant_deflects_alike_but_vibrates_with_the_secant():
+    for pivot in (ROCKER, SPHERE):
+        kirk, secant = formula_pivot(pivot), formula_pivot(pivot, secant_vibrations=True)
+        assert secant.name == "kirk-secant"
+        for w in LOADS:
+            assert secant.deflection(w) == kirk.deflection(w)
+            assert secant.stiffness(w) == kirk.stiffness(w)  # Newton needs the true slope
+            assert secant.vibration_stiffness(w) == kirk.secant(w)
+
+
+def test_sphere_is_hertz():
+    # delta^3 = 9 W^2 / (16 R E*^2), 1/E* = 2 (1 - nu^2) / E, and a flat: R = D_s / 2
+    modulus, radius, w = E / (2 * (1 - NU**2)), 0.2, 4375.0
+    assert formula_pivot(SPHERE).deflection(w) == pytest.approx((9 * w**2 / (16 * radius * modulus**2)) ** (1 / 3))
+
+
+def test_rigid():
+    law = formula_pivot(Pivot("rigid"))
+    assert isinstance(law, RigidPivot)
+    assert law.deflection(1e9) == 0.0
+    assert math.isinf(law.stiffness(1.0))
+
+
+def test_no_load_no_deflection_and_finite_stiffness():
+    for law in (formula_pivot(ROCKER), formula_pivot(SPHERE), ConstantPivot(1e9)):
+        assert law.deflection(0.0) == 0.0
+        assert 0 < law.stiffness(0.0) < math.inf
+
+
+def test_rocker_formula_is_held_beyond_its_physics():
+    law = RockerPivot(line_modulus=1e9, load_scale=1e4)
+    loads = np.linspace(10.0, 1e6, 400)
+    deflection = [law.deflection(w) for w in loads]
+    assert (np.diff(deflection) > 0).all()
+    assert all(law.stiffness(w) > 0 for w in loads)
+
+
+@pytest.mark.parametrize("factor", [0.3, 1.0, 2.5])
+def test_scaled(factor):
+    law = ScaledPivot(SphericalPivot(1e-8), factor)
+    assert law.deflection(1000.0) == pytest.approx(SphericalPivot(1e-8).deflection(1000.0) / factor)
+    assert law.stiffness(1000.0) == pytest.approx(SphericalPivot(1e-8).stiffness(1000.0) * factor)
+    assert f"{factor:g}" in law.name
+
+
+def test_measured_curve_goes_through_its_points_and_stays_monotone():
+    load = np.array([0.0, 500.0, 1000.0, 2000.0, 4000.0])
+    points = np.array([0.0, 2.0, 2.6, 4.1, 6.0]) * 1e-6
+    law = MeasuredPivot(load, points, valid_from=500.0, valid_to=4000.0)
+    np.testing.assert_allclose([law.deflection(w) for w in load], points, rtol=1e-12)
+    fine = [law.deflection(w) for w in np.linspace(0, 4000, 500)]
+    assert (np.diff(fine) > 0).all()
+    # on it goes with the last tangent
+    beyond = law.deflection(5000.0) - law.deflection(4000.0)
+    assert beyond == pytest.approx(1000.0 / law.stiffness(4000.0), rel=1e-9)
+    assert law.extrapolated(300.0)
+    assert law.extrapolated(4500.0)
+    assert not law.extrapolated(2000.0)
+
+
+def test_measured_curve_of_a_formula_gives_its_stiffness_back():
+    law = formula_pivot(ROCKER)
+    load = np.linspace(0, 6000, 25)
+    curve = MeasuredPivot(load, np.array([law.deflection(w) for w in load]))
+    for w in (1000.0, 2600.0, 4100.0):
+        assert curve.stiffness(w) == pytest.approx(law.stiffness(w), rel=0.005)
+
+
+@pytest.mark.parametrize(
+    ("load", "points", "message"),
+    [
+        ([0, 1, 1], [0, 1, 2], "rise strictly"),
+        ([0, 1, 2], [0, 2, 1], "rise strictly"),
+        ([0, 1, math.nan], [0, 1, 2], "finite"),
+        ([1.0], [1.0], "1-D"),
+        ([0, 1, 2], [0, 1], "alike"),
+        ([-1, 1, 2], [-2, 1, 2], "at or above zero"),
+    ],
+)
+def test_impossible_curves_are_refused(load, points, message):
+    with pytest.raises(ValueError, match=message):
+        MeasuredPivot(np.array(load, float), np.array(points, float))
+
+
+def test_choices(rocker):
+    assert [law.name for law in pivot_laws("kirk", rocker)] == ["kirk"] * 5
+    assert isinstance(pivot_laws("rigid", rocker)[0], RigidPivot)
+    assert pivot_laws("kirk-secant", rocker)[0].vibration_stiffness(4375.0) == pytest.approx(printed_rocker(4375.0))
+    assert pivot_laws(5e8, rocker) == (ConstantPivot(5e8),) * 5
+    one = ConstantPivot(1e9)
+    assert pivot_laws(one, rocker) == (one,) * 5
+    mixed = (one, RigidPivot(), one, RigidPivot(), one)
+    assert pivot_laws(mixed, rocker) == mixed
+
+
+@pytest.mark.parametrize("choice", ["kerk", 0.0, -1.0, math.inf, math.nan, [ConstantPivot(1.0)], "missing.toml"])
+def test_bad_choices_are_refused(rocker, choice):
+    with pytest.raises(BearingError, match="pivot"):
+        pivot_laws(choice, rocker)
+
+
+def pivots_file(pads: str, schema: str = "tpjb-pivots/1") -> str:
+    return f'schema = "{schema}"\n{pads}'
+
+
+def pad_table(number: int, force: str = "[500.0, 1000.0]", deflection: str = "[1e-6, 2e-6]") -> str:
+    return f"[[pads]]\npad = {number}\nforce_N = {force}\ndeflection_m = {deflection}\n"
+
+
+def test_file_is_read_pad_by_pad(tmp_path, rocker):
+    path = tmp_path / "pivots.toml"
+    path.write_text(pivots_file("".join(pad_table(k) for k in (3, 1, 2, 5, 4))), encoding="utf-8")
+    laws = pivot_laws(path, rocker)
+    assert len(laws) == 5
+    assert laws[0].deflection(750.0) == pytest.approx(1.5e-6)
+    again = pivot_laws(str(path), rocker)
+    assert [law.deflection(1234.0) for law in again] == [law.deflection(1234.0) for law in laws]
+    assert again != laws  # curves compare by identity, without an error about arrays
+    assert len({*laws, *laws}) == 5
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("schema = 1 2", "cannot be read"),
+        (pivots_file(pad_table(1), "tpjb-pivots/9"), "schema"),
+        (pivots_file(""), "no \\[\\[pads\\]\\]"),
+        (pivots_file("".join(pad_table(k) for k in (1, 2, 4, 5))), "Measure pad #3"),
+        (pivots_file("".join(pad_table(k) for k in range(1, 7))), "needs 1 to 5"),
+        (pivots_file(pad_table(1, force="[2.0, 1.0]")), "rise strictly"),
+        (pivots_file(pad_table(1, force='["a", "b"]')), "pad 1"),
+        (pivots_file("[[pads]]\npad = 1\n"), "force_N"),
+        (pivots_file('[[pads]]\npad = "one"\n'), "must be a number from 1"),
+    ],
+)
+def test_broken_files_say_what_and_where(tmp_path, text, message):
+    path = tmp_path / "pivots.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(BearingError, match=message):
+        load_pivots(path, 5)
