@@ -61,7 +61,8 @@ class Instruments:
 
         def one(omega: float) -> ComplexArray:
             share = 1.0 / (1.0 - self.housing_mass * omega**2 / np.array(self.cell_stiffness))
-            return np.eye(2) + (np.asarray(gain) - np.eye(2)) * share[None, :] + 0j
+            part = (np.asarray(gain) - np.eye(2)) * share[None, :]
+            return np.asarray(np.eye(2) + part, dtype=np.complex128)
 
         return replace(self, force=(*self.force, one))
 
@@ -81,7 +82,7 @@ class Instruments:
 
 
 def _product(maps: tuple[SensorMap, ...], omega: float) -> ComplexArray:
-    total = np.eye(2, dtype=complex)
+    total: ComplexArray = np.eye(2, dtype=np.complex128)
     for one in maps:
         total = np.asarray(np.asarray(one(omega)) @ total, dtype=np.complex128)
     return total
