@@ -217,7 +217,9 @@ def _result(
     condition = displacement_condition(table.D, joint)
     all_weights = np.zeros((len(table.valid), 2))
     all_weights[table.valid] = per_axis
-    found = [c for c in (_ill_conditioned(condition), _many_rejected(joint)) if c is not None]
+    used = len(np.unique(table.direction[joint > 0]))
+    checks = (_ill_conditioned(condition), _many_rejected(joint), _no_spare(used))
+    found = [c for c in checks if c is not None]
     return DynamicStiffness(
         h * table.h_scale,
         omega,
@@ -228,7 +230,7 @@ def _result(
         merged(conditions, tuple(found)),
         condition,
         chi_square,
-        4 * (len(np.unique(table.direction[joint > 0])) - 2),
+        4 * (used - 2),
     )
 
 
@@ -236,6 +238,14 @@ def _ill_conditioned(condition: float) -> Condition | None:
     if condition <= MAX_CONDITION:
         return None
     return Condition("ill-conditioned", f"condition number {condition:.3g} of the displacement directions > 30")
+
+
+def _no_spare(directions: int) -> Condition | None:
+    if directions != 2:
+        return None
+    return Condition(
+        "no-spare-direction", "two directions only: the interval cannot see what runs differ by, only their repeats"
+    )
 
 
 def _many_rejected(weights: FloatArray) -> Condition | None:

@@ -214,7 +214,7 @@ def identify_point(
     conditions = merged(
         *(run.conditions for run in data.runs),
         best.status,
-        flags(best, figure, size, settings.clearance),
+        flags(data, best, figure, size, settings.clearance),
         () if pattern is None else (pattern,),
         () if linearity is None else linearity.condition(),
         disagreement(by_method, settings.method),
