@@ -125,11 +125,10 @@ class EffectKind:
 def _number(value: Any, parameter: Parameter, where: str) -> float:
     if isinstance(value, str):
         value = parse_quantity(value, parameter.dimension, where)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        if hasattr(value, "__float__"):
-            value = float(value)
-        else:
-            raise EffectError(f"{where}: must be a number [{parameter.unit}], got {value!r}.")
+    if isinstance(value, bool) or not hasattr(value, "__float__"):
+        raise EffectError(f"{where}: must be a number [{parameter.unit}], got {value!r}.")
+    if not isinstance(value, (int, float)):
+        value = float(value)
     if not parameter.low <= value <= parameter.high:
         bounds = f"{parameter.low:g} to {parameter.high:g} [{parameter.unit}]"
         raise EffectError(f"{where}: {value:g} is outside the physical range {bounds}.")
