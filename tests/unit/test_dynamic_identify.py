@@ -228,3 +228,63 @@ def test_conditions_compare_by_name_and_survive_pickling():
     again = pickle.loads(pickle.dumps(c))
     assert (again, again.detail) == (c, c.detail)
     assert c.sentence() == "low-coherence: coherence 0.5 < 0.9"
+
+
+def test_an_executor_changes_no_number_even_when_jobs_are_lost(campaign, result):
+    from concurrent.futures import Executor, Future
+
+    class Pool(Executor):
+        """Runs jobs at once in this process, and loses every third with its worker."""
+
+        def __init__(self) -> None:
+            self.jobs = 0
+
+        def submit(self, fn, /, *args, **kwargs):
+            future: Future = Future()
+            self.jobs += 1
+            if self.jobs % 3 == 0:
+                future.set_exception(ConnectionError("worker lost"))
+            else:
+                future.set_result(fn(*args, **kwargs))
+            return future
+
+    pool = Pool()
+    spread = identify(campaign, IdentifySettings(methods=()), executor=pool)
+    assert pool.jobs == 18
+    for a, b in zip(spread.points, result.points):
+        np.testing.assert_array_equal(a.stiffness.h, b.stiffness.h)
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_the_record():
+    import tracemalloc
+
+    from rigdata.record import VectorRecord
+    from tests.benchmarks.bench_phasors import HeldRun
+
+    class Stream(HeldRun):
+        """Makes its samples when they are asked for."""
+
+        def __post_init__(self) -> None:
+            super().__post_init__()
+            self.block = {q: values[:50_000] for q, values in self.data.items()}
+            self.length = 6_000_000
+            self.data.clear()
+
+        def vector(self, quantity, start=None, stop=None):
+            index = np.arange(*slice(start, stop).indices(self.length))
+            time = index / self.sample_rate
+            return VectorRecord(quantity, self.block[quantity][index % 50_000], time, self.sample_rate, ("A", "B"))
+
+        def speed(self, start=None, stop=None):
+            return None
+
+    stream = Stream("long", 1, seconds=5.0)  # 5 s of lines that fit into the block a whole number of times
+    whole = 3 * 2 * 8 * stream.length
+    tracemalloc.start()
+    phasors = run_phasors(stream, 30.0, PhasorSettings())
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(phasors.start) > 50
+    assert peak < 0.25 * whole
+    assert peak < 80e6

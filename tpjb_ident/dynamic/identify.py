@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,11 +21,9 @@ from tpjb_ident.dynamic.point_data import PointData, gather
 from tpjb_ident.dynamic.point_result import PointResult
 from tpjb_ident.dynamic.quality import amplitude, coherence, directional_pattern, flags, rejected_windows
 from tpjb_ident.dynamic.rlm import RlmSettings
-from tpjb_ident.dynamic.run_phasors import PhasorSettings, RunPhasors, run_phasors
+from tpjb_ident.dynamic.run_jobs import Progress, all_runs
+from tpjb_ident.dynamic.run_phasors import PhasorSettings, RunPhasors
 from tpjb_ident.dynamic.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.windows import RecordTooShortError
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,10 @@ class IdentifySettings:
 
 
 def identify(
-    campaign: Any, settings: IdentifySettings | None = None, progress: Progress | None = None
+    campaign: Any,
+    settings: IdentifySettings | None = None,
+    progress: Progress | None = None,
+    executor: Executor | None = None,
 ) -> Identification:
     """Identify every operating point of a campaign.
 
@@ -70,6 +71,8 @@ def identify(
     settings : IdentifySettings, optional
     progress : callable, optional
         Called as progress(text, done, total).
+    executor : concurrent.futures.Executor, optional
+        Spreads the reading of runs over processes or machines; the numbers are the same.
 
     Returns
     -------
@@ -89,21 +92,10 @@ def identify(
     if not runs:
         raise ValueError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     tell = progress or (lambda text, done, total: None)
-    extracted = []
-    temperatures: dict[str, dict[int, float]] = {}
-    for i, run in enumerate(runs):
-        tell(run.id, i, len(runs))
-        extracted.append(_extract(run, campaign.housing_mass, settings.phasors))
-        temperatures[run.id] = mean_temperatures(run)
+    results = all_runs(campaign, settings.phasors, tell, executor)
     tell("estimating", len(runs), len(runs))
-    return assemble(campaign, extracted, temperatures, settings)
-
-
-def _extract(run: Any, housing_mass: float, settings: PhasorSettings) -> RunPhasors:
-    try:
-        return run_phasors(run, housing_mass, settings)
-    except RecordTooShortError as error:
-        raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
+    temperatures = {result.phasors.run: result.temperatures for result in results}
+    return assemble(campaign, [result.phasors for result in results], temperatures, settings)
 
 
 def assemble(
@@ -255,16 +247,6 @@ def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[
     if not found:
         return ()
     return (Condition("methods-disagree", f"{', '.join(found)} away from {default}"),)
-
-
-def mean_temperatures(run: Any) -> dict[int, float]:
-    """Mean temperature per pad over a run [K]; pads with several sensors give their mean."""
-    sums: dict[int, list[float]] = {}
-    for sensor in run.temperatures():
-        values = run.record(sensor.channel, 0, 2**17).values
-        if sensor.pad is not None and np.isfinite(values).any():
-            sums.setdefault(sensor.pad, []).append(float(np.nanmean(values)))
-    return {pad: float(np.mean(values)) for pad, values in sorted(sums.items())}
 
 
 def _pad_means(runs: list[dict[int, float]]) -> dict[int, float]:
