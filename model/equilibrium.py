@@ -15,7 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.acceleration import Anderson
-from model.carrying import find_branch, leave_unstable, longest_step, set_loaded, shed_pads, shorten, wake_or_rest
+from model.carrying import (
+    MAX_FLIPS,
+    find_branch,
+    leave_unstable,
+    longest_step,
+    set_loaded,
+    shed_pads,
+    shorten,
+    wake_or_rest,
+)
 from model.film import solve_film
 from model.kernel import compiled
 from model.pad_bending import bend
@@ -207,7 +216,9 @@ def _iterate(search: _Search) -> Equilibrium:
             _set_state(search, memory.next(before, _state(search)))
         else:
             memory.reset()
-    return _result(search, iteration, residual, heat_change, ("not converged",))
+    restless = [str(f.number) for f in search.films if f.flips >= MAX_FLIPS]
+    names = (f"pads {', '.join(restless)} take up and shed their load",) if restless else ()
+    return _result(search, iteration, residual, heat_change, (*names, "not converged"))
 
 
 #: Scale of lengths in the state that is accelerated [m]: a micrometre weighs as much as a kelvin.
