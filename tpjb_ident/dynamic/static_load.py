@@ -4,7 +4,7 @@ The load misses its set point a little differently in every run, and coefficient
 cells measure the miss of each run; the campaign's other loads tell the slope dH/d(ln W). So every
 run's forces are brought to the set point before the estimate: F - (dH/dlnW) * miss * D.
 
-What the cells say is taken relative to the campaign's own median: a gain error of the cells would
+What the cells say is taken relative to the campaign's own mean: a gain error of the cells would
 look like a miss of all runs alike, and the set point is met by the actuators' own transducers.
 Misses in direction are not corrected (their slope cannot be measured by such a campaign); they stay
 in the scatter between runs and so in the interval.
@@ -39,10 +39,13 @@ class LoadMiss:
         (W - W_set) / W_set along the load direction, relative to the campaign.
     sideways : (n_runs,) ndarray
         The same across it [rad].
+    uncertainty : float
+        Standard error of the campaign's ratio, which is common to all sizes.
     """
 
     size: FloatArray
     sideways: FloatArray
+    uncertainty: float = 0.0
 
 
 def load_ratio(data: PointData) -> ComplexArray:
@@ -55,17 +58,23 @@ def load_ratio(data: PointData) -> ComplexArray:
 
 
 def load_misses(points: list[PointData]) -> tuple[list[LoadMiss], complex]:
-    """Misses of all runs relative to the campaign, and the campaign's own ratio (cell gain, rotation)."""
+    """Misses of all runs relative to the campaign, and the campaign's own ratio (cell gain, rotation).
+
+    The ratio is the mean over the runs without outliers; what it is uncertain by, all misses are.
+    """
     ratios = [load_ratio(data) for data in points]
-    everything = np.concatenate(ratios)
-    known = everything[np.isfinite(everything)]
-    common = complex(np.median(known.real), np.median(known.imag)) if len(known) else complex(1.0)
-    if not 0.5 < abs(common) < 2.0:
-        common = complex(1.0)
+    known = np.concatenate(ratios)
+    known = known[np.isfinite(known)]
+    if not len(known) or not 0.5 < abs(np.median(known.real)) < 2.0:
+        return [LoadMiss(np.zeros(len(r)), np.zeros(len(r)), 0.0) for r in ratios], complex(1.0)
+    distance = np.abs(known - (np.median(known.real) + 1j * np.median(known.imag)))
+    inner = known[distance <= 4 * np.median(distance) + 1e-12]
+    common = complex(inner.mean())
+    uncertainty = float(inner.real.std() / np.sqrt(len(inner)))
     misses = []
     for ratio in ratios:
         relative = np.nan_to_num(ratio / common - 1.0)
-        misses.append(LoadMiss(relative.real, relative.imag))
+        misses.append(LoadMiss(relative.real, relative.imag, uncertainty))
     return misses, common
 
 
@@ -141,11 +150,14 @@ def to_set_point(data: PointData, miss: LoadMiss, slope: ComplexArray | None) ->
 
 
 def widened(est: DynamicStiffness, miss: LoadMiss, slope: ComplexArray | None) -> DynamicStiffness:
-    """Add what a known mean miss may have done where the slope is not known."""
-    if slope is not None or not np.isfinite(est.h).all():
+    """Add what is not known of the miss, or what a known one may have done where the slope is not known."""
+    if not np.isfinite(est.h).all():
         return est
-    shift = UNKNOWN_EXPONENT * abs(float(miss.size.mean())) * np.abs(est.vector)
-    return replace(est, covariance=est.covariance + np.diag(shift**2))
+    if slope is None:
+        shift = UNKNOWN_EXPONENT * abs(float(miss.size.mean())) * np.abs(est.vector)
+        return replace(est, covariance=est.covariance + np.diag(shift**2))
+    shift = miss.uncertainty * np.concatenate([slope.real.ravel(), slope.imag.ravel()])
+    return replace(est, covariance=est.covariance + np.outer(shift, shift))
 
 
 def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
