@@ -26,6 +26,7 @@ FloatArray = NDArray[np.float64]
 
 FEWEST_BLOCKS = 4  # per pad
 IRREGULAR = 3.0  # standard errors
+DISAGREES = 0.1  # share: a shaft that slides into its corner slowly makes up for some per cent
 
 
 @dataclass(frozen=True)
@@ -227,7 +228,7 @@ def _status(fit: SideFit, clearance: FloatArray, se: FloatArray, reached: int) -
         found.append(f"pads-not-reached: {missing}")
     if np.isnan(fit.scale):
         found.append("give-from-sweep: no pivot curves, zero load extrapolated from the sweep alone")
-    elif abs(fit.scale - 1.0) > IRREGULAR * fit.scale_se:
+    elif abs(fit.scale - 1.0) > max(IRREGULAR * fit.scale_se, DISAGREES):
         found.append(f"pivots-disagree: they give {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say")
     spread = np.abs(clearance - np.nanmedian(clearance))
     # below half a micrometre a difference between pads is of no consequence, however well it is measured
@@ -240,49 +241,3 @@ def _status(fit: SideFit, clearance: FloatArray, se: FloatArray, reached: int) -
     if fit.misfit > 4.0:
         found.append("misfit: the scatter exceeds the noise")
     return tuple(found)
-
-
-@dataclass(frozen=True)
-class RadialStiffness:
-    """Pivot stiffness from two sweeps with different push loads.
-
-    Attributes
-    ----------
-    load : float
-        Middle of the two push loads [N].
-    stiffness, stiffness_se : (n,) ndarray
-        Difference of load over difference of pushed position, per pad [N/m].
-    """
-
-    load: float
-    stiffness: FloatArray
-    stiffness_se: FloatArray
-
-
-def radial_stiffness(light: ClearancePolygon, heavy: ClearancePolygon) -> RadialStiffness:
-    """Secant between two push loads of the same bearing, same condition.
-
-    Parameters
-    ----------
-    light, heavy : ClearancePolygon
-        Measured with the smaller and the larger push load.
-
-    Returns
-    -------
-    RadialStiffness
-
-    Raises
-    ------
-    ValueError
-        When the push loads are not clearly different.
-    """
-    rise = heavy.push_load - light.push_load
-    if rise <= 0.2 * light.push_load:
-        raise ValueError(
-            f"push loads must differ by a fifth at least, got {light.push_load:.0f} and {heavy.push_load:.0f} N"
-        )
-    # one zero for both: the pushed sides move outward from where the light push held them
-    give = heavy.clearance_pushed - light.clearance_pushed + normals(light.angles) @ (heavy.centre - light.centre)
-    se = np.hypot(heavy.clearance_pushed_se, light.clearance_pushed_se)
-    stiffness = rise / give
-    return RadialStiffness(0.5 * (heavy.push_load + light.push_load), stiffness, np.abs(stiffness / give) * se)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,8 +20,9 @@ from rigdata.virtual_rig import (
     VirtualRig,
     write_campaign,
 )
-from tpjb_ident.clearance import measure_clearance, measure_clearances, radial_stiffness
+from tpjb_ident.clearance import measure_clearance, measure_clearances
 from tpjb_ident.pivot import fit_pivots
+from tpjb_ident.polygon_pairs import clearance_change, radial_stiffness
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 CLEARANCE = np.array([80.0, 80.0, 86.0, 80.0, 80.0]) * 1e-6
@@ -89,6 +92,19 @@ def test_two_push_loads_give_the_radial_stiffness(whole):
     assert pair.load == pytest.approx(500.0, rel=0.02)
     with pytest.raises(ValueError, match="push loads must differ"):
         radial_stiffness(light, light)
+
+
+def test_a_bearing_that_grew_shows_it_on_every_pad(whole, tmp_path):
+    source, _, curves = whole
+    hot, _ = made(tmp_path / "hot.h5", clearance=tuple(CLEARANCE + 6e-6))
+    cold = measure_clearance(source, ANGLES, curves)
+    change = clearance_change(cold, measure_clearance(hot, ANGLES, curves))
+    assert change.mean == pytest.approx(6e-6, abs=0.15e-6)
+    assert change.per_pad == pytest.approx(6e-6, abs=0.3e-6)
+    assert 0.0 < change.mean_se < 0.2e-6
+    assert np.abs(change.centre_shift).max() < 1e-6
+    with pytest.raises(ValueError, match="one bearing"):
+        clearance_change(cold, replace(cold, angles=ANGLES + 0.1))
 
 
 def test_without_curves_zero_load_is_extrapolated(whole):

@@ -92,6 +92,7 @@ def test_a_repeated_direction_shows_the_drift(campaign):
 def moved(run):
     class Moved:
         id, file, kind, point, channels = "again", run.file, "locus", run.point, run.channels
+        sample_rate = run.sample_rate
 
         def record(self, name):
             return run.record(name)

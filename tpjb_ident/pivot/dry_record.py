@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,7 @@ FloatArray = NDArray[np.float64]
 FEWEST_SAMPLES = 50
 MOST_LOST = 0.5  # share of samples lost to gaps and glitches above which a record is refused
 FEWEST_BLOCKS = 8
+UNDITHERED = 0.3  # share of samples that differ from the one before, below which noise does not reach a step
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,8 @@ class DryRecord:
         The same on the pad's axes.
     lost : float
         Share of samples left out.
+    quantisation : float
+        Standard deviation [m] of what the converter's steps add to a whole hold; zero where noise smears them.
     """
 
     run: Run
@@ -55,6 +59,7 @@ class DryRecord:
     blocks: Blocks
     projection: Projection
     lost: float
+    quantisation: float
 
 
 def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> DryRecord:
@@ -94,7 +99,7 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
     if len(blocks) < FEWEST_BLOCKS:
         what = f"gives only {len(blocks)} usable averages of {settings.block:g} s"
         raise refusal(run, "record", what, "Record for longer, or set a shorter block")
-    return DryRecord(run, run.pad, angle, holds, blocks, project(blocks, angle), samples.lost)
+    return DryRecord(run, run.pad, angle, holds, blocks, project(blocks, angle), samples.lost, _quantisation(samples))
 
 
 def _samples(run: Run, angle: float, settings: PivotSettings) -> Samples:
@@ -113,6 +118,18 @@ def _samples(run: Run, angle: float, settings: PivotSettings) -> Samples:
         order = np.argsort(time, kind="stable")
         time, load, position = time[order], load[order], position[order]
     return Samples(time, load, position, np.asarray(load @ pad_axes(angle)[0]), lost)
+
+
+def _quantisation(samples: Samples) -> float:
+    """Error of a level [m] that stands between two steps of the converter, where no noise dithers it."""
+    worst = 0.0
+    for column in samples.displacement.T:
+        moves = np.abs(np.diff(column))
+        # two channels turned into X and Y leave rounding residues: those are no steps
+        real = moves > 1e-6 * np.ptp(column)
+        if real.any() and real.mean() < UNDITHERED:
+            worst = max(worst, float(np.min(moves[real])) / math.sqrt(6.0))
+    return worst
 
 
 def refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:

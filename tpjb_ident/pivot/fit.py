@@ -31,6 +31,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 REFERENCE_SHARE = 0.4  # reference load of the laws, as a share of the largest load
+MODEL_ERROR = 3e-4  # of the deflection: what averaging over a curved law leaves; matters in computed records only
 UNKNOWN_ZERO = 2.0e-5  # [m], spread of the reading at zero load from run to run of one pad
 LAWS: dict[str, Law] = {
     law.name: law for law in (HertzLine(), HertzPoint(), Power(), Linear(), PointInSeries(), Bilinear(), SplineLaw())
@@ -153,8 +154,14 @@ def _fit_data(
         blocks = record.blocks.take(mask)
         part = slice(at, at + len(blocks))
         covariance[part, part] = noise.covariance(blocks.time, blocks.duration) + np.diag(
-            (compliance * blocks.load_spread) ** 2 + (settings.lag_allowance * compliance * blocks.rate) ** 2
+            (compliance * blocks.load_spread) ** 2
+            + (settings.lag_allowance * compliance * blocks.rate) ** 2
+            + (MODEL_ERROR * float(np.ptp(deflection))) ** 2
         )
+        one_level = (blocks.hold[:, None] == blocks.hold[None, :]) & (blocks.hold >= 0) | np.eye(
+            len(blocks), dtype=bool
+        )
+        covariance[part, part] += record.quantisation**2 * one_level
         if len(records) > 1:
             covariance[part, part] += UNKNOWN_ZERO**2
         at += len(blocks)

@@ -35,20 +35,34 @@ def refuse_flat_channels(run: Run) -> None:
         Names every such channel, from when on, and for how long.
     """
     problems = []
-    for name, channel in run.channels.items():
-        if channel.quantity not in ("force", "displacement"):
+    for quantity in ("force", "displacement"):
+        seen = {name: _statistics(run, name) for name, c in run.channels.items() if c.quantity == quantity}
+        if any(_repeated(s) > NOISE_FREE for s in seen.values() if not s.constant):
+            # noise below the converter's step: standing still says nothing here
             continue
-        record = run.record(name)
-        seen = ChannelStatistics()
-        seen.add(np.asarray(record.values))
-        others = max(seen.values - seen.longest_flat, 1)
-        repeated = (seen.repeats - seen.longest_flat + 1) / others
-        if repeated > NOISE_FREE or seen.longest_flat < max(SHORTEST, TIMES_EXPECTED * seen.expected_flat()):
-            continue
-        start, share = float(record.time[seen.flat_start]), seen.longest_flat / max(seen.samples, 1)
-        how_long = f"from {start:.2f} s on for {100 * share:.0f} % of the run"
-        what = f"run {run.id}: stands still {how_long}: stuck, clipped or dead"
-        cure = "Check sensor, range and logger, and repeat the run"
-        problems.append(Problem("error", run.file, f"channel {name}", what, cure, run=run.id))
+        problems += [_problem(run, name, s) for name, s in seen.items() if _stands_still(s)]
     if problems:
         raise RigDataError(problems)
+
+
+def _statistics(run: Run, name: str) -> ChannelStatistics:
+    seen = ChannelStatistics()
+    seen.add(np.asarray(run.record(name).values))
+    return seen
+
+
+def _repeated(seen: ChannelStatistics) -> float:
+    """Share of samples equal to the one before, apart from the longest stretch."""
+    return (seen.repeats - seen.longest_flat + 1) / max(seen.values - seen.longest_flat, 1)
+
+
+def _stands_still(seen: ChannelStatistics) -> bool:
+    return seen.longest_flat >= max(SHORTEST, TIMES_EXPECTED * seen.expected_flat())
+
+
+def _problem(run: Run, name: str, seen: ChannelStatistics) -> Problem:
+    start, share = seen.flat_start / run.sample_rate, seen.longest_flat / max(seen.samples, 1)
+    how_long = f"from {start:.2f} s on for {100 * share:.0f} % of the run"
+    what = f"run {run.id}: stands still {how_long}: stuck, clipped or dead"
+    cure = "Check sensor, range and logger, and repeat the run"
+    return Problem("error", run.file, f"channel {name}", what, cure, run=run.id)

@@ -15,6 +15,9 @@ from scipy import ndimage
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
+ROUNDING = 1e-9  # of the reading, for a component that does not move at all
+SMALLEST = 1e-4  # of the range: in a computed record without noise rounding is no glitch
+NOTHING = 1e-15  # [m] or [N]: below what any sensor knows
 THRESHOLD = 7.0  # noise standard deviations beyond both medians
 
 
@@ -68,6 +71,7 @@ def _noise(x: FloatArray, median: FloatArray) -> float:
     """Robust standard deviation about the running median, never below the recording's resolution."""
     spread = 1.4826 * float(np.median(np.abs(x - median)))
     steps = np.abs(np.diff(x))
-    steps = steps[steps > 0]
+    # two converters turned into X and Y leave rounding residues: those are no steps
+    steps = steps[steps > 1e-6 * np.ptp(x)]
     resolution = float(np.min(steps)) if len(steps) else 0.0
-    return max(spread, resolution / np.sqrt(12.0))
+    return max(spread, resolution / 2.0, SMALLEST * float(np.ptp(x)), ROUNDING * float(np.max(np.abs(x))), NOTHING)

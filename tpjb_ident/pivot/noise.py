@@ -21,6 +21,7 @@ from scipy import optimize
 
 FloatArray = NDArray[np.float64]
 
+DRIFT_OVER_FLICKER = 0.7  # [1/sqrt(s)], drift rate to be expected over the square root of the 1/f power density
 # time constants [s] of the exponentially correlated processes whose sum has a 1/f spectrum from some 5 mHz
 # to 5 Hz
 FLICKER_TIMES = 0.05 * 4.0 ** np.arange(7)
@@ -168,14 +169,16 @@ def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float) -> NoiseMod
     def objective(logs: FloatArray) -> float:
         w, f, d = np.exp(np.clip(logs, -30.0, 30.0))
         total = sum(r.minus_log_likelihood(w, f, d) for r in rotated)
-        # a level that the data do not feel (no 1/f at all) must not run away to minus infinity
-        return total + 0.5 * (logs[2] - prior) ** 2 + 0.5 * (logs[1] / 5.0) ** 2 + 0.5 * (logs[0] / 5.0) ** 2
+        # probes that flicker more drift more; beyond that, a level that the data do not feel (no 1/f at all) must
+        # not run away to minus infinity
+        expected = 0.5 * np.log(np.exp(2.0 * prior) + DRIFT_OVER_FLICKER**2 * f)
+        return total + 0.5 * (logs[2] - expected) ** 2 + 0.5 * (logs[1] / 5.0) ** 2 + 0.5 * (logs[0] / 5.0) ** 2
 
     found = optimize.minimize(
         objective,
         np.array([0.0, 0.0, prior]),
         method="Nelder-Mead",
-        options={"xatol": 0.05, "fatol": 0.05, "maxiter": 600, "initial_simplex": _simplex(prior)},
+        options={"xatol": 0.05, "fatol": 0.05, "maxiter": 150, "initial_simplex": _simplex(prior)},
     )
     w, f, d = np.exp(found.x)
     return NoiseModel(white=float(w * white), flicker=float(f * white), drift=float(d * unit))
