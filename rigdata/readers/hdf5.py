@@ -14,6 +14,7 @@ import numpy as np
 from rigdata.calibration import Channel
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, FloatArray, rate_of_time, undescribed
+from rigdata.readers.hdf5_heaps import broken_heap
 from rigdata.readers.hdf5_links import has_link, resolve
 
 #: Filters that the HDF5 library brings along; any other would load foreign code.
@@ -70,6 +71,13 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
     RigDataError
         No HDF5 file, no manifest, or no text.
     """
+    try:
+        heap = broken_heap(path)
+    except OSError as error:
+        raise _refuse(file, "", f"cannot be read ({error.strerror or error})", "Check the path") from error
+    if heap is not None:
+        what = "the file is damaged: its store of texts cannot be walked"
+        raise _refuse(file, f"byte {heap}", what, "Copy the file again from the rig")
     with open_readonly(path, file) as handle:
         if "manifest" not in handle.attrs:
             raise _refuse(file, "root attribute manifest", "is missing", "Store campaign.toml's text there")
@@ -262,7 +270,8 @@ class Hdf5Reader:
                 if dataset.shape[0] != length:
                     what = f"has {dataset.shape[0]} samples, the others {length}"
                     raise self._error(f"dataset {name}", what, "Store all channels of a run with one length")
-                columns.append(np.asarray(dataset[start:stop], dtype=np.float64))
+                with np.errstate(invalid="ignore"):  # a signalling NaN is a missing value as well
+                    columns.append(np.asarray(dataset[start:stop], dtype=np.float64))
             return columns
 
     def time(self, start: int, stop: int) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigdata.calibration import Channel, reading_gain, reading_zero
@@ -85,6 +85,7 @@ def test_readings_are_not_changed():
     assert readings.tolist() == [1.0, 2.0]
 
 
+@settings(max_examples=40, deadline=None)
 @given(st.floats(1e-6, 1e6), st.floats(-1e3, 1e3), st.sampled_from([1, -1]), st.floats(-1e3, 1e3))
 def test_to_reading_undoes_to_si(gain, zero, polarity, reading):
     channel = Channel("X", "displacement", "V", gain=gain, zero=zero, polarity=polarity)

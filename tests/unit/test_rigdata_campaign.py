@@ -309,7 +309,7 @@ def test_raw_data_is_not_touched(tmp_path):
 
 
 @given(st.text(max_size=40))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 def test_no_name_ever_leaves_the_folder(tmp_path_factory, name):
     root = tmp_path_factory.getbasetemp().resolve()
     try:

@@ -40,7 +40,7 @@ def seen(*blocks) -> ChannelStatistics:
     st.lists(st.sampled_from([0.0, 1.0, 2.0, math.nan, 1e300]), min_size=1, max_size=60),
     st.lists(st.integers(0, 60), max_size=4),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_statistics_do_not_depend_on_the_blocks(values, cuts):
     whole = seen(values)
     pieces = seen(*[values[a:b] for a, b in zip([0, *sorted(cuts)], [*sorted(cuts), len(values)])])

@@ -315,7 +315,7 @@ CELLS = st.one_of(
     end=st.sampled_from(["\n", "\r\n"]),
     preamble=st.lists(st.text(st.characters(codec="cp1252", categories=["L", "N", "P"]), max_size=20), max_size=3),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_what_is_written_is_read(tmp_path_factory, rows, delimiter, comma, end, preamble):
     """Any mixture of numbers and gaps, in any dialect, comes back; a first row to tell decimals by."""
     rows = [("0.25", "-1.5"), *rows]
@@ -337,7 +337,7 @@ def _number(cell: str) -> float:
 
 
 @given(st.binary(max_size=400))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_any_bytes_are_read_or_refused(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("b")
     run = make(folder, b"X1A;X1B\n1,5;2\n2,5;3\n" + data, time=False)

@@ -309,3 +309,27 @@ def test_nothing_is_written_and_no_file_stays_open(tmp_path):
 def test_display_name_and_limits_are_documented():
     assert 1 in hdf5._FILTERS
     assert 32015 not in hdf5._FILTERS
+
+
+def test_heap_that_the_library_would_walk_for_ever(tmp_path):
+    """One wrong byte: the free space of the heap that holds the manifest claims size zero."""
+    path = tmp_path / "c.h5"
+    make(path)
+    data = bytearray(path.read_bytes())
+    at = data.index(b"GCOL") + 16
+    index, need = int.from_bytes(data[at : at + 2], "little"), int.from_bytes(data[at + 8 : at + 16], "little")
+    while index:
+        at += 16 + (need + 7) // 8 * 8
+        index, need = int.from_bytes(data[at : at + 2], "little"), int.from_bytes(data[at + 8 : at + 16], "little")
+    data[at + 8 : at + 16] = bytes(8)
+    path.write_bytes(bytes(data))
+    with pytest.raises(RigDataError, match="damaged"):
+        rigdata.load_campaign(path)
+
+
+def test_signalling_nan_is_missing(tmp_path):
+    make(tmp_path / "c.h5")
+    with change(tmp_path / "c.h5") as file:
+        del file["runs/c-1/X1A"]
+        file["runs/c-1/X1A"] = np.full(N, 0x7F800001, dtype="u4").view("f4")
+    assert np.isnan(rigdata.load_campaign(tmp_path / "c.h5").run("c-1").record("X1A").values).all()

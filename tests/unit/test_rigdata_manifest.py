@@ -237,7 +237,7 @@ LINES = GOOD.splitlines()
 
 
 @given(st.data())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_mutated_manifests_parse_or_tell_their_problems(data):
     """Lines dropped, doubled, swapped or with a piece replaced: a manifest or named problems, nothing else."""
     lines = list(LINES)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigdata.vector import solve_vector
 
 
+@settings(max_examples=40, deadline=None)
 @given(st.floats(-7, 7), st.floats(0.1, 3.0), st.floats(-1, 1), st.floats(-1, 1))
 def test_any_two_angles(first, apart, x, y):
     axes = np.array([first, first + apart])
