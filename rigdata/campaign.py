@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
+import os
 import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,6 +20,7 @@ from rigdata.safe_path import inside
 
 MANIFEST_NAME = "campaign.toml"
 HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
+RECORD_SUFFIXES = (".csv", ".txt", ".asc", ".dat", ".tsv")
 _MAX_BEARING = 2**20
 
 
@@ -92,6 +95,8 @@ def _sha256(path: Path) -> str:
                 digest.update(block)
     except (FileNotFoundError, IsADirectoryError):
         return "missing"
+    except OSError as error:
+        raise _cannot(path.name, f"cannot be read ({error.strerror})", "Check the rights of the file") from error
     return digest.hexdigest()
 
 
@@ -114,24 +119,31 @@ def load_campaign(path: str | Path) -> Campaign:
     """
     given = Path(path)
     try:
-        is_folder, exists = given.is_dir(), given.exists()
-    except (OSError, ValueError) as error:  # a name too long, or with a NUL
-        raise _cannot(str(path)[:100], f"is not a usable path ({type(error).__name__})", "Check the path") from error
-    if not exists:
-        raise _cannot(str(path), "there is no such file or folder", "Check the path")
-    if is_folder:
-        manifest = given / MANIFEST_NAME
-        if not manifest.is_file():
-            inside_it = [p.name for p in given.iterdir() if p.suffix.lower() in HDF5_SUFFIXES][:3]
-            hint = f", or one of its HDF5 files ({', '.join(inside_it)})" if inside_it else ""
-            cure = f"Give the folder that holds campaign.toml{hint}"
-            raise _cannot(str(path), f"the folder has no {MANIFEST_NAME}", cure)
-        return _load_folder(given, manifest)
-    if given.suffix.lower() == ".toml":
-        return _load_folder(given.parent, given)
-    if given.suffix.lower() in {".csv", ".txt", ".asc", ".dat"}:
-        raise _cannot(str(path), "is a record, not a campaign", "Give the folder that holds campaign.toml")
-    return _load_hdf5(given)
+        kind = _kind_of(given)
+    except (OSError, ValueError) as error:  # a name too long or with a NUL, a folder that may not be entered
+        what = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
+        raise _cannot(str(path)[:100], what, "Check the path and its rights") from error
+    if kind == "folder":
+        return _load_folder(given, given / MANIFEST_NAME)
+    return _load_folder(given.parent, given) if kind == "manifest" else _load_hdf5(given)
+
+
+def _kind_of(given: Path) -> str:
+    """Tell what `given` is: "folder", "manifest" or "hdf5"; refuse what is none of these."""
+    if given.is_dir():
+        if (given / MANIFEST_NAME).exists():
+            return "folder"
+        inside_it = [p.name for p in itertools.islice(given.iterdir(), 1000) if p.suffix.lower() in HDF5_SUFFIXES][:3]
+        hint = f", or one of its HDF5 files ({', '.join(inside_it)})" if inside_it else ""
+        cure = f"Give the folder that holds {MANIFEST_NAME}{hint}"
+        raise _cannot(str(given), f"the folder has no {MANIFEST_NAME}", cure)
+    if not given.exists():
+        raise _cannot(str(given)[:200], "there is no such file or folder", "Check the path")
+    if not given.is_file():
+        raise _cannot(str(given), "is not an ordinary file", f"Give a folder with {MANIFEST_NAME} or an HDF5 file")
+    if given.suffix.lower() in RECORD_SUFFIXES:
+        raise _cannot(str(given), "is a record, not a campaign", f"Give the folder that holds {MANIFEST_NAME}")
+    return "manifest" if given.suffix.lower() == ".toml" else "hdf5"
 
 
 def _cannot(file: str, what: str, cure: str) -> RigDataError:
@@ -187,7 +199,7 @@ def _bearing_text(folder: Path, manifest: Manifest, file: str, files: dict[str, 
     except RigDataError as error:
         problems.extend(error.problems)
         return ""
-    if not path.is_file():
+    if not os.path.isfile(path):
         what = f"the bearing file {manifest.bearing!r} is not in the folder"
         problems.append(Problem("warning", file, "bearing", what, "Add it, or give --bearing where one is needed"))
         return ""

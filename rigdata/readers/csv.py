@@ -125,11 +125,18 @@ class CsvReader:
         key = (*signature, *names) if large else signature
         table = self.cache.get(key)
         if table is None:
-            dialect = self.dialect()
-            wanted = [n for n in dialect.names if n in self.channels and self.channels[n].quantity != "ignore"]
-            if large:
-                wanted = [n for n in wanted if n in names] or wanted[:1]
-            table = read_table(Source(self.path, self.file, self.run, dialect, self._clock_name()), wanted)
+            dialect, clock = self.dialect(), self._clock_name()
+            used = {n for n, c in self.channels.items() if c.quantity != "ignore"}
+            wanted = [n for n in dialect.names if n in used]
+            if not wanted:
+                raise self._error("", "holds none of the channels that are used", "Check the channels' names")
+            if large:  # one column, for the number of samples, and those that are asked for
+                first = clock if clock in wanted else wanted[0]
+                wanted = [n for n in wanted if n == first or n in names]
+            try:
+                table = read_table(Source(self.path, self.file, self.run, dialect, clock), wanted)
+            except OSError as error:
+                raise self._error("", f"cannot be read ({error})", "Check the file and its rights") from error
             self.cache.put(key, table)
         return table
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +86,8 @@ def read_table(source: Source, names: Sequence[str]) -> Table:
     try:
         columns, length, odd = _parse(source, names, numbers=True)
     except pa.ArrowInvalid:
+        if not source.dialect.sure:
+            return read_table(replace(source, dialect=replace(source.dialect, decimal=",", sure=True)), names)
         # Rare spellings of numbers, or text: as text once more, to mend the first and to locate the second.
         columns, length, odd = _parse(source, names, numbers=False)
     columns, length = _drop_empty_tail(columns, length, source.clock)

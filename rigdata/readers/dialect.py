@@ -35,6 +35,8 @@ class Dialect:
         Byte at which `data_line` starts, in the stream of `rigdata.readers.byte_stream.open_ascii`.
     names : tuple of str
         One per cell of a data line, "" where a column has no name.
+    sure : bool
+        Whether the decimal mark was given or seen; else the file's head holds whole numbers only.
     """
 
     encoding: str
@@ -44,6 +46,7 @@ class Dialect:
     data_line: int
     data_offset: int
     names: tuple[str, ...]
+    sure: bool = True
 
 
 @dataclass(frozen=True)
@@ -88,14 +91,16 @@ class DialectFinder:
         sample = [s for s in (split_line(t, header.delimiter) for t in lines[first : first + _SAMPLE]) if s]
         if not any(any(looks_like(c) or is_missing(c) for c in row) for row in sample):
             raise self._error(f"line {header.line}", "no samples follow the names", "Export the run again")
+        decimal = self._decimal(sample)
         return Dialect(
             encoding=encoding,
             delimiter=header.delimiter,
-            decimal=self._decimal(sample),
+            decimal=decimal or ".",
             header_line=header.line,
             data_line=first + 1,
             data_offset=raw[first][1],
             names=self._widen(header, sample),
+            sure=decimal is not None,
         )
 
     def _header(self, lines: list[str]) -> _Header:
@@ -178,7 +183,7 @@ class DialectFinder:
             raise self._error(f"line {header.line}", "no samples follow the names", "Export the run again")
         raise self._error(f"line {index}", "is neither names, units nor numbers", "Check [csv] delimiter and decimal")
 
-    def _decimal(self, sample: list[list[str]]) -> str:
+    def _decimal(self, sample: list[list[str]]) -> str | None:
         cells = [c for row in sample for c in row]
         comma = sum(is_number(c, ",") and "," in c for c in cells)
         point = sum(is_number(c, ".") and "." in c for c in cells)
@@ -187,7 +192,7 @@ class DialectFinder:
             example = next(c for c in cells if is_number(c, seen) and seen in c)
             what = f"decimal is {self.spec.decimal!r} in the manifest, but numbers look like {example!r}"
             raise self._error("", what, f"Set [csv] decimal = {seen!r}, or leave it out")
-        return self.spec.decimal or seen
+        return self.spec.decimal or (seen if comma or point else None)
 
     def _widen(self, header: _Header, sample: list[list[str]]) -> tuple[str, ...]:
         """Names for every cell of a data line: a trailing delimiter may stand in one line only."""

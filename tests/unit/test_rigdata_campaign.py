@@ -277,6 +277,39 @@ def test_paths_that_are_no_campaign(tmp_path, name):
     assert rigdata.check_campaign(str(tmp_path / name))
 
 
+def test_a_record_or_a_pipe_is_no_campaign(tmp_path):
+    folder = write(tmp_path)
+    with pytest.raises(RigDataError, match="is a record"):
+        rigdata.load_campaign(folder / "runs" / "l-1.csv")
+    os.mkfifo(tmp_path / "pipe.h5")
+    with pytest.raises(RigDataError, match="ordinary file"):
+        rigdata.load_campaign(tmp_path / "pipe.h5")
+
+
+def test_a_folder_without_rights(tmp_path, monkeypatch):
+    def no_rights(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "is_dir", no_rights)
+    with pytest.raises(RigDataError, match="Permission denied"):
+        rigdata.load_campaign(tmp_path)
+
+
+def test_problems_travel_back_from_worker_processes(tmp_path):
+    folder = write(tmp_path, MANIFEST.replace("[housing]", "[housng]"))
+    with pytest.raises(RigDataError) as caught:
+        rigdata.load_campaign(folder)
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert again.problems == caught.value.problems
+    assert str(again) == str(caught.value)
+
+
+def test_messages_cannot_steer_a_terminal():
+    problem = rigdata.Problem("error", "a\x1b[31m.csv", "line 1", "\u202eabc\x07", "mend")
+    assert str(problem).isprintable()
+    assert "\\x1b[31m" in str(problem)
+
+
 def test_folder_without_manifest_names_the_hdf5_file_in_it(tmp_path):
     (tmp_path / "c.h5").write_bytes(b"")
     with pytest.raises(RigDataError, match=r"c\.h5"):

@@ -347,3 +347,42 @@ def test_any_bytes_are_read_or_refused(tmp_path_factory, data):
         complete = all(p.cure and p.file for p in caught.problems)
         assert complete
     assert isinstance(rigdata.check_campaign(folder), list)
+
+
+def test_decimal_mark_that_shows_late(tmp_path):
+    """The head holds whole numbers only."""
+    rows = [f"{i};{i};{2 * i}" for i in range(400)] + ["400,5;1,5;2,5"]
+    run = make(tmp_path, "Zeit;X1A;X1B\n" + "\n".join(rows) + "\n")
+    assert run.record("X1A").values[-1] == pytest.approx(1.5e-6)
+
+
+def test_file_with_none_of_the_used_channels(tmp_path):
+    text = table(names=("Zeit", "a", "b"))
+    csv = TIME.replace('quantity = "time"\nunit = "s"', 'quantity = "ignore"')
+    refused(make(tmp_path, text, csv, time=False), "none of the channels")
+
+
+def test_large_files_are_parsed_by_column(tmp_path, monkeypatch):
+    monkeypatch.setattr("rigdata.readers.csv._LARGE_FILE", 100)
+    expect_good(make(tmp_path, table()))
+    expect_good(make(tmp_path, table() + ";;\r\n"))
+
+
+def test_a_cache_lets_go_of_old_runs():
+    from rigdata.readers.csv import TableCache
+    from rigdata.readers.csv_table import Table
+
+    cache = TableCache(limit=2000)
+    for i in range(5):
+        cache.put((i,), Table({"x": np.zeros(100)}, 100))
+    assert [cache.get((i,)) is not None for i in range(5)] == [False, False, False, True, True]
+
+
+def test_unreadable_file(tmp_path, monkeypatch):
+    run = make(tmp_path, table())
+
+    def no_rights(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("rigdata.readers.csv_table.open_ascii", no_rights)
+    refused(run, "Permission denied")
