@@ -242,6 +242,21 @@ def test_friction_shows_as_a_loop_and_is_taken_off(tmp_path):
     assert curve.hysteresis.energy == pytest.approx(np.trapezoid(width, load), rel=0.2)
 
 
+def test_up_and_down_in_two_runs_make_one_curve(tmp_path):
+    law = Sphere()
+    noise = Noise.like_samples()
+    noise = replace(noise, dry=replace(noise.dry, friction=0.03))
+    tests = (DryTest(1), DryTest(1, branch="down"))
+    source, _ = campaign(tmp_path / "c.h5", [law] * 5, 6, dry=tests, noise=noise)
+    (curve,) = fit_pivots(source, ANGLES)
+    assert curve.runs == ("p-1-up", "p-1-down")
+    assert set(curve.steps.branch) == {1, -1}
+    assert curve.stiffness(LOADS) == pytest.approx(1.0 / law.compliance(LOADS), rel=0.03)
+    error = np.log(curve.stiffness(LOADS) * law.compliance(LOADS))
+    assert np.all(np.abs(error) < 4 * curve.relative_stiffness_se(LOADS))
+    assert curve.hysteresis is not None
+
+
 def test_bad_steps_are_left_out(tmp_path):
     law = Line(0.4)
     start = 0.3 + 4 * 1.3

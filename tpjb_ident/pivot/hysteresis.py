@@ -72,7 +72,7 @@ def measure_loop(load: FloatArray, deflection: FloatArray, se: FloatArray, branc
     sensitivity = trapezoid @ (gains[0] - gains[1])
     energy_se = float(np.sqrt(np.sum((sensitivity * se) ** 2)))
     ends = np.interp([low, high], np.sort(load[up]), deflection[up][np.argsort(load[up])])
-    stored = math.pi / 4.0 * (high - low) * abs(float(ends[1] - ends[0]))
+    stored = math.pi / 4.0 * float(high - low) * abs(float(ends[1] - ends[0]))
     if stored == 0.0:
         return None
     return Hysteresis(energy, energy_se, energy / stored, energy_se / stored, (float(low), float(high)))
