@@ -380,6 +380,8 @@ def _read_value(value: Any, entry: str, dimension: str, where: str) -> Any:
     signed = dimension in {"temperature"} or entry == "pivot_angles"
     if not signed and (number < 0 or (number == 0 and entry not in _MAY_BE_ZERO)):
         raise BearingError(f"{where}: must be positive, got {value!r}.")
+    if entry == "poissons_ratio" and not number < 0.5:
+        raise BearingError(f"{where}: must be below 0.5, got {value!r}. Steel has 0.3.")
     return number
 
 

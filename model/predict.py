@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import operator
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,6 +23,9 @@ from model.units import to_si
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+
+#: No shaker excites faster [rad/s]; beyond, squares overflow.
+FASTEST = 1e9
 
 
 @dataclass(frozen=True)
@@ -212,26 +216,46 @@ def predict(
     """
     if thermal not in {"isothermal", "adiabatic", "tehd"}:
         raise ValueError(f"thermal must be isothermal, adiabatic or tehd, got {thermal!r}")
-    chosen = mesh if isinstance(mesh, Mesh) else Mesh(*mesh) if mesh is not None else Mesh()
-    setup = Setup(bearing, pivot_laws(pivots, bearing), thermal, chosen)
-    setup = apply_effects(setup, effects)
-    speed_si = float(to_si(speed, "angular speed", "speed"))
+    setup = apply_effects(Setup(bearing, pivot_laws(pivots, bearing), thermal, _mesh(mesh)), effects)
+    speed_si = _number(speed, "angular speed", "speed")
     omega = speed_si if excitation is None else to_si(excitation, "angular speed", "excitation")
     return predict_setup(
         setup,
-        float(to_si(load, "force", "load")),
-        float(to_si(load_direction, "angle", "load_direction")),
+        _number(load, "force", "load"),
+        _number(load_direction, "angle", "load_direction"),
         speed_si,
         omega,
         start.equilibrium if start is not None else None,
     )
 
 
+def _mesh(mesh: Any) -> Mesh:
+    if mesh is None or isinstance(mesh, Mesh):
+        return mesh or Mesh()
+    try:
+        along, across = (operator.index(n) for n in mesh)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"mesh must be two whole numbers, along and across, got {mesh!r}") from error
+    return Mesh(along, across)
+
+
+def _number(value: Any, dimension: str, name: str) -> float:
+    if isinstance(value, bool):
+        raise ValueError(f"{name} must be a number, got {value!r}")
+    try:
+        return float(to_si(value, dimension, name))
+    except TypeError as error:
+        raise ValueError(f"{name} must be a number, got {value!r}") from error
+
+
 def predict_setup(
     setup: Setup, load: float, load_direction: float, speed: float, excitation: Any, start: Equilibrium | None = None
 ) -> Prediction:
     """Predict for a `Setup` (effects applied); SI floats only, see `predict`."""
-    omega = np.asarray(excitation, float)
+    try:
+        omega = np.asarray(excitation, float)
+    except TypeError as error:
+        raise ValueError(f"excitation must be numbers [rad/s], got {excitation!r}") from error
     _check_point(load, load_direction, speed, omega)
     force = load * np.array([math.cos(load_direction), math.sin(load_direction)])
     equilibrium = solve_equilibrium(setup, force, speed, start)
@@ -276,5 +300,5 @@ def _check_point(load: float, direction: float, speed: float, omega: FloatArray)
         raise ValueError(f"load_direction must be finite [rad], got {direction!r}")
     if not (math.isfinite(speed) and speed > 0):
         raise ValueError(f"speed must be positive [rad/s] (the shaft turns counter-clockwise), got {speed!r}")
-    if omega.ndim > 1 or not np.all(np.isfinite(omega)) or np.any(omega <= 0):
-        raise ValueError("excitation must be a positive number or a 1-D array of them [rad/s]")
+    if omega.ndim > 1 or omega.size == 0 or not np.all((omega > 0) & (omega < FASTEST)):
+        raise ValueError(f"excitation must be a positive number below {FASTEST:g} rad/s or a 1-D array of them")

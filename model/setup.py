@@ -161,6 +161,8 @@ class Setup:
     def __post_init__(self) -> None:
         if self.thermal not in THERMAL:
             raise ValueError(f"thermal must be one of {', '.join(THERMAL)}, got {self.thermal!r}")
+        if not self.bearing.pads:
+            raise ValueError("a bearing needs at least one pad")
         if len(self.pivots) != len(self.bearing.pads):
             raise ValueError(f"need one pivot law per pad ({len(self.bearing.pads)}), got {len(self.pivots)}")
 

@@ -69,7 +69,7 @@ class LoadedAttitude:
     load: FloatArray
 
     def branch(self, clearance: float, scale: float, give: Callable[[float], float]) -> Branch:
-        """The loaded attitudes of a pad.
+        """The loaded attitudes of a pad; from an infinite reach on if it has none.
 
         Parameters
         ----------
@@ -80,6 +80,8 @@ class LoadedAttitude:
         give : callable
             Pivot deflection [m] by load [N].
         """
+        if len(self.curvature) < 2:
+            return Branch(np.array([math.inf, math.inf]), *np.zeros((3, 2)))
         room = clearance / (1.0 + self.curvature)
         load = scale * self.load / room**2
         approach = clearance - room
@@ -90,6 +92,10 @@ class LoadedAttitude:
         falling = np.flatnonzero(np.diff(reach) <= 0.0)
         rising = slice(int(falling[-1]) + 1 if len(falling) else 0, None)
         return Branch(reach[rising], approach[rising], (self.wedge * room)[rising], load[rising])
+
+
+#: A film that starts behind the pivot, or a pivot at an edge: never carries.
+_NEVER = LoadedAttitude(np.zeros(1), np.zeros(1), np.zeros(1))
 
 
 @functools.lru_cache(maxsize=64)
@@ -120,8 +126,7 @@ def loaded_attitude(start: float, end: float, radius: float, length: float) -> L
         if wedge is not None:
             rows.append((curvature, wedge))
     if len(rows) < 4:
-        edges = f"{math.degrees(start):.1f} to {math.degrees(end):.1f} deg"
-        raise ValueError(f"a pad from {edges} about its pivot has no loaded attitude; move the pivot downstream")
+        return _NEVER
     coarse = np.array([(*row, force(*row)[1]) for row in rows])
     coarse[0, 2] = 0.0
     return LoadedAttitude(*_refined(coarse).T)

@@ -56,9 +56,7 @@ class RigDataError(ValueError):
     """A campaign, manifest or record file that cannot be used; carries every problem found."""
 
     def __init__(self, problems: Problem | Iterable[Problem]) -> None:
-        self.problems: tuple[Problem, ...] = (
-            (problems,) if isinstance(problems, Problem) else tuple(problems)
-        )
+        self.problems: tuple[Problem, ...] = (problems,) if isinstance(problems, Problem) else tuple(problems)
         super().__init__("\n".join(str(p) for p in self.problems))
 
     def __reduce__(self) -> tuple[type[RigDataError], tuple[tuple[Problem, ...]]]:

@@ -64,7 +64,6 @@ def _check_gaps(report: Reporter, steps: NDArray[np.float64], step: float) -> No
     lost = float(np.sum(steps[gaps] - step)) / step
     severity: Severity = "warning" if lost > 0.005 * len(steps) else "note"
     what = (
-        f"{len(gaps)} gaps, about {lost:.0f} samples lost, the longest of {steps[longest]:.6g} s "
-        f"after sample {longest}"
+        f"{len(gaps)} gaps, about {lost:.0f} samples lost, the longest of {steps[longest]:.6g} s after sample {longest}"
     )
     report.say("gap", severity, "time", what, "Times are used as they are; check the logger's buffer")

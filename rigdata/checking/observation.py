@@ -116,9 +116,7 @@ def _usable_time(report: Reporter, run: Run, length: int) -> FloatArray | None:
     return time if len(time) > 2 else None
 
 
-def _scan(
-    report: Reporter, run: Run, length: int
-) -> tuple[dict[str, ChannelStatistics], dict[str, FloatArray], str]:
+def _scan(report: Reporter, run: Run, length: int) -> tuple[dict[str, ChannelStatistics], dict[str, FloatArray], str]:
     """Read all blocks: statistics per channel, the first block in SI, a digest of the main readings."""
     channels = {n: c for n, c in run.channels.items() if c.quantity != "time"}
     statistics = {name: ChannelStatistics() for name in channels}

@@ -161,7 +161,9 @@ def _along(force: ComplexArray) -> float:
 
 
 def _check_directions(shown: Sequence[tuple[Observation, ComplexArray]]) -> None:
-    stated = [(s, f, math.degrees(s.run.excitation_direction)) for s, f in shown if s.run.excitation_direction is not None]
+    stated = [
+        (s, f, math.degrees(s.run.excitation_direction)) for s, f in shown if s.run.excitation_direction is not None
+    ]
     off = [(s, f, d) for s, f, d in stated if angle_between(_along(f), d, 180.0) > _ANGLE_WARNING]
     guess = _common_wiring([(s, d) for s, _, d in stated]) if len(off) > 2 else ""
     for seen, _, _ in stated if guess else ():

@@ -59,9 +59,7 @@ def check_signal(report: Reporter, channel: Channel, seen: ChannelStatistics, no
         limits = f"{seen.low:g} and {seen.high:g} {channel.unit}"
         what = f"{clipped:.1%} of the samples sit flat at an extreme reading (limits {limits}): clipped"
         severity: Severity = grave if clipped > 0.05 else "warning"
-        report.say(
-            f"clipped {channel.name}", severity, place, what, "Widen the logger's range and repeat the run"
-        )
+        report.say(f"clipped {channel.name}", severity, place, what, "Widen the logger's range and repeat the run")
     if channel.quantity == "temperature":
         _temperature(report, channel, seen)
 
@@ -80,9 +78,7 @@ def _dead(report: Reporter, channel: Channel, seen: ChannelStatistics, grave: Se
     """A channel of what does not move in this kind of run may well read one value throughout."""
     place, value = f"channel {channel.name}", f"{seen.low:g} {channel.unit}"
     still = channel.quantity == "speed" or (alone and channel.quantity in {"temperature", "pressure"})
-    still = still or (
-        channel.quantity == "acceleration" and report.run.kind != "dynamic"
-    )
+    still = still or (channel.quantity == "acceleration" and report.run.kind != "dynamic")
     if not still:
         what = f"is dead: it reads {value} throughout"
         cure = "Check sensor, cable and amplifier; repeat the run, or set the channel to ignore"

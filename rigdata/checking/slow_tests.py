@@ -1,4 +1,4 @@
-"""Dry, clearance and locus runs: does the shaft go where it is pushed, and toward which pad?"""
+"""Check dry, clearance and locus runs: the shaft must go where it is pushed, toward the stated pad."""
 
 from __future__ import annotations
 

@@ -35,9 +35,7 @@ def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple
             yield f"{second} read {word}", np.diag([1.0, factor])
 
 
-def guess_wiring(
-    channels: Sequence[Channel], readings: FloatArray, wanted: FloatArray, within: float = 8.0
-) -> str:
+def guess_wiring(channels: Sequence[Channel], readings: FloatArray, wanted: FloatArray, within: float = 8.0) -> str:
     """Say which fault would turn the readings into the direction `wanted`; "" where not just one would.
 
     Parameters

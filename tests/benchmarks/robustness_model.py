@@ -157,7 +157,7 @@ def errors(p: Prediction) -> dict[str, float]:
         (kaa, kab), (kba, kbb) = film.forces.stiffness
         give = 1.0 / p.setup.pivots[film.number - 1].stiffness(float(load))
         determinant = kbb * (1.0 + give * kaa) - give * kba * kab
-        out["stability"] = max(out["stability"], -determinant / abs(kbb))
+        out["stability"] = max(out["stability"], -determinant / max(abs(kbb), 1.0))
     force = p.load * np.array([math.cos(p.load_direction), math.sin(p.load_direction)])
     out["force"] = float(np.hypot(*(total - force))) / p.load
     return out
@@ -168,7 +168,7 @@ def thickness(bearing: Bearing, film: PadFilm, position: np.ndarray, alpha: np.n
     pad, theta = film.pad, alpha + film.pad.pivot_angle
     return (
         pad.pad_clearance
-        - (pad.pad_clearance - pad.assembled_clearance - film.deflection) * np.cos(alpha)
+        - (film.gap - film.deflection) * np.cos(alpha)
         - position[0] * np.cos(theta)
         - position[1] * np.sin(theta)
         - bearing.pivot_radius(pad) * film.tilt * np.sin(alpha)
@@ -208,7 +208,7 @@ def missed_attitude(p: Prediction, film: PadFilm) -> float:
     work.viscosity[:] = oil.viscosity(float(np.mean(warm)))
     work.density[:] = oil.density_40
     law = p.setup.pivots[film.number - 1]
-    reach = pad.pad_clearance - pad.assembled_clearance + float(film.normal @ p.bearing_position)
+    reach = film.gap + float(film.normal @ p.bearing_position)
 
     def force(a: float, b: float) -> np.ndarray:
         work.ruptured[:] = False

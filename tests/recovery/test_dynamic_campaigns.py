@@ -54,6 +54,7 @@ def test_random_intervals_hold_on_fresh_campaigns(tmp_path):
     assert np.max(errors) < 1
 
 
+@pytest.mark.slow
 def test_angles_of_a_known_disturbance_are_found_among_many_minima():
     """Six runs, two probes with mains of known size and unknown phase: H is found, the interval holds."""
     omega = 2 * np.pi * 50

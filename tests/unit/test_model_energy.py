@@ -50,7 +50,7 @@ def enthalpy_out(grid: FilmGrid, work: FilmWork, temperature: np.ndarray) -> flo
 
 
 def side_flow(work: FilmWork) -> np.ndarray:
-    """Mass flow over the side edge per station [kg/s]: what enters the edge's half control volumes and does not go on."""
+    """Mass flow over the side edge per station [kg/s]: what enters the half volumes there and does not go on."""
     out = work.flow_z[:, -1].copy()
     out[1:-1] += work.flow_x[:-1, -1] - work.flow_x[1:, -1]
     out[[0, -1]] *= 0.5  # the first and last stations stand for half a step

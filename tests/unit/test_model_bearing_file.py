@@ -1,0 +1,227 @@
+"""Bearing files: what they mean, and what is said about every key that is missing, unknown, wrong or impossible."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from model.bearing import BABBITT, STEEL, BearingError, load_bearing
+from model.units import UnitError, parse_quantity, to_si
+
+SECTIONS = {
+    "journal": ["diameter"],
+    "bearing": ["length", "assembled_clearance", "pad_clearance"],
+    "pads": ["pivot_angles", "arc", "thickness", "mass", "moment_of_inertia"],
+    "pads.backing": ["youngs_modulus", "poissons_ratio", "thermal_expansion", "conductivity"],
+    "pads.babbitt": ["youngs_modulus", "poissons_ratio", "thermal_expansion", "conductivity"],
+    "pivot": ["kind", "contact_length", "housing_diameter", "pivot_diameter"],
+    "oil": [
+        "supply_temperature", "viscosity_40C", "viscosity_exponent", "density_40C", "thermal_expansion",
+        "specific_heat", "conductivity",
+    ],
+}  # fmt: skip
+KEYS = [(section, key) for section, keys in SECTIONS.items() for key in keys]
+
+
+@pytest.fixture(scope="module")
+def text(rocker_file) -> str:
+    return rocker_file.read_text(encoding="utf-8")
+
+
+def edit(text: str, section: str, key: str, line: str | None) -> str:
+    """Replace one key's line (or drop it)."""
+    head, body = text.split(f"[{section}]\n", 1)
+    pattern = re.compile(rf"^{key}\s*=.*$", re.MULTILINE)
+    assert pattern.search(body)
+    return head + f"[{section}]\n" + pattern.sub(line if line is not None else "", body, count=1)
+
+
+def refused(text: str, *words: str) -> None:
+    with pytest.raises(BearingError) as caught:
+        load_bearing(text)
+    for word in ("bearing", *words):
+        assert word in str(caught.value), str(caught.value)
+
+
+def test_bundled_rocker_is_the_papers(rocker_file):
+    b = load_bearing(rocker_file)
+    assert b.name == "Rocker-backed five-pad bearing"
+    assert b.journal_radius == pytest.approx(0.04993)
+    assert b.length == pytest.approx(0.0696)
+    assert [math.degrees(p.pivot_angle) for p in b.pads] == pytest.approx([-90, -18, 54, 126, 198])
+    pad = b.pads[0]
+    assert pad.pad_clearance == pytest.approx(130e-6)
+    assert pad.assembled_clearance == pytest.approx(80e-6)
+    assert pad.preload == pytest.approx(1 - 80 / 130)
+    assert math.degrees(pad.arc) == pytest.approx(63.5)
+    assert pad.leading_edge == pytest.approx(-0.5 * pad.arc)
+    assert b.pivot_radius(pad) == pytest.approx(0.04993 + 130e-6 + 0.016)  # physics.md: R_P
+    assert pad.elastic_thickness == pad.thickness
+    assert (pad.backing, pad.babbitt) == (STEEL, BABBITT)
+    assert b.oil.viscosity(40.0) == pytest.approx(0.0396)
+    assert b.oil.viscosity(50.0) == pytest.approx(0.0396 * math.exp(-0.34))
+    assert b.oil.density(50.0) == pytest.approx(860 * (1 - 7e-3))
+    assert b.pivot.kind == "rocker"
+
+
+@pytest.mark.parametrize("name", ["rocker", "spherical"])
+def test_bundled_files_are_the_shared_ones(rocker_file, name):
+    shared = rocker_file.parents[2].parent / "shared" / "bearings" / f"{name}.toml"
+    if not shared.exists():
+        pytest.skip("needs ../shared/bearings")
+    assert load_bearing(rocker_file.with_name(f"{name}.toml")).pads == load_bearing(shared).pads
+
+
+@pytest.mark.parametrize(("section", "key"), KEYS)
+def test_missing_keys_are_named(text, section, key):
+    if section == "pivot" and key != "kind":
+        refused(edit(text, section, key, None), "[pivot]", key, "a rocker pivot needs it")
+    else:
+        refused(edit(text, section, key, None), f"[{section}] {key}", "missing", "Add it")
+
+
+@pytest.mark.parametrize(("section", "key"), KEYS)
+def test_misspelt_keys_get_a_hint(text, section, key):
+    wrong = key[:-1] + "q"
+    refused(
+        edit(text, section, key, f'{wrong} = "1 mm"'), f"[{section}] {wrong}", "unknown key", f"Did you mean '{key}'"
+    )
+
+
+@pytest.mark.parametrize(("section", "key"), [k for k in KEYS if k[1] != "kind"])
+@pytest.mark.parametrize("value", ['"3 parsnips"', '"1 s^7"', "true", '"1e999 mm"', '"nan mm"', '""', "{}"])
+def test_wrong_units_and_values_are_named(text, section, key, value):
+    if key == "poissons_ratio" and value == '"1e999 mm"':
+        pytest.skip("covered by the others")
+    refused(edit(text, section, key, f"{key} = {value}"), f"[{section}] {key}")
+
+
+@pytest.mark.parametrize(
+    ("section", "key"),
+    [k for k in KEYS if k[1] not in {"kind", "supply_temperature", "pivot_angles", "poissons_ratio"}],
+)
+def test_negative_values_are_named(text, section, key):
+    unit = re.search(rf'\[{re.escape(section)}\]\n(?:.*\n)*?{key}\s*=\s*"[\d.e+-]+ ([^"]+)"', text)
+    assert unit
+    refused(edit(text, section, key, f'{key} = "-1 {unit[1]}"'), f"[{section}] {key}", "must be positive")
+
+
+@pytest.mark.parametrize("section", [s for s in SECTIONS if "." not in s])
+def test_missing_sections_are_named(text, section):
+    refused(text.replace(f"[{section}]", "[elsewhere]", 1), "elsewhere", "unknown key")
+    start = text.index(f"[{section}]\n")
+    following = text.find("\n[", start + 1)
+    while section == "pads" and text[following + 2 :].startswith("pads."):
+        following = text.find("\n[", following + 1)
+    refused(text[:start] + (text[following + 1 :] if following > 0 else ""), f"section [{section}] is missing")
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "line", "words"),
+    [
+        ("pads", "pivot_angles", "pivot_angles = []", ("pivot_angles", "1 to 40")),
+        ("pads", "pivot_angles", 'pivot_angles = "12 deg"', ("pivot_angles", "must be a list")),
+        ("pads", "pivot_angles", 'pivot_angles = ["0 deg", "30 deg"]', ("overlaps", "of arc", "of room")),
+        ("pads", "arc", 'arc = ["60 deg", "60 deg"]', ("arc", "2 values for 5 pads")),
+        ("pads", "arc", 'arc = "80 deg"', ("overlaps",)),
+        ("pads", "pivot_offset", "pivot_offset = 1.2", ("pivot_offset", "between 0 and 1")),
+        ("pads", "babbitt_thickness", 'babbitt_thickness = "20 mm"', ("babbitt_thickness < elastic_thickness",)),
+        ("pivot", "kind", 'kind = "roker"', ("kind", "Did you mean 'rocker'")),
+        ("pivot", "kind", "kind = 3", ("kind", "must be text")),
+        ("pivot", "pivot_diameter", 'pivot_diameter = "140 mm"', ("pivot_diameter must be smaller",)),
+        ("oil", "supply_temperature", 'supply_temperature = "40 K/s"', ("supply_temperature", "not a temperature")),
+    ],
+)  # fmt: skip
+def test_impossible_geometry_is_explained(text, section, key, line, words):
+    refused(edit(text, section, key, line), *words)
+
+
+def test_values_per_pad(text):
+    per_pad = 'assembled_clearance = ["80 um", "85 um", "80 um", "78 um", "81 um"]'
+    b = load_bearing(edit(text, "bearing", "assembled_clearance", per_pad))
+    assert [p.assembled_clearance for p in b.pads] == pytest.approx([80e-6, 85e-6, 80e-6, 78e-6, 81e-6])
+
+
+def test_units_do_not_matter(text):
+    b = load_bearing(edit(text, "journal", "diameter", 'diameter = "3.93149606299 inch"'))
+    assert b.journal_diameter == pytest.approx(99.86e-3, rel=1e-9)
+    k = load_bearing(edit(text, "oil", "supply_temperature", 'supply_temperature = "313.15 K"'))
+    assert k.oil.supply_temperature == pytest.approx(40.0)
+
+
+def test_other_schema_not_toml_too_large_and_no_file(text, tmp_path):
+    refused(text.replace("tpjb-bearing/1", "tpjb-bearing/2"), "schema", "tpjb-bearing/1")
+    refused(text + "\n= 3\n", "not valid TOML")
+    with pytest.raises(BearingError, match="no such file"):
+        load_bearing(tmp_path / "none.toml")
+    with pytest.raises(BearingError, match="cannot be read"):
+        load_bearing(tmp_path)
+    large = tmp_path / "large.toml"
+    large.write_bytes(b"#" * 1_000_001)
+    with pytest.raises(BearingError, match="larger than 1 MB"):
+        load_bearing(large)
+    latin = tmp_path / "latin.toml"
+    latin.write_bytes("name = 'Lager für Öl'\n".encode("cp1252"))
+    with pytest.raises(BearingError, match="UTF-8"):
+        load_bearing(latin)
+
+
+def test_byte_order_mark_is_taken(text, tmp_path):
+    path = tmp_path / "bom.toml"
+    path.write_text(text, encoding="utf-8-sig")
+    assert len(load_bearing(Path(path)).pads) == 5
+
+
+@pytest.mark.parametrize(
+    ("value", "dimension", "expected"),
+    [
+        ("0.080 mm", "length", 8e-5),
+        ("80µm", "length", 8e-5),
+        ("-90 deg", "angle", -math.pi / 2),
+        ("22 Hz", "angular speed", 44 * math.pi),
+        ("1320 rpm", "angular speed", 44 * math.pi),
+        ("5 kN", "force", 5000.0),
+        ("40 degC", "temperature", 40.0),
+        ("40 °C", "temperature", 40.0),
+        ("12e-6 1/K", "per kelvin", 12e-6),
+        ("50 %", "ratio", 0.5),
+        (0.5, "ratio", 0.5),
+        ("0.256e-3 kg m^2", "moment of inertia", 0.256e-3),
+    ],
+)
+def test_quantities(value, dimension, expected):
+    assert parse_quantity(value, dimension) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("value", "dimension", "message"),
+    [
+        (5.0, "length", "has no unit"),
+        ("5", "length", "has no unit"),
+        ("5 kg", "length", "not one of length"),
+        ("five mm", "length", "not a number with a unit"),
+        ("5 mm; import os", "length", "not a number with a unit"),
+        ("40 degF", "temperature", "not a temperature"),
+        (True, "ratio", "expected a number"),
+        ([1], "ratio", "expected a number"),
+    ],
+)
+def test_bad_quantities_are_named(value, dimension, message):
+    with pytest.raises(UnitError, match=f"gap: .*{message}"):
+        parse_quantity(value, dimension, "gap")
+
+
+def test_pint_quantities():
+    import pint
+
+    u = pint.UnitRegistry(cache_folder=None)
+    assert to_si(5 * u.kN, "force", "load") == pytest.approx(5000.0)
+    assert to_si(22 * u.hertz, "angular speed", "speed") == pytest.approx(44 * math.pi)
+    assert to_si(1320 * u.rpm, "angular speed", "speed") == pytest.approx(44 * math.pi)
+    assert to_si([1.0, 2.0] * u.rad / u.s, "angular speed", "excitation") == pytest.approx([1.0, 2.0])
+    with pytest.raises(UnitError, match="load"):
+        to_si(5 * u.mm, "force", "load")
+    assert to_si("5 kN", "force", "load") == pytest.approx(5000.0)

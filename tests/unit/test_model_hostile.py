@@ -1,0 +1,146 @@
+"""Impossible and extreme input: a ValueError that names the argument, or a named status with NaN; never a traceback,
+a warning (they are errors here) or a number without a word."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model.bearing import Bearing, load_bearing
+from model.effects import Effect
+from model.predict import Prediction, predict
+
+SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
+COARSE = (24, 4)
+
+
+@pytest.fixture(scope="module")
+def rocker(rocker_file) -> Bearing:
+    return load_bearing(rocker_file)
+
+
+def pads(bearing: Bearing, **changes: object) -> Bearing:
+    return bearing.with_pads(tuple(replace(p, **changes) for p in bearing.pads))
+
+
+def oil(bearing: Bearing, **changes: object) -> Bearing:
+    return replace(bearing, oil=replace(bearing.oil, **changes))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"load": -5.0}, "load must be zero or positive"),
+        ({"load": math.nan}, "load must be zero or positive"),
+        ({"load": math.inf}, "load must be zero or positive"),
+        ({"load": None}, "load must be a number"),
+        ({"load": 5 + 1j}, "load must be a number"),
+        ({"load": True}, "load must be a number"),
+        ({"load": np.array([1.0, 2.0])}, "load must be a number"),
+        ({"load": "5 mm"}, "load: unit 'mm'"),
+        ({"load_direction": math.inf}, "load_direction must be finite"),
+        ({"load_direction": "down"}, "load_direction"),
+        ({"speed": 0.0}, "speed must be positive"),
+        ({"speed": -SPEED}, "turns counter-clockwise"),
+        ({"speed": None}, "speed must be a number"),
+        ({"excitation": 0.0}, "excitation must be a positive"),
+        ({"excitation": []}, "excitation must be a positive"),
+        ({"excitation": [10.0, -1.0]}, "excitation must be a positive"),
+        ({"excitation": [10.0, math.nan]}, "excitation must be a positive"),
+        ({"excitation": np.ones((2, 2))}, "excitation must be a positive"),
+        ({"excitation": 1e200}, "excitation must be a positive"),
+        ({"excitation": "fast"}, "excitation"),
+        ({"thermal": "hot"}, "thermal must be"),
+        ({"pivots": "soft"}, "pivots"),
+        ({"pivots": 0.0}, "must be positive"),
+        ({"mesh": (0, 0)}, "even numbers"),
+        ({"mesh": (41, 4)}, "even numbers"),
+        ({"mesh": (40.5, 4)}, "two whole numbers"),
+        ({"mesh": "fine"}, "two whole numbers"),
+    ],
+)
+def test_bad_arguments_are_named(rocker, arguments, message):
+    point = {"load": 5000.0, "load_direction": DOWN, "speed": SPEED, "mesh": COARSE} | arguments
+    with pytest.raises(ValueError, match=message):
+        predict(rocker, **point)
+
+
+def test_no_pads(rocker):
+    with pytest.raises(ValueError, match="at least one pad"):
+        predict(rocker.with_pads(()), 5000.0, DOWN, SPEED)
+
+
+def sane(p: Prediction) -> None:
+    """Converged and finite, balanced by pads that push; or a status, and NaN instead of numbers."""
+    if not p.converged:
+        assert "not converged" in p.status
+        assert np.isnan(p.h).all()
+        return
+    assert np.isfinite(p.h).all()
+    assert np.isfinite(p.position).all()
+    assert (p.pad_load >= 0.0).all()
+    normals = np.array([[math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)] for pad in p.setup.bearing.pads])
+    down = np.array([math.cos(p.load_direction), math.sin(p.load_direction)])
+    # pads push along their pivots, but for the tangential part that k_theta holds
+    assert np.abs(p.pad_load @ normals - p.load * down).max() < 0.05 * max(p.load, 1.0) or p.setup.rotational_stiffness
+    assert p.min_film > 0.0
+
+
+EXTREMES = {
+    "no load": lambda b: (b, 0.0, {}),
+    "feather": lambda b: (b, 1e-9, {}),
+    "overload": lambda b: (b, 1e5, {}),
+    "absurd load": lambda b: (b, 1e300, {}),
+    "soft pivots": lambda b: (b, 5000.0, {"pivots": 1e6}),
+    "no pivots": lambda b: (b, 5000.0, {"pivots": 1e-3}),
+    "hard pivots": lambda b: (b, 5000.0, {"pivots": 1e300}),
+    "narrow": lambda b: (pads(b, pad_clearance=2e-9, assembled_clearance=1e-9), 5000.0, {}),
+    "wide": lambda b: (pads(b, pad_clearance=2e-2, assembled_clearance=1e-2), 5000.0, {}),
+    "no preload": lambda b: (pads(b, assembled_clearance=130e-6), 5000.0, {}),
+    "negative preload": lambda b: (pads(b, assembled_clearance=260e-6), 5000.0, {}),
+    "interference": lambda b: (pads(b, assembled_clearance=-30e-6), 5000.0, {}),
+    "slivers": lambda b: (pads(b, arc=2e-3), 5000.0, {}),
+    "pivot at the leading edge": lambda b: (pads(b, pivot_offset=0.01), 5000.0, {}),
+    "pivot at the trailing edge": lambda b: (pads(b, pivot_offset=0.99), 5000.0, {}),
+    "pivot ahead of the middle": lambda b: (pads(b, pivot_offset=0.4), 5000.0, {}),
+    "water": lambda b: (oil(b, viscosity_40=1e-6), 5000.0, {}),
+    "honey": lambda b: (oil(b, viscosity_40=1e3), 5000.0, {}),
+    "steep oil": lambda b: (oil(b, viscosity_exponent=50.0), 5000.0, {}),
+    "hot as the sun": lambda b: (oil(b, supply_temperature=1e4), 5000.0, {}),
+    "oil that vanishes": lambda b: (oil(b, thermal_expansion=10.0), 5000.0, {}),
+    "no heat capacity": lambda b: (oil(b, specific_heat=1e-3), 5000.0, {}),
+    "one pad": lambda b: (b.with_pads(b.pads[:1]), 5000.0, {}),
+    "one pad, load away from it": lambda b: (b.with_pads(b.pads[:1]), 5000.0, {"load_direction": 1.5}),
+    "two pads": lambda b: (b.with_pads(b.pads[:2]), 5000.0, {}),
+    "shaft on the pads' edges": lambda b: (b, 5000.0, {"effects": [Effect("misalignment", angle=2e-3, direction=0.0)]}),
+    "film starts behind the pivot": lambda b: (b, 5000.0, {"effects": [Effect("starvation", arc_fraction=0.6)]}),
+    "all oil carried over": lambda b: (b, 5000.0, {"effects": [Effect("hot_oil_carryover", fraction=0.98)]}),
+    "stuck pads": lambda b: (b, 5000.0, {"effects": [Effect("pivot_rotation", rotational_stiffness=1e6)]}),
+}
+
+
+@pytest.mark.parametrize("name", EXTREMES)
+def test_extremes_end_in_a_number_or_a_status(rocker, name):
+    bearing, load, more = EXTREMES[name](rocker)
+    point = {"load_direction": DOWN, "speed": SPEED, "mesh": COARSE} | more
+    sane(predict(bearing, load, **point))
+
+
+@pytest.mark.parametrize("speed", [1e-9, 1e-3, 1e4, 1e7])
+def test_extreme_speeds(rocker, speed):
+    sane(predict(rocker, 5000.0, DOWN, speed, 100.0, mesh=COARSE))
+
+
+def test_unloaded_directions_of_a_single_pad_are_no_equilibrium(rocker):
+    p = predict(rocker.with_pads(rocker.pads[:1]), 5000.0, 1.5, SPEED, mesh=COARSE)
+    assert not p.converged
+
+
+def test_what_cannot_carry_says_that_all_pads_idle(rocker):
+    p = predict(rocker, 5000.0, DOWN, SPEED, mesh=COARSE, effects=[Effect("starvation", arc_fraction=0.6)])
+    assert p.status[-1] == "idle pads 1, 2, 3, 4, 5"
+    assert p.max_temperature == 40.0
+    assert math.isinf(p.min_film)

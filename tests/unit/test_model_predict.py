@@ -1,0 +1,112 @@
+"""Predictions as users see them: mesh convergence and its estimate, fields, names, warm starts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from model.bearing import Bearing, load_bearing
+from model.predict import Prediction, predict
+from model.setup import Mesh
+
+SPEED, OMEGA, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, -math.pi / 2
+
+
+@pytest.fixture(scope="module")
+def rocker(rocker_file) -> Bearing:
+    return load_bearing(rocker_file)
+
+
+def run(bearing: Bearing, mesh: tuple[int, int] | None = None, thermal: str = "adiabatic") -> Prediction:
+    p = predict(bearing, 5000.0, DOWN, SPEED, OMEGA, thermal=thermal, mesh=mesh)
+    assert p.converged
+    return p
+
+
+def numbers(p: Prediction) -> np.ndarray:
+    return np.array([p.kxx, p.kyy, p.cxx, p.cyy, p.position[1], p.max_pressure, p.pad_load[0], p.pad_load[2]])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("thermal", ["isothermal", "adiabatic"])
+def test_bearing_converges_with_second_order(rocker, thermal):
+    fine = numbers(run(rocker, (320, 24), thermal))
+    errors = [np.abs(numbers(run(rocker, (40 * s, 4 * s), thermal)) / fine - 1.0) for s in (1, 2)]
+    errors.append(np.abs(numbers(run(rocker, (160, 12), thermal)) / fine - 1.0))
+    assert (errors[1] < 4e-3).all(), errors[1]
+    assert (errors[2] < 1.5e-3).all(), errors[2]
+    # between the first and the second everything halves: a quarter, with room for where the rupture line falls
+    assert np.median(errors[1] / errors[0]) < 0.4
+
+
+@pytest.mark.slow
+def test_mesh_error_is_an_honest_estimate(rocker):
+    fine = run(rocker, (320, 24))
+    default = run(rocker)
+    true = max(abs(getattr(default, n) / getattr(fine, n) - 1.0) for n in ("kxx", "kyy", "cxx", "cyy"))
+    assert true < 0.002  # issue 3: "mesh error of K, C <= 0.2 %"
+    assert 0.2 * true < default.mesh_error < 10.0 * true
+
+
+def test_mesh_error_grows_on_a_coarse_mesh(rocker):
+    assert run(rocker, (16, 4)).mesh_error > 2.0 * run(rocker).mesh_error
+
+
+def test_coefficients_by_name_and_shape(rocker):
+    p = run(rocker)
+    assert p.kxx == p.h[0, 0].real == p.k[0, 0]
+    assert p.cyx == pytest.approx(p.h[1, 0].imag / OMEGA)
+    several = predict(rocker, 5000.0, DOWN, SPEED, [OMEGA, 2 * OMEGA])
+    assert several.h.shape == (2, 2, 2)
+    assert several.cxx.shape == (2,)
+    with pytest.raises(AttributeError, match="kzz"):
+        _ = p.kzz
+
+
+def test_quantities_with_units(rocker):
+    q = predict(rocker, "5 kN", "-90 deg", "1320 rpm", "25 Hz")
+    np.testing.assert_allclose(q.h, run(rocker).h, rtol=1e-9)
+
+
+def test_fields_belong_together(rocker):
+    p = run(rocker)
+    for pressure, film, temperature in zip(p.pressure, p.film, p.temperature, strict=True):
+        assert pressure.shape == film.shape == temperature.shape == (Mesh().along + 1, Mesh().across + 1)
+        assert (pressure[[0, -1]] == 0.0).all()
+        assert (pressure[:, -1] == 0.0).all()
+    assert p.max_pressure == max(x.max() for x in p.pressure)
+    assert p.min_film == min(x.min() for x in p.film)
+    assert 40.0 < p.max_temperature < 80.0
+    down = p.pad_load @ np.array([math.sin(pad.pivot_angle) for pad in rocker.pads])
+    assert down == pytest.approx(-5000.0, rel=1e-6)
+
+
+def test_temperature_channel_reads_mid_length_along_the_arc(rocker):
+    p = run(rocker)
+    film = p.equilibrium.films[1]
+    at = film.pad.leading_edge + 0.75 * film.pad.arc
+    assert p.pad_temperature(0.75)[1] == pytest.approx(np.interp(at, film.grid.angle, film.work.temperature[:, 0]))
+    assert (p.pad_temperature(0.0) == 40.0).all()
+    assert (p.pad_temperature(1.0) > p.pad_temperature(0.5)).all()
+
+
+def test_symmetric_load_leaves_the_sides_alike(rocker):
+    # five pads about the load line, but the rotation tells left from right: only cross terms differ
+    p = run(rocker)
+    np.testing.assert_allclose(p.pad_load[[1, 2]], p.pad_load[[4, 3]], rtol=1e-6)
+    assert abs(p.position[0]) < 1e-9
+    assert abs(p.kxy) < 1e-3 * p.kxx
+
+
+def test_warm_start_on_another_mesh_starts_cold(rocker):
+    coarse = run(rocker, (40, 4))
+    p = predict(rocker, 5000.0, DOWN, SPEED, OMEGA, start=coarse)
+    np.testing.assert_allclose(p.h, run(rocker).h, rtol=1e-6, atol=1e-6 * p.kyy)
+
+
+def test_power_loss_grows_with_speed(rocker):
+    losses = [predict(rocker, 5000.0, DOWN, 2 * math.pi * hz).power_loss for hz in (11.0, 22.0, 44.0)]
+    assert losses[0] < losses[1] < losses[2]
+    assert 50.0 < losses[1] < 2000.0
