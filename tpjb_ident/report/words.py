@@ -30,6 +30,14 @@ MEANING = {
     "another direction too.",
     "ill-conditioned": "The displacement directions are almost parallel, so errors are strongly amplified. Excite in "
     "directions that move the shaft differently.",
+    "inertia-not-corrected": "Without accelerometers the housing's inertia stays in the force: small at low frequency, "
+    "growing with its square.",
+    "negative-damping": "A direct damping came out negative: a film takes energy. Look for a wrong polarity, swapped "
+    "channels or a delay.",
+    "no-spare-direction": "With two directions only, the interval holds how repeats differ, not how runs do. "
+    "Excite in a third direction.",
+    "run-without-data": "A run gave no usable window and takes no part.",
+    "windows-missing": "Parts of the records gave no phasors and take no part.",
     "iteration-limit": "The estimator stopped before it settled.",
     "large-amplitude": "The vibration is more than 5 % of the clearance: the film is no longer linear. Excite less.",
     "low-coherence": "Much of the force is not explained by the displacement: noise, or a wrong channel.",
