@@ -69,6 +69,9 @@ class Parameter:
     @property
     def typical_step(self) -> float:
         """Size of `typical` in the nearly linear form."""
+        if math.isnan(self.typical):  # not said: a tenth of the physical range, or of a unit
+            ends = [self.to_linear(v) for v in (self.low, self.high)]
+            return 0.1 * abs(ends[1] - ends[0]) if all(map(math.isfinite, ends)) else 0.1
         if math.isinf(self.neutral):
             return self.to_linear(self.typical)
         moved = self.neutral - self.typical if self.form == "inverse" else self.neutral + self.typical

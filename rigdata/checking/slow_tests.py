@@ -19,6 +19,8 @@ _ANGLE_WARNING, _ANGLE_ERROR = 10.0, 30.0
 _SAME_PAD = 25.0
 #: Cosine of the angle between load and motion; rigs move sideways by up to a quarter of the way.
 _FOLLOWS = math.cos(math.radians(40.0))
+#: A shaft that moves less than this [m] in a dry test may as well be a probe that drifts.
+_FIRM_MOVE = 1.5e-6
 #: A clearance polygon and a locus are far from round; 1 is round.
 _LEAST_DEFINITE = 0.02
 
@@ -104,7 +106,7 @@ def _check_follows(seen: Observation, planes: tuple[FloatArray, FloatArray], pus
     centred = load - load.mean()
     slope = centred @ (planes[1] - planes[1].mean(axis=0)) / float(centred @ centred)
     size = float(np.hypot(*slope))
-    if size == 0 or float(slope @ unit) > _FOLLOWS * size:
+    if size * float(np.ptp(load)) < _FIRM_MOVE or float(slope @ unit) > _FOLLOWS * size:
         return
     where = seen.pick("displacement")
     channels = [seen.channels[i] for i in where]

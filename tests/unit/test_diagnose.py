@@ -28,7 +28,11 @@ SPEED = 2 * math.pi * 22
 MESH = Mesh(40, 4)
 #: A part of the library, so that a test takes seconds.
 TRIED = {"thermal_growth", "soft_pivot", "pivot_flexibility", "oil_viscosity", "probe_gain", "channel_delay"}
-FEW = DiagnoseSettings(workers=1, skip=frozenset(known_effects()) - TRIED)
+
+
+def few() -> DiagnoseSettings:
+    """Settings that try `TRIED` only, whatever other tests have registered."""
+    return DiagnoseSettings(workers=1, skip=frozenset(known_effects()) - TRIED)
 
 
 @pytest.fixture(scope="module")
@@ -158,7 +162,7 @@ def test_next_test_ranks_the_test_that_separates(setup):
 )
 def test_a_hidden_effect_is_named_sized_and_closes_the_gap(setup, observations, hidden, tmp_path):
     hurt = campaign(observations, setup, (hidden,), seed=7)
-    result = diagnose(hurt, setup, FEW)
+    result = diagnose(hurt, setup, few())
     verdict = result.verdict
     assert verdict.verdict == "named"
     assert [e.name for e in verdict.effects] == [hidden.name]
@@ -178,7 +182,7 @@ def test_a_hidden_effect_is_named_sized_and_closes_the_gap(setup, observations, 
 
 @pytest.mark.slow
 def test_nothing_hidden_is_consistent(setup, observations):
-    verdict = diagnose(campaign(observations, setup, (), seed=3), setup, FEW).verdict
+    verdict = diagnose(campaign(observations, setup, (), seed=3), setup, few()).verdict
     assert verdict.verdict == "consistent"
     assert not verdict.effects
     assert "noise" in verdict.reasons[0]
@@ -191,7 +195,7 @@ def test_an_effect_outside_the_library_is_not_named(setup, observations):
     for i, e in enumerate(hurt.elements):  # stiffness that falls with frequency and rises with load: no effect does
         if e.observable in {"kxx", "kyy"}:
             value[i] *= 1.0 + 0.2 * math.sin(3 * e.place("excitation") / 60.0 + e.place("load") / 900.0)
-    verdict = diagnose(replace(hurt, value=value), setup, FEW).verdict
+    verdict = diagnose(replace(hurt, value=value), setup, few()).verdict
     assert verdict.verdict == "unexplained"
     assert not verdict.effects
     assert np.isfinite(residuals(hurt, hurt.value)).all()

@@ -78,6 +78,7 @@ SERIOUS = frozenset(
         "iteration-limit",
         "low-coherence",
         "many-windows-rejected",
+        "negative-damping",
         "no-robust-start",
         "zero-scale",
     }
