@@ -230,31 +230,39 @@ def test_conditions_compare_by_name_and_survive_pickling():
     assert c.sentence() == "low-coherence: coherence 0.5 < 0.9"
 
 
-def test_an_executor_changes_no_number_even_when_jobs_are_lost(campaign):
+def test_workers_change_no_number_even_when_jobs_are_lost(campaign):
     from concurrent.futures import Executor, Future
+
+    from tpjb_ident.executors import PoolWorkers
 
     class Pool(Executor):
         """Runs jobs at once in this process, and loses every third with its worker."""
 
-        def __init__(self) -> None:
-            self.jobs = 0
+        jobs = 0
 
         def submit(self, fn, /, *args, **kwargs):
             future: Future = Future()
-            self.jobs += 1
-            if self.jobs % 3 == 0:
+            Pool.jobs += 1
+            if Pool.jobs % 3 == 0:
                 future.set_exception(ConnectionError("worker lost"))
             else:
                 future.set_result(fn(*args, **kwargs))
             return future
 
-    pool = Pool()
     few = replace(campaign, runs=campaign.of_kind("dynamic")[:6])
     settings = IdentifySettings(methods=())
-    (spread,), (plain,) = identify(few, settings, executor=pool).points, identify(few, settings).points
-    assert pool.jobs == 6
+    (plain,) = identify(few, settings).points
+    (spread,) = identify(few, settings, workers=PoolWorkers(Pool, 2)).points
+    assert Pool.jobs == 8
     np.testing.assert_array_equal(spread.stiffness.h, plain.stiffness.h)
     np.testing.assert_array_equal(spread.stiffness.covariance, plain.stiffness.covariance)
+
+
+def test_a_refusal_travels_whole_between_processes():
+    import pickle
+
+    again = pickle.loads(pickle.dumps(RecordTooShortError("run a: takes 3 s", 3.0)))
+    assert (str(again), again.needed) == ("run a: takes 3 s", 3.0)
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.errors import BadInputError, NotTrustedError, guarded
 from tpjb_ident.cli.inputs import open_bearing, open_campaign
-from tpjb_ident.cli.options import CampaignPath, Method, Norm, Out, out_folder
+from tpjb_ident.cli.options import CampaignPath, Method, Norm, Out, Scheduler, WorkerCount, out_folder
 from tpjb_ident.cli.outdir import output_folder
 from tpjb_ident.cli.record import write_record
 from tpjb_ident.cli.show import progress, say, table
@@ -19,9 +19,21 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from tpjb_ident.dynamic.identification import Identification
 
+#: Records [bytes] above which several processes are quicker than one.
+WORTH_PROCESSES = 100 * 2**20
+#: What worker processes need, imported once for all of them.
+PRELOAD = ("tpjb_ident.dynamic.run_jobs", "rigdata.readers.hdf5", "rigdata.readers.csv", "h5py")
+
 
 @guarded
-def identify(campaign: CampaignPath, method: Method = "mm-eiv", norm: Norm = None, out: Out = None) -> None:
+def identify(
+    campaign: CampaignPath,
+    method: Method = "mm-eiv",
+    norm: Norm = None,
+    workers: WorkerCount = None,
+    scheduler: Scheduler = None,
+    out: Out = None,
+) -> None:
     """Identify stiffness and damping with 95 % intervals at every operating point.
 
     Writes coefficients (chosen method), estimators (every method, statsmodels RLM among them) and windows (rejected
@@ -30,17 +42,37 @@ def identify(campaign: CampaignPath, method: Method = "mm-eiv", norm: Norm = Non
     source = open_campaign(campaign)
     settings = identify_settings(source, method, norm)
     from tpjb_ident.dynamic.identify import identify as run_identification
+    from tpjb_ident.executors import open_workers
 
+    count = worker_count(source, workers, scheduler)
     target = out_folder(out, "identify")
     with output_folder(target, "identify", (campaign,)) as folder:
-        with progress("identifying") as show:
-            result = run_identification(source, settings, show)
+        with open_workers(count, scheduler, PRELOAD) as team, progress("identifying") as show:
+            result = run_identification(source, settings, show, team)
         write_identification(folder, result)
         options = {"campaign": campaign, "method": method, "norm": norm}
         write_record(folder, target, "identify", options, source.fingerprint())
     show_coefficients(result)
     say(f"Results: {target}")
     refuse_untrusted(result)
+
+
+def worker_count(campaign: Campaign, asked: int | None, scheduler: str | None) -> int | None:
+    """Processes to use: as asked, else one per core where the records are long enough to pay for starting them.
+
+    Raises
+    ------
+    BadInputError
+        Both a number and a scheduler.
+    """
+    if scheduler is not None:
+        if asked is not None:
+            raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")
+        return None
+    if asked is not None:
+        return asked
+    size = sum(path.stat().st_size for path in campaign.files.values() if path.is_file())
+    return None if size > WORTH_PROCESSES else 1
 
 
 def identify_settings(campaign: Campaign, method: str, norm: str | None) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -24,6 +23,7 @@ from tpjb_ident.dynamic.rlm import RlmSettings
 from tpjb_ident.dynamic.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.run_phasors import PhasorSettings, RunPhasors
 from tpjb_ident.dynamic.stiffness import DynamicStiffness
+from tpjb_ident.executors import Workers
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def identify(
     campaign: Any,
     settings: IdentifySettings | None = None,
     progress: Progress | None = None,
-    executor: Executor | None = None,
+    workers: Workers | None = None,
 ) -> Identification:
     """Identify every operating point of a campaign.
 
@@ -71,8 +71,8 @@ def identify(
     settings : IdentifySettings, optional
     progress : callable, optional
         Called as progress(text, done, total).
-    executor : concurrent.futures.Executor, optional
-        Spreads the reading of runs over processes or machines; the numbers are the same.
+    workers : tpjb_ident.executors.Workers, optional
+        Processes or machines over which the reading of runs is spread; the numbers are the same.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def identify(
     if not runs:
         raise ValueError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     tell = progress or (lambda text, done, total: None)
-    results = all_runs(campaign, settings.phasors, tell, executor)
+    results = all_runs(campaign, settings.phasors, tell, workers)
     tell("estimating", len(runs), len(runs))
     temperatures = {result.phasors.run: result.temperatures for result in results}
     return assemble(campaign, [result.phasors for result in results], temperatures, settings)

@@ -1,22 +1,20 @@
-"""Turning all runs of a campaign to phasors: one after the other, or spread by an executor.
+"""Turning all runs of a campaign to phasors: one job per run, wherever the workers are.
 
-Any `concurrent.futures.Executor` will do: a process pool on one machine, or what a Dask client's
-``get_executor()`` gives. A job opens the campaign itself, by its path, so only names travel out and a
-few phasors travel back; a job that is lost with its worker is done here.
+A job carries the run's description and reads the file itself, so that little travels out and a few phasors
+travel back.
 """
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
-from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from tpjb_ident.dynamic.run_phasors import PhasorSettings, RunPhasors, run_phasors
 from tpjb_ident.dynamic.windows import RecordTooShortError
+from tpjb_ident.executors import Here, Workers, in_order
 
 Progress = Callable[[str, int, int], None]
 #: Samples from which a run's temperatures are taken.
@@ -39,7 +37,7 @@ class RunResult:
 
 
 def all_runs(
-    campaign: Any, settings: PhasorSettings, progress: Progress, executor: Executor | None = None
+    campaign: Any, settings: PhasorSettings, progress: Progress, workers: Workers | None = None
 ) -> list[RunResult]:
     """Phasors and temperatures of every dynamic run, in the campaign's order.
 
@@ -49,28 +47,32 @@ def all_runs(
     settings : PhasorSettings
     progress : callable
         Called as progress(text, done, total).
-    executor : concurrent.futures.Executor, optional
-        Spreads the runs; the numbers are the same.
+    workers : Workers, optional
+        Who reads the runs; the numbers are the same.
 
     Raises
     ------
     RecordTooShortError, rigdata.problem.RigDataError
         Of the first run, in order, that cannot be used.
+    LostJobsError
+        Workers were lost again and again.
     """
     runs = campaign.of_kind("dynamic")
-    if executor is None:
-        jobs = [functools.partial(one_run, run, campaign.housing_mass, settings) for run in runs]
-    else:
-        futures = [executor.submit(_remote_run, str(campaign.path), run.id, settings) for run in runs]
-        jobs = [
-            functools.partial(_collected, future, run, campaign.housing_mass, settings)
-            for future, run in zip(futures, runs)
-        ]
-    results = []
-    for i, (run, job) in enumerate(zip(runs, jobs)):
-        progress(run.id, i, len(runs))
-        results.append(job())
+    jobs = [(_anywhere(run), campaign.housing_mass, settings) for run in runs]
+    results: list[RunResult] = []
+    progress(runs[0].id if runs else "", 0, len(runs))
+    for result in in_order(workers or Here(), one_run, jobs):
+        results.append(result)
+        progress(result.phasors.run, len(results), len(runs))
     return results
+
+
+def _anywhere(run: Any) -> Any:
+    """The run with its file's absolute path: workers may stand in another folder."""
+    reader: Any = getattr(run, "reader", None)
+    if reader is None or reader.path.is_absolute():
+        return run
+    return replace(run, reader=replace(reader, path=reader.path.absolute()))
 
 
 def one_run(run: Any, housing_mass: float, settings: PhasorSettings) -> RunResult:
@@ -80,27 +82,6 @@ def one_run(run: Any, housing_mass: float, settings: PhasorSettings) -> RunResul
     except RecordTooShortError as error:
         raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
     return RunResult(phasors, mean_temperatures(run))
-
-
-def _collected(future: Any, run: Any, housing_mass: float, settings: PhasorSettings) -> RunResult:
-    """Result of a remote job; what went wrong there is tried again here, where the error is whole."""
-    try:
-        result: RunResult = future.result()
-    except Exception:  # a lost worker raises whatever its executor thinks fit
-        return one_run(run, housing_mass, settings)
-    return result
-
-
-def _remote_run(path: str, run_id: str, settings: PhasorSettings) -> RunResult:
-    campaign = _opened(path)
-    return one_run(campaign.run(run_id), campaign.housing_mass, settings)
-
-
-@functools.lru_cache(maxsize=4)
-def _opened(path: str) -> Any:
-    from rigdata.campaign import load_campaign
-
-    return load_campaign(path)
 
 
 def mean_temperatures(run: Any) -> dict[int, float]:

@@ -49,6 +49,9 @@ class RecordTooShortError(ValueError):
         super().__init__(message)
         self.needed = needed
 
+    def __reduce__(self) -> tuple[type[RecordTooShortError], tuple[str, float]]:
+        return RecordTooShortError, (str(self), self.needed)
+
 
 def line_design(time: FloatArray, frequencies: FloatArray, drift_order: int = 1) -> FloatArray:
     """Columns of the joint least-squares problem.

@@ -1,0 +1,126 @@
+"""The same campaign on a Dask cluster: the same bits, even if a worker is killed half-way."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.unit.test_executors import dies_once
+from tpjb_ident.cluster import ClusterError, dask_workers
+from tpjb_ident.executors import in_order, local_workers
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Cluster:
+    """A scheduler and two workers on this machine, as ``dask scheduler`` and ``dask worker`` start them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.file = folder / "scheduler.json"
+        self.log = (folder / "dask.log").open("w")
+        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", "0")
+        self.workers = [self._start("worker", "--nthreads", "1", "--no-nanny") for _ in range(2)]
+        until = time.monotonic() + 60
+        while not self.file.exists() and time.monotonic() < until:
+            time.sleep(0.1)
+
+    def _start(self, role: str, *options: str) -> subprocess.Popen:
+        command = [sys.executable, "-m", f"distributed.cli.dask_{role}", "--no-dashboard", *options]
+        environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        return subprocess.Popen(
+            [*command, "--scheduler-file", str(self.file)],
+            cwd=ROOT,
+            env=environment,
+            stdout=self.log,
+            stderr=subprocess.STDOUT,
+        )
+
+    def close(self) -> None:
+        for process in (*self.workers, self.scheduler):
+            process.kill()
+            process.wait()
+        self.log.close()
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    started = Cluster(tmp_path_factory.mktemp("cluster"))
+    yield started
+    started.close()
+
+
+@pytest.fixture(scope="module")
+def campaign_file(tmp_path_factory):
+    from rigdata.virtual_rig import write_campaign
+    from tests.unit.test_dynamic_identify import rig
+
+    path = tmp_path_factory.mktemp("rig") / "campaign.h5"
+    write_campaign(path, rig([(2500.0, 25.0), (5000.0, 25.0)], seed=7))
+    return path
+
+
+def wait_for(address: str, count: int) -> None:
+    from distributed import Client
+
+    with Client(scheduler_file=address, set_as_default=False) as client:
+        client.wait_for_workers(count, timeout=60)
+
+
+@pytest.mark.slow
+def test_a_worker_killed_half_way_changes_no_bit(cluster, campaign_file, tmp_path):
+    from rigdata.campaign import load_campaign
+    from tpjb_ident.dynamic.identify import IdentifySettings, identify
+
+    wait_for(str(cluster.file), 2)
+    campaign = load_campaign(campaign_file)
+    settings = IdentifySettings(methods=("ols", "mm"))
+    seen = []
+
+    def kill_half_way(text, done, total):
+        seen.append((done, total))
+        if done == total // 2 and cluster.workers[0].poll() is None:
+            cluster.workers[0].kill()
+
+    with dask_workers(str(cluster.file)) as workers:
+        assert workers.count == 2
+        spread = identify(campaign, settings, kill_half_way, workers)
+        # and with a job in its hands: the second worker kills itself, nobody is left, a new one takes over
+        cluster.workers.append(cluster._start("worker", "--nthreads", "1", "--no-nanny"))
+        jobs = [(str(tmp_path), i) for i in range(6)]
+        assert list(in_order(workers, dies_once, jobs)) == [3 * i for i in range(6)]
+    assert cluster.workers[0].poll() is not None
+    assert (6, 12) in seen
+    with local_workers(2) as processes:
+        local = identify(campaign, settings, workers=processes)
+    alone = identify(campaign, settings)
+    for other in (spread, local):
+        assert other.estimators_frame().equals(alone.estimators_frame())
+        assert other.windows_frame().equals(alone.windows_frame())
+        assert (other.systematic == alone.systematic).all()
+
+
+@pytest.mark.slow
+def test_the_command_line_works_on_a_cluster(cluster, small_campaign, tmp_path):
+    from typer.testing import CliRunner
+
+    from tpjb_ident.cli.app import app
+
+    wait_for(str(cluster.file), 1)
+    tables = []
+    for options in (["--scheduler", str(cluster.file)], ["--workers", "1"]):
+        out = tmp_path / options[0].strip("-")
+        result = CliRunner().invoke(app, ["identify", str(small_campaign), "--out", str(out), *options])
+        assert result.exit_code == 0, result.output
+        tables.append([(out / f"{name}.csv").read_bytes() for name in ("coefficients", "estimators", "windows")])
+    assert tables[0] == tables[1]
+
+
+def test_a_scheduler_that_is_not_there_is_named():
+    answer = r"no Dask scheduler answers at tcp://127\.0\.0\.1:9 .*dask scheduler"
+    with pytest.raises(ClusterError, match=answer), dask_workers("tcp://127.0.0.1:9", patience=1.0):
+        pass
