@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from model.film import FilmGrid, FilmWork
+from model.film_mesh import FilmGrid, FilmWork
 from model.kernel import compiled
 
 FloatArray = NDArray[np.float64]

@@ -26,8 +26,8 @@ from model.carrying import (
     wake_or_rest,
 )
 from model.film import solve_film
-from model.kernel import compiled
-from model.pad_bending import bend
+from model.newton_step import newton_step
+from model.pad_bending import bending_step, change_of_shape, wanted_shapes
 from model.pad_film import PadFilm, film_step, least_share, oil_constants, pad_films
 from model.setup import Setup
 from model.start import first_position
@@ -91,7 +91,6 @@ class _Search:
     position: FloatArray = field(default_factory=lambda: np.zeros(2))
     limited: float = 0.0
     relaxation: float = HELD_BACK
-    deformation_change: float = 0.0
 
     @property
     def surface_speed(self) -> float:
@@ -190,7 +189,7 @@ def _iterate(search: _Search) -> Equilibrium:
         heat_change = _solve_films(search)
         if any(not f.idle and f.forces is not None and f.forces.steps < 0 for f in search.films):
             return _result(search, iteration, math.inf, heat_change, ("film lost", "not converged"))
-        residual, shift, moves = _newton_step(search)
+        residual, shift, moves = newton_step(search.setup, search.load, search.films)
         if not (math.isfinite(residual) and np.all(np.isfinite(shift)) and np.all(np.isfinite(moves))):
             return _result(search, iteration, math.inf, heat_change, ("singular", "not converged"))
         near = residual < NEAR and heat_change < NEAR_HEAT
@@ -271,8 +270,11 @@ def _solve_films(search: _Search) -> float:
                 change = max(change, 0.0 if film.idle else _solve_film(search, film))
                 film.idle = film.idle or not film.forces.force[0] > 0.0
         if film.idle:
-            film.forces = None
+            film.forces = film.step = None
             film.work.pressure[:] = 0.0
+    if setup.flexible_pads:
+        # a deformation counts like a temperature change of the same weight in the film's resistance
+        change = max(change, HEAT_PER_FORCE * _bend_pads(search))
     return change
 
 
@@ -285,10 +287,24 @@ def _solve_film(search: _Search, film: PadFilm) -> float:
         oil_constants(oil), (oil.specific_heat, oil.conductivity), (film.inlet, relaxation, HEATING_STEP),
     )  # fmt: skip
     search.limited = max(search.limited, limited)
-    if not setup.flexible_pads or film.forces.steps < 0:
-        return film.temperature_change
-    # a deformation counts like a temperature change of the same weight in the film's resistance
-    return max(film.temperature_change, HEAT_PER_FORCE * bend(setup, film))
+    return film.temperature_change
+
+
+def _bend_pads(search: _Search) -> float:
+    """Let every pad ask for the deformation its film gives it; returns the largest change over the least film."""
+    setup = search.setup
+    carrying = [f for f in search.films if f.forces is not None and f.forces.steps > 0]
+    gives = [f.give for f in carrying if f.give is not None]
+    wanted = wanted_shapes(gives, [f.work for f in carrying], setup.inlet_temperature, setup.bending_factor)
+    share = 0.0
+    for film, give, shape in zip(carrying, gives, wanted, strict=True):
+        assert film.forces is not None
+        wedge = (film.pad.pad_clearance, *film.approach(search.position))
+        film.step = bending_step(
+            give, film.grid, film.work, wedge, film.forces, shape - film.bent, setup.bending_factor
+        )
+        share = max(share, film.step.share)
+    return share
 
 
 def _sharpen(search: _Search) -> None:
@@ -316,119 +332,35 @@ def outlet_temperature(film: PadFilm) -> float:
     return float(flow @ film.work.temperature[-1]) / total
 
 
-def _newton_step(search: _Search) -> tuple[float, FloatArray, FloatArray]:
-    """One linear solve: the residual, the journal's move (2,), and every pad's (tilt, deflection) move (n_pads, 2)."""
-    laws = search.setup.pivots
-    carrying = [f for f in search.films if f.forces is not None]
-    pads = np.zeros((len(carrying), _COLUMNS))
-    for row, film in zip(pads, carrying, strict=True):
-        forces = film.forces
-        assert forces is not None
-        law, radial = laws[film.number - 1], float(forces.force[0])
-        row[0:4] = *film.normal, *film.tangent
-        row[4:10] = *forces.force, *forces.stiffness.ravel()
-        row[10] = film.pivot_radius
-        row[11] = search.setup.rotational_stiffness / film.pivot_radius
-        row[12] = film.tilt
-        row[13] = law.deflection(max(radial, 0.0)) - film.deflection
-        row[14] = 1.0 / law.stiffness(max(radial, 1e-6))
-    residual, shift, moves = eliminate(search.load, pads)
-    every = np.zeros((len(search.films), 2))
-    every[[f.number - 1 for f in carrying]] = moves
-    return residual, shift, every
-
-
-#: What `eliminate` is told per pad: normal, tangent, force, stiffness, R_P, k_theta / R_P, tilt, missing give,
-#: pivot compliance.
-_COLUMNS = 15
-
-
-@compiled
-def eliminate(load: FloatArray, pads: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-    """Eliminate every pad's tilt and deflection, and solve for the journal's move.
-
-    Parameters
-    ----------
-    load : (2,) ndarray
-        [N]
-    pads : (n, 15) ndarray
-        One row per pad that carries, see `_COLUMNS`.
-
-    Returns
-    -------
-    residual : float
-        Unbalanced force, moment over R_P, or give times stiffness, as a share of the load.
-    shift : (2,) ndarray
-        [m]
-    moves : (n, 2) ndarray
-        Changes of tilt [rad] and deflection [m].
-    """
-    n = pads.shape[0]
-    size = max(math.hypot(load[0], load[1]), 1.0)
-    jxx, jxy, jyx, jyy = 1.0, 0.0, 0.0, 1.0  # a pad that only touches leaves a direction free: keep it regular
-    fx, fy = load[0], load[1]
-    worst = 0.0
-    constant = np.empty((n, 2))
-    gradient = np.empty((n, 2, 2))
-    for m in range(n):
-        nx, ny, tx, ty, radial, tangential, kaa, kab, kba, kbb, arm, hold, tilt, missing, compliance = pads[m]
-        moment = tangential + hold * tilt
-        # d(a, b) = (n . dX - deta, t . dX + R_P dt); rows: tilting force, pivot
-        m11, m12 = kbb * arm + hold, -kba
-        m21, m22 = -compliance * kab * arm, 1.0 + compliance * kaa
-        det = m11 * m22 - m12 * m21
-        for axis in range(3):  # right-hand sides: constant, dx, dy
-            if axis == 0:
-                r1, r2 = -moment, missing
-            else:
-                da = nx if axis == 1 else ny
-                db = tx if axis == 1 else ty
-                r1, r2 = -(kba * da + kbb * db), compliance * (kaa * da + kab * db)
-            dt, deta = (r1 * m22 - m12 * r2) / det, (m11 * r2 - m21 * r1) / det
-            if axis == 0:
-                constant[m, 0], constant[m, 1] = dt, deta
-                da, db = -deta, arm * dt
-            else:
-                gradient[m, 0, axis - 1], gradient[m, 1, axis - 1] = dt, deta
-                da, db = da - deta, db + arm * dt
-            fr, ft = kaa * da + kab * db, kba * da + kbb * db
-            if axis == 0:
-                fx -= nx * (radial + fr) + tx * (tangential + ft)
-                fy -= ny * (radial + fr) + ty * (tangential + ft)
-            elif axis == 1:
-                jxx += nx * fr + tx * ft
-                jyx += ny * fr + ty * ft
-            else:
-                jxy += nx * fr + tx * ft
-                jyy += ny * fr + ty * ft
-        worst = max(worst, max(abs(moment), abs(missing * kaa)) / size)
-    worst = max(worst, math.hypot(fx, fy) / size)
-    det = jxx * jyy - jxy * jyx
-    shift = np.array([(fx * jyy - jxy * fy) / det, (jxx * fy - jyx * fx) / det])
-    moves = np.empty((n, 2))
-    for m in range(n):
-        for q in range(2):
-            moves[m, q] = constant[m, q] + gradient[m, q, 0] * shift[0] + gradient[m, q, 1] * shift[1]
-    return worst, shift, moves
-
-
 def _apply(search: _Search, step: tuple[FloatArray, FloatArray], damping: float) -> bool:
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
     shift, moves = step
     scale = min(damping, longest_step(search.films, shift))
+    bent: list[FloatArray | None] = []
     for film, move in zip(search.films, moves, strict=True):
-        if film.forces is not None:
-            da = float(film.normal @ shift) - move[1]
-            db = float(film.tangent @ shift) + film.pivot_radius * move[0]
-            worst = least_share(film.grid, film.work, da, db)
-            if worst * damping < SHRINK - 1.0:
-                scale = min(scale, (SHRINK - 1.0) / worst)
+        bent.append(None)
+        if film.forces is None:
+            continue
+        da = float(film.normal @ shift) - move[1]
+        db = float(film.tangent @ shift) + film.pivot_radius * move[0]
+        if film.give is not None and film.step is not None:
+            bent[-1] = change_of_shape(film.give, film.step, da, db)
+        worst = least_share(film.grid, film.work, da, db, _NO_CHANGE if bent[-1] is None else bent[-1])
+        if worst * damping < SHRINK - 1.0:
+            scale = min(scale, (SHRINK - 1.0) / worst)
     scale = shorten(search.films, search.position, shift, scale)
     search.position = search.position + scale * shift
-    for film, move in zip(search.films, moves, strict=True):
+    for film, move, change in zip(search.films, moves, bent, strict=True):
         film.tilt += float(scale * move[0])
         film.deflection += float(scale * move[1])
+        if change is not None:
+            film.bent += scale * change
+            film.work.extra[:] += scale * change
     return scale == 1.0
+
+
+#: What the film's thickness changes by besides its (a, b), where the pads are rigid.
+_NO_CHANGE = np.empty((0, 0))
 
 
 def _result(search: _Search, iterations: int, residual: float, heat: float, status: tuple[str, ...]) -> Equilibrium:

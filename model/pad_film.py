@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from model.bearing import Oil, Pad
 from model.energy import solve_energy
-from model.film import FilmForces, FilmGrid, FilmWork, film_grid, film_work, solve_film
+from model.film import FilmForces, solve_film
+from model.film_mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.kernel import compiled
+from model.pad_bending import BendingStep, PadGive, pad_give
 from model.setup import Setup
 from model.start import Branch
 
@@ -44,6 +46,10 @@ class PadFilm:
     forces : FilmForces or None
     bent : (nt + 1, nz + 1) ndarray
         The pad's deformation, part of `work.extra` [m].
+    give : PadGive or None
+        How the pad gives way; None for a rigid one.
+    step : BendingStep or None
+        Its part of the present Newton step.
     """
 
     number: int
@@ -56,6 +62,8 @@ class PadFilm:
     work: FilmWork
     inlet: float
     bent: FloatArray
+    give: PadGive | None = None
+    step: BendingStep | None = None
     tilt: float = 0.0
     deflection: float = 0.0
     idle: bool = False
@@ -102,6 +110,7 @@ def pad_films(setup: Setup) -> list[PadFilm]:
                 work=work,
                 inlet=setup.inlet_temperature,
                 bent=np.zeros_like(work.extra),
+                give=pad_give(pad, bearing, grid) if setup.flexible_pads else None,
             )
         )
     return films
@@ -175,11 +184,12 @@ def set_viscosity(work: FilmWork, oil: tuple[float, float, float, float]) -> Non
 
 
 @compiled
-def least_share(grid: FilmGrid, work: FilmWork, da: float, db: float) -> float:
-    """Most negative relative change of the film thickness for a change of (a, b)."""
+def least_share(grid: FilmGrid, work: FilmWork, da: float, db: float, extra: FloatArray) -> float:
+    """Most negative relative change of the film thickness for a change of (a, b) and of its shape (may be empty)."""
     worst = 0.0
     for i in range(work.thickness.shape[0]):
         change = -(da * grid.cos[i] + db * grid.sin[i])
         for j in range(work.thickness.shape[1]):
-            worst = min(worst, change / work.thickness[i, j])
+            more = extra[i, j] if extra.size > 0 else 0.0
+            worst = min(worst, (change + more) / work.thickness[i, j])
     return worst

@@ -111,6 +111,16 @@ class PadSolid:
         return self._thermal_matrix("expansion")
 
     @cached_property
+    def expansion_factors(self) -> tuple[Array, Array]:
+        """`thermal` as a product, ``second @ first``: film to the pad's coarser nodes, (n_coarse, n_film), and back."""
+        maps, answers = [], []
+        for solid, to in self._parts:
+            _, project, coarse = to.dense
+            maps.append(coarse)
+            answers.append(project @ solid.expansion)
+        return _frozen(np.vstack(maps)), _frozen(np.hstack(answers))
+
+    @cached_property
     def heat_flux(self) -> Array:
         """Heat flux density into the pad per film temperature rise, as `heat_flow` [W/m^2/K], (n_film, n_film)."""
         return self._thermal_matrix("flux")
@@ -238,7 +248,13 @@ def pad_solid(
     ValueError
         The film grid does not span the pad, or the pivot face does not fit on it.
     """
-    geometry = PadGeometry.of(pad, bearing, face)
+    return solid_of(PadGeometry.of(pad, bearing, face), film_theta, film_z, density)
+
+
+def solid_of(
+    geometry: PadGeometry, film_theta: ArrayLike, film_z: ArrayLike, density: MeshDensity | None = None
+) -> PadSolid:
+    """`pad_solid` for a geometry at hand."""
     theta, z = np.asarray(film_theta, dtype=float), np.asarray(film_z, dtype=float)
     _check_span(theta, (geometry.leading, geometry.trailing), "film_theta", "rad")
     if z.ndim == 1 and z.size and abs(z[0]) < 1e-6 * geometry.length:

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from model.film import film_grid, film_work, solve_film
+from model.film import solve_film
+from model.film_mesh import film_grid, film_work
 from model.kernel import compiled
 
 FloatArray = NDArray[np.float64]

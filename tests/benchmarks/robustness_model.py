@@ -22,7 +22,8 @@ from scipy.stats import qmc
 
 from model.bearing import Bearing, Oil, Pad, Pivot
 from model.energy import solve_energy
-from model.film import film_work, solve_film
+from model.film import solve_film
+from model.film_mesh import film_work
 from model.pad_film import PadFilm
 from model.predict import Prediction, predict
 

@@ -9,7 +9,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.sparse.linalg import spsolve
 
-from model.film import FilmForces, FilmGrid, FilmWork, film_grid, film_work, solve_film
+from model.film import FilmForces, solve_film
+from model.film_mesh import FilmGrid, FilmWork, film_grid, film_work
 
 MU, RHO, SPEED, RADIUS, CLEARANCE = 0.03, 850.0, 7.0, 0.05, 1e-4
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import model.equilibrium
 import model.film
+import model.newton_step
 import model.pad_film
 from model import kernel
 
@@ -32,7 +32,7 @@ def test_stamp_follows_every_source(tmp_path, monkeypatch):
 
 
 def test_cached_code_carries_the_stamp():
-    for function in (model.film.solve_film, model.pad_film.film_step, model.equilibrium.eliminate):
+    for function in (model.film.solve_film, model.pad_film.film_step, model.newton_step.eliminate):
         assert function._cache._cache_file._source_stamp == kernel.STAMP
 
 

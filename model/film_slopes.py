@@ -1,0 +1,156 @@
+"""Perturbed film pressure: derivatives by approach, wedge and their rates, and by the pad's shape.
+
+One factorisation serves all right-hand sides.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from model.film_matrix import substitute_four, substitute_many
+from model.film_mesh import FilmGrid, FilmWork, FloatArray
+from model.kernel import compiled
+
+
+@compiled
+def rupture_line(
+    grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, source: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Where between two nodes the film ruptures, as changes of the wet nodes' diagonal and area.
+
+    A dry node is reached by the share `wet` of the flow that would wet it; the pressure rises as the square of
+    the distance from the rupture line, so that the line lies (0.5 + wet) steps from the last wet node. A linear
+    profile that vanishes there has (wet - 0.5) / (wet + 0.5) of the wet node's value at the dry node.
+    """
+    nt, nz = gx.shape[0], gz.shape[1]
+    p, ruptured = work.pressure, work.ruptured
+    diagonal = np.zeros((nt + 1, nz + 1))
+    area = grid.area.copy()
+    for i in range(1, nt):
+        for j in range(grid.first, nz):
+            if not ruptured[i, j] or source[i, j] >= 0.0:
+                continue
+            inflow = gx[i - 1, j] * p[i - 1, j] + gx[i, j] * p[i + 1, j] + gz[i, j] * p[i, j + 1]
+            if j > 0:
+                inflow += gz[i, j - 1] * p[i, j - 1]
+            wet = min(1.0, inflow / -source[i, j])
+            ghost = (wet - 0.5) / (wet + 0.5)
+            for side in range(-1, 2, 2):
+                m = i + side
+                if 0 < m < nt and not ruptured[m, j]:
+                    diagonal[m, j] -= (gx[i - 1, j] if side < 0 else gx[i, j]) * ghost
+                    area[m, j] *= 1.0 + 0.5 * (wet - 0.5)
+    return diagonal, area
+
+
+@compiled
+def derivatives(
+    grid: FilmGrid,
+    work: FilmWork,
+    wedge: tuple[float, float, float],
+    conductance: tuple[FloatArray, FloatArray],
+) -> None:
+    """Right-hand sides of the perturbed equation, solved with the factor at hand; then the mass flows."""
+    p, rhs, h = work.pressure, work.slopes, work.thickness
+    gx, gz = conductance
+    nt, nz = gx.shape[0], gz.shape[1]
+    first = grid.first
+    width = nz - first
+    rhs[:, :] = 0.0
+    for i in range(nt):
+        base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
+        for j in range(nz + 1):
+            poiseuille = gx[i, j] * (p[i + 1, j] - p[i, j])
+            hf = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
+            # d(outflow through the face)/dh, times dh/da = -cos, dh/db = -sin
+            slope = (work.flow_x[i, j] - 3.0 * poiseuille) / hf
+            work.flow_x[i, j] -= poiseuille
+            if first <= j < nz:
+                k = i * width + j - first
+                if i + 1 < nt:
+                    rhs[k, 0] -= slope * grid.cos_face[i]
+                    rhs[k, 1] -= slope * grid.sin_face[i]
+                if i > 0:
+                    rhs[k - width, 0] += slope * grid.cos_face[i]
+                    rhs[k - width, 1] += slope * grid.sin_face[i]
+    for i in range(nt + 1):
+        for j in range(nz):
+            poiseuille = gz[i, j] * (p[i, j + 1] - p[i, j])
+            work.flow_z[i, j] = -poiseuille
+            if 0 < i < nt:
+                slope = -3.0 * poiseuille / (0.5 * (h[i, j] + h[i, j + 1]))
+                k = (i - 1) * width + j - first
+                if j >= first:
+                    rhs[k, 0] += slope * grid.cos[i]
+                    rhs[k, 1] += slope * grid.sin[i]
+                if j + 1 < nz:
+                    rhs[k + 1, 0] -= slope * grid.cos[i]
+                    rhs[k + 1, 1] -= slope * grid.sin[i]
+    for i in range(1, nt):
+        for j in range(first, nz):
+            k = (i - 1) * width + j - first
+            squeeze = work.density[i, j] * grid.dx * grid.height[j]
+            rhs[k, 2] = squeeze * grid.cos[i]
+            rhs[k, 3] = squeeze * grid.sin[i]
+            if work.ruptured[i, j]:
+                for m in range(4):
+                    rhs[k, m] = 0.0
+    substitute_four(work.band, rhs)
+
+
+@compiled
+def shape_slopes(
+    grid: FilmGrid, work: FilmWork, conductance: tuple[FloatArray, FloatArray], shapes: FloatArray
+) -> FloatArray:
+    """Derivatives of the pressure by the amplitudes of shapes that are added to the film thickness.
+
+    Parameters
+    ----------
+    grid, work
+        As `model.film.solve_film` left them: the factor of the matrix is read.
+    conductance : tuple of ndarray
+        Of the faces along and across, at the present thickness.
+    shapes : (nt + 1, nz + 1, m) ndarray
+        What a unit amplitude adds to h [m].
+
+    Returns
+    -------
+    (unknowns, m) ndarray
+        [Pa per unit]; zero where the film is ruptured.
+    """
+    p, h = work.pressure, work.thickness
+    gx, gz = conductance
+    nt, nz = gx.shape[0], gz.shape[1]
+    first, count = grid.first, shapes.shape[2]
+    width = nz - first
+    rhs = np.zeros((work.unknown.shape[0], count))
+    for i in range(nt):
+        for j in range(first, nz):
+            # flow = couette - poiseuille; a thicker film takes more of both
+            poiseuille = gx[i, j] * (p[i + 1, j] - p[i, j])
+            couette = work.flow_x[i, j] + poiseuille
+            slope = (couette - 3.0 * poiseuille) / (h[i, j] + h[i + 1, j])
+            k = i * width + j - first
+            for m in range(count):
+                more = slope * (shapes[i, j, m] + shapes[i + 1, j, m])
+                if i + 1 < nt:
+                    rhs[k, m] += more
+                if i > 0:
+                    rhs[k - width, m] -= more
+    for i in range(1, nt):
+        for j in range(nz):
+            slope = -3.0 * gz[i, j] * (p[i, j + 1] - p[i, j]) / (h[i, j] + h[i, j + 1])
+            k = (i - 1) * width + j - first
+            for m in range(count):
+                more = slope * (shapes[i, j, m] + shapes[i, j + 1, m])
+                if j >= first:
+                    rhs[k, m] -= more
+                if j + 1 < nz:
+                    rhs[k + 1, m] += more
+    for i in range(1, nt):
+        for j in range(first, nz):
+            if work.ruptured[i, j]:
+                for m in range(count):
+                    rhs[(i - 1) * width + j - first, m] = 0.0
+    substitute_many(work.band, rhs)
+    return rhs
