@@ -25,11 +25,6 @@ EffectsFile = Annotated[
 ]
 Method = Annotated[str, typer.Option("--method", help="Estimator of coefficients.csv: mm-eiv, mm, rlm, ols or iv.")]
 Norm = Annotated[str | None, typer.Option("--norm", help="Norm of --method rlm: huber, tukey, hampel, ...")]
-
-
-def out_folder(out: Path | None, command: str) -> Path:
-    """Return the folder for the results of `command`."""
-    return out if out is not None else Path(f"tpjb-{command}-out")
 WorkerCount = Annotated[
     int | None,
     typer.Option("--workers", metavar="N", min=1, help="Processes [default: one per core where it pays]."),
@@ -38,3 +33,8 @@ Scheduler = Annotated[
     str | None,
     typer.Option("--scheduler", metavar="ADDRESS", help="Dask scheduler to work on, such as tcp://host:8786."),
 ]
+
+
+def out_folder(out: Path | None, command: str) -> Path:
+    """Return the folder for the results of `command`."""
+    return out if out is not None else Path(f"tpjb-{command}-out")
