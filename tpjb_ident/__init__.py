@@ -49,6 +49,7 @@ _HOMES = {
     "CompareSettings": "tpjb_ident.compare",
     "compare_campaign": "tpjb_ident.compare",
     "write_report": "tpjb_ident.report",
+    "plots": "tpjb_ident.report",
 }
 
 __all__ = sorted([*_HOMES, "__version__"])

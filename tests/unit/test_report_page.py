@@ -7,21 +7,22 @@ import re
 
 import pytest
 
-from tpjb_ident.report.figure import Panel, add_legend, new_panel, save_panels, svg_text
+from tpjb_ident.report.figure import panel, save_panels, svg_text
 from tpjb_ident.report.page import Page, Section, Table, render_page
+from tpjb_ident.report.plots.look import add_legend, new_picture
 
 HOSTILE = "<script>alert(1)</script>\"'& <img src=x onerror=alert(2)> $\\frac{a}{b}$ \x1b[31m\u202e"
 
 
 @pytest.fixture(scope="module")
 def page_and_svg(tmp_path_factory):
-    figure, axes = new_panel("static load, kN", "kxx, MN/m")
+    figure, axes = new_picture("static load, kN", "kxx, MN/m")
     axes.plot([1, 2, 3], [1, 4, 9], color="#0072b2", label=r"pivot <b> & \$5")
     axes.plot([1, 2, 3], [1, 2, 3], marker="o", clip_on=True)
     add_legend(axes)
-    other, axes = new_panel("x", "y")
+    other, axes = new_picture("x", "y")
     axes.plot([0, 1], [1, 0], marker="s")
-    panels = [Panel("one", f"first {HOSTILE}", figure, "g"), Panel("two", "second", other, "g")]
+    panels = [panel("one", f"first {HOSTILE}", figure, "g"), panel("two", "second", other, "g")]
     page = Page(
         title=HOSTILE,
         subtitle=HOSTILE,
@@ -112,15 +113,15 @@ def test_text_in_figures_is_text(page_and_svg):
 
 
 def test_the_same_figure_gives_the_same_bytes(page_and_svg):
-    figure, axes = new_panel("x", "y")
+    figure, axes = new_picture("x", "y")
     axes.plot([0, 1], [1, 0], marker="s")
-    assert svg_text(figure, "two") == page_and_svg[1]["two"]
+    assert svg_text(panel("two", "second", figure, "g").figure, "two") == page_and_svg[1]["two"]
 
 
 def test_no_global_matplotlib_setting_is_left_behind():
     import matplotlib
 
     before = dict(matplotlib.rcParams)
-    figure, _ = new_panel("x", "y")
+    figure, _ = new_picture("x", "y")
     svg_text(figure, "z")
     assert dict(matplotlib.rcParams) == before

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from tpjb_ident.report.coefficient_panels import coefficient_panels, longest_series
-from tpjb_ident.report.position_panels import polygon_corners, position_panels
+from tpjb_ident.report.coefficient_panels import coefficient_panels
+from tpjb_ident.report.plots.series import longest_series
+from tpjb_ident.report.position_panels import position_panels
 
 NAMES = [f"{s}{e}_{u}" for s, u in (("k", "N_per_m"), ("c", "Ns_per_m")) for e in ("xx", "xy", "yx", "yy")]
 
@@ -52,12 +53,6 @@ def test_measured_points_have_their_intervals_and_predictions_their_lines():
     (bars,) = axes.containers
     low, high = bars[2][0].get_segments()[0][:, 1]
     assert (low, high) == (0.9 * 4e3 / 1e6, 1.2 * 4e3 / 1e6)
-
-
-def test_corners_of_a_regular_pentagon():
-    angles = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
-    corners = polygon_corners(angles, np.full(5, 80e-6))
-    assert np.allclose(np.hypot(*corners.T), 80e-6 / np.cos(np.radians(36.0)))
 
 
 def test_positions_need_something_to_show():

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import optimize, special
 
 from tpjb_ident.pivot.hysteresis import Hysteresis
-from tpjb_ident.pivot.law_fit import SCALE, LawFit
+from tpjb_ident.pivot.law_fit import FRICTION, OFFSET, SCALE, LawFit
 from tpjb_ident.pivot.projection import Direction
 
 EXTRAPOLATION_SPREAD = 0.04  # of ln(stiffness) per e-fold of load beyond the points: no law is quite the pivot's own
@@ -178,6 +178,37 @@ class PivotCurve:
     def relative_stiffness_se(self, load: ArrayLike) -> FloatArray:
         """Standard error of ln(tangent stiffness) at pad loads [N]."""
         return self._spread(_loads(load), secant=False)
+
+    def reading_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Deflection that the steps should show while loading, and its interval.
+
+        Other than `deflection` it holds the way into contact, and its interval is that of the reading about the
+        steps' own zero: what the fit leaves open among the points, not how far the zero load's reading is known.
+
+        Parameters
+        ----------
+        load : array_like
+            Pad loads [N].
+        level : float
+            Coverage.
+
+        Returns
+        -------
+        value, lo, hi : ndarray
+            [m], shape of `load`.
+        """
+        values = _loads(load)
+        flat, up = values.ravel(), np.ones(values.size)
+        applied = flat / (1.0 - self.law.theta[FRICTION])
+        centre = self.law.reading(applied, up)
+        variance = np.zeros(len(flat))
+        for fit, weight in zip(self.fits, self.weights, strict=True):
+            reading, gradient = fit.reading_gradient(applied, up)
+            own = np.einsum("ij,jk,ik->i", gradient, fit.covariance, gradient)
+            variance += weight * (own + (reading - centre) ** 2)
+        half = self._quantile(level) * np.sqrt(variance)
+        value = centre - self.law.theta[OFFSET]
+        return tuple(np.asarray(part).reshape(values.shape) for part in (value, value - half, value + half))  # type: ignore[return-value]
 
     def is_extrapolated(self, load: ArrayLike) -> NDArray[np.bool_]:
         """True where a load lies outside what was measured with full contact."""

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from tpjb_ident.compare.pivot_formula import printed_formula
-from tpjb_ident.compare.positions import measured_locus, predicted_locus
+from tpjb_ident.compare.positions import predicted_locus
 from tpjb_ident.compare.summary import Deviation, deviations, summary_sentences
 from tpjb_ident.compare.tables import comparison_frame
 from tpjb_ident.report.coefficient_panels import coefficient_panels
@@ -21,10 +21,11 @@ from tpjb_ident.report.comparison_tables import (
     pivot_points_table,
     predicted_table,
 )
-from tpjb_ident.report.figure import VARIANT_LABEL, Panel, save_panels
+from tpjb_ident.report.figure import Panel, save_panels
 from tpjb_ident.report.numbers import percent
 from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.report.pivot_panels import pivot_panels
+from tpjb_ident.report.plots.look import VARIANT_LABEL
 from tpjb_ident.report.position_panels import position_panels
 from tpjb_ident.tables import write_text
 
@@ -141,10 +142,7 @@ def _sections(comparison: Comparison, frame: pd.DataFrame) -> list[Section]:
 def _pivot_sections(comparison: Comparison) -> list[Section]:
     if not comparison.curves:
         return []
-    from tpjb_ident.pivot import pivot_table
-
     formula = printed_formula(comparison.bearing)
-    table = pivot_table(comparison.curves, formula=formula)
     note = (
         "The dry test sees pivot, pad back and housing seat together. Its tangent stiffness is what small vibrations "
         "feel; the formula as printed is a secant, about 10 % below its own tangent for line contact, a third below it "
@@ -154,7 +152,7 @@ def _pivot_sections(comparison: Comparison) -> list[Section]:
         Section(
             "Pivots, from the dry tests",
             notes=[note],
-            panels=pivot_panels(comparison.curves, table),
+            panels=pivot_panels(comparison.curves, formula),
             tables=[pivot_points_table(comparison.curves, formula)],
         )
     ]
@@ -166,7 +164,7 @@ def _position_sections(comparison: Comparison) -> list[Section]:
         np.array([pad.assembled_clearance for pad in comparison.bearing.pads]),
     )
     predicted = {v.name: predicted_locus(comparison, v) for v in comparison.variants if len(v.locus)}
-    panels = position_panels(comparison.clearance, drawn, measured_locus(comparison), predicted)
+    panels = position_panels(comparison.clearance, drawn, comparison.locus, predicted)
     if not panels:
         return []
     tables = [] if comparison.clearance is None else [clearance_table(comparison.clearance, drawn[1])]

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tpjb_ident.report.figure import VARIANT_LABEL
 from tpjb_ident.report.numbers import fixed, percent, signed, with_interval
 from tpjb_ident.report.page import Table
+from tpjb_ident.report.plots.look import VARIANT_LABEL
 from tpjb_ident.report.words import meaning
 
 if TYPE_CHECKING:

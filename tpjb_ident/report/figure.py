@@ -1,8 +1,7 @@
-"""One look for all figures: colours that colour-blind readers can tell apart, text kept as text, light and dark.
+"""Pictures inside a page: text kept as text, light and dark.
 
-Figures are matplotlib `Figure` objects without pyplot and without any global setting. A figure is drawn once in the
-colours of `LIGHT`; saved files keep them, and the copy inside the report gets CSS variables in their place, so that it
-follows the reader's light or dark screen.
+A picture (`tpjb_ident.report.plots`) is drawn once in the colours of `LIGHT`; saved files keep them, and the copy
+inside the report gets CSS variables in their place, so that it follows the reader's light or dark screen.
 """
 
 from __future__ import annotations
@@ -15,45 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from tpjb_ident.report.plots.look import LIGHT
 from tpjb_ident.tables import write_atomic, write_text
 
-#: Okabe and Ito's palette, told apart by most colour-blind readers; ink, rule and paper follow the page.
-LIGHT = {
-    "ink": "#1c2024",
-    "rule": "#d7dce1",
-    "paper": "#fdfefe",
-    "blue": "#0072b2",
-    "orange": "#d98c00",
-    "green": "#009e73",
-    "red": "#d55e01",
-    "purple": "#b9609a",
-    "grey": "#7a828b",
-}
-#: How each pivot model is drawn everywhere: colour, line, marker. Line and marker tell them apart without colour.
-VARIANT_STYLE = {
-    "rigid": ("grey", (0, (1, 1.5)), "s"),
-    "kirk": ("orange", (0, (5, 2)), "^"),
-    "kirk-secant": ("purple", (0, (3, 1, 1, 1)), "v"),
-    "measured": ("blue", "-", "D"),
-}
-VARIANT_LABEL = {
-    "rigid": "rigid pivots",
-    "kirk": "Kirk pivots",
-    "kirk-secant": "Kirk, secant",
-    "measured": "measured pivots",
-}
-PAD_STYLE = (
-    ("blue", "-", "o"),
-    ("red", (0, (5, 2)), "s"),
-    ("green", (0, (3, 1, 1, 1)), "^"),
-    ("purple", (0, (1, 1.5)), "D"),
-    ("orange", (0, (8, 2, 1, 2)), "v"),
-)
-WIDTH, HEIGHT = 5.2, 3.4  # inches: legible in one column of a phone
-FONT_SIZE = 9.0
 PNG_DPI = 160
 _FONT = re.compile(r"font: (?:(italic|oblique) )?(?:(bold|\d+) )?([\d.]+)px [^;\"]*")
 _ID = re.compile(r"(\bid=\"|href=\"#|url\(#)([^\")]+)")
@@ -80,42 +45,10 @@ class Panel:
     group: str
 
 
-def new_panel(x_label: str, y_label: str, width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Axes]:
-    """Make an empty panel in the house look.
-
-    Parameters
-    ----------
-    x_label, y_label : str
-        With units.
-    width, height : float
-        Inches.
-    """
-    figure = Figure(figsize=(width, height))
+def panel(name: str, title: str, figure: Figure, group: str) -> Panel:
+    """Make a panel of a picture, without its white ground: the page's own shows through."""
     figure.patch.set_alpha(0.0)
-    # fixed margins: they suit every panel, line up side by side, and save the layout solver's time
-    axes = figure.add_axes((0.8 / width, 0.55 / height, 1.0 - 0.95 / width, 1.0 - 1.15 / height))
-    axes.patch.set_alpha(0.0)
-    axes.set_xlabel(x_label, fontsize=FONT_SIZE, color=LIGHT["ink"])
-    axes.set_ylabel(y_label, fontsize=FONT_SIZE, color=LIGHT["ink"])
-    axes.tick_params(colors=LIGHT["ink"], labelsize=FONT_SIZE, color=LIGHT["rule"])
-    axes.grid(True, color=LIGHT["rule"], linewidth=0.6)
-    axes.set_axisbelow(True)
-    for side, spine in axes.spines.items():
-        spine.set_color(LIGHT["rule"])
-        spine.set_visible(side in ("left", "bottom"))
-    return figure, axes
-
-
-def add_legend(axes: Axes, columns: int = 2) -> None:
-    """Add a frameless legend above the panel; nothing if nothing is labelled."""
-    handles, labels = axes.get_legend_handles_labels()
-    if handles:
-        legend = axes.legend(
-            handles, labels, fontsize=FONT_SIZE, frameon=False, ncols=columns, loc="lower center",
-            bbox_to_anchor=(0.5, 1.0), columnspacing=1.2, handlelength=2.6, borderaxespad=0.2,
-        )  # fmt: skip
-        for text in legend.get_texts():
-            text.set_color(LIGHT["ink"])
+    return Panel(name, title, figure, group)
 
 
 def svg_text(figure: Figure, name: str) -> str:

@@ -1,0 +1,93 @@
+"""Fig. 17 to 20: one coefficient over load or frequency, measured with its interval, predicted as lines."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tpjb_ident.report.plots.look import LIGHT, VARIANT_LABEL, VARIANT_STYLE, add_legend, new_picture
+from tpjb_ident.report.plots.series import AXES, DIRECT, UNITS, longest_series
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tpjb_ident.compare.comparison import Comparison
+
+
+def coefficient(
+    comparison: Comparison | pd.DataFrame,
+    name: str,
+    *,
+    over: Literal["load", "frequency"] = "load",
+    title: str | None = None,
+) -> Figure:
+    """Draw one coefficient over load or frequency (the paper's Fig. 17 to 20).
+
+    Parameters
+    ----------
+    comparison : Comparison or DataFrame
+        What `compare_campaign` gives, or its table (``comparison.csv``). A prediction that needed a pivot beyond its
+        measured loads stands in a frame.
+    name : str
+        ``"kxx"``, ``"kxy"``, .. ``"cyy"``.
+    over : {"load", "frequency"}
+        The longest series over it is drawn.
+    title : str, optional
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    ValueError
+        For an unknown coefficient, or when nothing varies over `over`.
+    """
+    if len(name) != 3 or name[0] not in UNITS or set(name[1:]) - {"x", "y"}:
+        raise ValueError(f"name must be one of kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy; got {name!r}")
+    series = longest_series(_table(comparison), over)
+    if series is None:
+        raise ValueError(f"the campaign has no two points that differ in {over} alone")
+    suffix, scale, unit, _ = UNITS[name[0]]
+    column, axis_scale, axis_label = AXES[over]
+    figure, axes = new_picture(axis_label, f"{name}, {unit}", title=title)
+    key = f"{name}_{suffix}"
+    for variant in dict.fromkeys(series["pivots"]):
+        rows = series[series["pivots"] == variant].sort_values(column)
+        _line(axes, rows, column, axis_scale, f"{key}_predicted", scale, str(variant))
+    measured = series.drop_duplicates(column).sort_values(column)
+    value, low, high = (measured[f"{key}{end}"].to_numpy(float) / scale for end in ("", "_lo", "_hi"))
+    axes.errorbar(
+        measured[column] / axis_scale, value, yerr=np.abs([value - low, high - value]), fmt="o", color=LIGHT["ink"],
+        markersize=5, capsize=3, linewidth=1.2, label="measured, 95 %", zorder=5,
+    )  # fmt: skip
+    axes.margins(x=0.06, y=0.1)
+    if name in DIRECT:
+        axes.set_ylim(bottom=0.0)
+    add_legend(axes)
+    return figure
+
+
+def _table(comparison: Comparison | pd.DataFrame) -> pd.DataFrame:
+    import pandas as pd
+
+    if isinstance(comparison, pd.DataFrame):
+        return comparison
+    from tpjb_ident.compare.tables import comparison_frame
+
+    return comparison_frame(comparison)
+
+
+def _line(axes: Axes, rows: pd.DataFrame, column: str, axis_scale: float, key: str, scale: float, variant: str) -> None:
+    colour, dashes, marker = VARIANT_STYLE.get(variant, ("green", (0, (4, 1, 1, 1)), "*"))
+    x, y = rows[column].to_numpy(float) / axis_scale, rows[key].to_numpy(float) / scale
+    axes.plot(x, y, color=LIGHT[colour], linestyle=dashes, linewidth=1.6, marker=marker, markersize=4,
+              label=VARIANT_LABEL.get(variant, variant))  # fmt: skip
+    if variant == "measured" and "pivot_extrapolated" in rows:
+        beyond = rows["pivot_extrapolated"].to_numpy(bool)
+        if beyond.any():
+            axes.plot(x[beyond], y[beyond], linestyle="none", marker=marker, markersize=8.5, color=LIGHT[colour],
+                      markerfacecolor="none", label="beyond the dry tests")  # fmt: skip

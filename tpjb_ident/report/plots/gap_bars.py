@@ -1,0 +1,82 @@
+"""The gap by observable, before and after the effects that were found are added."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tpjb_ident.report.plots.look import CHARACTER, LEFT, LIGHT, add_legend, new_picture, shrink
+
+if TYPE_CHECKING:
+    from tpjb_ident.diagnose.diagnose import Diagnosis
+    from tpjb_ident.diagnose.verdict import Verdict
+
+
+def gap(
+    source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]],
+    *,
+    logarithmic: bool | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Draw the root mean square of (measured - predicted) / sigma per observable, before and after.
+
+    Observables that got worse have their name in brackets with a minus; those that no held-out point shows are
+    marked with an asterisk.
+
+    Parameters
+    ----------
+    source : Diagnosis, Verdict or mapping
+        Or ``gap_by_observable`` of ``diagnosis.json``: ``{"kxx": {"heldout_before": 9.1, "heldout_after": 1.0}}``.
+    logarithmic : bool, optional
+        Default: when the gaps span more than a factor of thirty.
+    title : str, optional
+
+    Returns
+    -------
+    Figure
+    """
+    gaps = _gaps(source)
+    if not gaps:
+        raise ValueError("there is no gap by observable to draw")
+    before, after = (np.array([_end(g, end) for g in gaps.values()]) for end in ("_before", "_after"))
+    words = [_word(name, g, b, a) for (name, g), b, a in zip(gaps.items(), before, after, strict=True)]
+    figure, axes = new_picture("gap, sigma", "", title=title, height=0.3 * len(words) + 1.3)
+    shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))
+    y = np.arange(len(words))
+    for offset, values, colour, hatch, name in (
+        (-0.2, before, "orange", "////", "baseline"), (0.2, after, "blue", None, "with the effects found"),
+    ):  # fmt: skip
+        axes.barh(y + offset, values, 0.38, color=LIGHT[colour] if hatch is None else LIGHT["paper"], hatch=hatch,
+                  edgecolor=LIGHT[colour], linewidth=0.8, label=name)  # fmt: skip
+    axes.set_yticks(y, words)
+    axes.invert_yaxis()
+    axes.grid(axis="y", visible=False)
+    axes.axvline(1.0, color=LIGHT["ink"], linewidth=0.9, linestyle=(0, (2, 2)), label="noise and tolerance")
+    handles = axes.get_legend_handles_labels()[0]
+    both = np.concatenate([before, after])
+    wide = float(both.max()) > 30.0 * max(float(both[both > 0].min(initial=1.0)), 1e-3)
+    if logarithmic or (logarithmic is None and wide):
+        axes.set_xscale("log")
+        axes.set_xlim(left=max(0.7 * float(both[both > 0].min(initial=1.0)), 1e-2))
+    add_legend(axes, 3, [*handles[1:], handles[0]], across=True)
+    return figure
+
+
+def _gaps(source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]]) -> Mapping[str, Mapping[str, float]]:
+    if isinstance(source, Mapping):
+        return source
+    # a diagnosis holds a verdict, whose own `verdict` is a word
+    return source.gap_by_observable if hasattr(source, "gap_by_observable") else source.verdict.gap_by_observable
+
+
+def _end(gaps: Mapping[str, float], end: str) -> float:
+    return next((float(v) for k, v in gaps.items() if k.endswith(end)), 0.0)
+
+
+def _word(name: str, gaps: Mapping[str, float], before: float, after: float) -> str:
+    star = "" if any(k.startswith("heldout") for k in gaps) else "*"
+    worse = " (worse)" if after > max(1.05 * before, 1.0) else ""
+    return f"{name.replace('_', ' ')}{star}{worse}"

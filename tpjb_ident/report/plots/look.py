@@ -1,0 +1,248 @@
+"""One look for all pictures: colours that colour-blind readers can tell apart, lines and markers that need none.
+
+Pictures are matplotlib figures made without pyplot and without any global setting: what a user has set for plots of
+their own stays as it is. Margins are fixed in inches, so that pictures line up side by side and no layout solver runs.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+
+#: Okabe and Ito's palette, told apart by most colour-blind readers; ink, rule and paper follow the page.
+LIGHT = {
+    "ink": "#1c2024",
+    "rule": "#d7dce1",
+    "paper": "#fdfefe",
+    "blue": "#0072b2",
+    "orange": "#d98c00",
+    "green": "#009e73",
+    "red": "#d55e01",
+    "purple": "#b9609a",
+    "grey": "#7a828b",
+}
+#: How each pivot model is drawn everywhere: colour, line, marker. Line and marker tell them apart without colour.
+VARIANT_STYLE: dict[str, tuple[str, Any, str]] = {
+    "rigid": ("grey", (0, (1, 1.5)), "s"),
+    "kirk": ("orange", (0, (5, 2)), "^"),
+    "kirk-secant": ("purple", (0, (3, 1, 1, 1)), "v"),
+    "measured": ("blue", "-", "D"),
+}
+VARIANT_LABEL = {
+    "rigid": "rigid pivots",
+    "kirk": "Kirk pivots",
+    "kirk-secant": "Kirk, secant",
+    "measured": "measured pivots",
+}
+PAD_STYLE: tuple[tuple[str, Any, str], ...] = (
+    ("blue", "-", "o"),
+    ("red", (0, (5, 2)), "s"),
+    ("green", (0, (3, 1, 1, 1)), "^"),
+    ("purple", (0, (1, 1.5)), "D"),
+    ("orange", (0, (8, 2, 1, 2)), "v"),
+)
+#: Blue through paper to orange: signs that nobody confuses.
+DIVERGING = LinearSegmentedColormap.from_list("tpjb-diverging", ["#004c7a", "#4f9bcb", "#f6f7f8", "#e8a33d", "#9a4a00"])
+#: Paper to deep blue: more is darker.
+SEQUENTIAL = LinearSegmentedColormap.from_list("tpjb-sequential", ["#f6f7f8", "#9cc7e3", "#2f86bf", "#003a63"])
+WIDTH, HEIGHT = 5.2, 3.4  # inches: legible in one column of a phone
+FONT_SIZE = 9.0
+LEFT, RIGHT, BOTTOM, TOP = 0.8, 0.15, 0.55, 0.15  # margins [inches]
+LINE = 0.172  # height of one line of text with its leading [inches]
+CHARACTER = 0.074  # mean width of a character [inches]
+NOTEBOOK_DPI = 120
+
+
+class Picture(Figure):
+    """A figure that shows itself in a notebook, with or without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
+        return buffer.getvalue()
+
+
+def style_of_pad(pad: int) -> tuple[str, Any, str]:
+    """Colour, line style and marker of a pad (from 1)."""
+    colour, dashes, marker = PAD_STYLE[(pad - 1) % len(PAD_STYLE)]
+    return LIGHT[colour], dashes, marker
+
+
+def new_picture(
+    x_label: str, y_label: str, *, title: str | None = None, width: float = WIDTH, height: float = HEIGHT
+) -> tuple[Picture, Axes]:
+    """Make a picture with one empty panel.
+
+    Parameters
+    ----------
+    x_label, y_label : str
+        With units.
+    title : str, optional
+    width, height : float
+        Inches.
+    """
+    figure, ((axes,),) = new_pictures(1, 1, title=title, width=width, height=height)
+    label(axes, x_label, y_label)
+    return figure, axes
+
+
+def new_pictures(
+    rows: int, columns: int, *, title: str | None = None, width: float = WIDTH, height: float = HEIGHT
+) -> tuple[Picture, list[list[Axes]]]:
+    """Make a picture with rows times columns of empty panels, each with its own margins.
+
+    Parameters
+    ----------
+    rows, columns : int
+    title : str, optional
+        Of the whole picture.
+    width, height : float
+        Of one panel with its labels [inches].
+
+    Returns
+    -------
+    figure : Picture
+    axes : list (rows) of list (columns) of Axes
+        Top row first.
+    """
+    head = 1.6 * LINE if title else 0.0
+    size = (columns * width, rows * height + head)
+    figure = Picture(figsize=size, facecolor="white")
+    FigureCanvasAgg(figure)
+    grid = [
+        [
+            _panel(figure, (j * width + LEFT, (rows - 1 - i) * height + BOTTOM, width - LEFT - RIGHT,
+                            height - BOTTOM - TOP))
+            for j in range(columns)
+        ]
+        for i in range(rows)
+    ]  # fmt: skip
+    if title:
+        figure.suptitle(
+            title, x=0.5, y=1.0 - 0.06 / size[1], va="top", fontsize=FONT_SIZE + 1.0, color=LIGHT["ink"], wrap=True
+        )
+    return figure, grid
+
+
+def _panel(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
+    """Empty axes at a box in inches, in the house look."""
+    axes = figure.add_axes(_fractions(figure, box))
+    axes.patch.set_alpha(0.0)
+    axes.tick_params(colors=LIGHT["ink"], labelsize=FONT_SIZE, color=LIGHT["rule"], labelcolor=LIGHT["ink"])
+    axes.grid(True, color=LIGHT["rule"], linewidth=0.6, linestyle="-", alpha=1.0)
+    axes.set_axisbelow(True)
+    for side, spine in axes.spines.items():
+        spine.set_color(LIGHT["rule"])
+        spine.set_visible(side in ("left", "bottom"))
+    return axes
+
+
+def _fractions(figure: Figure, box: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    width, height = figure.get_size_inches()
+    return box[0] / width, box[1] / height, box[2] / width, box[3] / height
+
+
+def label(axes: Axes, x_label: str, y_label: str, heading: str | None = None) -> None:
+    """Label both axes; a heading stands above the panel, which gives way."""
+    axes.set_xlabel(x_label, fontsize=FONT_SIZE, color=LIGHT["ink"])
+    axes.set_ylabel(y_label, fontsize=FONT_SIZE, color=LIGHT["ink"])
+    if heading:
+        shrink(axes, top=1.2 * LINE)
+        axes.set_title(heading, fontsize=FONT_SIZE, color=LIGHT["ink"], pad=4.0)
+
+
+def shrink(axes: Axes, *, left: float = 0.0, right: float = 0.0, top: float = 0.0, bottom: float = 0.0) -> None:
+    """Take inches off the sides of a panel: room for names, a colour bar or a legend."""
+    box = axes.get_position()
+    width, height = _size(axes)
+    axes.set_position((
+        box.x0 + left / width, box.y0 + bottom / height,
+        box.width - (left + right) / width, box.height - (top + bottom) / height,
+    ))  # fmt: skip
+
+
+def add_legend(
+    axes: Axes, columns: int | None = None, handles: Sequence[Any] | None = None, across: bool = False
+) -> Legend | None:
+    """Put a frameless legend above the panel, which makes room for it; nothing if nothing is labelled.
+
+    Parameters
+    ----------
+    axes : Axes
+    columns : int, optional
+        Default: as many as the width holds.
+    handles : sequence, optional
+        Default: everything that is labelled.
+    across : bool
+        Centred on the whole picture: for a panel that gave much room to names.
+    """
+    drawn = list(axes.get_legend_handles_labels()[0] if handles is None else handles)
+    if not drawn:
+        return None
+    names = [str(handle.get_label()) for handle in drawn]
+    width, box = _size(axes)[0], axes.get_position()
+    columns = columns or _columns(names, width - 0.1 if across else width * box.width + 0.4 * LEFT)
+    columns = math.ceil(len(drawn) / math.ceil(len(drawn) / columns))  # no wider than the rows need
+    centre = (0.5 - box.x0) / box.width if across else 0.5
+    heading = 1.4 * LINE if axes.get_title() else 0.0
+    shrink(axes, top=LINE * math.ceil(len(drawn) / columns) + 0.03)
+    legend = axes.legend(
+        handles=drawn, fontsize=FONT_SIZE, frameon=False, ncols=columns, loc="lower center", borderaxespad=0.2,
+        bbox_to_anchor=(centre, 1.0 + heading / _height(axes)), columnspacing=1.2, handlelength=2.6, labelspacing=0.35,
+        labelcolor=LIGHT["ink"],
+    )  # fmt: skip
+    return legend
+
+
+def _size(axes: Axes) -> tuple[float, float]:
+    """Width and height of the picture that holds a panel [inches]."""
+    figure = axes.get_figure(root=True)
+    width, height = figure.get_size_inches()  # type: ignore[union-attr]
+    return float(width), float(height)
+
+
+def _height(axes: Axes) -> float:
+    """Of a panel, inches."""
+    return float(axes.get_position().height * _size(axes)[1])
+
+
+def _columns(names: Sequence[str], room: float) -> int:
+    """Most columns whose widest entries, side by side, fit into `room` inches."""
+    for columns in range(min(len(names), 4), 1, -1):
+        rows = math.ceil(len(names) / columns)
+        widest = [max(len(name) for name in names[j * rows : (j + 1) * rows] or [""]) for j in range(columns)]
+        if sum(0.55 + CHARACTER * n for n in widest) <= room:
+            return columns
+    return 1
+
+
+def add_colour_bar(axes: Axes, image: Any, text: str) -> None:
+    """Put a colour bar right of a panel, which makes room for it."""
+    shrink(axes, right=0.75)
+    figure, box = axes.figure, axes.get_position()
+    width = _size(axes)[0]
+    beside = figure.add_axes((box.x1 + 0.12 / width, box.y0, 0.14 / width, box.height))
+    bar = figure.colorbar(image, cax=beside)  # type: ignore[union-attr]
+    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.ax.tick_params(labelsize=FONT_SIZE - 1, colors=LIGHT["ink"], color=LIGHT["rule"])
+    bar.set_label(text, fontsize=FONT_SIZE, color=LIGHT["ink"])
+
+
+def mark_extrapolated(axes: Axes, start: float, text: str = "extrapolated") -> None:
+    """Shade everything right of `start` (in the panel's units) and say why."""
+    end = axes.get_xlim()[1]
+    if end > start:
+        axes.axvspan(start, end, color=LIGHT["rule"], alpha=0.35, linewidth=0, zorder=0)
+        axes.text(
+            start, 0.02, f" {text}", transform=axes.get_xaxis_transform(), fontsize=FONT_SIZE - 1.5,
+            color=LIGHT["grey"], va="bottom", ha="left",
+        )  # fmt: skip
+        axes.set_xlim(right=end)

@@ -1,0 +1,81 @@
+"""Whitened residuals as a table: one row per coefficient and operating point."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tpjb_ident.compare.comparison import Comparison
+    from tpjb_ident.diagnose.diagnose import Diagnosis
+
+ENTRIES = ("kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy")
+COLUMNS = ("model", "entry", "static_load_N", "excitation_Hz", "z")
+TWO_SIDED_95 = 1.959964
+
+
+def residual_frame(source: Diagnosis | Comparison | pd.DataFrame) -> pd.DataFrame:
+    """(measured - predicted) / sigma of every coefficient.
+
+    Parameters
+    ----------
+    source : Diagnosis, Comparison or DataFrame
+        A diagnosis gives two models (``before``: the baseline, ``after``: with the effects that were found), sigma as
+        in its gap. A comparison, or its table, gives one model per pivot law; sigma is that of the measurement alone.
+        A table with the columns ``model``, ``entry``, ``static_load_N``, ``excitation_Hz``, ``z`` is taken as it is.
+
+    Returns
+    -------
+    DataFrame
+        Columns as above.
+    """
+    import pandas as pd
+
+    if isinstance(source, pd.DataFrame):
+        return source if set(COLUMNS) <= set(source.columns) else _of_comparison(source)
+    from tpjb_ident.compare.comparison import Comparison
+
+    if isinstance(source, Comparison):
+        from tpjb_ident.compare.tables import comparison_frame
+
+        return _of_comparison(comparison_frame(source))
+    return _of_diagnosis(source)
+
+
+def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
+    import pandas as pd
+
+    from tpjb_ident.diagnose.gap import residuals
+
+    rows = []
+    for model, fit in (("before", diagnosis.found.baseline), ("after", diagnosis.found.model)):
+        z = residuals(diagnosis.observations, fit.prediction)
+        for element, value in zip(diagnosis.observations.elements, z, strict=True):
+            if element.family == "h":
+                frequency = element.place("excitation") / (2 * np.pi)
+                rows.append((model, element.observable, element.place("load"), round(frequency, 6), float(value)))
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _of_comparison(table: pd.DataFrame) -> pd.DataFrame:
+    import pandas as pd
+
+    frames = []
+    for entry in ENTRIES:
+        key = f"{entry}_{'N_per_m' if entry[0] == 'k' else 'Ns_per_m'}"
+        sigma = (table[f"{key}_hi"] - table[f"{key}_lo"]) / (2 * TWO_SIDED_95)
+        frames.append(
+            pd.DataFrame(
+                {
+                    "model": table["pivots"],
+                    "entry": entry,
+                    "static_load_N": table["static_load_N"],
+                    "excitation_Hz": table["excitation_Hz"],
+                    "z": (table[key] - table[f"{key}_predicted"]) / sigma,
+                }
+            )
+        )
+    return pd.concat(frames, ignore_index=True)

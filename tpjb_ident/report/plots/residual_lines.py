@@ -1,0 +1,80 @@
+"""Residuals over load or frequency, before and after: the coefficients that disagree most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+from matplotlib.figure import Figure
+
+from tpjb_ident.report.plots.look import LIGHT, VARIANT_LABEL, add_legend, new_picture
+from tpjb_ident.report.plots.residual_frames import residual_frame
+from tpjb_ident.report.plots.series import AXES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tpjb_ident.compare.comparison import Comparison
+    from tpjb_ident.diagnose.diagnose import Diagnosis
+
+STYLE = (("blue", "o"), ("red", "s"), ("green", "^"), ("purple", "D"))
+DASHES: tuple[Any, ...] = ((0, (4, 2)), "-", (0, (1, 1.5)), (0, (3, 1, 1, 1)))
+
+
+def residual_series(
+    source: Diagnosis | Comparison | pd.DataFrame,
+    over: Literal["load", "frequency"] = "load",
+    *,
+    entries: Sequence[str] | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Draw (measured - predicted) / sigma over load or frequency, one line per coefficient and model.
+
+    The grey band holds two standard deviations: residuals inside say nothing.
+
+    Parameters
+    ----------
+    source : Diagnosis, Comparison or DataFrame
+        See `residual_frame`.
+    over : {"load", "frequency"}
+        The longest series over it is drawn.
+    entries : sequence of str, optional
+        Coefficients, four at most; default: the three that disagree most with the first model.
+    title : str, optional
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    ValueError
+        When nothing varies over `over`.
+    """
+    frame = residual_frame(source)
+    column, scale, text = AXES[over]
+    other = AXES["frequency" if over == "load" else "load"][0]
+    counts = frame.groupby(other)[column].nunique()
+    if frame.empty or counts.max() < 2:
+        raise ValueError(f"there are no two points that differ in {over} alone")
+    series = frame[frame[other] == counts.idxmax()]
+    models = list(dict.fromkeys(frame["model"]))
+    chosen = list(entries or _worst(frame[frame["model"] == models[0]]))
+    figure, axes = new_picture(text, "(measured - predicted) / sigma", title=title)
+    axes.axhspan(-2, 2, color=LIGHT["rule"], alpha=0.6, linewidth=0)
+    for entry, (colour, marker) in zip(chosen, STYLE, strict=False):
+        for number, model in enumerate(models):
+            rows = series[(series["entry"] == entry) & (series["model"] == model)].sort_values(column)
+            last = number == len(models) - 1
+            axes.plot(
+                rows[column] / scale, rows["z"], color=LIGHT[colour], linestyle=DASHES[number % len(DASHES)],
+                marker=marker, markersize=4.5, markerfacecolor=LIGHT[colour] if last else LIGHT["paper"], linewidth=1.3,
+                label=f"{entry}, {VARIANT_LABEL.get(model, str(model))}",
+            )  # fmt: skip
+    add_legend(axes)
+    return figure
+
+
+def _worst(frame: pd.DataFrame, count: int = 3) -> list[str]:
+    size = (frame["z"] ** 2).groupby(frame["entry"]).sum()
+    return [str(name) for name in size.sort_values(ascending=False).index[:count]]

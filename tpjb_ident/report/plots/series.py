@@ -1,0 +1,45 @@
+"""Series of operating points: which of them vary over load or over frequency alone."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tpjb_ident.dynamic.identification import Identification
+
+#: Suffix in the tables, divisor and unit of the axis, and name, of stiffness and damping.
+UNITS = {"k": ("N_per_m", 1e6, "MN/m", "stiffness"), "c": ("Ns_per_m", 1e3, "kN s/m", "damping")}
+AXES = {
+    "load": ("static_load_N", 1e3, "static load, kN"),
+    "frequency": ("excitation_Hz", 1.0, "excitation frequency, Hz"),
+}
+DIRECT = ("kxx", "kyy", "cxx", "cyy")
+CROSS = ("kxy", "kyx", "cxy", "cyx")
+STATIC = ["static_load_direction_deg", "shaft_speed_Hz"]
+
+
+def as_table(source: Identification | pd.DataFrame) -> pd.DataFrame:
+    """Table of coefficients of whatever was given."""
+    from tpjb_ident.dynamic.identification import Identification
+
+    return source.to_frame() if isinstance(source, Identification) else source
+
+
+def longest_series(table: pd.DataFrame, axis: str) -> pd.DataFrame | None:
+    """Rows of the longest series over load (at one frequency) or over frequency (at one load); None if none varies."""
+    column = AXES[axis][0]
+    fixed = ["excitation_Hz" if axis == "load" else "static_load_N", *STATIC]
+    best, length = None, 1
+    for _, group in table.groupby(fixed, sort=True):
+        if group[column].nunique() > length:
+            best, length = group, group[column].nunique()
+    return best
+
+
+def where(series: pd.DataFrame, axis: str) -> str:
+    """What is constant along a series, in words."""
+    first = series.iloc[0]
+    fixed = f"{first.excitation_Hz:g} Hz excitation" if axis == "load" else f"{first.static_load_N / 1e3:g} kN"
+    return f"{fixed}, {first.shaft_speed_Hz:g} Hz shaft speed"

@@ -1,0 +1,61 @@
+"""Robust weights of all windows of an operating point."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tpjb_ident.report.plots.look import FONT_SIZE, LIGHT, add_legend, new_picture
+
+if TYPE_CHECKING:
+    from tpjb_ident.dynamic.point_result import PointResult
+    from tpjb_ident.dynamic.stiffness import DynamicStiffness
+
+REJECTED = 0.3
+NAMED = 6  # rejected windows that are named in the picture
+
+
+def window_weights(result: PointResult | DynamicStiffness, *, title: str | None = None) -> Figure:
+    """Draw the final weight of every record window, 1 fully used, 0 thrown out.
+
+    Parameters
+    ----------
+    result : PointResult or DynamicStiffness
+        From a `PointResult` the rejected windows carry run, time and reason.
+    title : str, optional
+
+    Returns
+    -------
+    Figure
+    """
+    estimate = result.stiffness if hasattr(result, "stiffness") else result
+    weights = np.asarray(estimate.weights, dtype=float)
+    if not weights.size:
+        raise ValueError("the estimate has no windows")
+    figure, axes = new_picture("window, in the order of the runs", "robust weight", title=title, width=6.4)
+    at = np.arange(1, len(weights) + 1)
+    same = bool(np.allclose(weights[:, 0], weights[:, 1], equal_nan=True))
+    for axis, colour, marker, name in ((0, "blue", "o", "horizontal force"), (1, "red", "s", "vertical force")):
+        if same and axis:
+            break
+        values = weights[:, axis]
+        axes.vlines(at, 0.0, values, color=LIGHT[colour], linewidth=0.6, alpha=0.5)
+        axes.plot(
+            at, values, linestyle="none", marker=marker, markersize=3.5 if axis else 4.5, color=LIGHT[colour],
+            markerfacecolor=LIGHT[colour if axis else "paper"], label="both forces" if same else name,
+        )  # fmt: skip
+    axes.axhline(REJECTED, color=LIGHT["ink"], linestyle=(0, (5, 2)), linewidth=0.9, label="counted as outlier below")
+    axes.set_ylim(-0.03, 1.08)
+    axes.set_xlim(0.0, len(weights) + 1)
+    rejected = sorted(getattr(result, "rejected", ()), key=lambda w: w.weight)
+    if rejected:
+        words = [f"{w.run} at {w.time:.2f} s: {w.reason}" for w in rejected[:NAMED]]
+        if len(rejected) > NAMED:
+            words.append(f"and {len(rejected) - NAMED} more")
+        box = {"facecolor": LIGHT["paper"], "edgecolor": LIGHT["rule"], "alpha": 0.85}
+        axes.text(0.015, 0.42, "\n".join(words), transform=axes.transAxes, fontsize=FONT_SIZE - 2, color=LIGHT["ink"],
+                  va="bottom", bbox=box)  # fmt: skip
+    add_legend(axes)
+    return figure
