@@ -17,7 +17,19 @@ from numba import njit
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 #: Modules with compiled functions; a test holds the list complete.
-KERNELS = ("energy", "film", "film_matrix", "film_slopes", "kernel", "newton_step", "pad_film", "start")
+KERNELS = (
+    "cavitation",
+    "cavitation_matrix",
+    "cavitation_slopes",
+    "energy",
+    "film",
+    "film_matrix",
+    "film_slopes",
+    "kernel",
+    "newton_step",
+    "pad_film",
+    "start",
+)
 #: Sums may be reordered, but NaN and infinity keep their meaning.
 OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
