@@ -1,4 +1,4 @@
-"""The oil's temperature, Eq. (3), constant across the film and adiabatic at shaft and pad.
+"""The oil's temperature, Eq. (3), constant across the film; adiabatic at shaft and pad unless they exchange heat.
 
 Marched along the arc from the leading edge: the box scheme of Keller along the flow (second order, exact mass
 flows of the Reynolds solution), centred differences and conduction across, one tridiagonal system per line.
@@ -51,13 +51,41 @@ def solve_energy(
     Notes
     -----
     Integrated over the film thickness, Eq. (3) reads
-    rho c h (u T_x + w T_z) = k h T_zz + mu U^2 / h + h^3 / (12 mu) (p_x^2 + p_z^2).
+    rho c h (u T_x + w T_z) = k h T_zz + mu U^2 / h + h^3 / (12 mu) (p_x^2 + p_z^2) - exchange T + gained;
+    the last two are what pad and journal take and give (`model.heat_paths`), zero in the adiabatic baseline.
+    """
+    temperature[0, :] = inlet
+    fields = temperature.reshape((1, *temperature.shape))
+    sources = np.empty_like(fields)
+    sources[0] = dissipation(grid, work, speed) + work.gained
+    return march(grid, work, speed, heat, fields, sources)
+
+
+@compiled
+def march(
+    grid: FilmGrid, work: FilmWork, speed: float, heat: tuple[float, float], fields: FloatArray, sources: FloatArray
+) -> float:
+    """March any number of temperature fields that differ in their inlet and sources: the equation is linear.
+
+    Parameters
+    ----------
+    grid, work, speed, heat
+        As for `solve_energy`; `work.exchange` is what every kelvin loses [W/K].
+    fields : (m, nt + 1, nz + 1) ndarray
+        Row 0 holds the temperature at the leading edge; the rest is overwritten [degC].
+    sources : (m, nt + 1, nz + 1) ndarray
+        Heat per station of length dx and control-volume height [W].
+
+    Returns
+    -------
+    float
+        Largest share of a line's flow that had to be limited.
     """
     nz = work.flow_z.shape[1]
-    heating = dissipation(grid, work, speed)
+    count = fields.shape[0]
     limited = 0.0
-    temperature[0, :] = inlet
-    lower, main, upper, right = np.zeros(nz + 1), np.zeros(nz + 1), np.zeros(nz + 1), np.zeros(nz + 1)
+    lower, main, upper = np.zeros(nz + 1), np.zeros(nz + 1), np.zeros(nz + 1)
+    right = np.zeros((nz + 1, count))
     h, flow_x, flow_z, density = work.thickness, work.flow_x, work.flow_z, work.density
     conduct = heat[1] * grid.dx
     for i in range(work.flow_x.shape[0]):
@@ -82,15 +110,20 @@ def solve_energy(
                 if j == 0 and grid.first == 1:
                     high = -0.25 * heat[0] * max(-north, 0.0)
             advect = heat[0] * flow
-            lower[j], main[j], upper[j] = low, advect - low - high, high
-            right[j] = (advect + low + high) * temperature[i, j] + 0.5 * (heating[i, j] + heating[i + 1, j])
-            if j > 0:
-                right[j] -= low * temperature[i, j - 1]
-            if j < nz:
-                right[j] -= high * temperature[i, j + 1]
+            lower[j], main[j], upper[j] = low, advect - low - high + 0.5 * work.exchange[i + 1, j], high
+            for m in range(count):
+                t = fields[m]
+                value = (advect + low + high - 0.5 * work.exchange[i, j]) * t[i, j]
+                value += 0.5 * (sources[m, i, j] + sources[m, i + 1, j])
+                if j > 0:
+                    value -= low * t[i, j - 1]
+                if j < nz:
+                    value -= high * t[i, j + 1]
+                right[j, m] = value
         _tridiagonal(lower, main, upper, right)
-        for j in range(nz + 1):
-            temperature[i + 1, j] = right[j]
+        for m in range(count):
+            for j in range(nz + 1):
+                fields[m, i + 1, j] = right[j, m]
     return limited
 
 
@@ -124,12 +157,14 @@ def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
 
 @compiled
 def _tridiagonal(lower: FloatArray, main: FloatArray, upper: FloatArray, right: FloatArray) -> None:
-    """Thomas' algorithm in place; the solution is left in `right`."""
-    n = len(main)
+    """Thomas' algorithm in place for the columns of `right`, (n, m); the solutions are left there."""
+    n, count = right.shape
     for j in range(1, n):
         factor = lower[j] / main[j - 1]
         main[j] -= factor * upper[j - 1]
-        right[j] -= factor * right[j - 1]
-    right[n - 1] /= main[n - 1]
-    for j in range(n - 2, -1, -1):
-        right[j] = (right[j] - upper[j] * right[j + 1]) / main[j]
+        for m in range(count):
+            right[j, m] -= factor * right[j - 1, m]
+    for m in range(count):
+        right[n - 1, m] /= main[n - 1]
+        for j in range(n - 2, -1, -1):
+            right[j, m] = (right[j, m] - upper[j] * right[j + 1, m]) / main[j]

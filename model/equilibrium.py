@@ -26,6 +26,7 @@ from model.carrying import (
     wake_or_rest,
 )
 from model.film import solve_film
+from model.heat_paths import couples_heat, settle_temperatures
 from model.newton_step import newton_step
 from model.pad_bending import bending_step, change_of_shape, wanted_shapes
 from model.pad_film import PadFilm, film_step, least_share, oil_constants, pad_films
@@ -63,6 +64,8 @@ class Equilibrium:
         Share of the load (or of 1 N) that is not balanced.
     temperature_residual : float
         Largest change that one more step would make [K].
+    journal_temperature : float
+        [degC]; NaN where the journal takes no heat.
     status : tuple of str
         Named conditions; empty when all is well.
     """
@@ -72,12 +75,24 @@ class Equilibrium:
     iterations: int
     force_residual: float
     temperature_residual: float
+    journal_temperature: float
     status: tuple[str, ...]
 
     @property
     def converged(self) -> bool:
         """Whether the residuals are below the tolerances."""
         return "not converged" not in self.status and "film lost" not in self.status
+
+    @property
+    def mean_journal_temperature(self) -> float:
+        """The journal's temperature, or the mean over the films that carry where it takes no heat [degC]."""
+        if math.isfinite(self.journal_temperature):
+            return self.journal_temperature
+        carrying = [f for f in self.films if not f.idle]
+        if not carrying:
+            return self.films[0].inlet
+        area = sum(float(f.grid.area.sum()) for f in carrying)
+        return sum(float((f.grid.area * f.work.temperature).sum()) for f in carrying) / area
 
 
 @dataclass
@@ -90,6 +105,7 @@ class _Search:
     films: list[PadFilm]
     position: FloatArray = field(default_factory=lambda: np.zeros(2))
     limited: float = 0.0
+    journal: float = math.nan
     relaxation: float = HELD_BACK
 
     @property
@@ -258,8 +274,6 @@ def _solve_films(search: _Search) -> float:
     setup = search.setup
     change = 0.0
     search.limited = 0.0
-    if setup.carryover:
-        _carry_over(search)
     for film in search.films:
         if not film.idle:
             change = max(change, _solve_film(search, film))
@@ -272,6 +286,12 @@ def _solve_films(search: _Search) -> float:
         if film.idle:
             film.forces = film.step = None
             film.work.pressure[:] = 0.0
+    if couples_heat(setup):
+        limits = (search.relaxation, HEATING_STEP)
+        heated, search.limited, search.journal = settle_temperatures(
+            setup, search.films, search.surface_speed, search.journal, limits
+        )
+        change = max(change, heated)
     if setup.flexible_pads:
         # a deformation counts like a temperature change of the same weight in the film's resistance
         change = max(change, HEAT_PER_FORCE * _bend_pads(search))
@@ -280,7 +300,8 @@ def _solve_films(search: _Search) -> float:
 
 def _solve_film(search: _Search, film: PadFilm) -> float:
     setup, oil = search.setup, search.setup.bearing.oil
-    relaxation = 0.0 if setup.thermal == "isothermal" else search.relaxation
+    own = setup.thermal != "isothermal" and not couples_heat(setup)
+    relaxation = search.relaxation if own else 0.0
     a, b = film.approach(search.position)
     film.forces, film.temperature_change, limited = film_step(
         film.grid, film.work, (film.pad.pad_clearance, a, b), search.surface_speed,
@@ -313,23 +334,6 @@ def _sharpen(search: _Search) -> None:
         if film.forces is not None:
             a, b = film.approach(search.position)
             film.forces = solve_film(film.grid, film.work, (film.pad.pad_clearance, a, b), search.surface_speed, True)
-
-
-def _carry_over(search: _Search) -> None:
-    """Inlet temperature of every pad from the outlet of the one before it (rotation is counter-clockwise)."""
-    supply, share = search.setup.inlet_temperature, search.setup.carryover
-    order = sorted(search.films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
-    for before, film in zip([order[-1], *order[:-1]], order):
-        film.inlet = supply + share * (outlet_temperature(before) - supply)
-
-
-def outlet_temperature(film: PadFilm) -> float:
-    """Flow-weighted temperature at the trailing edge [degC]; an idle pad passes its inlet temperature on."""
-    flow = film.work.flow_x[-1]
-    total = float(flow.sum())
-    if film.idle or total <= 0:
-        return film.inlet
-    return float(flow @ film.work.temperature[-1]) / total
 
 
 def _apply(search: _Search, step: tuple[FloatArray, FloatArray], damping: float) -> bool:
@@ -370,4 +374,6 @@ def _result(search: _Search, iterations: int, residual: float, heat: float, stat
         names.append("idle pads " + ", ".join(map(str, idle)))
     if search.limited > 0:
         names.append("flow back at a leading edge")
-    return Equilibrium(search.position.copy(), tuple(search.films), iterations, residual, heat, tuple(names))
+    return Equilibrium(
+        search.position.copy(), tuple(search.films), iterations, residual, heat, search.journal, tuple(names)
+    )

@@ -62,6 +62,11 @@ class FilmWork(NamedTuple):
         [degC]
     viscosity, density : ndarray
         [Pa s], [kg/m^3], frozen for the pressure solution.
+    exchange : ndarray
+        What a kelvin of film temperature loses to pad and journal, per station of length dx and control-volume
+        height [W/K]; zero in the adiabatic baseline.
+    gained : ndarray
+        What the film gains from them besides [W].
     thickness : ndarray
         h [m].
     extra : ndarray
@@ -83,6 +88,8 @@ class FilmWork(NamedTuple):
     temperature: FloatArray
     viscosity: FloatArray
     density: FloatArray
+    exchange: FloatArray
+    gained: FloatArray
     thickness: FloatArray
     extra: FloatArray
     flow_x: FloatArray
@@ -175,6 +182,8 @@ def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:
         temperature=np.full(shape, inlet_temperature),
         viscosity=np.zeros(shape),
         density=np.zeros(shape),
+        exchange=np.zeros(shape),
+        gained=np.zeros(shape),
         thickness=np.zeros(shape),
         extra=np.zeros(shape),
         flow_x=np.zeros((nt, nz + 1)),

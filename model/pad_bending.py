@@ -43,6 +43,8 @@ class PadGive:
         Temperatures of the pad's coarser nodes by those of the film.
     expansion : (n, c) ndarray
         Deformation by them [m/K].
+    flux : (n, c) ndarray
+        Heat flux density into the pad by them [W/m^2/K].
     shapes : (nt + 1, nz + 1, m) ndarray
         In which the pad gives way most.
     amplitudes : (m, n) ndarray
@@ -56,6 +58,7 @@ class PadGive:
     compliance: FloatArray
     warmth: FloatArray
     expansion: FloatArray
+    flux: FloatArray
     shapes: FloatArray
     amplitudes: FloatArray
     response: FloatArray
@@ -103,7 +106,7 @@ def _pad_give(geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes) -> 
     solid = solid_of(geometry, angle, z)
     wet = slice(ahead * len(z), None)
     compliance = np.ascontiguousarray(solid.compliance[wet, wet])
-    warmth, expansion = solid.expansion_factors
+    warmth, expansion, flux = solid.thermal_factors
     shapes = _softest_shapes(compliance, area)
     amplitudes = (shapes * area[:, None]).T
     angle = angle[ahead:]
@@ -115,6 +118,7 @@ def _pad_give(geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes) -> 
         compliance=compliance,
         warmth=np.ascontiguousarray(warmth[:, wet]),
         expansion=np.ascontiguousarray(expansion[wet]),
+        flux=np.ascontiguousarray(flux[wet]),
         shapes=shapes.reshape(-1, len(z), SHAPES),
         amplitudes=amplitudes,
         response=np.ascontiguousarray((amplitudes @ compliance)[:, unknown]),

@@ -110,7 +110,7 @@ def pad_films(setup: Setup) -> list[PadFilm]:
                 work=work,
                 inlet=setup.inlet_temperature,
                 bent=np.zeros_like(work.extra),
-                give=pad_give(pad, bearing, grid) if setup.flexible_pads else None,
+                give=pad_give(pad, bearing, grid) if setup.flexible_pads or setup.options.conduction else None,
             )
         )
     return films

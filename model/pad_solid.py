@@ -111,14 +111,15 @@ class PadSolid:
         return self._thermal_matrix("expansion")
 
     @cached_property
-    def expansion_factors(self) -> tuple[Array, Array]:
-        """`thermal` as a product, ``second @ first``: film to the pad's coarser nodes, (n_coarse, n_film), and back."""
-        maps, answers = [], []
+    def thermal_factors(self) -> tuple[Array, Array, Array]:
+        """Film to the pad's coarser nodes, (n_coarse, n_film), and from there `thermal` and `heat_flux`."""
+        coarser, expansion, flux = [], [], []
         for solid, to in self._parts:
             _, project, coarse = to.dense
-            maps.append(coarse)
-            answers.append(project @ solid.expansion)
-        return _frozen(np.vstack(maps)), _frozen(np.hstack(answers))
+            coarser.append(coarse)
+            expansion.append(project @ solid.expansion)
+            flux.append(project @ solid.flux)
+        return _frozen(np.vstack(coarser)), _frozen(np.hstack(expansion)), _frozen(np.hstack(flux))
 
     @cached_property
     def heat_flux(self) -> Array:

@@ -6,7 +6,7 @@ import functools
 import math
 import operator
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,8 @@ from model.bearing import Bearing
 from model.dynamics import PadMatrices, bearing_impedance, pad_matrices
 from model.effects import Effect, apply_effects
 from model.equilibrium import Equilibrium, solve_equilibrium
+from model.growth import grown
+from model.options import Options
 from model.pivots import pivot_laws
 from model.power import power_loss
 from model.setup import Mesh, Setup
@@ -182,6 +184,7 @@ def predict(
     effects: Iterable[Effect] = (),
     mesh: Mesh | tuple[int, int] | None = None,
     start: Prediction | None = None,
+    options: Options | None = None,
 ) -> Prediction:
     """Predict a bearing's coefficients, position and fields at one operating point.
 
@@ -204,6 +207,8 @@ def predict(
         Intervals along the arc and across half the width.
     start : Prediction, optional
         A neighbouring prediction to start from.
+    options : Options, optional
+        Physics beyond the paper's model: heat into pads and journal, thermal growth, cavitation.
 
     Returns
     -------
@@ -216,7 +221,10 @@ def predict(
     """
     if thermal not in {"isothermal", "adiabatic", "tehd"}:
         raise ValueError(f"thermal must be isothermal, adiabatic or tehd, got {thermal!r}")
-    setup = apply_effects(Setup(bearing, pivot_laws(pivots, bearing), thermal, _mesh(mesh)), effects)
+    if not (options is None or isinstance(options, Options)):
+        raise ValueError(f"options must be an Options object, got {options!r}")
+    plain = Setup(bearing, pivot_laws(pivots, bearing), thermal, _mesh(mesh), options=options or Options())
+    setup = apply_effects(plain, effects)
     speed_si = _number(speed, "angular speed", "speed")
     omega = speed_si if excitation is None else to_si(excitation, "angular speed", "excitation")
     return predict_setup(
@@ -258,7 +266,7 @@ def predict_setup(
         raise ValueError(f"excitation must be numbers [rad/s], got {excitation!r}") from error
     _check_point(load, load_direction, speed, omega)
     force = load * np.array([math.cos(load_direction), math.sin(load_direction)])
-    equilibrium = solve_equilibrium(setup, force, speed, start)
+    setup, equilibrium = _solve_as_it_runs(setup, force, speed, start)
     lines = np.atleast_1d(omega)
     if equilibrium.converged:
         h = bearing_impedance(setup, equilibrium, lines)
@@ -291,6 +299,34 @@ def predict_setup(
         equilibrium=equilibrium,
         setup=setup,
     )
+
+
+def _solve_as_it_runs(
+    setup: Setup, force: FloatArray, speed: float, start: Equilibrium | None
+) -> tuple[Setup, Equilibrium]:
+    """Equilibrium with the clearances that belong to its own temperatures; returns the setup they make, too."""
+    growth = setup.options.growth
+    if growth is None:
+        return setup, solve_equilibrium(setup, force, speed, start)
+    journal = setup.inlet_temperature if growth.journal is None else growth.journal
+    settled = False
+    for _ in range(MAX_GROWTH_STEPS):
+        running = setup.change(bearing=grown(setup.bearing, growth, setup.inlet_temperature, journal))
+        equilibrium = start = solve_equilibrium(running, force, speed, start)
+        felt = growth.journal if growth.journal is not None else equilibrium.mean_journal_temperature
+        settled = not equilibrium.converged or abs(felt - journal) < GROWTH_TOLERANCE
+        if settled:
+            break
+        journal = felt
+    if not settled:
+        names = (*equilibrium.status, "thermal growth does not settle", "not converged")
+        equilibrium = replace(equilibrium, status=names)
+    return running, equilibrium
+
+
+#: Journal temperature that is near enough for the clearances [K]: a few nanometres.
+GROWTH_TOLERANCE = 0.01
+MAX_GROWTH_STEPS = 20
 
 
 def _check_point(load: float, direction: float, speed: float, omega: FloatArray) -> None:

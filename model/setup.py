@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.bearing import Bearing, Pad
+from model.options import Options
 from model.pivots import PivotLaw
 
 FloatArray = NDArray[np.float64]
@@ -119,6 +120,8 @@ class Setup:
         The oil enters this much hotter than the bearing file says [K].
     carryover : float
         Fraction lambda of hot oil carried over from pad to pad.
+    options : Options
+        Physics beyond the paper's model.
     bending : float
         Factor on the computed pad deformation; 0: rigid pads.
     rotational_stiffness : float
@@ -147,6 +150,7 @@ class Setup:
     mesh: Mesh = field(default_factory=Mesh)
     supply_change: float = 0.0
     carryover: float = 0.0
+    options: Options = field(default_factory=Options)
     bending: float = 0.0
     rotational_stiffness: float = 0.0
     pivot_damping: float = 0.0

@@ -11,9 +11,9 @@ import pytest
 from model.bearing import Bearing, load_bearing
 from model.effects import Effect
 from model.energy import dissipation, solve_energy
-from model.equilibrium import outlet_temperature
 from model.film import solve_film
 from model.film_mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.heat_paths import outlet_temperature
 from model.predict import predict
 
 SPEED = 2 * math.pi * 22.0

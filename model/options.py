@@ -1,0 +1,37 @@
+"""What the model can do beyond the paper's: switches of the film, its heat and the clearances, all off by default."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from model.growth import Growth
+
+CAVITATION = ("swift-stieber",)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Physics that the baseline leaves out; `predict(..., options=Options(conduction=True))`.
+
+    Attributes
+    ----------
+    conduction : bool
+        The pads conduct the film's heat to their backs and edges; see `model.heat_paths`.
+    isothermal_journal : bool
+        The journal passes heat from hot films to cold ones and keeps none.
+    growth : Growth, optional
+        Clearances change with the temperatures of journal, housing and pads; see `model.growth`.
+    cavitation : {"swift-stieber"}
+        What happens where the film ruptures.
+    """
+
+    conduction: bool = False
+    isothermal_journal: bool = False
+    growth: Growth | None = None
+    cavitation: str = "swift-stieber"
+
+    def __post_init__(self) -> None:
+        if self.cavitation not in CAVITATION:
+            raise ValueError(f"cavitation must be one of {', '.join(CAVITATION)}, got {self.cavitation!r}")
+        if not (self.growth is None or isinstance(self.growth, Growth)):
+            raise ValueError(f"growth must be a Growth or None, got {self.growth!r}")
