@@ -120,6 +120,8 @@ def load_campaign(path: str | Path) -> Campaign:
     given = Path(path)
     try:
         kind = _kind_of(given)
+    except RigDataError:
+        raise
     except (OSError, ValueError) as error:  # a name too long or with a NUL, a folder that may not be entered
         what = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
         raise _cannot(str(path)[:100], what, "Check the path and its rights") from error
@@ -170,6 +172,7 @@ def _read_text(path: Path, file: str, limit: int) -> str:
 
 def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
     from rigdata.readers.csv import CsvReader, TableCache
+    from rigdata.readers.foreign import ForeignReader, is_foreign
 
     text = _read_text(manifest_path, manifest_path.name, MAX_MANIFEST)
     manifest = parse_manifest(text, manifest_path.name)
@@ -188,7 +191,11 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
             continue
         files[entry.file] = target
         rate = entry.sample_rate or manifest.sample_rate
-        reader = CsvReader(target, entry.file, entry.id, manifest.csv, manifest.channels, rate, cache)
+        reader: RunReader
+        if is_foreign(target):
+            reader = ForeignReader(target, entry.file, entry.id, frozenset(manifest.channels), rate)
+        else:
+            reader = CsvReader(target, entry.file, entry.id, manifest.csv, manifest.channels, rate, cache)
         runs.append(_make_run(entry, channels, reader))
     return _finish(manifest, folder, bearing, channels, runs, problems, files)
 

@@ -1,0 +1,50 @@
+"""LabVIEW TDMS, read by npTDMS: waveforms bring their own step; a channel named like a time is one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigdata.readers.base import FloatArray
+from rigdata.readers.series import Series, equidistant
+from rigdata.readers.time_names import is_time, seconds
+
+
+def read_series(path: Path) -> list[Series]:
+    """Read every channel of numbers.
+
+    Parameters
+    ----------
+    path : Path
+        A ``.tdms`` file; its index file is not needed.
+
+    Returns
+    -------
+    list of Series
+    """
+    from nptdms import TdmsFile
+
+    found: list[Series] = []
+    # opened here: npTDMS leaves a file open that it cannot read
+    with path.open("rb") as stream, TdmsFile.open(stream) as file:
+        for group in file.groups():
+            channels = [c for c in group.channels() if np.issubdtype(c.dtype or object, np.number)]
+            clock = next((c for c in channels if is_time(c.name) and len(c)), None)
+            unit = "" if clock is None else str(clock.properties.get("unit_string", ""))
+            shared = None if clock is None else seconds(np.asarray(clock[:], dtype=float), unit)
+            found += [_series(channel, group.name, shared) for channel in channels if channel is not clock]
+    return found
+
+
+def _series(channel: Any, group: str, shared: FloatArray | None) -> Series:
+    values = np.asarray(channel[:], dtype=float)
+    unit = str(channel.properties.get("unit_string", ""))
+    step = channel.properties.get("wf_increment")
+    time: FloatArray | None
+    if step is not None and float(step) > 0:
+        time = equidistant(len(values), float(step), float(channel.properties.get("wf_start_offset", 0.0)))
+    else:
+        time = shared if shared is not None and len(shared) == len(values) else None
+    return Series(channel.name, unit, values, time, group)

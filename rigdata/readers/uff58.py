@@ -1,0 +1,66 @@
+"""Universal file format, data set 58 (time records), read by pyuff."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigdata.readers.base import FloatArray
+from rigdata.readers.series import Series, equidistant
+
+#: Function types of data set 58 that are records over time.
+_GENERAL, _TIME_RESPONSE = 0, 1
+
+
+def read_series(path: Path) -> list[Series]:
+    """Read every time record of a universal file.
+
+    A record is named by its ID line 1, or else by its response node and direction (``"Rsp 7+X"``).
+
+    Parameters
+    ----------
+    path : Path
+        ``.uff``, ``.unv`` or ``.58``.
+    """
+    import pyuff
+
+    file = pyuff.UFF(str(path))
+    found = []
+    for index, kind in enumerate(file.get_set_types()):
+        if int(kind) == 58:
+            data = file.read_sets(index)
+            over_time = int(data.get("func_type", 0)) in (_GENERAL, _TIME_RESPONSE)
+            if over_time and not np.iscomplexobj(data["data"]):
+                found.append(_series(data, index))
+    return found
+
+
+def _series(data: dict[str, Any], index: int) -> Series:
+    values = np.asarray(data["data"], dtype=float)
+    known = data.get("x")
+    time: FloatArray | None
+    step = float(data.get("abscissa_inc") or 0.0)
+    if known is not None and len(known) == len(values):
+        time = np.asarray(known, dtype=float)
+    elif step > 0:
+        time = equidistant(len(values), step, float(data.get("abscissa_min") or 0.0))
+    else:
+        time = None
+    unit = str(data.get("ordinate_axis_units_lab") or "").strip()
+    return Series(_name(data, index), "" if unit.upper() == "NONE" else unit, values, time, f"set {index + 1}")
+
+
+def _name(data: dict[str, Any], index: int) -> str:
+    for key in ("id1", "id4", "ordinate_axis_lab"):
+        text = str(data.get(key) or "").strip()
+        if text and text.upper() != "NONE":
+            return text
+    node = data.get("rsp_node")
+    return f"Rsp {node}{_direction(data.get('rsp_dir'))}" if node else f"set {index + 1}"
+
+
+def _direction(code: object) -> str:
+    number = int(code) if isinstance(code, (int, float)) else 0
+    return f"{'+' if number > 0 else '-'}{'XYZ'[abs(number) - 1]}" if 1 <= abs(number) <= 3 else ""
