@@ -1,20 +1,24 @@
-"""Regenerate the estimator study: ``python -m tests.benchmarks.bench_estimators [replicates [seed]]``.
+"""Regenerate the estimator study: ``python -m tests.benchmarks.bench_estimators [--out DIR] [--docs]``.
 
 Prints, for every case of `estimator_cases` and every method: RMSE of H in % of its norm, bias of kxx
 and kyy in %, coverage of the 95 % intervals in % (all eight entries), milliseconds per H. The default
-method gets all replicates, the others a quarter of them. Ends with exit code 1 if a target is missed.
+method gets all replicates, the others a quarter of them. ``--out`` keeps the figures (study.json) with
+plots, ``--docs`` puts table and plots into docs/. Ends with exit code 1 if a target is missed.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from tests.benchmarks.estimator_cases import H_TRUE, OMEGA, Case, draw
 from tpjb_ident.dynamic.estimate import estimate_dynamic_stiffness
+from tpjb_ident.executors import in_order, local_workers
 
 METHODS = ("ols", "rlm:huber", "rlm:tukey", "mm", "iv", "mm-eiv")
 CASES = (
@@ -22,6 +26,7 @@ CASES = (
     Case(relx=0.02),
     Case(relx=0.10),
     Case(relx=0.20),
+    Case("lev", 0.05),
     *(Case(kind, share) for kind in ("force", "forcesys", "lev", "gain") for share in (0.1, 0.2, 0.3, 0.4)),
     *(Case(directions=g, windows=1) for g in (3, 4, 5, 8)),
 )
@@ -57,6 +62,26 @@ class Score:
         return f"{self.rmse:6.2f} ({self.bias[0]:+.2f} {self.bias[1]:+.2f}, {self.coverage:.0f})"
 
 
+@dataclass(frozen=True)
+class Row:
+    """One case of the study.
+
+    Attributes
+    ----------
+    case : str
+    windows : int
+        Per direction.
+    scores : dict of str to Score
+    missed : list of str
+        Targets that the default method misses.
+    """
+
+    case: str
+    windows: int
+    scores: dict[str, Score]
+    missed: list[str]
+
+
 def score(case: Case, method: str, replicates: int, seed: int) -> Score:
     """Run one method on `replicates` fresh draws."""
     name, _, norm = method.partition(":")
@@ -87,25 +112,48 @@ def score(case: Case, method: str, replicates: int, seed: int) -> Score:
     )
 
 
-def main(replicates: int = 400, seed: int = 2026) -> int:
+def study(replicates: int, seed: int, count: int) -> list[Row]:
+    """Score every method in every case, `count` cases at a time; print each row as it comes."""
+    jobs = [(case, replicates, seed) for case in CASES]
+    rows = []
+    with local_workers(count) as workers:
+        for row in in_order(workers, score_case, jobs):
+            print(f"| {row.case} | " + " | ".join(str(row.scores[m]) for m in METHODS) + " |", flush=True)
+            rows.append(row)
+    return rows
+
+
+def score_case(case: Case, replicates: int, seed: int) -> Row:
+    """Score every method in one case."""
+    scores, missed = {}, []
+    for method in METHODS:
+        scores[method] = score(case, method, replicates if method == DEFAULT else max(replicates // 4, 1), seed)
+        if method == DEFAULT:
+            missed = [f"{case.name}: {what}" for what in shortfalls(case, scores[method])]
+    return Row(case.name, case.windows, scores, missed)
+
+
+def main(arguments: list[str] | None = None) -> int:
     """Print the table; 1 if a target is missed."""
-    print(f"{replicates} replicates, seed {seed}: RMSE % (bias kxx, kyy %, coverage %)")
+    parser = argparse.ArgumentParser(description="Accuracy, coverage and speed of every estimator")
+    parser.add_argument("--replicates", type=int, default=400)
+    parser.add_argument("--seed", type=int, default=2026)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--out", type=Path, help="folder for study.json and plots")
+    parser.add_argument("--docs", action="store_true", help="put table and plots into docs/")
+    options = parser.parse_args(arguments)
+    print(f"{options.replicates} replicates, seed {options.seed}: RMSE % (bias kxx, kyy %, coverage %)")
     print("| case | " + " | ".join(METHODS) + " |")
     print("|---|" + "---|" * len(METHODS))
-    spent: dict[str, list[float]] = {m: [] for m in METHODS}
-    missed: list[str] = []
-    for case in CASES:
-        cells = []
-        for method in METHODS:
-            result = score(case, method, replicates if method == DEFAULT else max(replicates // 4, 1), seed)
-            if method == DEFAULT:
-                missed += [f"{case.name}: {what}" for what in shortfalls(case, result)]
-            if case.windows == 20:
-                spent[method].append(result.milliseconds)
-            cells.append(str(result))
-        print(f"| {case.name} | " + " | ".join(cells) + " |", flush=True)
-    print("| ms per H (8 x 20) | " + " | ".join(f"{np.median(spent[m]):.1f}" for m in METHODS) + " |")
+    rows = study(options.replicates, options.seed, options.workers)
+    times = {m: float(np.median([r.scores[m].milliseconds for r in rows if r.windows == 20])) for m in METHODS}
+    print("| ms per H (8 x 20) | " + " | ".join(f"{times[m]:.1f}" for m in METHODS) + " |")
+    missed = [text for row in rows for text in row.missed]
     print("\n".join(["targets missed:", *missed]) if missed else "all targets met")
+    if options.out or options.docs:
+        from tests.benchmarks.bench_estimators_report import write_report
+
+        write_report(rows, METHODS, (options.replicates, options.seed), options.out, options.docs)
     return 1 if missed else 0
 
 
@@ -126,4 +174,4 @@ def shortfalls(case: Case, result: Score) -> list[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*(int(a) for a in sys.argv[1:3])))
+    sys.exit(main())

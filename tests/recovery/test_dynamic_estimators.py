@@ -1,6 +1,6 @@
 """Recovery of a known H by every estimator: accuracy, bias, coverage in the study's situation.
 
-Small here, with fixed seeds; ``python -m tests.benchmarks.bench_estimators 400`` is the whole study.
+Small here, with fixed seeds; ``python -m tests.benchmarks.bench_estimators`` is the whole study.
 The targets are for 400 replicates; fewer leave a Monte-Carlo error of 1/sqrt(2 n) on an RMSE.
 """
 

@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
-from rigdata.virtual_rig import Noise, RigPlan, RigTruth, Timing, VirtualRig, operating_points, write_campaign
+from rigdata.virtual_rig import Noise, RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
+from tests.benchmarks.bench_phasors import HeldRun
 from tpjb_ident.dynamic.conditions import Condition
+from tpjb_ident.dynamic.extraction import extract
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
+from tpjb_ident.dynamic.line_tuning import speeds_from_runout
+from tpjb_ident.dynamic.lines import known_lines
 from tpjb_ident.dynamic.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.dynamic.windows import RecordTooShortError
 
@@ -108,8 +112,8 @@ def test_tables_have_the_promised_columns(result):
     assert frame["outlier_fraction"].max() < 0.2
     np.testing.assert_allclose(frame["temperature_1_K"], 273.15 + 45 + frame["static_load_N"] / 2e3, atol=1.0)
     every = result.estimators_frame()
-    assert set(every["method"]) == {"ols", "rlm:huber", "rlm:tukey", "mm", "mm-eiv"}
-    assert len(every) == 15
+    assert set(every["method"]) == {"ols", "rlm:huber", "rlm:tukey", "mm", "mm-eiv", "iv"}
+    assert len(every) == 18
 
 
 def test_frequency_fits_cover_loads_run_at_several_frequencies(result):
@@ -207,17 +211,51 @@ def test_several_excitation_lines_in_one_record_are_told_apart(tmp_path):
         assert "unexpected lines" in p.quality
 
 
-def test_a_drifting_shaft_is_followed(tmp_path):
-    path = tmp_path / "c.h5"
-    write_campaign(
-        path, rig([(5000.0, 25.0)], seed=4, timing=Timing(dynamic_rate=1000.0, dynamic_seconds=20.0), directions=(0.0,))
-    )
-    run = load_campaign(path).of_kind("dynamic")[0]
+class DriftingRun(HeldRun):
+    """The shaft slows down by 0.2 Hz in 20 s; the tachometer is noisier than that, or not there at all."""
+
+    tach_noise: float | None = 0.05
+    drift = -0.01
+
+    def __post_init__(self):
+        super().__post_init__()
+        rng = np.random.default_rng(self.seed)
+        shaft = np.exp(2j * np.pi * (22.0 * self.time + 0.5 * self.drift * self.time**2))
+        drive = np.exp(2j * np.pi * 25.0 * self.time)
+        lines = np.outer(drive, [1.0, 0.5j]).real + np.outer(shaft, [2.0, -2.0j]).real
+        self.data["displacement"] = 1e-6 * (lines + 0.05 * rng.standard_normal((self.length, 2)))
+
+    def speed(self, start=None, stop=None):
+        if self.tach_noise is None:
+            return None
+        record = super().speed(start, stop)
+        turns = self.tach_noise * np.random.default_rng(start or 0).standard_normal()
+        return replace(record, values=record.values + 2 * np.pi * (turns + self.drift * record.time))
+
+
+@pytest.mark.parametrize("tach_noise", [0.05, None])
+def test_a_drifting_shaft_is_followed_by_its_runout(tach_noise):
+    class Run(DriftingRun):
+        pass
+
+    Run.tach_noise = tach_noise
+    run = Run("a", 3, sample_rate=1000.0, seconds=20.0)
+    first = extract(run, 30.0, PhasorSettings(), known_lines((25.0,), 22.0, run.sample_rate))
+    speeds, doubt = speeds_from_runout(first, run.sample_rate)
+    expected = 22.0 + Run.drift * (first.start + first.length / 2)
+    np.testing.assert_allclose(speeds, expected, atol=0.006)
+    assert doubt < 1e-3
     phasors = run_phasors(run, 30.0)
     assert "speed drifts" in phasors.conditions
-    assert len(phasors.start) == 20
-    scatter = phasors.displacement.phasors[:, 0].std(axis=0)
-    assert (scatter < 1e-8).all()
+    scatter = [p.displacement.phasors[:, 0].std(axis=0).max() for p in (first, phasors)]
+    assert scatter[1] < 0.5 * scatter[0]
+
+
+def test_a_noisy_tachometer_is_no_drift():
+    class Run(DriftingRun):
+        drift = 0.0
+
+    assert "speed drifts" not in run_phasors(Run("a", 3, sample_rate=1000.0, seconds=20.0), 30.0).conditions
 
 
 def test_conditions_compare_by_name_and_survive_pickling():
@@ -270,7 +308,6 @@ def test_memory_does_not_grow_with_the_record():
     import tracemalloc
 
     from rigdata.record import VectorRecord
-    from tests.benchmarks.bench_phasors import HeldRun
 
     class Stream(HeldRun):
         """Makes its samples when they are asked for."""

@@ -3,14 +3,28 @@
 from __future__ import annotations
 
 import difflib
+import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.errors import BadInputError, NotTrustedError, guarded
 from tpjb_ident.cli.inputs import open_bearing, open_campaign
-from tpjb_ident.cli.options import CampaignPath, Method, Norm, Out, Scheduler, WorkerCount, out_folder
+from tpjb_ident.cli.options import (
+    CampaignPath,
+    Delays,
+    Lines,
+    Method,
+    Norm,
+    Out,
+    Scheduler,
+    WorkerCount,
+    out_folder,
+)
 from tpjb_ident.cli.outdir import output_folder
+from tpjb_ident.cli.quantities import parse_values
 from tpjb_ident.cli.record import write_record
-from tpjb_ident.cli.show import progress, say, table
+from tpjb_ident.cli.show import note_line, progress, say, table
 from tpjb_ident.tables import write_table
 
 if TYPE_CHECKING:
@@ -18,6 +32,7 @@ if TYPE_CHECKING:
 
     from rigdata.campaign import Campaign
     from tpjb_ident.dynamic.identification import Identification
+    from tpjb_ident.dynamic.run_phasors import PhasorSettings
 
 #: Records [bytes] above which several processes are quicker than one.
 WORTH_PROCESSES = 100 * 2**20
@@ -30,17 +45,21 @@ def identify(
     campaign: CampaignPath,
     method: Method = "mm-eiv",
     norm: Norm = None,
+    lines: Lines = None,
+    delay: Delays = None,
     workers: WorkerCount = None,
     scheduler: Scheduler = None,
     out: Out = None,
 ) -> None:
     """Identify stiffness and damping with 95 % intervals at every operating point.
 
-    Writes coefficients (chosen method), estimators (every method, statsmodels RLM among them) and windows (rejected
-    ones, with reasons), each as .csv and .parquet. Exit code 3 if a point is not to be trusted.
+    Writes coefficients (chosen method), estimators (every method, statsmodels RLM among them), windows (rejected
+    ones, with reasons) and frequency_fits (K-C and K-C-M over frequency, per load), each as .csv and .parquet. Exit
+    code 3 if a point is not to be trusted.
     """
     source = open_campaign(campaign)
-    settings = identify_settings(source, method, norm)
+    phasors = phasor_settings(lines, delay or ())
+    settings = replace(identify_settings(source, method, norm), phasors=phasors)
     from tpjb_ident.dynamic.identify import identify as run_identification
     from tpjb_ident.executors import open_workers
 
@@ -50,9 +69,12 @@ def identify(
         with open_workers(count, scheduler, PRELOAD) as team, progress("identifying") as show:
             result = run_identification(source, settings, show, team)
         write_identification(folder, result)
-        options = {"campaign": campaign, "method": method, "norm": norm}
-        write_record(folder, target, "identify", options, source.fingerprint())
+        options = {"campaign": campaign, "method": method, "norm": norm, "lines": lines, "delay": delay}
+        write_record(folder, target, "identify", options, source.fingerprint(), result.remarks())
     show_coefficients(result)
+    show_frequency_fits(result)
+    for remark in result.remarks():
+        say(f"note: {remark}")
     say(f"Results: {target}")
     refuse_untrusted(result)
 
@@ -73,6 +95,30 @@ def worker_count(campaign: Campaign, asked: int | None, scheduler: str | None) -
         return asked
     size = sum(path.stat().st_size for path in campaign.files.values() if path.is_file())
     return None if size > WORTH_PROCESSES else 1
+
+
+def phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:
+    """Build `PhasorSettings` from ``--lines`` and ``--delay``.
+
+    Raises
+    ------
+    BadInputError
+        Not a frequency, not a time, or a quantity that has no direction.
+    """
+    from rigdata.units import UnitError, parse_quantity
+    from tpjb_ident.dynamic.extraction import QUANTITIES
+    from tpjb_ident.dynamic.run_phasors import PhasorSettings
+
+    driven = () if lines is None else parse_values(lines, "angular speed", "--lines")
+    known: dict[str, float] = {}
+    for text in delays:
+        quantity, _, time = text.partition("=")
+        _known(quantity, QUANTITIES, "--delay")
+        try:
+            known[quantity] = parse_quantity(time, "time")
+        except UnitError as error:
+            raise BadInputError(f"--delay {text!r}: {error}. Write, for instance, --delay force=0.2ms.") from error
+    return PhasorSettings(excitation_lines=tuple(f / (2 * math.pi) for f in driven), delays=known)
 
 
 def identify_settings(campaign: Campaign, method: str, norm: str | None) -> Any:
@@ -105,18 +151,25 @@ def _known(value: str, known: tuple[str, ...], option: str) -> None:
 
 
 def _clearance(campaign: Campaign) -> float | None:
-    """Smallest assembled clearance [m], None if the campaign carries no bearing."""
+    """Smallest assembled clearance [m], None if the campaign carries no bearing that can be read."""
+    from model.bearing import BearingError
+
     if not campaign.bearing_text:
         return None
-    bearing, _ = open_bearing(campaign, None)
+    try:
+        bearing, _ = open_bearing(campaign, None)
+    except BearingError as error:  # coefficients need no bearing
+        note_line("warning", f"{error} Until then the amplitude is not held against the clearance.")
+        return None
     return min(pad.assembled_clearance for pad in bearing.pads)
 
 
 def write_identification(folder: Path, result: Identification) -> None:
-    """Write coefficients, estimators and windows."""
+    """Write coefficients, estimators, windows and the models over frequency."""
     write_table(folder, "coefficients", result.to_frame())
     write_table(folder, "estimators", result.estimators_frame())
     write_table(folder, "windows", result.windows_frame())
+    write_table(folder, "frequency_fits", result.frequency_frame())
 
 
 def show_coefficients(result: Identification) -> None:
@@ -134,6 +187,25 @@ def show_coefficients(result: Identification) -> None:
         ])  # fmt: skip
     columns = ["load kN", "exc. Hz", "kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m", "out %", "quality"]
     table(f"{result.campaign}: {result.method}, 95 % intervals", columns, rows, words=(6,))
+
+
+def show_frequency_fits(result: Identification) -> None:
+    """Print which model over frequency the data of every load support."""
+    rows = []
+    for group in result.frequency_fits():
+        point = group.points[0].point
+        for name, fit in group.fits.items():
+            misfit = f"{100 * fit.misfit:.1f}"
+            verdict = "supported" if name == group.supported else "refused" if fit.refused else "not needed"
+            figures = [f"{fit.chi_square:.1f}", str(fit.dof), f"{fit.probability:.2g}", misfit]
+            rows.append([f"{point.static_load / 1e3:g}", name, *figures, verdict])
+    if rows:
+        columns = ["load kN", "model", "chi-square", "dof", "probability", "misfit %", "verdict"]
+        table("over frequency", columns, rows, words=(1, 6))
+    for group in result.frequency_fits():
+        if group.supported not in group.fits:
+            load = f"{group.points[0].point.static_load / 1e3:g} kN"
+            say(f"note: at {load} the data refuse K-C and K-C-M; use the coefficients of each excitation frequency")
 
 
 def refuse_untrusted(result: Identification) -> None:

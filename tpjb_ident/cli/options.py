@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+
+def one_of(*names: str) -> Callable[[str], list[str]]:
+    """Complete a half-typed value to the names it may become."""
+
+    def complete(incomplete: str) -> list[str]:
+        return [name for name in names if name.startswith(incomplete)]
+
+    return complete
+
 
 CampaignPath = Annotated[
     Path, typer.Argument(metavar="CAMPAIGN", help="Campaign: a folder with campaign.toml, or one HDF5 file.")
@@ -19,12 +30,41 @@ BearingOption = Annotated[
     Path | None,
     typer.Option("--bearing", metavar="FILE", help="Bearing file [default: the one that the campaign names]."),
 ]
-Thermal = Annotated[str, typer.Option("--thermal", help="isothermal, adiabatic or tehd.")]
+Thermal = Annotated[
+    str,
+    typer.Option(
+        "--thermal",
+        help="isothermal, adiabatic or tehd.",
+        autocompletion=one_of("isothermal", "adiabatic", "tehd"),
+    ),
+]
 EffectsFile = Annotated[
     Path | None, typer.Option("--effects", metavar="FILE", help="Effects file: what the baseline model lacks.")
 ]
-Method = Annotated[str, typer.Option("--method", help="Estimator of coefficients.csv: mm-eiv, mm, rlm, ols or iv.")]
-Norm = Annotated[str | None, typer.Option("--norm", help="Norm of --method rlm: huber, tukey, hampel, ...")]
+Method = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        help="Estimator of coefficients.csv: mm-eiv, mm, rlm, ols or iv.",
+        autocompletion=one_of("mm-eiv", "mm", "rlm", "ols", "iv"),
+    ),
+]
+Norm = Annotated[
+    str | None,
+    typer.Option(
+        "--norm",
+        help="Norm of --method rlm: huber, tukey, hampel, ...",
+        autocompletion=one_of("huber", "tukey", "hampel", "andrew", "ramsay", "trimmed"),
+    ),
+]
+Lines = Annotated[
+    str | None,
+    typer.Option("--lines", metavar="LIST", help='Excitation lines that every record holds: "20, 25, 30 Hz".'),
+]
+Delays = Annotated[
+    list[str] | None,
+    typer.Option("--delay", metavar="QUANTITY=TIME", help="Known lateness of channels, as force=0.2ms; repeatable."),
+]
 WorkerCount = Annotated[
     int | None,
     typer.Option("--workers", metavar="N", min=1, help="Processes [default: one per core where it pays]."),

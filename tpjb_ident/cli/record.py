@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,12 @@ from tpjb_ident.tables import write_text
 
 
 def write_record(
-    staging: Path, target: Path, command: str, settings: Mapping[str, Any], inputs: Mapping[str, str]
+    staging: Path,
+    target: Path,
+    command: str,
+    settings: Mapping[str, Any],
+    inputs: Mapping[str, str],
+    remarks: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Write run.json into the temporary folder of a command, last.
 
@@ -31,6 +36,8 @@ def write_record(
         Options as they were used.
     inputs : mapping of str to str
         SHA-256 by file name.
+    remarks : sequence of str
+        What the command has to say about its results.
 
     Returns
     -------
@@ -44,6 +51,7 @@ def write_record(
         "versions": versions(),
         "inputs_sha256": dict(inputs),
         "outputs": outputs,
+        **({"remarks": list(remarks)} if remarks else {}),
     }
     commands = {**former_runs(target), command: entry}
     text = json.dumps({"schema": "tpjb-run/1", "commands": commands}, indent=1, ensure_ascii=False) + "\n"

@@ -80,6 +80,8 @@ def estimate_dynamic_stiffness(
     if not (np.isfinite(frequency) and frequency > 0):
         raise ValueError(f"omega must be a positive number of rad/s, got {omega}")
     instruments = None if reference is None else getattr(reference, "magnitude", reference)
+    if method == "iv" and reference is None:
+        raise ValueError('method "iv" needs reference phasors (n, 2), for instance the actuators\' command')
     table = phasor_table(_si(D, "m", "D"), _si(F, "N", "F"), direction, instruments)
     return estimate_table(table, frequency, method, RlmSettings(norm or "huber"))
 
@@ -89,7 +91,7 @@ def estimate_table(
 ) -> DynamicStiffness:
     """As `estimate_dynamic_stiffness`, for a table that is already checked and scaled."""
     name = f"rlm:{(rlm_settings or RlmSettings()).norm}" if method == "rlm" else method
-    obstacle = _obstacle(table)
+    obstacle = _obstacle(table) or _no_reference(table, method)
     if obstacle is not None:
         return _failed(table, omega, name, obstacle)
     if method == "rlm":
@@ -122,6 +124,12 @@ def _obstacle(table: PhasorTable) -> Condition | None:
     if not np.isfinite(displacement_condition(table.D)):
         return Condition("fewer-than-two-directions", "all displacements are collinear: H needs two directions in them")
     return None
+
+
+def _no_reference(table: PhasorTable, method: str) -> Condition | None:
+    if method != "iv" or table.reference is not None:
+        return None
+    return Condition("no-reference", "instruments are missing: the runs do not state two excitation directions")
 
 
 def _failed(table: PhasorTable, omega: float, name: str, why: Condition) -> DynamicStiffness:

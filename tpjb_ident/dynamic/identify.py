@@ -15,6 +15,7 @@ from tpjb_ident.dynamic.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections import Correction, find_corrections
 from tpjb_ident.dynamic.estimate import REJECTED_WEIGHT, estimate_table
 from tpjb_ident.dynamic.identification import Identification
+from tpjb_ident.dynamic.nominal_drive import nominal_drive
 from tpjb_ident.dynamic.phasor_table import phasor_table
 from tpjb_ident.dynamic.point_data import PointData, gather
 from tpjb_ident.dynamic.point_result import PointResult
@@ -35,7 +36,8 @@ class IdentifySettings:
     method : str
         Default method, the one in ``coefficients.csv``.
     methods : tuple of str
-        All that are run; ``"rlm:tukey"`` names a norm.
+        All that are run; ``"rlm:tukey"`` names a norm. ``"iv"`` takes the excitation directions of the manifest
+        for instruments and is left out where they cannot serve.
     phasors : PhasorSettings
     clearance : float or None
         Assembled clearance [m], for the amplitude check; None leaves it out.
@@ -49,7 +51,7 @@ class IdentifySettings:
     """
 
     method: str = "mm-eiv"
-    methods: tuple[str, ...] = ("ols", "rlm:huber", "rlm:tukey", "mm", "mm-eiv")
+    methods: tuple[str, ...] = ("ols", "rlm:huber", "rlm:tukey", "mm", "mm-eiv", "iv")
     phasors: PhasorSettings = field(default_factory=PhasorSettings)
     clearance: float | None = None
     correct: bool = True
@@ -131,7 +133,7 @@ def assemble(
 
 def _first_estimates(gathered: list[PointData], settings: IdentifySettings) -> list[DynamicStiffness]:
     """Estimates before any correction, for how H changes with load and how runs scatter."""
-    method = settings.method.partition(":")[0]
+    method = "mm-eiv" if settings.method == "iv" else settings.method.partition(":")[0]
     return [estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, method) for data in gathered]
 
 
@@ -192,11 +194,7 @@ def identify_point(
     differ : bool
         Whether runs are known to differ by more than their windows do.
     """
-    table = replace(phasor_table(data.D, data.F, data.run_index), directions_differ=differ)
-    by_method: dict[str, DynamicStiffness] = {}
-    for name in dict.fromkeys((*settings.methods, settings.method)):
-        method, _, norm = name.partition(":")
-        by_method[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"))
+    by_method = _all_methods(data, settings, differ)
     best = by_method[settings.method]
     weights = best.weights.min(axis=1)
     figure = coherence(data.D, data.F, best.h, weights)
@@ -229,7 +227,22 @@ def identify_point(
         rejected_windows(data, best.h, weights),
         tuple(run.run for run in data.runs),
         linearity=linearity,
+        inertia_corrected=data.runs[0].acceleration is not None,
+        clearance=settings.clearance,
     )
+
+
+def _all_methods(data: PointData, settings: IdentifySettings, differ: bool) -> dict[str, DynamicStiffness]:
+    """Every method that was asked for and applies, the default one in any case."""
+    drive = nominal_drive(data)
+    table = phasor_table(data.D, data.F, data.run_index, drive)
+    table = replace(table, directions_differ=differ)
+    found: dict[str, DynamicStiffness] = {}
+    for name in dict.fromkeys((*settings.methods, settings.method)):
+        method, _, norm = name.partition(":")
+        if method != "iv" or drive is not None or settings.method == "iv":
+            found[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"))
+    return found
 
 
 def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[Condition, ...]:

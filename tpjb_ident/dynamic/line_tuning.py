@@ -89,7 +89,7 @@ def tuned(
     exact, off_set_point = _excitations(result, driven, run.sample_rate)
     slip = _shaft_slip(result, run.sample_rate)
     span = result.start[-1] - result.start[0] + result.length
-    follow = _drifting(result)
+    follow = _drifting(result, run.sample_rate)
     if not off_set_point and follow is None and abs(slip) * span <= 5 * MAX_SLIP:
         return None
     extra = tuple(line.frequency for line in result.lines.nuisance if line.name == "found")
@@ -128,21 +128,75 @@ def _excitations(
     )
 
 
-def _shaft_slip(result: RunPhasors, rate: float) -> float:
+def _shaft_line(result: RunPhasors) -> int | None:
+    """Which line is 1X; None where it is not fitted apart."""
     names = [line.name for line in result.lines.nuisance]
-    if "1X" not in names:
+    return len(result.lines.excitation) + names.index("1X") if "1X" in names else None
+
+
+def _shaft_slip(result: RunPhasors, rate: float) -> float:
+    index = _shaft_line(result)
+    if index is None:
         return 0.0
-    noise = _typical(result.displacement.noise) / np.sqrt(result.length * rate)
-    index = len(result.lines.excitation) + names.index("1X")
-    return frequency_slip(result.displacement.phasors[:, index], result.start, noise)
+    return frequency_slip(result.displacement.phasors[:, index], result.start, _phasor_noise(result, rate))
 
 
-def _drifting(result: RunPhasors) -> FloatArray | None:
-    """Window speeds, where the shaft's phase runs away within a window."""
-    known = result.speeds[np.isfinite(result.speeds)]
-    if len(known) < 2 or np.ptp(known) / 2 * result.length <= MAX_WINDOW_SLIP:
+def _phasor_noise(result: RunPhasors, rate: float) -> float:
+    """Standard error of a component of a window's displacement phasor."""
+    return _typical(result.displacement.noise) / np.sqrt(result.length * rate)
+
+
+def _drifting(result: RunPhasors, rate: float) -> FloatArray | None:
+    """Window speeds, where the shaft's phase runs away within a window.
+
+    The runout tells them ten times better than a tachometer, whose own noise looks like a drift.
+    """
+    told = speeds_from_runout(result, rate)
+    speeds, doubt = (result.speeds, 0.0) if told is None else told
+    known = speeds[np.isfinite(speeds)]
+    if len(known) < 2 or np.ptp(known) / 2 <= max(MAX_WINDOW_SLIP / result.length, 4 * doubt):
         return None
-    return result.speeds
+    return speeds
+
+
+def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, float] | None:
+    """Shaft speed in every window from the turning of its 1X phasor.
+
+    Runout and unbalance draw the same 1X from window to window; between the middles of two windows its phase
+    advances by what the shaft is ahead of the frequency fitted.
+
+    Parameters
+    ----------
+    result : RunPhasors
+        A fit with one speed for all windows.
+    rate : float
+        Sample rate [Hz].
+
+    Returns
+    -------
+    speeds : (n,) ndarray
+        [Hz]; NaN where a window gave no phasor.
+    doubt : float
+        Standard error of one of them [Hz].
+    None
+        Where 1X is too weak, or on another line.
+    """
+    index = _shaft_line(result)
+    if index is None or len(result.start) < 3:
+        return None
+    z = result.displacement.phasors[:, index]
+    good = np.flatnonzero(np.isfinite(z).all(axis=1))
+    noise = _phasor_noise(result, rate)
+    size = float(np.median(np.linalg.norm(z[good], axis=1))) if len(good) else 0.0
+    if len(good) < 3 or not size > 10 * noise:
+        return None
+    t = result.start[good]
+    steps = np.angle(np.einsum("ni,ni->n", z[good][1:], z[good][:-1].conj())) / (2 * np.pi * np.diff(t))
+    speeds = np.full(len(result.start), np.nan)
+    speeds[good] = result.lines.frequencies[index] + np.concatenate(
+        [steps[:1], 0.5 * (steps[1:] + steps[:-1]), steps[-1:]]
+    )
+    return speeds, noise / size / (2 * np.pi * float(np.median(np.diff(t))))
 
 
 def _typical(noise: FloatArray) -> float:

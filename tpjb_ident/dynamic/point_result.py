@@ -67,6 +67,10 @@ class PointResult:
         How far each run's static load was off.
     linearity : AmplitudeSlope or None
         Change of h with amplitude, where directions were run at several.
+    inertia_corrected : bool
+        Whether the housing's inertia was added to the cells' force.
+    clearance : float or None
+        Assembled clearance, where the campaign carries a bearing [m].
     """
 
     point: OperatingPoint
@@ -86,6 +90,8 @@ class PointResult:
     runs: tuple[str, ...] = field(repr=False)
     load_miss: LoadMiss | None = field(default=None, repr=False)
     linearity: AmplitudeSlope | None = field(default=None, repr=False)
+    inertia_corrected: bool = False
+    clearance: float | None = field(default=None, repr=False)
 
     @property
     def condition_number(self) -> float:

@@ -27,6 +27,8 @@ from tpjb_ident.dynamic.stiffness import DynamicStiffness
 UNKNOWN_EXPONENT = 0.6
 #: Misses beyond this share are no scatter: the set point or the cells are wrong.
 MAX_MISS = 0.05
+#: The same for its direction [rad].
+MAX_SIDEWAYS = 0.05
 
 
 @dataclass(frozen=True)
@@ -167,6 +169,14 @@ def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
     if worst > MAX_MISS:
         found.append(
             Condition("static-load-off", f"a run's measured static load is {100 * worst:.1f} % off its set point")
+        )
+    sideways = float(np.abs(miss.sideways).max(initial=0.0))
+    if sideways > MAX_SIDEWAYS:
+        found.append(
+            Condition(
+                "static-load-turned",
+                f"a run's measured static load points {np.degrees(sideways):.1f} deg away from its set direction",
+            )
         )
     if abs(abs(common) - 1) > 0.01:
         found.append(

@@ -93,9 +93,7 @@ def distance2(terms: FloatArray, inner: ComplexArray) -> FloatArray:
     q = inner.shape[-1]
     first, second = _pairs(q)
     pairs = inverse[..., first, second]
-    factors = np.concatenate(
-        [2 * np.einsum("...ii->...i", inverse).real, 4 * pairs.real, -4 * pairs.imag], axis=-1
-    )
+    factors = np.concatenate([2 * np.einsum("...ii->...i", inverse).real, 4 * pairs.real, -4 * pairs.imag], axis=-1)
     return np.asarray((factors[..., None, :] @ terms)[..., 0, :])
 
 

@@ -20,6 +20,8 @@ MEANING = {
     "pads-not-reached": "The sweep never touched some pads; their clearance is unknown.",
     "pivots-disagree": "In the sweep the pivots give another amount than the dry tests say.",
     "speed-drifts": "The shaft speed moved during the record; its lines were followed window by window.",
+    "no-reference": "The runs do not state two excitation directions, so they cannot serve as instruments.",
+    "static-load-turned": "The measured static load of a run points elsewhere than its set point says.",
     "static-load-off": "The measured static load of a run misses its set point.",
     "unexpected-lines": "The records hold lines that the manifest does not explain; they were fitted along.",
     "calibration-uncertainty-unstated": "The manifest states no calibration uncertainty for some channels; the "
