@@ -32,6 +32,7 @@ SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better 
 SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
 CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the give, where no curve says it
 CLIP = 5.0  # robust standard deviations
+SLIDING = 0.03  # of the give: while the shaft slides, its next pad may already carry a little
 
 
 @dataclass(frozen=True)
@@ -124,18 +125,14 @@ def fit_sides(touch: Touch, angles: FloatArray, reached: BoolArray, curves: Sequ
     -------
     SideFit
     """
-    system = _system(touch, angles, reached)
-    if curves is None:
-        return _solve_unknown(system)
-    return _solve_known(system, curves)
-
-
-def _system(touch: Touch, angles: FloatArray, reached: BoolArray) -> _System:
     place = _place_along_side(touch, angles, reached)
     usable = reached[touch.pad] & _consistent(touch, place)
-    used = touch.take(usable)
-    noise = _noise(used, place[usable])
-    return _System(used, place[usable], _whitener(used, angles, noise), np.flatnonzero(reached), len(angles), noise)
+    used, place = touch.take(usable), place[usable]
+    noise = _noise(used, place)
+    give = known_give(curves or (), used.pad, used.load)
+    whitener = _whitener(used, angles, noise, SLIDING * give * used.alone)
+    system = _System(used, place, whitener, np.flatnonzero(reached), len(angles), noise)
+    return _solve_unknown(system) if curves is None else _solve_known(system, curves)
 
 
 def _place_along_side(touch: Touch, angles: FloatArray, reached: BoolArray) -> FloatArray:
@@ -186,8 +183,11 @@ def _noise(touch: Touch, place: FloatArray) -> NoiseModel:
     return estimate_noise(series, DRIFT_RATE)
 
 
-def _whitener(touch: Touch, angles: FloatArray, noise: NoiseModel) -> FloatArray:
-    """Inverse Cholesky factor of the covariance of the averages; all pads share the two probes."""
+def _whitener(touch: Touch, angles: FloatArray, noise: NoiseModel, unsure: FloatArray) -> FloatArray:
+    """Inverse Cholesky factor of the covariance of the averages; all pads share the two probes.
+
+    `unsure` (m,) is a standard deviation of each average by itself [m].
+    """
     n = normals(angles)[touch.pad]
     centred = touch.time - touch.time.mean()
     same = touch.time[:, None] == touch.time[None, :]
@@ -197,6 +197,7 @@ def _whitener(touch: Touch, angles: FloatArray, noise: NoiseModel) -> FloatArray
         + noise.drift**2 * np.outer(centred, centred)
     )
     covariance[np.diag_indices_from(covariance)] *= 1.0 + 1e-9
+    covariance += np.diag(unsure**2)
     return np.linalg.inv(np.linalg.cholesky(covariance))
 
 

@@ -31,13 +31,12 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
 
     The shaft rests in the corner between the two pads that the load points between; each pivot carries its share
     of the load and gives by its own law. It slides along a pad's side to the next corner when the load has
-    passed that pad by `lag`, over about `width` (friction). At the pad itself its pivot carries all the load:
-    there the side stands at clearance + deflection(push).
+    passed that pad by `lag`, over about `width` (friction). On its way that pad alone carries, push times the cosine
+    of the angle between them: there the side stands at clearance + deflection(that).
     """
     pads = _sides(truth)
     normals = np.array([[np.cos(truth.pivot_angles[k]), np.sin(truth.pivot_angles[k])] for k in pads])
-    total = np.zeros((len(direction), 2))
-    weight = np.zeros(len(direction))
+    shares, places = [], []
     for i, pad in enumerate(pads):
         after = pads[(i + 1) % len(pads)]
         here, there = truth.pivot_angles[pad], truth.pivot_angles[after]
@@ -49,9 +48,17 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
         forces = push * np.stack([np.sin(gap - turned), np.sin(turned)]) / np.sin(gap)
         reach = np.stack([truth.clearance[k] + truth.deflection(k + 1, f) for k, f in zip((pad, after), forces)])
         corner = np.linalg.solve(np.stack([normals[i], normals[(i + 1) % len(pads)]]), reach).T
-        total += share[:, None] * corner
-        weight += share
-    return total / weight[:, None]
+        shares.append(share)
+        places.append(corner)
+    weight = np.array(shares) / np.sum(shares, axis=0)
+    position = np.einsum("kn,knj->nj", weight, np.array(places))
+    for i, pad in enumerate(pads):
+        # between two corners a blend of both would share the load among three pads
+        alone = 4.0 * weight[i - 1] * weight[i]
+        off = np.cos(direction - truth.pivot_angles[pad])
+        stands = truth.clearance[pad] + truth.deflection(pad + 1, push * np.maximum(off, 0.0))
+        position += (alone * (stands - position @ normals[i]))[:, None] * normals[i]
+    return np.asarray(position)
 
 
 def corners(truth: RigTruth) -> FloatArray:

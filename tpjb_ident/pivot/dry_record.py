@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,11 +14,13 @@ from rigdata.problem import Problem, RigDataError
 from tpjb_ident.pivot.blocks import Blocks, Samples, cut_blocks
 from tpjb_ident.pivot.flat_channels import refuse_flat_channels
 from tpjb_ident.pivot.glitches import good_samples
+from tpjb_ident.pivot.pickup import Pickup, measure_pickup
 from tpjb_ident.pivot.projection import Projection, pad_axes, project
 from tpjb_ident.pivot.settings import PivotSettings
 from tpjb_ident.pivot.steps import Hold, find_holds
 
 if TYPE_CHECKING:
+    from rigdata.calibration import Channel
     from rigdata.campaign import Run
 
 FloatArray = NDArray[np.float64]
@@ -50,6 +53,8 @@ class DryRecord:
         Share of samples left out.
     quantisation : float
         Standard deviation [m] of what the converter's steps add to a whole hold; zero where noise smears them.
+    pickup : Pickup or None
+        Mains line in every probe and cell; None where the record is too short to show it.
     """
 
     run: Run
@@ -60,6 +65,7 @@ class DryRecord:
     projection: Projection
     lost: float
     quantisation: float
+    pickup: Pickup | None = None
 
 
 def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> DryRecord:
@@ -89,7 +95,7 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
         )
     angle = float(pad_angles[run.pad - 1])
     refuse_flat_channels(run)
-    samples = _samples(run, angle, settings)
+    samples, pickup = _samples(run, angle, settings)
     load_range = float(np.ptp(samples.along))
     if load_range <= 0.0 or np.ptp(samples.displacement, axis=0).max() <= 0.0:
         what = "does not move: a dead or disconnected channel"
@@ -99,11 +105,12 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
     if len(blocks) < FEWEST_BLOCKS:
         what = f"gives only {len(blocks)} usable averages of {settings.block:g} s"
         raise refusal(run, "record", what, "Record for longer, or set a shorter block")
-    return DryRecord(run, run.pad, angle, holds, blocks, project(blocks, angle), samples.lost, _quantisation(samples))
+    on_pad, steps = project(blocks, angle), _quantisation(samples)
+    return DryRecord(run, run.pad, angle, holds, blocks, on_pad, samples.lost, steps, pickup)
 
 
-def _samples(run: Run, angle: float, settings: PivotSettings) -> Samples:
-    """Both vectors on one time base, glitches left out."""
+def _samples(run: Run, angle: float, settings: PivotSettings) -> tuple[Samples, Pickup | None]:
+    """Both vectors on one time base, glitches left out; the mains line of the channels behind them."""
     force, displacement = run.vector("force"), run.vector("displacement")
     n = min(len(force), len(displacement))
     load, position, time = force.values[:n], displacement.values[:n], np.asarray(displacement.time[:n])
@@ -112,12 +119,27 @@ def _samples(run: Run, angle: float, settings: PivotSettings) -> Samples:
     if n < FEWEST_SAMPLES or lost > MOST_LOST:
         what = f"has {n} samples, of which {100 * lost:.0f} % are missing or glitches"
         raise refusal(run, "record", what, "Repeat the test")
+    pickup = _pickup(run, {"force": load, "displacement": position}, good)
     time, load, position = time[good], load[good], position[good]
     if np.any(np.diff(time) <= 0.0):
         # a logger that repeats or shuffles time stamps: order is what averages need
         order = np.argsort(time, kind="stable")
         time, load, position = time[order], load[order], position[order]
-    return Samples(time, load, position, np.asarray(load @ pad_axes(angle)[0]), lost)
+    return Samples(time, load, position, np.asarray(load @ pad_axes(angle)[0]), lost), pickup
+
+
+def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: NDArray[np.bool_]) -> Pickup | None:
+    """Mains line per channel. Two channels per vector: only then the vector holds each of them as it was."""
+    channels = axial_channels(run)
+    if any(sum(c.quantity == quantity for c in channels.values()) != 2 for quantity in vectors):
+        return None
+    values = {name: vectors[c.quantity] @ pad_axes(c.axis or 0.0)[0] for name, c in channels.items()}
+    return measure_pickup(values, good, run.sample_rate)
+
+
+def axial_channels(run: Run) -> dict[str, Channel]:
+    """Probes and cells of a run, by name."""
+    return {n: c for n, c in run.channels.items() if c.quantity in ("force", "displacement") and c.axis is not None}
 
 
 def _quantisation(samples: Samples) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,13 +15,14 @@ from tpjb_ident.pivot.bad_holds import bad_blocks
 from tpjb_ident.pivot.choice import keep_likely, posterior_weights
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.dry_record import DryRecord, read_dry_run
-from tpjb_ident.pivot.law_fit import FitData, LawFit, fit_law
+from tpjb_ident.pivot.law_fit import FitData, LawFit, ShapePrior, fit_law
 from tpjb_ident.pivot.laws import Bilinear, HertzLine, HertzPoint, Law, Linear, PointInSeries, Power
 from tpjb_ident.pivot.noise import NoiseModel
 from tpjb_ident.pivot.noise_of_records import noise_about_curve, noise_within_holds
 from tpjb_ident.pivot.projection import Direction
-from tpjb_ident.pivot.refusals import check_directions, check_placement
+from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement
 from tpjb_ident.pivot.settings import PivotSettings
+from tpjb_ident.pivot.shape_sharing import with_shared_shape
 from tpjb_ident.pivot.spline_law import SplineLaw
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ def fit_pivots(
     """
     chosen = settings or PivotSettings()
     records, problems = _read(campaign, np.asarray(pivot_angles, dtype=float), chosen)
-    problems += check_placement(records)
+    problems += check_placement(records) + check_pickup(records)
     refused = {problem.run for problem in problems}
     noise = noise_within_holds(records, chosen.drift_rate) if records else NoiseModel(1.0, 1.0, 1.0)
     pads: dict[int, list[tuple[DryRecord, tuple[Direction, Direction]]]] = {}
@@ -125,7 +126,9 @@ def _curves(
     noise = noise_about_curve(
         [r for m in members for r in m.records], [g for m in members for g in m.good], settings.drift_rate
     )
-    fits = [_fit_all(member, noise, settings) for member in members]
+    data = [_fit_data(member.records, member.good, noise, settings) for member in members]
+    fits = [_fit_all(one, settings) for one in data]
+    fits = with_shared_shape(fits, posterior_weights(fits), [_refit(one) for one in data])
     weights = posterior_weights(fits)
     curves = []
     for member, candidates, shares in zip(members, fits, weights, strict=True):
@@ -135,9 +138,12 @@ def _curves(
     return tuple(curves)
 
 
-def _fit_all(member: _Pad, noise: NoiseModel, settings: PivotSettings) -> list[LawFit]:
-    data = _fit_data(member.records, member.good, noise, settings)
+def _fit_all(data: FitData, settings: PivotSettings) -> list[LawFit]:
     return [fit_law(LAWS[name], contact, data) for name in settings.laws for contact in (False, True)]
+
+
+def _refit(data: FitData) -> Callable[[LawFit, ShapePrior], LawFit]:
+    return lambda fit, known: fit_law(fit.law, fit.contact, data, known, start=fit.theta)
 
 
 def _fit_data(

@@ -180,7 +180,15 @@ class _Prior:
         return float(np.linalg.slogdet(self.precision[np.ix_(proper, proper)])[1])
 
 
-def _prior(law: Law, contact: bool, data: FitData) -> _Prior:
+@dataclass(frozen=True)
+class ShapePrior:
+    """Gaussian prior of a law's shape parameters: mean (k,) and precision (k, k)."""
+
+    mean: FloatArray
+    precision: FloatArray
+
+
+def _prior(law: Law, contact: bool, data: FitData, known: ShapePrior | None) -> _Prior:
     k = len(law.parameters)
     p = SCALE + 1 + k + (2 if contact else 0)
     mean, precision = np.zeros(p), np.zeros((p, p))
@@ -188,7 +196,8 @@ def _prior(law: Law, contact: bool, data: FitData) -> _Prior:
     mean[FRICTION], precision[FRICTION, FRICTION] = data.friction[0], data.friction[1] ** -2
     low[FRICTION], high[FRICTION] = -0.2, 0.2
     shape = slice(SCALE + 1, SCALE + 1 + k)
-    mean[shape], precision[shape, shape] = law.prior_mean, law.prior_precision
+    mean[shape] = law.prior_mean if known is None else known.mean
+    precision[shape, shape] = law.prior_precision if known is None else known.precision
     low[shape], high[shape] = law.bounds
     if contact:
         largest = float(np.max(data.load))
@@ -199,7 +208,9 @@ def _prior(law: Law, contact: bool, data: FitData) -> _Prior:
     return _Prior(mean, precision, low, high)
 
 
-def fit_law(law: Law, contact: bool, data: FitData) -> LawFit:
+def fit_law(
+    law: Law, contact: bool, data: FitData, known: ShapePrior | None = None, start: FloatArray | None = None
+) -> LawFit:
     """Fit one law by its posterior mode.
 
     Parameters
@@ -210,13 +221,17 @@ def fit_law(law: Law, contact: bool, data: FitData) -> LawFit:
         Whether to fit a contact loss beside it.
     data : FitData
         Blocks and their covariance.
+    known : ShapePrior, optional
+        What is known of the shape beforehand; default: what the law itself says is plausible.
+    start : (p,) ndarray, optional
+        Parameters to start from.
 
     Returns
     -------
     LawFit
     """
-    prior = _prior(law, contact, data)
-    theta = _start(prior, contact, data)
+    prior = _prior(law, contact, data, known)
+    theta = _start(prior, contact, data) if start is None else np.clip(start, prior.low, prior.high)
     unit = np.ones(len(theta))
     unit[OFFSET] = np.ptp(data.deflection)  # metres and pure numbers in one matrix: scale the metres
     if contact:

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigdata.problem import Problem, RigDataError
-from tpjb_ident.pivot.dry_record import DryRecord, refusal
+from tpjb_ident.pivot.dry_record import DryRecord, axial_channels, refusal
 from tpjb_ident.pivot.noise import NoiseModel
+from tpjb_ident.pivot.pickup import mistakes
 from tpjb_ident.pivot.projection import Direction, displacement_direction, load_direction
 from tpjb_ident.pivot.settings import PivotSettings
 
@@ -96,6 +97,34 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
                 f"{1e6 * reach:.0f} um toward it: channels exchanged or wrong pad"
             )
             problems.append(Problem("error", record.run.file, "displacement channels", what, CURE, run=record.run.id))
+    return problems
+
+
+def check_pickup(records: Sequence[DryRecord]) -> list[Problem]:
+    """Runs whose mains pick-up is that of exchanged or reversed channels, while the other runs agree with each other.
+
+    Parameters
+    ----------
+    records : sequence of DryRecord
+        One campaign; at least three runs, otherwise nothing can be said.
+
+    Returns
+    -------
+    list of Problem
+        One per such run. None where the channels' pick-up is no signature: phases that change from run to run.
+    """
+    pairs: dict[str, list[str]] = {}
+    for name, channel in (axial_channels(records[0].run) if records else {}).items():
+        pairs.setdefault(str(channel.quantity), []).append(name)
+    found = mistakes([r.pickup for r in records], [(p[0], p[1]) for p in pairs.values() if len(p) == 2])
+    problems = []
+    for record, mistake in zip(records, found, strict=True):
+        if mistake is not None:
+            what = (
+                f"run {record.run.id}: {mistake.what}: then its mains pick-up is that of {mistake.agree} other dry "
+                "runs, and as it stands it is not: wrong channel"
+            )
+            problems.append(Problem("error", record.run.file, "channels", what, CURE, run=record.run.id))
     return problems
 
 
