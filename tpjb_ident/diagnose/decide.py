@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpjb_ident.diagnose.candidates import Candidate
-from tpjb_ident.diagnose.fit import Fit, Misfit
+from tpjb_ident.diagnose.fit import Fit
 from tpjb_ident.diagnose.gap import gap, gap_by_observable, noise_floor
 from tpjb_ident.diagnose.localise import localise
 from tpjb_ident.diagnose.observe import Observations
+from tpjb_ident.diagnose.problem import Problem
 from tpjb_ident.diagnose.search import Search
 from tpjb_ident.diagnose.settings import DiagnoseSettings
 from tpjb_ident.diagnose.verdict import FoundEffect, FoundParameter, RankedCandidate, Verdict, VerdictName
@@ -19,24 +20,19 @@ from tpjb_ident.diagnose.verdict import FoundEffect, FoundParameter, RankedCandi
 BoolArray = NDArray[np.bool_]
 
 
-def decide(
-    observations: Observations, misfit: Misfit, found: Search, held: BoolArray, settings: DiagnoseSettings
-) -> Verdict:
+def decide(problem: Problem, found: Search, settings: DiagnoseSettings) -> Verdict:
     """Turn a search into a verdict.
 
     Parameters
     ----------
-    observations : Observations
-    misfit : Misfit
+    problem : Problem
     found : Search
-    held : (n,) ndarray of bool
-        Elements no fit has seen.
     settings : DiagnoseSettings
     """
-    size = int(misfit.train.sum())
-    scale = misfit_scale(found.model, size)
+    observations, held = problem.observations, problem.held
+    scale = found.after.scale
     groups = _groups(found, scale, settings)
-    name, reasons = _judge(found, misfit, observations, held, groups, settings)
+    name, reasons = _judge(problem, found, groups, settings)
     model = found.model if name in {"named", "ambiguous"} else found.baseline
     shown = found.model if found.model.candidates else found.baseline
     return Verdict(
@@ -45,7 +41,7 @@ def decide(
         indistinguishable=groups if name == "ambiguous" else (),
         below_floor=_below_floor(found, settings),
         next_test="",
-        candidates=_ranked(found, observations, held, size),
+        candidates=_ranked(found, observations, held, int(problem.misfit.train.sum())),
         disagreement=localise(observations, found.baseline.prediction),
         gap_by_observable=gap_by_observable(observations, found.baseline.prediction, shown.prediction, held),
         gap={
@@ -59,35 +55,55 @@ def decide(
     )
 
 
-def misfit_scale(model: Fit, size: int) -> float:
-    """How large whitened residuals really are, squared: tolerances are upper bounds, and mostly generous ones."""
-    return float(np.clip(model.chi_square / max(size - len(model.candidates), 1), 0.15, 1.0))
-
-
 def _judge(
-    found: Search, misfit: Misfit, observations: Observations, held: BoolArray,
-    groups: tuple[tuple[str, ...], ...], settings: DiagnoseSettings,
-) -> tuple[VerdictName, tuple[str, ...]]:  # fmt: skip
-    size = int(misfit.train.sum())
-    model = found.model
-    left = math.sqrt(model.chi_square / size)
+    problem: Problem, found: Search, groups: tuple[tuple[str, ...], ...], settings: DiagnoseSettings
+) -> tuple[VerdictName, tuple[str, ...]]:
+    model, before, after = found.model, found.before, found.after
     if not model.candidates:
-        if left <= settings.closed:
-            return "consistent", ("no disagreement above noise and tolerance",)
-        return "unexplained", (f"whitened residuals of {left:.2f} remain, and no effect of the library reduces them",)
-    reasons = []
-    before, after = gap(observations, found.baseline.prediction, held), gap(observations, model.prediction, held)
-    if left > settings.closed and after > 0.3 * before:
-        reasons.append(f"whitened residuals of {left:.2f} remain after the best fit")
-    if after > 1.0 and after > 0.5 * before:
-        reasons.append(f"held-out points keep a gap of {after:.2f} (before: {before:.2f})")
-    if model.at_bound:
-        reasons.append("the best fit runs into a physical bound")
+        if before.structure.p >= settings.alarm:
+            return "consistent", (f"no disagreement above noise and tolerance (p = {before.structure.p:.2g})",)
+        where = before.structure.words
+        return "unexplained", (
+            f"something is the matter (p = {before.structure.p:.1g}, most in {where}), and no effect of the library "
+            "reduces it enough",
+        )
+    reasons = _refusals(problem, found, settings)
     if reasons:
-        return "unexplained", tuple(reasons)
+        return "unexplained", reasons
+    gaps = [gap(problem.observations, f.prediction, problem.held) for f in (found.baseline, model)]
+    text = f"held-out gap {gaps[0]:.2f} -> {gaps[1]:.2f}; what is left has no structure (p = {after.structure.p:.2g})"
+    if after.structure.p < settings.adequate:
+        text = (
+            f"held-out gap {gaps[0]:.2f} -> {gaps[1]:.2f}; what is left is small but structured, most in "
+            f"{after.structure.words}"
+        )
     if groups:
-        return "ambiguous", tuple(f"{' or '.join(group)}: these data cannot tell" for group in groups)
-    return "named", (f"held-out gap {before:.2f} -> {after:.2f}",)
+        return "ambiguous", (*(f"{' or '.join(group)}: these data cannot tell" for group in groups), text)
+    return "named", (text,)
+
+
+def _refusals(problem: Problem, found: Search, settings: DiagnoseSettings) -> tuple[str, ...]:
+    """Why the best model is not believed; empty if it is."""
+    model, after = found.model, found.after
+    reasons = []
+    if model.at_bound:
+        reasons.append(f"the best fit ({model.label}) runs into a physical bound")
+    left = share_left(problem, found)
+    if after.structure.p < settings.adequate and left > settings.closed:
+        reasons.append(
+            f"the best fit ({model.label}) leaves {100 * left:.0f} % of the squared gap, and that has structure "
+            f"(p = {after.structure.p:.1g}), most in {after.structure.words}"
+        )
+    if after.held_p < settings.held and left > settings.closed:
+        reasons.append(f"points that the best fit ({model.label}) has not seen contradict it (p = {after.held_p:.1g})")
+    return tuple(reasons)
+
+
+def share_left(problem: Problem, found: Search) -> float:
+    """Share of the baseline's squared gap that the model leaves, noise deducted from both."""
+    floor = noise_floor(problem.observations) ** 2
+    before, after = (gap(problem.observations, f.prediction) ** 2 for f in (found.baseline, found.model))
+    return max(after - floor, 0.0) / max(before - floor, 1e-12) if before > floor else 1.0
 
 
 def _groups(found: Search, scale: float, settings: DiagnoseSettings) -> tuple[tuple[str, ...], ...]:

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from model.setup import Setup
 from tpjb_ident.diagnose.candidates import candidates
 from tpjb_ident.diagnose.decide import decide
-from tpjb_ident.diagnose.fit import Misfit
-from tpjb_ident.diagnose.forward import Forward
+from tpjb_ident.diagnose.forward import Forward, ForwardModel
 from tpjb_ident.diagnose.next_test import designs, rank_designs, say
-from tpjb_ident.diagnose.nuisance import Nuisances, nuisances
+from tpjb_ident.diagnose.nuisance import nuisances
 from tpjb_ident.diagnose.observe import Observations
+from tpjb_ident.diagnose.problem import Problem, loosened
 from tpjb_ident.diagnose.search import Progress, Search, search
 from tpjb_ident.diagnose.settings import DiagnoseSettings
-from tpjb_ident.diagnose.split import held_out
 from tpjb_ident.diagnose.verdict import Verdict
 from tpjb_ident.diagnose.workers import workers
 
@@ -31,19 +28,18 @@ class Diagnosis:
     Attributes
     ----------
     verdict : Verdict
-    observations : Observations
-    misfit : Misfit
+    problem : Problem
     found : Search
-    held : (n,) ndarray of bool
-    nuisances : Nuisances
     """
 
     verdict: Verdict
-    observations: Observations = field(repr=False)
-    misfit: Misfit = field(repr=False)
+    problem: Problem = field(repr=False)
     found: Search = field(repr=False)
-    held: np.ndarray = field(repr=False)
-    nuisances: Nuisances = field(repr=False)
+
+    @property
+    def observations(self) -> Observations:
+        """What was measured."""
+        return self.problem.observations
 
 
 def diagnose(
@@ -71,17 +67,28 @@ def diagnose(
     """
     settings = settings or DiagnoseSettings()
     forward = Forward(setup.change(accuracy=ACCURACY), observations.layout, observations.elements)
-    base = forward()
-    known = nuisances(forward, (), base, settings.certificates)
-    covariance = observations.covariance + np.diag(observations.fine**2) + known.columns @ known.columns.T
-    held = held_out(observations)
-    misfit = Misfit(observations.value, covariance, ~held)
-    pool = candidates(setup.bearing, settings.skip)
+    problem = pose(observations, forward, settings)
     with workers(forward, settings.workers) as run:
-        found = search(run, misfit, base, pool, settings, progress)
-    verdict = decide(observations, misfit, found, held, settings)
+        found = search(run, problem, settings, progress)
+    verdict = decide(problem, found, settings)
     verdict = replace(verdict, next_test=_next_test(verdict, found, setup, observations, settings))
-    return Diagnosis(verdict, observations, misfit, found, held, known)
+    return Diagnosis(verdict, problem, found)
+
+
+def pose(observations: Observations, forward: Forward, settings: DiagnoseSettings) -> Problem:
+    """Set a campaign beside a model: baseline, nuisances, candidates."""
+    base = forward()
+    trusted = loosened(observations, forward.pad_shares(), settings.tolerance)
+    known = nuisances(forward.fresh(), (), base, settings.certificates)
+    pool = candidates(forward.setup.bearing, settings.skip)
+    return Problem(trusted, base, known, pool, settings.tolerance.shape)
+
+
+def solve(problem: Problem, forward: ForwardModel, settings: DiagnoseSettings) -> tuple[Verdict, Search]:
+    """Search and decide in this process, whatever stands behind the model; without a next test."""
+    with workers(forward, 1) as run:
+        found = search(run, problem, settings)
+    return decide(problem, found, settings), found
 
 
 def _next_test(

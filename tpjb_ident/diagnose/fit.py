@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from model.effects import Effect
 from tpjb_ident.diagnose.candidates import Candidate
-from tpjb_ident.diagnose.forward import Forward, NoEquilibriumError
+from tpjb_ident.diagnose.forward import ForwardModel, NoEquilibriumError
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 MAX_STEPS = 12
 #: A fit is settled when a step would move every amplitude by less than this share of its standard error.
-SETTLED = 0.05
+SETTLED = 0.1
 #: Width of the prior of an amplitude, in typical sizes.
 PRIOR_WIDTH = 6.0
 
@@ -60,6 +60,11 @@ class Fit:
         """Names, joined."""
         return " + ".join(c.label for c in self.candidates) or "baseline"
 
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of the effects."""
+        return frozenset(c.name for c in self.candidates)
+
 
 def build(candidates: Sequence[Candidate], amplitudes: FloatArray) -> tuple[Effect, ...]:
     """Effects of candidates at amplitudes."""
@@ -99,91 +104,140 @@ class Misfit:
         return float(np.sum(self.whiten(self.value - prediction) ** 2))
 
 
-def fit(
-    forward: Forward,
-    misfit: Misfit,
-    chosen: Sequence[Candidate],
-    start: FloatArray,
-    prediction: FloatArray | None = None,
-) -> Fit | None:
+@dataclass(frozen=True)
+class Start:
+    """Where a fit begins.
+
+    Attributes
+    ----------
+    amplitudes : (k,) ndarray
+    columns : (n, k) ndarray
+        Derivatives that are known from nearby; steps correct them.
+    """
+
+    amplitudes: FloatArray
+    columns: FloatArray = field(repr=False)
+
+
+@dataclass(frozen=True)
+class _Prior:
+    neutral: FloatArray
+    width: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    def cost(self, now: FloatArray) -> float:
+        return float(np.sum(((now - self.neutral) / self.width) ** 2))
+
+
+def fit(forward: ForwardModel, misfit: Misfit, chosen: Sequence[Candidate], start: Start) -> Fit | None:
     """Fit amplitudes by Levenberg-Marquardt with bounds and a wide prior.
+
+    The derivatives at hand are corrected along every step (Broyden, Math. Comp. 19 (1965) 577): a step costs one run
+    of the model however many effects there are.
 
     Parameters
     ----------
-    forward : Forward
+    forward : ForwardModel
     misfit : Misfit
     chosen : sequence of Candidate
-    start : (k,) ndarray
-        First guess.
-    prediction : (n,) ndarray, optional
-        The model at `start`, if it is at hand.
+    start : Start
 
     Returns
     -------
     Fit or None
         None where the model has no equilibrium near the start.
     """
-    neutral = np.array([c.neutral for c in chosen])
-    width = np.array([c.step for c in chosen]) * PRIOR_WIDTH
     low, high = np.array([c.bounds for c in chosen]).reshape(-1, 2).T
-    now = np.clip(start, low, high)
-    try:
-        y = forward(build(chosen, now)) if prediction is None else prediction
-    except NoEquilibriumError:
+    prior = _Prior(
+        np.array([c.neutral for c in chosen]), np.array([c.step for c in chosen]) * PRIOR_WIDTH, low, high
+    )  # fmt: skip
+    now = np.clip(start.amplitudes, low, high)
+    y = attempt(forward, chosen, now)
+    if y is None:
         return None
-    cost = _cost(misfit, y, now, neutral, width)
+    cost = misfit.chi_square(y) + prior.cost(now)
     damping = 1e-4
-    jacobian = _jacobian(forward, chosen, now, y)
+    jacobian = start.columns.copy()
+    renewed = False
     for _ in range(MAX_STEPS):
-        normal, gradient = _normal(misfit, jacobian, y, (now - neutral) / width**2, width)
-        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
-        new = np.clip(now + step, low, high)
-        settled = np.all(np.abs(new - now) < SETTLED / np.sqrt(np.diag(normal)))
-        if settled:
+        new = _proposed(misfit, prior, now, y, jacobian, damping)
+        spread = _spread(misfit, prior, jacobian)
+        if np.all(np.abs(new - now) < SETTLED * spread):
             break
-        trial = _try(forward, chosen, new)
-        trial_cost = np.inf if trial is None else _cost(misfit, trial, new, neutral, width)
+        trial = attempt(forward, chosen, new)
+        trial_cost = np.inf if trial is None else misfit.chi_square(trial) + prior.cost(new)
+        if trial is not None:
+            jacobian = _corrected(jacobian, trial - y, new - now, prior.width)
         if trial is None or trial_cost > cost:
             damping = max(10 * damping, 0.1)
-            if damping > 1e4:
-                break
+            if damping > 1e3:
+                if renewed:
+                    break
+                # the corrected derivatives have led nowhere: take real ones, once
+                jacobian, damping, renewed = derivatives(forward, chosen, now, y), 1e-4, True
             continue
         damping = max(0.1 * damping, 1e-6)
         now, y, cost = new, trial, trial_cost
-        jacobian = _jacobian(forward, chosen, now, y)
-    normal, _ = _normal(misfit, jacobian, y, (now - neutral) / width**2, width)
-    inside = (now > low + 1e-9 * np.abs(low)) & (now < high - 1e-9 * np.abs(high))
-    return Fit(tuple(chosen), now, y, jacobian, cost, np.asarray(np.linalg.inv(normal)), not bool(np.all(inside)))
+    return _result(misfit, prior, chosen, now, y, jacobian, cost)
 
 
-def _cost(misfit: Misfit, y: FloatArray, now: FloatArray, neutral: FloatArray, width: FloatArray) -> float:
-    return misfit.chi_square(y) + float(np.sum(((now - neutral) / width) ** 2))
+def settle(forward: ForwardModel, misfit: Misfit, found: Fit) -> Fit:
+    """Give a fit real derivatives at its place, for intervals and further searches."""
+    jacobian = derivatives(forward, found.candidates, found.amplitudes, found.prediction)
+    better = fit(forward, misfit, found.candidates, Start(found.amplitudes, jacobian))
+    return better if better is not None and better.chi_square <= found.chi_square + 0.1 else found
 
 
-def _normal(
-    misfit: Misfit, jacobian: FloatArray, y: FloatArray, pull: FloatArray, width: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _result(  # type: ignore[no-untyped-def]
+    misfit: Misfit, prior: _Prior, chosen: Sequence[Candidate], now: FloatArray, y: FloatArray, jacobian, cost: float
+) -> Fit:
     white = misfit.whiten(jacobian)
-    residual = misfit.whiten(misfit.value - y)
-    return white.T @ white + np.diag(1.0 / width**2), white.T @ residual - pull
+    covariance = np.linalg.inv(white.T @ white + np.diag(1.0 / prior.width**2))
+    inside = (now > prior.low + 1e-9 * np.abs(prior.low)) & (now < prior.high - 1e-9 * np.abs(prior.high))
+    return Fit(tuple(chosen), now, y, jacobian, cost, np.asarray(covariance), not bool(np.all(inside)))
 
 
-def _try(forward: Forward, chosen: Sequence[Candidate], amplitudes: FloatArray) -> FloatArray | None:
+def _proposed(  # type: ignore[no-untyped-def]
+    misfit: Misfit, prior: _Prior, now: FloatArray, y: FloatArray, jacobian: FloatArray, damping: float
+):
+    white = misfit.whiten(jacobian)
+    normal = white.T @ white + np.diag(1.0 / prior.width**2)
+    gradient = white.T @ misfit.whiten(misfit.value - y) - (now - prior.neutral) / prior.width**2
+    step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
+    return np.clip(now + step, prior.low, prior.high)
+
+
+def _spread(misfit: Misfit, prior: _Prior, jacobian: FloatArray) -> FloatArray:
+    white = misfit.whiten(jacobian)
+    return np.asarray(1.0 / np.sqrt(np.sum(white**2, axis=0) + 1.0 / prior.width**2))
+
+
+def _corrected(jacobian: FloatArray, change: FloatArray, step: FloatArray, width: FloatArray) -> FloatArray:
+    """Broyden's update, amplitudes measured in their prior widths."""
+    scaled = step / width
+    length = float(scaled @ scaled)
+    if length < 1e-20:
+        return jacobian
+    return np.asarray(jacobian + np.outer(change - jacobian @ step, scaled / length) / width)
+
+
+def attempt(forward: ForwardModel, chosen: Sequence[Candidate], amplitudes: FloatArray) -> FloatArray | None:
+    """Predict; None where the model has no equilibrium."""
     try:
         return forward(build(chosen, amplitudes))
     except NoEquilibriumError:
         return None
 
 
-def _jacobian(forward: Forward, chosen: Sequence[Candidate], now: FloatArray, y: FloatArray) -> FloatArray:
-    columns = []
-    for i, candidate in enumerate(chosen):
-        columns.append(slope(forward, chosen, now, y, i, 0.1 * candidate.step))
+def derivatives(forward: ForwardModel, chosen: Sequence[Candidate], now: FloatArray, y: FloatArray) -> FloatArray:
+    """Change of the prediction per unit of every amplitude, (n, k)."""
+    columns = [slope(forward, chosen, now, y, i, 0.1 * c.step) for i, c in enumerate(chosen)]
     return np.column_stack(columns) if columns else np.zeros((len(y), 0))
 
 
 def slope(
-    forward: Forward, chosen: Sequence[Candidate], now: FloatArray, y: FloatArray, index: int, size: float
+    forward: ForwardModel, chosen: Sequence[Candidate], now: FloatArray, y: FloatArray, index: int, size: float
 ) -> FloatArray:
     """Change of the prediction per unit of one amplitude, by a one-sided difference that stays inside the bounds.
 
@@ -195,7 +249,7 @@ def slope(
         moved[index] = min(max(now[index] + signed, low), high)
         if moved[index] == now[index]:
             continue
-        other = _try(forward, chosen, moved)
+        other = attempt(forward, chosen, moved)
         if other is not None:
             return (other - y) / (moved[index] - now[index])
     return np.zeros_like(y)

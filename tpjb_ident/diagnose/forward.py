@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,18 @@ class NoEquilibriumError(ValueError):
     """The model found no equilibrium at an operating point of the campaign."""
 
 
+class ForwardModel(Protocol):
+    """Anything that predicts an observation vector: the bearing model, or a surrogate of it."""
+
+    elements: tuple[Element, ...]
+
+    def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
+        """Predict with effects; see `Forward`."""
+
+    def fresh(self) -> ForwardModel:
+        """Return a copy whose answers depend on nothing that this one goes on to solve."""
+
+
 @dataclass
 class Forward:
     """Predicts an observation vector; remembers equilibria to start the next call from.
@@ -43,6 +57,7 @@ class Forward:
     elements: tuple[Element, ...] = field(repr=False)
     calls: int = 0
     _start: dict[StaticPoint, Equilibrium] = field(default_factory=dict, repr=False)
+    _shares: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)
 
     def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
         """Predict.
@@ -68,9 +83,11 @@ class Forward:
         self.calls += 1
         table = _Answers(setup)
         for test in self.layout.dynamic:
-            table.dynamic(
-                test, self._solve(setup, (test.load, test.direction, test.speed), test.excitation), self.layout
-            )
+            point = (test.load, test.direction, test.speed)
+            prediction = self._solve(setup, point, test.excitation)
+            table.dynamic(test, prediction, self.layout)
+            for pad, load in enumerate(prediction.pad_load, start=1):
+                self._shares[(*point, float(pad))] = float(load) / test.load
         for one in self.layout.locus:
             point = (one.load, one.direction, one.speed)
             table.locus(point, self._solve(setup, point, (one.speed,)))
@@ -82,7 +99,16 @@ class Forward:
 
     def fresh(self) -> Forward:
         """Return a copy that starts from the same equilibria, whatever this one goes on to solve."""
-        return Forward(self.setup, self.layout, self.elements, 0, dict(self._start))
+        return Forward(self.setup, self.layout, self.elements, 0, dict(self._start), dict(self._shares))
+
+    def pad_shares(self) -> FloatArray:
+        """Share of the static load on the pad of every temperature element at the last call; NaN elsewhere, (n,)."""
+        names = ("load", "direction", "speed", "pad")
+        places = [tuple(e.place(name) for name in names) for e in self.elements]
+        mine = [e.family == "temperature" for e in self.elements]
+        return np.array(
+            [self._shares.get(place, math.nan) if m else math.nan for place, m in zip(places, mine, strict=True)]
+        )
 
     def _solve(self, setup: Setup, point: StaticPoint, excitation: Sequence[float]) -> Prediction:
         prediction = predict_setup(setup, *point, np.array(excitation), self._start.get(point))

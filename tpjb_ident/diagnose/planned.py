@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from model.setup import Setup
+from tpjb_ident.diagnose.directions import direct_scale
 from tpjb_ident.diagnose.forward import Forward
 from tpjb_ident.diagnose.layout import DryTest, DynamicTest, Layout, LocusTest
 from tpjb_ident.diagnose.observe import ENTRY_NAMES, Element, Observations
@@ -53,7 +54,7 @@ def planned_observations(
     tolerance, noise = tolerance or Tolerance(), noise or ExpectedNoise()
     elements = _elements(layout, [pad.pivot_angle for pad in setup.bearing.pads])
     value = Forward(setup, layout, elements)()
-    scale = _direct_scale(elements, value)
+    scale = direct_scale(elements, value)
     table: dict[str, tuple[np.ndarray | float, np.ndarray | float, np.ndarray | float]] = {
         "h": (noise.stiffness * scale, tolerance.stiffness * scale, tolerance.fine_stiffness * scale),
         "temperature": (noise.temperature, tolerance.temperature, tolerance.fine_temperature),
@@ -68,15 +69,6 @@ def planned_observations(
         row = table["side" if e.observable == "side_angle" else e.family]
         columns[:, i] = [float(np.broadcast_to(v, value.shape)[i]) for v in row]
     return Observations(layout, value, np.diag(columns[0] ** 2), columns[1], columns[2], elements)
-
-
-def _direct_scale(elements: Sequence[Element], value: np.ndarray) -> np.ndarray:
-    """Mean direct coefficient of every element's point and part (k or omega c)."""
-    sums: dict[tuple[object, ...], list[float]] = {}
-    for e, v in zip(elements, value, strict=True):
-        if e.family == "h" and e.observable[1] == e.observable[2]:
-            sums.setdefault((e.observable[0], e.where), []).append(abs(float(v)))
-    return np.array([np.mean(sums[(e.observable[0], e.where)]) if e.family == "h" else 1.0 for e in elements])
 
 
 def _elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:

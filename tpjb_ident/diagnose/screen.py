@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tpjb_ident.diagnose.candidates import Candidate
 from tpjb_ident.diagnose.fit import Fit, Misfit, slope
-from tpjb_ident.diagnose.forward import Forward
+from tpjb_ident.diagnose.forward import ForwardModel
 from tpjb_ident.diagnose.workers import Map
 
 FloatArray = NDArray[np.float64]
@@ -40,7 +40,10 @@ class Score:
     detectable: float
 
 
-def screen(run: Map, misfit: Misfit, model: Fit, pool: Sequence[Candidate]) -> list[Score]:
+def screen(
+    run: Map, misfit: Misfit, model: Fit, pool: Sequence[Candidate],
+    known: Mapping[Candidate, FloatArray] | None = None, renewed: int = 0,
+) -> list[Score]:  # fmt: skip
     """Score every candidate of a pool against a fitted model, best first.
 
     Parameters
@@ -50,18 +53,31 @@ def screen(run: Map, misfit: Misfit, model: Fit, pool: Sequence[Candidate]) -> l
     misfit : Misfit
     model : Fit
     pool : sequence of Candidate
+    known : mapping of Candidate to (n,) ndarray, optional
+        Columns found at another model; they serve for a first ranking here.
+    renewed : int
+        Of the candidates that rank best by known columns so many get new ones.
     """
+    if known is None:
+        columns = run(_column, [(model, candidate) for candidate in pool])
+        return _ranked(misfit, model, dict(zip(pool, columns, strict=True)))
+    table = {c: known[c] for c in pool}
+    first = [s.candidate for s in _ranked(misfit, model, table)[:renewed]]
+    table |= dict(zip(first, run(_column, [(model, c) for c in first]), strict=True))
+    return _ranked(misfit, model, table)
+
+
+def _ranked(misfit: Misfit, model: Fit, columns: Mapping[Candidate, FloatArray]) -> list[Score]:
     residual = misfit.whiten(misfit.value - model.prediction)
     project = _projector(misfit.whiten(model.jacobian))
     scores = []
-    columns = run(_column, [(model, candidate) for candidate in pool])
-    for candidate, column in zip(pool, columns, strict=True):
+    for candidate, column in columns.items():
         seen = project(misfit.whiten(column))
         scores.append(_score(candidate, column, seen, float(seen @ seen), residual))
     return sorted(scores, key=lambda s: -s.gain)
 
 
-def _column(forward: Forward, model: Fit, candidate: Candidate) -> FloatArray:
+def _column(forward: ForwardModel, model: Fit, candidate: Candidate) -> FloatArray:
     chosen = (*model.candidates, candidate)
     now = np.append(model.amplitudes, candidate.neutral)
     # a step of the size one would expect: some effects act late, or by their square
@@ -78,7 +94,7 @@ def _score(candidate: Candidate, column: FloatArray, seen: FloatArray, power: fl
     return Score(candidate, gain, candidate.neutral + moved, column, float(np.sqrt(power)) * candidate.step)
 
 
-def _projector(basis: FloatArray):  # type: ignore[no-untyped-def]
+def _projector(basis: FloatArray) -> Callable[[FloatArray], FloatArray]:
     if basis.shape[1] == 0:
         return lambda v: v
     q, _ = np.linalg.qr(basis)

@@ -16,17 +16,22 @@ class DiagnoseSettings:
     ----------
     tolerance : Tolerance
     certificates : Certificates
-    detect : float
-        Drop of chi-square below which no effect is added (32 candidates are tried: 20 is far out on their maximum).
-    further : float
-        Share of the chi-square that is left which every effect after the first must take away.
+    alarm : float
+        p-value of the baseline's residual, all tests considered, below which something is the matter.
+    adequate : float
+        p-value below which what a model leaves is still structured.
+    held : float
+        p-value below which held-out points contradict a model.
+    detect, further : float
+        Drop of chi-square, in units of the residual's own variance, which the first effect and every one after it
+        must bring: combinations imitate far more than single effects do.
     rivals : float
-        Rescaled difference of chi-square below which two explanations count as alike.
+        Difference of chi-square, in the same units, below which two explanations count as alike.
+    closed : float
+        Share of the squared gap that a model may leave however structured: it closes all that matters.
     tried : int
         Candidates that are fitted per round, the best by score.
     most_effects : int
-    closed : float
-        Root mean square of whitened residuals above which a model does not describe the data.
     visible : float
         Whitened size of a typical effect below which a campaign could not have seen it.
     skip : frozenset of str
@@ -36,12 +41,15 @@ class DiagnoseSettings:
 
     tolerance: Tolerance = field(default_factory=Tolerance)
     certificates: Certificates = field(default_factory=Certificates)
-    detect: float = 20.0
-    further: float = 0.3
-    rivals: float = 12.0
+    alarm: float = 0.01
+    adequate: float = 0.01
+    held: float = 0.001
+    detect: float = 12.0
+    further: float = 25.0
+    rivals: float = 9.0
+    closed: float = 0.01
     tried: int = 8
     most_effects: int = 3
-    closed: float = 1.0
     visible: float = 3.0
     skip: frozenset[str] = frozenset()
     workers: int | None = None

@@ -44,6 +44,11 @@ class FoundEffect:
         return {"name": self.name, "probability": self.probability, "parameters": parameters}
 
     @property
+    def label(self) -> str:
+        """Name with the parameters that are no amplitude: ``soft_pivot pad 5``."""
+        return " ".join([self.name, *(f"{k} {p.value:g}" for k, p in self.parameters.items() if p.lo == p.hi)])
+
+    @property
     def effect(self) -> Effect:
         """The effect itself."""
         return Effect(self.name, **{k: p.value for k, p in self.parameters.items()})

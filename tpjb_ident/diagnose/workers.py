@@ -9,12 +9,12 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
-from tpjb_ident.diagnose.forward import Forward
+from tpjb_ident.diagnose.forward import ForwardModel
 
-_forward: Forward | None = None
+_forward: ForwardModel | None = None
 
 
-def _initialise(forward: Forward) -> None:
+def _initialise(forward: ForwardModel) -> None:
     global _forward
     _forward = forward
 
@@ -30,7 +30,7 @@ Map = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterator[Any]]
 
 
 @contextmanager
-def workers(forward: Forward, count: int | None = None) -> Iterator[Map]:
+def workers(forward: ForwardModel, count: int | None = None) -> Iterator[Map]:
     """Open a pool whose tasks get a `Forward` as their first argument.
 
     Parameters
