@@ -24,7 +24,6 @@ FloatArray = NDArray[np.float64]
 LEAST_FLOW = 0.2
 
 
-@compiled
 def solve_energy(
     grid: FilmGrid, work: FilmWork, inlet: float, speed: float, heat: tuple[float, float], temperature: FloatArray
 ) -> float:
@@ -54,11 +53,9 @@ def solve_energy(
     rho c h (u T_x + w T_z) = k h T_zz + mu U^2 / h + h^3 / (12 mu) (p_x^2 + p_z^2) - exchange T + gained;
     the last two are what pad and journal take and give (`model.heat_paths`), zero in the adiabatic baseline.
     """
-    temperature[0, :] = inlet
-    fields = temperature.reshape((1, *temperature.shape))
-    sources = np.empty_like(fields)
-    sources[0] = dissipation(grid, work, speed) + work.gained
-    return march(grid, work, speed, heat, fields, sources)
+    temperature[0] = inlet
+    sources = dissipation(grid, work, speed) + work.gained
+    return march(grid, work, speed, heat, temperature[None], sources[None])
 
 
 @compiled

@@ -26,12 +26,13 @@ from model.carrying import (
     wake_or_rest,
 )
 from model.film import solve_film
+from model.film_state import least_share
+from model.first_position import first_position
 from model.heat_paths import couples_heat, settle_temperatures
 from model.newton_step import newton_step
 from model.pad_bending import bending_step, change_of_shape, wanted_shapes
-from model.pad_film import PadFilm, film_step, least_share, oil_constants, pad_films
+from model.pad_film import PadFilm, film_step, oil_constants, pad_films
 from model.setup import Setup
-from model.start import first_position
 
 FloatArray = NDArray[np.float64]
 

@@ -119,7 +119,10 @@ def conductances(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: 
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     gx = np.empty((nt, nz + 1))
     gz = np.empty((nt + 1, nz))
-    fluidity = work.density / work.viscosity
+    fluidity = np.empty((nt + 1, nz + 1))
+    for i in range(nt + 1):
+        for j in range(nz + 1):
+            fluidity[i, j] = work.density[i, j] / work.viscosity[i, j]
     for i in range(nt):
         base = clearance - a * grid.cos_face[i] - b * grid.sin_face[i]
         for j in range(nz + 1):
@@ -204,7 +207,8 @@ def _integrate(grid: FilmGrid, work: FilmWork, weight: FloatArray) -> tuple[Floa
     width = nz - first
     total = np.zeros(5)
     for i in range(1, nt):
-        total[:] = 0.0
+        for m in range(5):
+            total[m] = 0.0
         for j in range(first, nz):
             k = (i - 1) * width + j - first
             total[0] += grid.area[i, j] * work.unknown[k]

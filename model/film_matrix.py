@@ -11,7 +11,9 @@ def assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArr
     """Lower band of the matrix: row k holds its diagonal and the entries below it; ruptured nodes stand alone."""
     nt, nz = gx.shape[0], gz.shape[1]
     width = nz - first
-    band[:, :] = 0.0
+    for k in range(band.shape[0]):
+        for r in range(band.shape[1]):
+            band[k, r] = 0.0
     for i in range(1, nt):
         for j in range(first, nz):
             k = (i - 1) * width + j - first

@@ -25,7 +25,10 @@ def rupture_line(
     nt, nz = gx.shape[0], gz.shape[1]
     p, ruptured = work.pressure, work.ruptured
     diagonal = np.zeros((nt + 1, nz + 1))
-    area = grid.area.copy()
+    area = np.empty((nt + 1, nz + 1))
+    for i in range(nt + 1):
+        for j in range(nz + 1):
+            area[i, j] = grid.area[i, j]
     for i in range(1, nt):
         for j in range(grid.first, nz):
             if not ruptured[i, j] or source[i, j] >= 0.0:
@@ -56,7 +59,9 @@ def derivatives(
     nt, nz = gx.shape[0], gz.shape[1]
     first = grid.first
     width = nz - first
-    rhs[:, :] = 0.0
+    for k in range(rhs.shape[0]):
+        for m in range(4):
+            rhs[k, m] = 0.0
     for i in range(nt):
         base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
         for j in range(nz + 1):

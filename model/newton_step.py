@@ -73,7 +73,10 @@ def eliminate(load: FloatArray, pads: FloatArray) -> tuple[float, FloatArray, Fl
     constant = np.empty((n, 2))
     gradient = np.empty((n, 2, 2))
     for m in range(n):
-        nx, ny, tx, ty, radial, tangential, kaa, kab, kba, kbb, arm, hold, tilt, missing, compliance = pads[m]
+        nx, ny, tx, ty = pads[m, 0], pads[m, 1], pads[m, 2], pads[m, 3]
+        radial, tangential = pads[m, 4], pads[m, 5]
+        kaa, kab, kba, kbb = pads[m, 6], pads[m, 7], pads[m, 8], pads[m, 9]
+        arm, hold, tilt, missing, compliance = pads[m, 10], pads[m, 11], pads[m, 12], pads[m, 13], pads[m, 14]
         moment = tangential + hold * tilt
         # d(a, b) = (n . dX - deta, t . dX + R_P dt); rows: tilting force, pivot
         m11, m12 = kbb * arm + hold, -kba
@@ -106,7 +109,8 @@ def eliminate(load: FloatArray, pads: FloatArray) -> tuple[float, FloatArray, Fl
         worst = max(worst, max(abs(moment), abs(missing * kaa)) / size)
     worst = max(worst, math.hypot(fx, fy) / size)
     det = jxx * jyy - jxy * jyx
-    shift = np.array([(fx * jyy - jxy * fy) / det, (jxx * fy - jyx * fx) / det])
+    shift = np.empty(2)
+    shift[0], shift[1] = (fx * jyy - jxy * fy) / det, (jxx * fy - jyx * fx) / det
     moves = np.empty((n, 2))
     for m in range(n):
         for q in range(2):

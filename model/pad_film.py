@@ -12,7 +12,7 @@ from model.bearing import Oil, Pad
 from model.energy import solve_energy
 from model.film import FilmForces, solve_film
 from model.film_mesh import FilmGrid, FilmWork, film_grid, film_work
-from model.kernel import compiled
+from model.film_state import set_viscosity
 from model.pad_bending import BendingStep, PadGive, pad_give
 from model.setup import Setup
 from model.start import Branch
@@ -121,7 +121,6 @@ def oil_constants(oil: Oil) -> tuple[float, float, float, float]:
     return oil.viscosity_40, oil.viscosity_exponent, oil.density_40, oil.thermal_expansion
 
 
-@compiled
 def film_step(
     grid: FilmGrid,
     work: FilmWork,
@@ -162,34 +161,7 @@ def film_step(
         return forces, 0.0, 0.0
     new = np.empty_like(work.temperature)
     limited = solve_energy(grid, work, thermal[0], speed, heat, new)
-    change = 0.0
-    for i in range(new.shape[0]):
-        for j in range(new.shape[1]):
-            change = max(change, abs(new[i, j] - work.temperature[i, j]))
-    relaxation = thermal[1] * min(1.0, thermal[2] / max(change, 1e-30))
-    for i in range(new.shape[0]):
-        for j in range(new.shape[1]):
-            work.temperature[i, j] += relaxation * (new[i, j] - work.temperature[i, j])
+    new -= work.temperature
+    change = float(np.abs(new).max())
+    work.temperature[:] += thermal[1] * min(1.0, thermal[2] / max(change, 1e-30)) * new
     return forces, change, limited
-
-
-@compiled
-def set_viscosity(work: FilmWork, oil: tuple[float, float, float, float]) -> None:
-    """Eq. (4) and (5) at every node."""
-    t = work.temperature
-    for i in range(t.shape[0]):
-        for j in range(t.shape[1]):
-            work.viscosity[i, j] = oil[0] * np.exp(oil[1] * (40.0 - t[i, j]))
-            work.density[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - t[i, j]))
-
-
-@compiled
-def least_share(grid: FilmGrid, work: FilmWork, da: float, db: float, extra: FloatArray) -> float:
-    """Most negative relative change of the film thickness for a change of (a, b) and of its shape (may be empty)."""
-    worst = 0.0
-    for i in range(work.thickness.shape[0]):
-        change = -(da * grid.cos[i] + db * grid.sin[i])
-        for j in range(work.thickness.shape[1]):
-            more = extra[i, j] if extra.size > 0 else 0.0
-            worst = min(worst, (change + more) / work.thickness[i, j])
-    return worst

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from model.film import solve_film
 from model.film_mesh import film_grid, film_work
-from model.kernel import compiled
 
 FloatArray = NDArray[np.float64]
 _TABLE_MESH = (32, 4)
@@ -177,92 +176,3 @@ def _free_wedge(force: _Force, curvature: float, end: float) -> float | None:
     from scipy.optimize import brentq
 
     return float(brentq(lambda w: force(curvature, w)[0], lower, upper, xtol=1e-6 * upper, rtol=1e-6))
-
-
-def first_position(load: FloatArray, normals: FloatArray, gaps: FloatArray, branches: list[Branch]) -> FloatArray:
-    """Journal position that balances a load on tabulated isothermal films.
-
-    Parameters
-    ----------
-    load : (2,) ndarray
-        [N]
-    normals : (n_pads, 2) ndarray
-        Unit vectors at the pivots.
-    gaps : (n_pads,) ndarray
-        Cp - Cb [m].
-    branches : list of Branch
-
-    Returns
-    -------
-    (2,) ndarray
-        [m]
-    """
-    longest = max(len(b.reach) for b in branches)
-    curves = np.full((len(branches), 2, longest), math.nan)
-    for row, branch in zip(curves, branches, strict=True):
-        row[0, : len(branch.reach)] = branch.reach
-        row[1, : len(branch.load)] = branch.load
-    lengths = np.array([len(b.reach) for b in branches])
-    room = min(float(b.approach[-1]) - g for b, g in zip(branches, gaps, strict=True))
-    return _first_position(np.asarray(load, float), np.column_stack([normals, gaps]), curves, lengths, room)
-
-
-@compiled
-def _first_position(
-    load: FloatArray, pads: FloatArray, curves: FloatArray, lengths: NDArray[np.int64], room: float
-) -> FloatArray:
-    size = math.hypot(load[0], load[1])
-    position = np.zeros(2)
-    if size == 0.0:
-        return position
-    position = load / size * 0.4 * room
-    residual = load - _pull(position, pads, curves, lengths)
-    error = math.hypot(residual[0], residual[1])
-    step = 1e-4 * room
-    for _ in range(60):
-        if error < 0.002 * size:
-            break
-        jacobian = np.zeros((2, 2))
-        for axis in range(2):
-            ahead, behind = position.copy(), position.copy()
-            ahead[axis] += step
-            behind[axis] -= step
-            slope = _pull(ahead, pads, curves, lengths) - _pull(behind, pads, curves, lengths)
-            jacobian[:, axis] = slope / (2 * step)
-        det = jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0]
-        if abs(det) <= 1e-9 * np.sum(jacobian**2):  # nothing carries in some direction: go where the load pushes
-            move = 0.1 * room * residual / error
-        else:
-            move = np.array(
-                [
-                    (residual[0] * jacobian[1, 1] - jacobian[0, 1] * residual[1]) / det,
-                    (jacobian[0, 0] * residual[1] - jacobian[1, 0] * residual[0]) / det,
-                ]
-            )
-            move *= min(1.0, 0.2 * room / max(math.hypot(move[0], move[1]), 1e-30))
-        for halving in range(8):  # a pad that takes up or sheds its load on the way bends the force sharply
-            trial = position + move * 0.5**halving
-            missing = load - _pull(trial, pads, curves, lengths)
-            left = math.hypot(missing[0], missing[1])
-            if left < error or halving == 7:
-                position, residual, error = trial, missing, left
-                break
-    return position
-
-
-@compiled
-def _pull(position: FloatArray, pads: FloatArray, curves: FloatArray, lengths: NDArray[np.int64]) -> FloatArray:
-    """Force of all tabulated films at a position."""
-    total = np.zeros(2)
-    for m in range(pads.shape[0]):
-        reach = pads[m, 2] + pads[m, 0] * position[0] + pads[m, 1] * position[1]
-        reaches, loads = curves[m, 0], curves[m, 1]
-        if reach < reaches[0]:
-            continue
-        i = min(np.searchsorted(reaches[: lengths[m]], reach), lengths[m] - 1)  # beyond the end: the last slope
-        i = max(i, 1)
-        slope = (loads[i] - loads[i - 1]) / (reaches[i] - reaches[i - 1])
-        carried = loads[i - 1] + slope * (reach - reaches[i - 1])
-        total[0] += pads[m, 0] * carried
-        total[1] += pads[m, 1] * carried
-    return total
