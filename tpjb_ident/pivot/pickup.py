@@ -28,7 +28,7 @@ SMOOTH = 0.1  # [s]: whole periods of either, so that taking off the running mea
 NOISE_FROM, NOISE_TO = 1.0, 4.0  # [Hz] off the mains, where noise is measured
 SHORTEST = 3.0  # [s] of record
 MATCHES = 30.0  # chi-square below which two runs show one signature (6 degrees of freedom; by chance above: 4e-5)
-DIFFERS = 60.0  # chi-square above which they do not
+CLEARER = 25.0  # by which a mistake undone must lower it
 
 
 @dataclass(frozen=True)
@@ -132,12 +132,13 @@ def mistakes(pickups: Sequence[Pickup | None], pairs: Sequence[tuple[str, str]])
 
 def _mistake(mine: Pickup, others: Sequence[Pickup], pairs: Sequence[tuple[str, str]]) -> Mistake | None:
     others = [other for other in others if other.channels == mine.channels]
-    strange = [other for other in others if _mismatch(mine, other) > DIFFERS]
+    stated = [(other, _mismatch(mine, other)) for other in others]
+    strange = [(other, size) for other, size in stated if size > MATCHES]
     needed = max(2, math.ceil(len(others) / 2))
     if len(strange) < needed:
         return None
     found = [
-        Mistake(what, sum(_mismatch(undone, other) < MATCHES for other in strange))
+        Mistake(what, sum(_mismatch(undone, other) < min(MATCHES, size - CLEARER) for other, size in strange))
         for what, undone in _undone(mine, pairs)
     ]
     best = max(found, key=lambda m: m.agree)
