@@ -26,6 +26,11 @@ def has_several_clocks(path: Path) -> bool:
     return sum(is_time(_short(n)) for n in head.names) > 1
 
 
+def time_column(path: Path) -> str:
+    """Name of the first time column of a text file; "" without one."""
+    return next((n for n in map(_short, find_head(path).names) if is_time(n)), "")
+
+
 def read_series(path: Path) -> list[Series]:
     """Read every column with the clock at its left.
 

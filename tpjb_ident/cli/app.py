@@ -12,10 +12,13 @@ from tpjb_ident.cli.demo import demo
 from tpjb_ident.cli.diagnose import diagnose
 from tpjb_ident.cli.export import export
 from tpjb_ident.cli.identify import identify
+from tpjb_ident.cli.init import init
 from tpjb_ident.cli.locus import locus
+from tpjb_ident.cli.look import show
 from tpjb_ident.cli.pivot import pivot
 from tpjb_ident.cli.predict import predict
 from tpjb_ident.cli.simulate import simulate
+from tpjb_ident.cli.spoken import add_command
 
 # plain help: the markup renderer costs more start-up time than all the rest together
 app = typer.Typer(
@@ -43,5 +46,5 @@ def _common(
     pass
 
 
-for command in (check, identify, pivot, locus, predict, compare, diagnose, simulate, demo, export):
-    app.command()(command)
+for command in (init, show, check, identify, pivot, locus, predict, compare, diagnose, simulate, demo, export):
+    add_command(app, command)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tpjb_ident.cli.outdir import RECORD, former_runs
+from tpjb_ident.cli.voice import voice
 from tpjb_ident.provenance import versions
 from tpjb_ident.tables import write_text
 
@@ -56,6 +57,7 @@ def write_record(
     commands = {**former_runs(target), command: entry}
     text = json.dumps({"schema": "tpjb-run/1", "commands": commands}, indent=1, ensure_ascii=False) + "\n"
     write_text(staging / RECORD, text)
+    voice().wrote(target, outputs)
     return entry
 
 

@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import TYPE_CHECKING, Literal
 
+from tpjb_ident.cli.voice import voice
 from tpjb_ident.tables import printable
 
 if TYPE_CHECKING:
@@ -26,23 +27,34 @@ def _console(stderr: bool = False) -> Console:
 
 def say(text: str) -> None:
     """Print one line; text from outside is shown as it is, less its control characters."""
+    voice().said.append(printable(text))
+    if voice().silent:
+        return
     _console().print(printable(text), markup=False)
 
 
 def error_line(kind: str, text: str) -> None:
     """Print a message to stderr, its lines kept."""
     lines = "\n".join(printable(line) for line in text.splitlines())
+    voice().remarks.append({"kind": kind, "text": lines})
     style = "bold red" if kind == "bug" else None
     _console(stderr=True).print(f"tpjb: {kind}: {lines}", markup=False, style=style)
 
 
 def note_line(kind: str, text: str) -> None:
-    """Print a remark to stderr."""
+    """Print a remark to stderr; of a quiet command only warnings."""
+    if kind != "doing":
+        voice().remarks.append({"kind": kind, "text": printable(text)})
+    if voice().silent and kind != "warning":
+        return
     _console(stderr=True).print(f"tpjb: {kind}: {printable(text)}", markup=False)
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int] = (0,)) -> None:
     """Print a table; columns of words stand left, numbers right."""
+    voice().tables.append({"title": title, "columns": list(columns), "rows": [list(row) for row in rows]})
+    if voice().silent:
+        return
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -65,7 +77,7 @@ def progress(what: str) -> Iterator[Progress]:
     Progress
     """
     console = _console(stderr=True)
-    if not console.is_terminal:
+    if voice().silent or not console.is_terminal:
         yield _plain_progress(what)
         return
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn

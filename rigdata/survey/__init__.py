@@ -1,0 +1,3 @@
+"""Looking at exports of which nothing is known yet: what the channels may be, which runs these are, a draft."""
+
+from __future__ import annotations

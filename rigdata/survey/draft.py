@@ -1,0 +1,190 @@
+"""A commented draft of a manifest: what the exports tell is filled in, what they cannot tell is marked."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rigdata.survey.channel_guess import ChannelGuess, guess_channel, quantity_of_unit
+from rigdata.survey.exports import Export
+from rigdata.survey.run_guess import RunGuess, guess_run, strongest_lines
+
+#: Stands where only the person at the rig knows; no parser takes it for a value.
+MARK = "??"
+_DIRECTED = ("displacement", "force", "acceleration")
+_EXAMPLE = {
+    "displacement": '"7.78 mV/um"',
+    "force": '"2.0 mV/V", with full_scale and excitation of the bridge, or "1 mV/N"',
+    "acceleration": '"10 mV/g"',
+    "temperature": '"15 K/V", with zero = "0 degC"',
+    "pressure": '"1 V/bar"',
+    "speed": '"100 mV/Hz"',
+}
+_NEAR = 0.02
+#: Share of the running records in which the shaft speed must show.
+_MOST_OF = 0.8
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What was found in a folder of exports.
+
+    Attributes
+    ----------
+    exports : tuple of str
+        Names of the files, in order.
+    rates : tuple of float
+        Sample rate of each [Hz]; NaN where the file knows no times.
+    channels : dict of str to ChannelGuess
+    runs : tuple of RunGuess
+        One per file.
+    speed_line : float
+        Frequency that stands in every running record [Hz]: perhaps the shaft speed; NaN if none does.
+    clock : str
+        Name of the time column of text files; "" without one.
+    """
+
+    exports: tuple[str, ...]
+    rates: tuple[float, ...]
+    channels: dict[str, ChannelGuess]
+    runs: tuple[RunGuess, ...]
+    speed_line: float = float("nan")
+    clock: str = ""
+
+
+def survey(exports: Sequence[Export]) -> Survey:
+    """Guess channels and runs of a folder of exports."""
+    channels: dict[str, ChannelGuess] = {}
+    for export in exports:
+        for one in export.series:
+            if one.name not in channels:
+                channels[one.name] = guess_channel(one.name, one.unit)
+    quantities = {name: guess.quantity for name, guess in channels.items()}
+    runs = tuple(guess_run(export, channels) for export in exports)
+    return Survey(
+        exports=tuple(e.name for e in exports),
+        rates=tuple(e.rate for e in exports),
+        channels=channels,
+        runs=runs,
+        speed_line=_common_line(exports, quantities, runs),
+        clock=next((e.clock for e in exports if e.clock), ""),
+    )
+
+
+def _common_line(exports: Sequence[Export], quantities: dict[str, str], runs: Sequence[RunGuess]) -> float:
+    """Line that every running record's displacement holds, besides its own excitation."""
+    running = []
+    for export, run in zip(exports, runs, strict=True):
+        if run.kind in ("dynamic", "locus"):
+            found = strongest_lines([s for s in export.series if quantities.get(s.name) == "displacement"])
+            driven = run.lines[0].frequency if run.kind == "dynamic" and run.lines else -1.0
+            running.append([x.frequency for x in found if abs(x.frequency - driven) > _NEAR * x.frequency])
+    if len(running) < 2:
+        return float("nan")
+    for candidate in sorted({f for lines in running for f in lines}):
+        near = [f for lines in running for f in lines if abs(f - candidate) < _NEAR * candidate]
+        if len(near) >= _MOST_OF * len(running):
+            return sorted(near)[len(near) // 2]
+    return float("nan")
+
+
+def draft_manifest(found: Survey, name: str, bearing: str | None) -> str:
+    """Write the text of a draft.
+
+    Parameters
+    ----------
+    found : Survey
+    name : str
+        Id of the campaign.
+    bearing : str or None
+        File name of the bearing, if one lies in the folder.
+
+    Returns
+    -------
+    str
+        TOML; every place with `MARK` is for the person at the rig.
+    """
+    lines = [
+        "# Draft by `tpjb init`. Places marked ?? only you can know; what is marked (guess) is worth a look.",
+        "# When they are filled in, `tpjb check` lists what is left. Signs and frame: docs/guide/mounting.md",
+        'schema = "tpjb-rig/1"',
+        f"id = {toml_string(name)}",
+        f"bearing = {toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # bearing file, beside this one',
+        'description = ""',
+        "",
+        "[housing]",
+        f'mass = "{MARK} kg"   # stator mass between oil film and load cells',
+        "",
+    ]
+    if not all(rate > 0 for rate in found.rates):
+        lines += ["[acquisition]", f'sample_rate = "{MARK} Hz"   # some files hold no times', ""]
+    if found.clock:
+        lines += [f"[channels.{_key(found.clock)}]", 'quantity = "time"', 'unit = "s"', ""]
+    for channel, guess in found.channels.items():
+        lines += [*_channel_lines(channel, guess), ""]
+    for export, run in zip(found.exports, found.runs, strict=True):
+        lines += [*_run_lines(export, run, found), ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _channel_lines(name: str, guess: ChannelGuess) -> list[str]:
+    head = f"[channels.{_key(name)}]"
+    if not guess.quantity:
+        return [
+            head,
+            f'quantity = "ignore"   # (guess) {guess.why}; or displacement, force, acceleration, ..',
+        ]
+    lines = [head, f'quantity = "{guess.quantity}"   # (guess) {guess.why}']
+    if guess.quantity in _DIRECTED:
+        known = f'axis = "{guess.axis}"   # (guess) by its name' if guess.axis else f'axis = "{MARK} deg"'
+        where = "direction of the positive quantity, counter-clockwise from horizontal"
+        lines.append(known if guess.axis else f"{known}   # {where}")
+    lines.append(f'unit = "{guess.unit or MARK}"')
+    if quantity_of_unit(guess.unit) == "":
+        lines.append(f'sensitivity = "{MARK}"   # such as {_EXAMPLE[guess.quantity]}')
+    if guess.quantity == "displacement":
+        lines.append("# polarity = -1   # an eddy-current probe reads less as the shaft comes nearer")
+    if guess.quantity == "temperature":
+        lines += ["# pad = 1", "# position = 0.75   # fraction of the arc from the leading edge"]
+    return lines
+
+
+def _run_lines(export: str, run: RunGuess, found: Survey) -> list[str]:
+    stem = export.rpartition("/")[2].rpartition(".")[0]
+    kind = f'kind = "{MARK}"   # dynamic, dry_pivot, locus, clearance'
+    if run.kind:
+        kind = f'kind = "{run.kind}"   # (guess) {run.why}'
+    lines = ["[[runs]]", f"id = {toml_string(stem)}", f"file = {toml_string(export)}", kind]
+    if run.kind in ("dynamic", "locus", ""):
+        lines.append(_line("shaft_speed", found.speed_line, "Hz", "this line stands in most records"))
+        lines.append(_line("static_load", run.load / 1e3, "kN", "by the file's name; per bearing", "per bearing"))
+    if run.kind == "dry_pivot":
+        known = f"pad = {run.pad}   # (guess) by the file's name"
+        lines.append(known if run.pad else f'pad = "{MARK}"   # number of the pad that is loaded, without quotes')
+    if run.kind != "clearance":
+        where = "where it pushes the shaft; down is -90 deg"
+        lines.append(_line("static_load_direction", run.direction, "deg", f"by the cells; {where}", where))
+    if run.kind in ("dynamic", ""):
+        frequency = run.lines[0].frequency if run.lines else float("nan")
+        lines.append(_line("excitation_frequency", frequency, "Hz", "strongest line of the record"))
+        lines.append(f'# excitation_direction = "{MARK} deg"')
+    return lines
+
+
+def _line(key: str, value: float, unit: str, why: str, otherwise: str = "") -> str:
+    """One line of a run: the guess with its reason, or the mark with what is wanted."""
+    if math.isfinite(value):
+        return f'{key} = "{value:.4g} {unit}"   # (guess) {why}'
+    return f'{key} = "{MARK} {unit}"' + (f"   # {otherwise}" if otherwise else "")
+
+
+def toml_string(text: str) -> str:
+    """Write text as a TOML string: quoted, controls escaped."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _key(name: str) -> str:
+    bare = name.isascii() and name.replace("_", "").replace("-", "").isalnum()
+    return name if bare else toml_string(name)

@@ -1,0 +1,91 @@
+"""Find the records in a folder and read them without a manifest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rigdata.problem import Problem, RigDataError
+from rigdata.readers.catman import time_column
+from rigdata.readers.foreign import FORMATS, read_foreign
+from rigdata.readers.series import Series, without_twins
+
+TEXT = (".csv", ".txt", ".asc", ".dat", ".tsv")
+MOST_FILES = 5000
+
+
+@dataclass(frozen=True)
+class Export:
+    """One record file as it was found.
+
+    Attributes
+    ----------
+    name : str
+        Path relative to the folder, with slashes.
+    series : tuple of Series
+        Its channels, each on its own clock.
+    clock : str
+        Name of the time column of a text file; "" without one.
+    """
+
+    name: str
+    series: tuple[Series, ...] = field(repr=False)
+    clock: str = ""
+
+    @property
+    def rate(self) -> float:
+        """Rate of the fastest channel [Hz]; NaN if the file knows no times."""
+        rates = [s.rate for s in self.series if s.rate > 0]
+        return max(rates, default=float("nan"))
+
+    @property
+    def knows_times(self) -> bool:
+        """Whether a time column or a rate stands in the file."""
+        return self.rate > 0
+
+
+def record_files(folder: Path) -> list[Path]:
+    """List files below `folder` that may be records, by suffix, in order of name.
+
+    Raises
+    ------
+    RigDataError
+        There are none, or absurdly many.
+    """
+    known = (*TEXT, *FORMATS)
+    found = []
+    for path in sorted(folder.rglob("*")):
+        hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
+        if path.suffix.lower() in known and path.is_file() and not hidden:
+            found.append(path)
+        if len(found) > MOST_FILES:
+            problem = Problem("error", str(folder), "", f"holds more than {MOST_FILES} records", "Give a folder below")
+            raise RigDataError(problem)
+    if not found:
+        problem = Problem("error", str(folder), "", "holds no records", f"Known are {', '.join(known)}")
+        raise RigDataError(problem)
+    return found
+
+
+def read_export(path: Path, name: str | None = None) -> Export:
+    """Read one record file of any known kind, without a manifest.
+
+    Raises
+    ------
+    RigDataError
+        It cannot be read; says why.
+    """
+    name = name or path.name
+    series = tuple(without_twins(read_foreign(path, name)))
+    clock = time_column(path) if path.suffix.lower() in TEXT else ""
+    return Export(name, series, clock)
+
+
+def read_exports(folder: Path, problems: list[Problem]) -> Iterator[Export]:
+    """Read all records of a folder one by one; what cannot be read is noted in `problems` and left out."""
+    for path in record_files(folder):
+        try:
+            yield read_export(path, path.relative_to(folder).as_posix())
+        except RigDataError as error:
+            problems.extend(error.problems)

@@ -1,0 +1,147 @@
+"""Which kind of run a record may be, from how its forces and displacements move; every guess says why."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigdata.readers.base import FloatArray
+from rigdata.readers.series import Series
+from rigdata.survey.channel_guess import ChannelGuess
+from rigdata.survey.exports import Export
+from rigdata.survey.spectrum import Line, amplitude_spectrum, strongest
+
+#: Share of slow movement above which a record is a quasi-static test, and of one direction for load steps.
+_SLOW, _STRAIGHT = 0.9, 0.97
+_BLOCK = 0.25
+_BY_NAME = (
+    ("dry_pivot", r"pivot|dry|trocken|steps?|^p-"),
+    ("clearance", r"clear|spiel|^c-"),
+    ("locus", r"locus|locat|^l-"),
+    ("dynamic", r"dyn|excit|shake|^d-"),
+)
+
+
+@dataclass(frozen=True)
+class RunGuess:
+    """What a record may be.
+
+    Attributes
+    ----------
+    kind : str
+        ``"dynamic"``, ``"dry_pivot"``, ``"locus"``, ``"clearance"``, or "" if nothing tells.
+    why : str
+    lines : tuple of Line
+        Strongest lines of forces or displacements, strongest first.
+    load : float
+        Static load [N] that the file's name seems to state; NaN without one.
+    direction : float
+        Of the load on the shaft [deg], by the cells: of its change in load steps, of its mean else; NaN if unknown.
+    pad : int
+        Number of the pad that the file's name states; 0 without one.
+    """
+
+    kind: str
+    why: str
+    lines: tuple[Line, ...] = ()
+    load: float = float("nan")
+    direction: float = float("nan")
+    pad: int = 0
+
+
+def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
+    """Guess what a record is.
+
+    Parameters
+    ----------
+    export : Export
+    channels : mapping of str to ChannelGuess
+        By channel name.
+    """
+    quantities = {name: guess.quantity for name, guess in channels.items()}
+    forces = [s for s in export.series if quantities.get(s.name) == "force"]
+    moves = [s for s in export.series if quantities.get(s.name) == "displacement"]
+    lines = strongest_lines(forces) or strongest_lines(moves)
+    stem = export.name.rpartition("/")[2]
+    named = next((k for k, pattern in _BY_NAME if re.search(pattern, stem, re.IGNORECASE)), "")
+    seen, why = _by_movement(forces, moves, lines)
+    kind, reason = named or seen, "by its name" if named else "nothing tells"
+    if seen == kind and seen:
+        reason = why
+    elif seen and {seen, named} != {"dynamic", "locus"}:
+        kind, reason = seen, f"{why} (its name says {named})"
+    pad = re.search(r"(?:^p|pad)[-_ #]?(\d{1,2})(?!\d)", stem, re.IGNORECASE)
+    return RunGuess(
+        kind=kind,
+        why=reason,
+        lines=lines,
+        load=_load_of(stem),
+        direction=_direction(forces, channels, steps=kind == "dry_pivot"),
+        pad=int(pad[1]) if pad else 0,
+    )
+
+
+def _direction(forces: list[Series], channels: Mapping[str, ChannelGuess], steps: bool) -> float:
+    """Direction [deg] from two cells at right angles whose axes are known and whose units agree."""
+    axes = {channels[s.name].axis: s for s in forces}
+    if not {"0 deg", "90 deg"} <= set(axes):
+        return float("nan")
+    pair = (axes["0 deg"], axes["90 deg"])
+    if channels[pair[0].name].unit != channels[pair[1].name].unit:
+        return float("nan")
+    parts = []
+    for one in pair:
+        good = one.values[np.isfinite(one.values)]
+        tenth = max(1, len(good) // 10)
+        parts.append(float(good[-tenth:].mean() - good[:tenth].mean() if steps else good.mean()) if len(good) else 0.0)
+    return float(round(math.degrees(math.atan2(parts[1], parts[0])))) if any(parts) else float("nan")
+
+
+def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[Line, ...]) -> tuple[str, str]:
+    pair = [s for s in forces if s.rate > 0][:2] or [s for s in moves if s.rate > 0][:2]
+    if not pair:
+        return "", ""
+    slow = [_slow(s) for s in pair]
+    total = sum(float(np.nanvar(s.values)) for s in pair)
+    if total <= 0:
+        return "", ""
+    share = sum(float(np.var(b)) for b in slow) / total
+    if share > _SLOW:
+        if len(slow) == 2 and len(slow[0]) == len(slow[1]) > 3:
+            spread = np.linalg.eigvalsh(np.cov(np.stack(slow)))
+            if spread[-1] < _STRAIGHT * spread.sum():
+                return "clearance", "the force goes around"
+        return "dry_pivot", "the force climbs slowly along one line"
+    return ("dynamic", "the force swings") if lines else ("locus", "the force stands still")
+
+
+def _slow(series: Series) -> FloatArray:
+    """Means over blocks of a quarter of a second."""
+    step = max(1, round(_BLOCK * series.rate))
+    count = len(series.values) // step
+    blocks = series.values[: count * step].reshape(count, step)
+    return np.array([float(np.mean(b[np.isfinite(b)])) for b in blocks if np.isfinite(b).any()])
+
+
+def strongest_lines(series: list[Series]) -> tuple[Line, ...]:
+    """Lines of the channel that swings most, strongest first."""
+    best: tuple[Line, ...] = ()
+    size = 0.0
+    for one in series:
+        found = strongest(*amplitude_spectrum(one.values, one.rate), most=4)
+        if found and found[0].amplitude > size:
+            best, size = found, found[0].amplitude
+    return best
+
+
+def _load_of(stem: str) -> float:
+    """Static load that a file name states: ``5kN``, ``5_kN``, or a bare number of newtons such as ``05000``."""
+    kilo = re.search(r"(\d+(?:[.,]\d+)?)[ _]?kN", stem, re.IGNORECASE)
+    if kilo:
+        return 1e3 * float(kilo[1].replace(",", "."))
+    bare = [float(n) for n in re.findall(r"(?<![\d.])(\d{3,6})(?![\d.])", stem)]
+    return next((n for n in bare if 100.0 <= n <= 200_000.0), float("nan"))

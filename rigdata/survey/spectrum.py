@@ -1,0 +1,131 @@
+"""Amplitude spectrum and statistics of one channel, for a first look."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigdata.readers.base import FloatArray
+
+#: A line must stand this far out of the median of its neighbourhood to be named.
+_STANDS_OUT = 8.0
+_NEIGHBOURS = 25
+
+
+@dataclass(frozen=True)
+class Line:
+    """A spectral line: frequency [Hz] and peak amplitude, in the unit of the signal."""
+
+    frequency: float
+    amplitude: float
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a first look at a channel shows.
+
+    Attributes
+    ----------
+    count : int
+    missing : int
+        Samples without a value.
+    mean, deviation, low, high : float
+        NaN where no sample has a value.
+    frequency, amplitude : (m,) ndarray
+        Spectrum [Hz] and peak amplitude; empty where the rate is unknown or the record is short.
+    lines : tuple of Line
+        The strongest ones, strongest first.
+    """
+
+    count: int
+    missing: int
+    mean: float
+    deviation: float
+    low: float
+    high: float
+    frequency: FloatArray = field(repr=False)
+    amplitude: FloatArray = field(repr=False)
+    lines: tuple[Line, ...] = ()
+
+    @property
+    def flat(self) -> bool:
+        """Whether the channel never moves: a dead one."""
+        return not self.high > self.low
+
+
+def look_at(values: FloatArray, rate: float, most: int = 3) -> Look:
+    """Take a first look at a channel.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        NaN where missing.
+    rate : float
+        Sample rate [Hz]; NaN if unknown.
+    most : int
+        Lines to name.
+    """
+    good = np.isfinite(values)
+    kept = values[good]
+    empty = np.empty(0)
+    if not len(kept):
+        nan = float("nan")
+        return Look(len(values), len(values), nan, nan, nan, nan, empty, empty)
+    frequency, amplitude = amplitude_spectrum(values, rate)
+    return Look(
+        count=len(values),
+        missing=int((~good).sum()),
+        mean=float(kept.mean()),
+        deviation=float(kept.std()),
+        low=float(kept.min()),
+        high=float(kept.max()),
+        frequency=frequency,
+        amplitude=amplitude,
+        lines=strongest(frequency, amplitude, most),
+    )
+
+
+def amplitude_spectrum(values: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+    """Peak amplitudes over frequency [Hz], Hann window, straight trend taken off; empty if there is too little.
+
+    Gaps are filled in between, which is good enough for a look and for nothing else.
+    """
+    good = np.isfinite(values)
+    n = len(values)
+    if not rate > 0 or good.sum() < 32:
+        return np.empty(0), np.empty(0)
+    filled = values if good.all() else np.interp(np.arange(n), np.flatnonzero(good), values[good])
+    place = np.linspace(-1.0, 1.0, n)
+    centred = filled - filled.mean()
+    centred = centred - place * (centred @ place) / (place @ place)
+    window = np.hanning(n)
+    amplitude = 2.0 * np.abs(np.fft.rfft(centred * window)) / float(window.sum())
+    return np.asarray(np.fft.rfftfreq(n, 1.0 / rate), dtype=np.float64), amplitude
+
+
+def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> tuple[Line, ...]:
+    """Name the strongest peaks that stand out of their neighbourhood; slow drift below four bins is no line."""
+    found: list[Line] = []
+    if len(amplitude) < 16:
+        return ()
+    left = amplitude.copy()
+    left[:4] = 0.0
+    for _ in range(4 * most):
+        i = int(np.argmax(left))
+        if left[i] <= 0.0 or len(found) == most:
+            break
+        around = amplitude[max(4, i - _NEIGHBOURS) : i + _NEIGHBOURS + 1]
+        if amplitude[i] > _STANDS_OUT * np.median(around) and i + 1 < len(amplitude):
+            found.append(Line(_refined(frequency, amplitude, i), float(amplitude[i])))
+        left[max(0, i - 3) : i + 4] = 0.0
+    return tuple(found)
+
+
+def _refined(frequency: FloatArray, amplitude: FloatArray, i: int) -> float:
+    """Frequency of a peak between the bins, from a parabola through the logarithms."""
+    step = float(frequency[1])
+    a, b, c = np.log(np.maximum(amplitude[i - 1 : i + 2], 1e-300))
+    curve = a - 2 * b + c
+    shift = 0.5 * (a - c) / curve if curve < 0 else 0.0
+    return float(frequency[i]) + step * float(np.clip(shift, -0.5, 0.5))

@@ -1,0 +1,139 @@
+"""How loud a command is: for people, quiet, or as one JSON document for other programs.
+
+``--quiet`` leaves warnings and errors only. ``--json`` prints exactly one document to standard output, whatever way the
+command ends; messages go to standard error as ever.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+SCHEMA = "tpjb-command/1"
+#: A result table of more rows is named in the document, not repeated in it.
+MOST_ROWS = 5000
+
+
+@dataclass
+class Voice:
+    """What a command has to say so far.
+
+    Attributes
+    ----------
+    command : str
+    as_json, quiet : bool
+    said : list of str
+        Sentences for standard output.
+    tables : list of dict
+        Short tables for people, as they would have been printed.
+    remarks : list of dict
+        ``kind`` ("note", "warning", "error", ..) and ``text``.
+    folder : Path or None
+        Where the results are.
+    outputs : tuple of str
+        Files in it, relative.
+    """
+
+    command: str = ""
+    as_json: bool = False
+    quiet: bool = False
+    said: list[str] = field(default_factory=list)
+    tables: list[dict[str, Any]] = field(default_factory=list)
+    remarks: list[dict[str, str]] = field(default_factory=list)
+    folder: Path | None = None
+    outputs: tuple[str, ...] = ()
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing is printed for people."""
+        return self.as_json or self.quiet
+
+    def wrote(self, folder: Path, outputs: Sequence[str]) -> None:
+        """Note where the results are."""
+        self.folder, self.outputs = folder, (*self.outputs, *outputs)
+
+    def document(self, exit_code: int) -> dict[str, Any]:
+        """Everything said, as plain data; ``data`` holds the result tables and JSON files themselves."""
+        return {
+            "schema": SCHEMA,
+            "command": self.command,
+            "exit_code": exit_code,
+            "results": None if self.folder is None else str(self.folder),
+            "outputs": list(self.outputs),
+            "said": self.said,
+            "remarks": self.remarks,
+            "tables": self.tables,
+            "data": {} if self.folder is None else _data(self.folder, self.outputs),
+        }
+
+
+_current = Voice()
+
+
+def voice() -> Voice:
+    """Return the voice of the command that runs."""
+    return _current
+
+
+@contextlib.contextmanager
+def speaking(command: str, as_json: bool, quiet: bool) -> Iterator[Voice]:
+    """Give a command its voice; with JSON, print the document when the command ends, however it does.
+
+    Yields
+    ------
+    Voice
+    """
+    import typer
+
+    global _current
+    before, _current = _current, Voice(command, as_json, quiet)
+    code = 0
+    try:
+        yield _current
+    except typer.Exit as end:
+        code = end.exit_code
+        raise
+    except BaseException:
+        code = 1
+        raise
+    finally:
+        mine, _current = _current, before
+        if as_json:
+            typer.echo(json.dumps(_plain(mine.document(code)), indent=1, ensure_ascii=False, allow_nan=False))
+
+
+def _data(folder: Path, outputs: Sequence[str]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name in outputs:
+        path = folder / name
+        if not path.is_file():  # the command failed after it had listed its files
+            continue
+        if path.suffix == ".parquet":
+            found[path.stem] = _records(path)
+        elif path.suffix == ".json" and name != "run.json":
+            found[path.stem] = json.loads(path.read_text(encoding="utf-8"))
+    return found
+
+
+def _records(path: Path) -> Any:
+    import pyarrow.parquet as pq
+
+    table = pq.ParquetFile(path)
+    rows = table.metadata.num_rows
+    return table.read().to_pylist() if rows <= MOST_ROWS else {"rows": rows, "file": path.name}
+
+
+def _plain(value: Any) -> Any:
+    """Numbers that JSON cannot hold become null."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, (str, int, bool)) or value is None else str(value)
