@@ -25,17 +25,26 @@ _MAX_TEXT = 8 * 2**20
 _MAX_MEMBERS, _LISTED = 4096, 20
 
 
+#: Key under which an open group is kept; no dataset can have this name.
+_GROUP = "/"
+#: Bytes of unpacked chunks that the library keeps per dataset.
+_LEAST_CACHE, _MOST_CACHE = 2**20, 2**25
+
+
 def _refuse(file: str, place: str, what: str, cure: str, run: str | None = None) -> RigDataError:
     return RigDataError(Problem("error", file, place, what, cure, run))
 
 
 @contextmanager
-def open_readonly(path: Path, file: str, run: str | None = None) -> Iterator[Any]:
-    """Open an HDF5 file for reading; turn what h5py raises on a broken file into `RigDataError`."""
+def open_readonly(path: Path, file: str, run: str | None = None, cache: int | None = None) -> Iterator[Any]:
+    """Open an HDF5 file for reading; turn what h5py raises on a broken file into `RigDataError`.
+
+    `cache` is the number of bytes of unpacked chunks that the library keeps per dataset.
+    """
     import h5py
 
     try:
-        with h5py.File(path, "r", locking="best-effort") as handle:
+        with h5py.File(path, "r", locking="best-effort", rdcc_nbytes=cache) as handle:
             yield handle
     except RigDataError:
         raise
@@ -44,6 +53,17 @@ def open_readonly(path: Path, file: str, run: str | None = None) -> Iterator[Any
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError) as error:
         what = f"the file cannot be read as HDF5 ({_first_line(error)})"
         raise _refuse(file, "", what, "Copy it again from the rig, or check it with h5dump", run) from error
+
+
+def _chunk_bytes(group: Any, name: str) -> int:
+    """Bytes of a stored chunk; zero of what is no chunked dataset, or leads out of the file."""
+    import h5py
+
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        return 0
+    member = group[name]
+    chunk = member.chunks if isinstance(member, h5py.Dataset) else None
+    return 0 if chunk is None else int(np.prod(chunk)) * member.dtype.itemsize
 
 
 def _first_line(error: BaseException) -> str:
@@ -140,6 +160,7 @@ class Hdf5Reader:
     described: frozenset[str] = field(default=frozenset(), repr=False)
     clock: Channel | None = field(default=None, repr=False)
     facts: dict[str, _Facts] = field(default_factory=dict, repr=False, compare=False)
+    held: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def file(self) -> str:
@@ -150,10 +171,13 @@ class Hdf5Reader:
         return _refuse(self.file, place, what, cure, self.run)
 
     @contextmanager
-    def _group(self) -> Iterator[Any]:
+    def _group(self, cache: int | None = None) -> Iterator[Any]:
         import h5py
 
-        with open_readonly(self.path, self.base, self.run) as handle:
+        if _GROUP in self.held:
+            yield self.held[_GROUP]
+            return
+        with open_readonly(self.path, self.base, self.run, cache) as handle:
             group = resolve(handle, f"runs/{self.run}", self.base, self.run)
             if group is None:
                 raise self._error("", "the group is missing", "Delete the run from the manifest, or add the group")
@@ -161,7 +185,35 @@ class Hdf5Reader:
                 raise self._error("", "is not a group", "Store one dataset per channel in a group")
             yield group
 
+    @contextmanager
+    def kept_open(self) -> Iterator[None]:
+        """Keep the file open while the block runs, so that many small requests cost little.
+
+        The library's cache then holds a whole stored chunk of every dataset: slices that are no multiples of the
+        chunks would else be unpacked again and again.
+        """
+        with self._group() as group:
+            largest = max((_chunk_bytes(group, name) for name in itertools.islice(group, _MAX_MEMBERS)), default=0)
+        with self._group(min(max(2 * largest, _LEAST_CACHE), _MOST_CACHE)) as group:
+            self.held[_GROUP] = group
+            try:
+                yield
+            finally:
+                self.held.clear()
+
+    def counted(self) -> bool:
+        """Whether times are counted from the rate, not read from the file."""
+        return self.clock is None or not self._known().has_time
+
     def _dataset(self, group: Any, name: str) -> Any:
+        if name in self.held:
+            return self.held[name]
+        dataset = self._checked_dataset(group, name)
+        if _GROUP in self.held:
+            self.held[name] = dataset
+        return dataset
+
+    def _checked_dataset(self, group: Any, name: str) -> Any:
         import h5py
 
         place = f"dataset {name}"

@@ -33,7 +33,7 @@ def record(n: int, noise: float = 0.0, seed: int = 0) -> np.ndarray:
 def fit(values: np.ndarray, length: int):
     count = len(values) // length
     fitter = LineFitter(length, RATE, np.array(list(TRUE)))
-    return fitter.fit(values[: count * length].reshape(count, length, 2), np.arange(count) * length / RATE)
+    return fitter.fit(values[: count * length].T.reshape(2, count, length), np.arange(count) * length / RATE)
 
 
 def test_exact_lines_are_found_in_every_window_with_the_phase_of_the_run():
@@ -49,8 +49,8 @@ def test_phasors_have_the_sign_of_a_positive_damper():
     x = 1e-6 * np.cos(omega * t + 0.7)
     velocity = -1e-6 * omega * np.sin(omega * t + 0.7)
     fitter = LineFitter(500, RATE, np.array([25.0]))
-    d = fitter.fit(np.stack([x, x], axis=1)[None], np.zeros(1)).phasors[0, 0, 0]
-    f = fitter.fit(np.stack([k * x + c * velocity] * 2, axis=1)[None], np.zeros(1)).phasors[0, 0, 0]
+    d = fitter.fit(np.stack([x, x])[:, None], np.zeros(1)).phasors[0, 0, 0]
+    f = fitter.fit(np.stack([k * x + c * velocity] * 2)[:, None], np.zeros(1)).phasors[0, 0, 0]
     assert (f / d).imag / omega == pytest.approx(c, rel=1e-9)
 
 

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from tpjb_ident.dynamic.arrays import FloatArray
+from tpjb_ident.dynamic.arrays import FloatArray, IntArray
 from tpjb_ident.dynamic.lines import LineSet
-from tpjb_ident.dynamic.phasors import LineFitter, PhasorBlock, fit_uneven, usual_scale
+from tpjb_ident.dynamic.phasors import SCALE_LIMIT, LineFitter, PhasorBlock, fit_uneven, usual_scale
 from tpjb_ident.dynamic.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.dynamic.shaft_speed import window_speeds
+from tpjb_ident.dynamic.stretches import Stretches, open_stretches
 from tpjb_ident.dynamic.windows import plan_windows
 
 QUANTITIES = ("displacement", "force", "acceleration")
-#: Samples of one channel held at a time.
-CHUNK = 2**17
+#: Samples of one channel held at a time: few enough for X and Y to stay in a core's cache.
+CHUNK = 2**15
 #: Time stamps may stray this share of a sample from the even grid before they are used one by one.
 MAX_JITTER = 0.02
 
@@ -37,35 +39,32 @@ def extract(
     follow : (n_windows,) ndarray, optional
         Shaft speed of every window [Hz]: 1X and its harmonics then take each window's own.
     """
-    rate = run.sample_rate
-    length, count = plan_windows(run.length, rate, lines, settings.windows)
-    fitter = LineFitter(length, rate, lines.frequencies)
-    followers = _Followers(length, rate, lines, follow)
+    length, count = plan_windows(run.length, run.sample_rate, lines, settings.windows)
     present = {c.quantity for c in run.channels.values()}
-    blocks: dict[str, list[PhasorBlock]] = {q: [] for q in QUANTITIES if q in present or q != "acceleration"}
-    starts, speeds = [], []
-    for first, stop in _chunks(length, count):
-        start = None
-        for quantity, parts in blocks.items():
-            record = run.vector(quantity, first * length, stop * length)
-            block, start = _fit_chunk(fitter, record, first, stop)
-            followers.refit(block, record, first, start)
-            parts.append(_undelayed(block, lines, settings.delays.get(quantity, 0.0)))
-        starts.append(start)
-        speeds.append(window_speeds(run, first, stop, length))
-    joined = {quantity: _joined(parts) for quantity, parts in blocks.items()}
+    quantities = tuple(q for q in QUANTITIES if q in present or q != "acceleration")
+    work = _Work(length, run.sample_rate, lines, follow)
+    parts: list[_Fitted] = []
+    with open_stretches(run, quantities) as stretches:
+        for first, stop in _chunks(length, count):
+            parts.append(work.fit(stretches, first, stop))
+        blocks = {q: _joined([part.blocks[q] for part in parts]) for q in quantities}
+        if len(parts) > 1:
+            _look_again(work, stretches, blocks)
+    starts = np.concatenate([part.start for part in parts])
+    speeds = np.concatenate([window_speeds(p.speed, len(p.start), run.point.shaft_speed_hz) for p in parts])
+    found = {q: _undelayed(block, lines, settings.delays.get(q, 0.0)) for q, block in blocks.items()}
     return RunPhasors(
         run.id,
         run.point,
         run.excitation_direction,
         lines,
-        np.concatenate([s for s in starts if s is not None]),
-        length / rate,
-        joined["displacement"],
-        joined["force"],
-        joined.get("acceleration"),
+        starts,
+        length / run.sample_rate,
+        found["displacement"],
+        found["force"],
+        found.get("acceleration"),
         housing_mass,
-        np.concatenate(speeds),
+        speeds,
     )
 
 
@@ -75,21 +74,86 @@ def _chunks(length: int, count: int) -> Iterator[tuple[int, int]]:
         yield first, min(first + step, count)
 
 
-def _fit_chunk(fitter: LineFitter, record: Any, first: int, stop: int) -> tuple[PhasorBlock, FloatArray]:
-    """Fit windows first..stop-1 of a record that starts at window `first`."""
-    n, length = stop - first, fitter.length
-    values = record.values.reshape(n, length, 2)
-    time = record.time.reshape(n, length)
-    grid = time[:, :1] + np.arange(length) / fitter.rate
-    even = np.abs(time - grid).max(axis=1) <= MAX_JITTER / fitter.rate
-    start = np.where(np.isfinite(time[:, 0]), time[:, 0], (first + np.arange(n)) * length / fitter.rate)
-    block = fitter.fit(values, start)
-    for i in np.flatnonzero(~even):
-        good = np.isfinite(time[i])
+def _look_again(work: _Work, stretches: Stretches, blocks: dict[str, PhasorBlock]) -> None:
+    """Fit windows anew that are noisier than the run's usual one: a chunk alone may hold nothing to compare with."""
+    usual = {q: usual_scale(block.noise) for q, block in blocks.items()}
+    with np.errstate(invalid="ignore"):  # a window without phasors has no noise and stays as it is
+        loud = [(block.noise > SCALE_LIMIT * usual[q]).any(axis=1) for q, block in blocks.items()]
+    for k in np.flatnonzero(np.any(loud, axis=0)):
+        again = work.fit(stretches, int(k), int(k) + 1, usual)
+        for quantity, block in blocks.items():
+            _put(block, int(k), again.blocks[quantity])
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """Windows of one chunk: phasors by quantity, start of every window [s], samples of the tachometer [rad/s]."""
+
+    blocks: dict[str, PhasorBlock]
+    start: FloatArray
+    speed: FloatArray | None
+
+
+class _Work:
+    """What all windows of a run are fitted with."""
+
+    def __init__(self, length: int, rate: float, lines: LineSet, follow: FloatArray | None) -> None:
+        self.length = length
+        self.fitter = LineFitter(length, rate, lines.frequencies)
+        self.followers = _Followers(length, rate, lines, follow)
+
+    def fit(self, stretches: Stretches, first: int, stop: int, usual: dict[str, FloatArray] | None = None) -> _Fitted:
+        """Read and fit windows first..stop-1; `usual` is the residual scale that windows of the run have."""
+        stretch = stretches.read(first * self.length, stop * self.length)
+        times = _times(stretch.time, first, stop, self.fitter)
+        blocks = {}
+        for quantity, values in stretch.rows.items():
+            rows = values.reshape(2, stop - first, self.length)
+            blocks[quantity] = _fit_windows(self.fitter, rows, times, None if usual is None else usual[quantity])
+            self.followers.refit(blocks[quantity], rows, times, first)
+        return _Fitted(blocks, times.start, stretch.speed)
+
+
+@dataclass(frozen=True)
+class _Times:
+    """Times of some windows.
+
+    Attributes
+    ----------
+    start : (n,) ndarray
+        Of every window [s].
+    stamps : (n, length) ndarray or None
+        Of every sample, where they are not on an even grid.
+    uneven : (m,) ndarray of int
+        Windows that are to be fitted by their stamps.
+    """
+
+    start: FloatArray
+    stamps: FloatArray | None
+    uneven: IntArray
+
+
+def _times(time: FloatArray | None, first: int, stop: int, fitter: LineFitter) -> _Times:
+    counted = (first + np.arange(stop - first)) * fitter.length / fitter.rate
+    if time is None:
+        return _Times(counted, None, np.empty(0, dtype=int))
+    stamps = time.reshape(stop - first, fitter.length)
+    grid = stamps[:, :1] + np.arange(fitter.length) / fitter.rate
+    even = np.abs(stamps - grid).max(axis=1) <= MAX_JITTER / fitter.rate
+    start = np.where(np.isfinite(stamps[:, 0]), stamps[:, 0], counted)
+    return _Times(start, stamps, np.flatnonzero(~even))
+
+
+def _fit_windows(fitter: LineFitter, rows: FloatArray, times: _Times, usual: FloatArray | None) -> PhasorBlock:
+    """Fit windows, those off the even grid by their own time stamps."""
+    block = fitter.fit(rows, times.start, usual)
+    for i in times.uneven:
+        if times.stamps is None:
+            continue
+        good = np.isfinite(times.stamps[i])
         if good.sum() > 2 * fitter.design.shape[1]:
-            single = fit_uneven(values[i][good], time[i][good], fitter.frequencies, 0.0)
-            _put(block, int(i), single)
-    return block, start
+            _put(block, int(i), fit_uneven(rows[:, i, good].T, times.stamps[i][good], fitter.frequencies, 0.0))
+    return block
 
 
 class _Followers:
@@ -98,16 +162,15 @@ class _Followers:
     def __init__(self, length: int, rate: float, lines: LineSet, speeds: FloatArray | None) -> None:
         self.length, self.rate, self.lines, self.speeds = length, rate, lines, speeds
 
-    def refit(self, block: PhasorBlock, record: Any, first: int, start: FloatArray) -> None:
+    def refit(self, block: PhasorBlock, rows: FloatArray, times: _Times, first: int) -> None:
+        """Fit every window once more with its own speed, where the speeds are known."""
         if self.speeds is None:
             return
         usual = usual_scale(block.noise)
-        values = record.values.reshape(-1, self.length, 2)
-        for i in range(len(values)):
+        for i in range(rows.shape[1]):
             speed = float(self.speeds[first + i])
-            if np.isfinite(speed) and np.isfinite(record.time[i * self.length]):
-                own = self._at(speed).fit(values[i : i + 1], start[i : i + 1], usual)
-                _put(block, i, own)
+            if np.isfinite(speed) and i not in times.uneven:
+                _put(block, i, self._at(speed).fit(rows[:, i : i + 1], times.start[i : i + 1], usual))
 
     @functools.lru_cache(maxsize=64)  # noqa: B019 -- lives as long as the run's extraction
     def _at(self, speed: float) -> LineFitter:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.wave_blocks import BLOCK, WaveBlocks
 from tpjb_ident.dynamic.windows import line_design
 
 #: A sample is a glitch beyond this many robust standard deviations of the fit's residual.
@@ -21,6 +22,8 @@ SCALE_LIMIT = 1.5
 GLITCH_MARGIN = 3
 #: A window that has lost more than this share of its samples gives no phasor.
 MAX_LOST = 0.5
+#: Change of a residual over the usual one at which least absolute deviations have settled.
+SETTLED = 0.02
 _LAD_ROUNDS = 15
 _ROUNDS = 12
 
@@ -65,50 +68,72 @@ class LineFitter:
         self.frequencies = np.asarray(frequencies, dtype=float)
         self.design = line_design(np.arange(length) / rate, self.frequencies)
         # Lines that a window tells apart leave a well-conditioned Gram matrix; its size is a dozen.
-        self.inverse = np.linalg.pinv(self.design.T @ self.design, rcond=1e-12, hermitian=True) @ self.design.T
+        self._gram_inverse = np.linalg.pinv(self.design.T @ self.design, rcond=1e-12, hermitian=True)
+        self._blocks = WaveBlocks(length, rate, self.frequencies) if length >= 2 * BLOCK else None
         # The scale of the residual needs no more than a few hundred samples.
         self._stride = max(1, length // 512)
 
-    def fit(self, values: FloatArray, start: FloatArray, usual: FloatArray | None = None) -> PhasorBlock:
+    def fit(self, rows: FloatArray, start: FloatArray, usual: FloatArray | None = None) -> PhasorBlock:
         """Fit windows of a vector record.
 
         Parameters
         ----------
-        values : (n_windows, length, 2) ndarray
+        rows : (2, n_windows, length) ndarray
             SI samples, X and Y; NaN where missing.
         start : (n_windows,) ndarray
             Time of each window's first sample [s] after the start of the run.
         usual : (2,) ndarray, optional
             Residual scale that windows of the run have; default the median of those given.
         """
-        stack = np.ascontiguousarray(values.transpose(0, 2, 1)).reshape(-1, self.length)
+        n = rows.shape[1]
+        stack = rows.reshape(2 * n, self.length)
         offset = _mean_of_present(stack[:, :: self._stride])
-        stack = stack - offset
-        coefficients = stack @ self.inverse.T
-        residual = np.abs(stack - coefficients @ self.design.T)
-        scale = 1.4826 * np.median(residual[:, :: self._stride], axis=1)
-        scale, largest = scale.reshape(-1, 2), residual.max(axis=1).reshape(-1, 2)
+        residual = stack - offset
+        coefficients = self._solve_and_subtract(residual)
+        size = np.abs(coefficients).sum(axis=1)
+        largest = _by_window(_largest(residual))
+        scale = _by_window(1.4826 * np.median(np.abs(residual[:, :: self._stride]), axis=1))
         usual = usual_scale(scale) if usual is None else usual
         # A long glitch pulls the whole fit and hides in the window's own scale: the run's tells.
         # A NaN in the window makes both comparisons false: refit those too.
         # (The rounding of a noise-free record is no glitch either.)
-        rounding = 1e-10 * np.abs(stack).max(axis=1).reshape(-1, 2)
+        rounding = 1e-10 * _by_window(size)
         clean = (largest <= np.maximum(GLITCH_LIMIT * scale, rounding)) & (
             scale <= np.maximum(SCALE_LIMIT * usual, rounding)
         )
         clean = clean.all(axis=1)
-        lost = np.zeros(len(start))
-        coefficients = coefficients.reshape(-1, 2, coefficients.shape[1])
+        lost = np.zeros(n)
+        coefficients = coefficients.reshape(2, n, -1).transpose(1, 0, 2).copy()
+        offset = _by_window(offset[:, 0])
         for i in np.flatnonzero(~clean):
-            pair = stack.reshape(-1, 2, self.length)[i].T
-            coefficients[i], scale[i], lost[i] = _refit(self.design, pair, usual)
-        mean = coefficients[:, :, 2 * len(self.frequencies)] + np.reshape(offset, (-1, 2))
+            coefficients[i], scale[i], lost[i] = _refit(self.design, rows[:, i].T - offset[i], usual)
+        mean = coefficients[:, :, 2 * len(self.frequencies)] + offset
         return PhasorBlock(self._phasors(coefficients, start), mean, scale, lost)
+
+    def _solve_and_subtract(self, rows: FloatArray) -> FloatArray:
+        """Coefficients of every row, (k, n_columns); the rows become residuals."""
+        if self._blocks is None:
+            coefficients = (rows @ self.design) @ self._gram_inverse
+            rows -= coefficients @ self.design.T
+        else:
+            coefficients = self._blocks.project(rows) @ self._gram_inverse
+            self._blocks.subtract(rows, coefficients)
+        return coefficients
 
     def _phasors(self, coefficients: FloatArray, start: FloatArray) -> ComplexArray:
         n = 2 * len(self.frequencies)
         local = coefficients[:, :, 0:n:2] + 1j * coefficients[:, :, 1:n:2]
         return to_run_origin(local.transpose(0, 2, 1), self.frequencies, start)
+
+
+def _largest(rows: FloatArray) -> FloatArray:
+    """Largest modulus in every row; NaN where one is missing."""
+    return np.maximum(rows.max(axis=1), -rows.min(axis=1))
+
+
+def _by_window(values: FloatArray) -> FloatArray:
+    """From (2 n,), all X before all Y, to (n, 2)."""
+    return np.ascontiguousarray(values.reshape(2, -1).T)
 
 
 def usual_scale(scale: FloatArray) -> FloatArray:
@@ -181,14 +206,16 @@ def _refit(design: FloatArray, values: FloatArray, usual: FloatArray) -> tuple[F
     if present.mean() < 1 - MAX_LOST or present.sum() <= 2 * design.shape[1]:
         return *nothing, float(1 - present.mean())
     full, y = design[present], values[present]
-    weights = np.ones(len(y))
+    weights, size = np.ones(len(y)), np.full_like(y, np.inf)
     for _ in range(_LAD_ROUNDS):
-        size = np.abs(y - full @ _least_squares(full, y, weights))
+        previous, size = size, np.abs(y - full @ _quick_solution(full, y, weights))
+        if (np.abs(size - previous).max(axis=0) <= SETTLED * np.median(size, axis=0)).all():
+            break  # nothing moves any more that could make a verdict
         relative = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).max(axis=1)
         weights = 1 / np.maximum(relative, 0.1)
     scale = np.zeros(2)
     for _ in range(_ROUNDS):
-        size = np.abs(y - full @ _least_squares(full, y, weights))
+        size = np.abs(y - full @ _quick_solution(full, y, weights))
         scale = np.minimum(1.4826 * np.median(size, axis=0), SCALE_LIMIT * usual)
         u = (size / np.maximum(scale, np.finfo(float).tiny)).max(axis=1) / GLITCH_LIMIT
         previous, weights = weights, np.maximum(1 - u**2, 0.0) ** 2
@@ -204,10 +231,15 @@ def _refit(design: FloatArray, values: FloatArray, usual: FloatArray) -> tuple[F
     lost = float(1 - keep.mean())
     if lost > MAX_LOST:
         return *nothing, lost
-    return _least_squares(design[keep], values[keep], np.ones(int(keep.sum()))).T, scale, lost
+    return _least_squares(design[keep], values[keep]).T, scale, lost
 
 
-def _least_squares(design: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:
-    root = np.sqrt(weights)[:, None]
-    solution: FloatArray = np.linalg.lstsq(design * root, values * root, rcond=None)[0]
+def _quick_solution(design: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Weighted least squares by normal equations: good enough for the verdict on samples, and several times quicker."""
+    weighted = design * weights[:, None]
+    return np.asarray(np.linalg.pinv(weighted.T @ design, rcond=1e-12, hermitian=True) @ (weighted.T @ values))
+
+
+def _least_squares(design: FloatArray, values: FloatArray) -> FloatArray:
+    solution: FloatArray = np.linalg.lstsq(design, values, rcond=None)[0]
     return solution

@@ -30,15 +30,20 @@ def shaft_speed(run: Any) -> tuple[float, tuple[Condition, ...]]:
     )
 
 
-def window_speeds(run: Any, first: int, stop: int, length: int) -> FloatArray:
-    """Mean speed in windows first..stop-1 [Hz]; NaN where the tachometer gives nothing usable."""
-    record = run.speed(first * length, stop * length)
-    if record is None:
-        return np.full(stop - first, np.nan)
-    values = record.values.reshape(stop - first, length) / (2 * np.pi)
-    complete = np.isfinite(values).all(axis=1)
-    speeds = np.full(stop - first, np.nan)
-    speeds[complete] = values[complete].mean(axis=1)
-    nominal = run.point.shaft_speed_hz
+def window_speeds(speed: FloatArray | None, count: int, nominal: float) -> FloatArray:
+    """Mean speed in `count` equal windows [Hz]; NaN where the tachometer gives nothing usable.
+
+    Parameters
+    ----------
+    speed : (n,) ndarray or None
+        Samples of the tachometer [rad/s], n a multiple of `count`.
+    count : int
+    nominal : float
+        Set point [Hz].
+    """
+    if speed is None:
+        return np.full(count, np.nan)
+    # the mean of a window with a missing value is NaN, which is what it shall be
+    speeds = speed.reshape(count, -1).mean(axis=1) / (2 * np.pi)
     believable = np.abs(np.nan_to_num(speeds) - nominal) <= MAX_DEPARTURE * max(nominal, 1.0)
     return np.where(believable, speeds, np.nan)
