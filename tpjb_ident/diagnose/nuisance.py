@@ -40,6 +40,8 @@ class Certificates:
         [K]
     assembled_clearance, pad_clearance : float
         Of the drawing [m].
+    thermometer : float
+        Zero of every pad's temperature sensor [K].
     centre : float
         How far the polygon's centre may lie from the bearing's [m]: it is a choice where pads stand unequal.
     coherent_stiffness : float
@@ -57,6 +59,7 @@ class Certificates:
     supply_temperature: float = 0.3
     assembled_clearance: float = 0.5e-6
     pad_clearance: float = 1.0e-6
+    thermometer: float = 0.2
     centre: float = 10e-6
     coherent_stiffness: float = 0.004
     coherent_dry: float = 0.01
@@ -98,6 +101,10 @@ def nuisances(forward: Forward, effects: Sequence[Effect], base: FloatArray, kno
     names.append("model dry")
     columns.append(np.where(compliances, known.coherent_dry, 0.0))
     pads = np.array([e.place("pad") for e in elements])
+    warm = np.array([e.observable == "pad_temperature" for e in elements])
+    for pad in sorted(set(pads[warm])):
+        names.append(f"thermometer of pad {pad:.0f}")
+        columns.append(np.where(warm & (pads == pad), known.thermometer, 0.0))
     for pad in sorted(set(pads[compliances])):
         names.append(f"dry test of pad {pad:.0f}")
         columns.append(np.where(compliances & (pads == pad), known.pad_dry, 0.0))

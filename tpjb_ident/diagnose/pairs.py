@@ -47,7 +47,7 @@ def best_pairs(
             if found is not None:
                 rows.append((*found, i, j))
     rows.sort(key=lambda row: -row[0])
-    starts = []
+    starts: list[tuple[tuple[Candidate, ...], Start]] = []
     for _, moved_pair, i, j in rows[:most]:
         chosen = (pool[i], pool[j])
         amplitudes = np.array([c.neutral for c in chosen]) + moved_pair

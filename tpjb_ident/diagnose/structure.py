@@ -143,14 +143,13 @@ def residual_structure(found: Patterns, residual: FloatArray, limits: tuple[floa
     draws = np.random.default_rng(20190761).standard_normal((len(residual), DRAWS))
     null = chi2.sf(_statistics(found, draws) / rough_scale(found, draws, limits), dof[:, None]).min(axis=0)
     rank = (1.0 + np.sum(null <= p.min())) / (DRAWS + 1.0)
-    rows = [
-        GroupTest(n, float(t), int(d), float(q)) for n, t, d, q in zip(found.labels, own[:, 0], dof, p, strict=True)
-    ]
-    return Structure(
-        tuple(sorted(rows, key=lambda t: (t.p, -t.statistic / t.dof))),
-        _beyond(float(rank), float(p.min()), len(p)),
-        float(scale[0]),
-    )
+    table = zip(found.labels, own[:, 0], dof, p, strict=True)
+    tests = sorted((GroupTest(n, float(t), int(d), float(q)) for n, t, d, q in table), key=_most_telling)
+    return Structure(tuple(tests), _beyond(float(rank), float(p.min()), len(p)), float(scale[0]))
+
+
+def _most_telling(test: GroupTest) -> tuple[float, float]:
+    return test.p, -test.statistic / test.dof
 
 
 def rough_scale(found: Patterns, residuals: FloatArray, limits: tuple[float, float]) -> FloatArray:

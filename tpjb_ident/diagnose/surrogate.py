@@ -10,6 +10,7 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +104,7 @@ class Surrogate:
 
     def save(self, path: Path) -> None:
         """Write the tables to a file that `load_tables` reads."""
-        arrays = {f"a{i}": t.amplitudes for i, t in enumerate(self.tables)}
+        arrays: dict[str, Any] = {f"a{i}": t.amplitudes for i, t in enumerate(self.tables)}
         arrays |= {f"c{i}": t.changes for i, t in enumerate(self.tables)}
         temporary = path.with_name(f".{path.stem}.partial.npz")
         np.savez(temporary, base=self.base, labels=np.array([c.label for c in self.candidates]), **arrays)

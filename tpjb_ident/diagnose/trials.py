@@ -1,4 +1,4 @@
-"""Trials: hidden effects of a set size, nothing hidden, the true effect left out of the library, two effects at once."""
+"""Trials: hidden effects of a set size, nothing hidden, the true effect left out of the library, two effects."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def run_trial(bench: Bench, trial: Trial) -> dict[str, Any]:
     """
     rng = seed(*asdict(trial).values())
     chosen = [next(c for c in bench.pool if c.label == label) for label in trial.truth]
-    effects = _sized(bench, chosen, trial, rng)
+    effects = sized(bench, chosen, trial, rng)
     row: dict[str, Any] = {**asdict(trial), "names": tuple(c.name for c in chosen)}
     if effects is None:
         return {**row, "verdict": "unreachable"}
@@ -102,7 +102,7 @@ def run_trial(bench: Bench, trial: Trial) -> dict[str, Any]:
         problem = replace(problem, pool=tuple(c for c in problem.pool if c.name not in row["names"]))
     settings = DiagnoseSettings()
     verdict, found = solve(problem, bench.surrogate, settings)
-    row |= _summary(verdict, effects)
+    row |= summary(verdict, effects)
     row["p_before"], row["p_after"] = found.before.structure.p, found.after.structure.p
     row["held_p"], row["scale"] = found.after.held_p, found.after.scale
     row["size_all"] = bench.size(effects, bench.factor(trial.noise))
@@ -110,9 +110,10 @@ def run_trial(bench: Bench, trial: Trial) -> dict[str, Any]:
     return row
 
 
-def _sized(
+def sized(
     bench: Bench, chosen: Sequence[Candidate], trial: Trial, rng: np.random.Generator
 ) -> tuple[Effect, ...] | None:
+    """Effects of the trial's size, each with a random sign where both can be; None where bounds forbid."""
     factor = bench.factor(trial.noise)
     out = []
     for c in chosen:
@@ -125,7 +126,8 @@ def _sized(
     return tuple(out)
 
 
-def _summary(verdict: Verdict, effects: Sequence[Effect]) -> dict[str, Any]:
+def summary(verdict: Verdict, effects: Sequence[Effect]) -> dict[str, Any]:
+    """What a verdict says, flat."""
     row: dict[str, Any] = {
         "verdict": verdict.verdict,
         "found": tuple(e.name for e in verdict.effects),
