@@ -42,8 +42,10 @@ HEAT_PER_FORCE = 300.0
 #: Below this residual the iteration is accelerated; above it the temperature is held back, because a much hotter
 #: film carries less and heats less: undamped, the two would swing.
 NEAR = 0.3
-NEAR_HEAT = 10.0
+NEAR_HEAT = 25.0
 HELD_BACK = 0.6
+#: Steps that leave more than this share of what was left are accelerated; the others need no help.
+SLOW = 0.4
 #: Largest change of a film temperature in one step [K].
 HEATING_STEP = 15.0
 #: A film may shrink to this share of itself in one step.
@@ -196,6 +198,7 @@ def _cold_start(search: _Search) -> None:
 
 def _iterate(search: _Search) -> Equilibrium:
     best, residual, stalled = math.inf, math.inf, 0
+    left = best_left = math.inf
     memory = Anderson()
     accuracy = search.setup.accuracy
     isothermal = search.setup.thermal == "isothermal" and not search.setup.flexible_pads
@@ -209,6 +212,7 @@ def _iterate(search: _Search) -> Equilibrium:
         residual, shift, moves = newton_step(search.setup, search.load, search.films)
         if not (math.isfinite(residual) and np.all(np.isfinite(shift)) and np.all(np.isfinite(moves))):
             return _result(search, iteration, math.inf, heat_change, ("singular", "not converged"))
+        best_left, left = min(best_left, left), max(residual, heat_change / HEAT_PER_FORCE)
         near = residual < NEAR and heat_change < NEAR_HEAT
         search.relaxation = 1.0 if near else HELD_BACK
         if residual < accuracy and heat_change < HEAT_PER_FORCE * accuracy:
@@ -225,10 +229,8 @@ def _iterate(search: _Search) -> Equilibrium:
         stalled = 0 if residual < 0.7 * best else stalled + 1
         best = min(best, residual)
         whole = _apply(search, (shift, moves), 0.5 if stalled > 12 else 1.0)
-        if before is None:
-            continue
         # steps that were cut short, or still far off, say nothing of the iteration's slow modes
-        if whole and near:
+        if before is not None and whole and near and left > SLOW * best_left:
             _set_state(search, memory.next(before, _state(search)))
         else:
             memory.reset()
@@ -285,7 +287,7 @@ def _solve_films(search: _Search) -> float:
                 change = max(change, 0.0 if film.idle else _solve_film(search, film))
                 film.idle = film.idle or not film.forces.force[0] > 0.0
         if film.idle:
-            film.forces = film.step = None
+            film.forces = film.foreseen = film.step = None
             film.work.pressure[:] = 0.0
     if couples_heat(setup):
         limits = (search.relaxation, HEATING_STEP)
@@ -293,6 +295,13 @@ def _solve_films(search: _Search) -> float:
             setup, search.films, search.surface_speed, search.journal, limits
         )
         change = max(change, heated)
+    for film in search.films:
+        if film.forces is None or film.forces.steps < 0:
+            continue
+        if setup.thermal == "isothermal":
+            film.foreseen = film.forces
+        else:
+            film.foresee(search.surface_speed, setup.bearing.oil)
     if setup.flexible_pads:
         # a deformation counts like a temperature change of the same weight in the film's resistance
         change = max(change, HEAT_PER_FORCE * _bend_pads(search))
@@ -317,13 +326,15 @@ def _bend_pads(search: _Search) -> float:
     setup = search.setup
     carrying = [f for f in search.films if f.forces is not None and f.forces.steps > 0]
     gives = [f.give for f in carrying if f.give is not None]
-    wanted = wanted_shapes(gives, [f.work for f in carrying], setup.inlet_temperature, setup.bending_factor)
+    pressures = [f.foreseen_pressure() for f in carrying]
+    rises = [f.work.temperature - setup.inlet_temperature for f in carrying]
+    wanted = wanted_shapes(gives, pressures, rises, setup.bending_factor)
     share = 0.0
     for film, give, shape in zip(carrying, gives, wanted, strict=True):
-        assert film.forces is not None
+        assert film.foreseen is not None
         wedge = (film.pad.pad_clearance, *film.approach(search.position))
         film.step = bending_step(
-            give, film.grid, film.work, wedge, film.forces, shape - film.bent, setup.bending_factor
+            give, film.grid, film.work, wedge, film.foreseen, shape - film.bent, setup.bending_factor
         )
         share = max(share, film.step.share)
     return share

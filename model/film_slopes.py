@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.film_matrix import substitute_four, substitute_many
+from model.film_matrix import substitute, substitute_four, substitute_many
 from model.film_mesh import FilmGrid, FilmWork, FloatArray
 from model.kernel import compiled
 
@@ -159,3 +159,76 @@ def shape_slopes(
                     rhs[(i - 1) * width + j - first, m] = 0.0
     substitute_many(work.band, rhs)
     return rhs
+
+
+@compiled
+def warmer_pressure(
+    grid: FilmGrid, work: FilmWork, speed: float, oil: tuple[float, float, float, float], change: FloatArray
+) -> FloatArray:
+    """Change of the pressure that the film's new temperature will make, to first order.
+
+    Parameters
+    ----------
+    grid, work
+        As `model.film.solve_film` left them, with the new `work.temperature`; viscosity and density are those that
+        the pressure was solved with.
+    speed : float
+        Surface speed of the journal [m/s].
+    oil : tuple of float
+        See `model.pad_film.oil_constants`.
+    change : (unknowns,) ndarray
+        Overwritten with the change [Pa].
+
+    Returns
+    -------
+    (2,) ndarray
+        Change of the radial and tangential force [N].
+    """
+    h = work.thickness
+    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
+    first = grid.first
+    width = nz - first
+    old = np.empty((nt + 1, nz + 1))
+    new = np.empty((nt + 1, nz + 1))
+    dense = np.empty((nt + 1, nz + 1))
+    for i in range(nt + 1):
+        for j in range(nz + 1):
+            t = work.temperature[i, j]
+            dense[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - t)) - work.density[i, j]
+            old[i, j] = work.density[i, j] / work.viscosity[i, j]
+            new[i, j] = (work.density[i, j] + dense[i, j]) / (oil[0] * np.exp(oil[1] * (40.0 - t)))
+    for k in range(change.shape[0]):
+        change[k] = 0.0
+    for i in range(nt):
+        for j in range(first, nz):
+            couette = 0.25 * speed * 0.5 * (h[i, j] + h[i + 1, j]) * grid.height[j]
+            poiseuille = couette * (work.density[i, j] + work.density[i + 1, j]) - work.flow_x[i, j]
+            ratio = (new[i, j] + new[i + 1, j]) / (old[i, j] + old[i + 1, j]) - 1.0
+            more = couette * (dense[i, j] + dense[i + 1, j]) - poiseuille * ratio
+            k = i * width + j - first
+            if i + 1 < nt:
+                change[k] += more
+            if i > 0:
+                change[k - width] -= more
+    for i in range(1, nt):
+        for j in range(nz):
+            ratio = (new[i, j] + new[i, j + 1]) / (old[i, j] + old[i, j + 1]) - 1.0
+            more = work.flow_z[i, j] * ratio
+            k = (i - 1) * width + j - first
+            if j >= first:
+                change[k] -= more
+            if j + 1 < nz:
+                change[k + 1] += more
+    for i in range(1, nt):
+        for j in range(first, nz):
+            if work.ruptured[i, j]:
+                change[(i - 1) * width + j - first] = 0.0
+    substitute(work.band, change)
+    force = np.zeros(2)
+    for i in range(1, nt):
+        total = 0.0
+        for j in range(first, nz):
+            total += grid.area[i, j] * change[(i - 1) * width + j - first]
+        force[0] += grid.cos[i] * total
+        force[1] += grid.sin[i] * total
+    return force

@@ -25,10 +25,10 @@ KERNELS = (
     "film",
     "film_matrix",
     "film_slopes",
+    "film_state",
+    "first_position",
     "kernel",
     "newton_step",
-    "pad_film",
-    "start",
 )
 #: Sums may be reordered, but NaN and infinity keep their meaning.
 OPTIONS: dict[str, Any] = {

@@ -24,7 +24,7 @@ def newton_step(setup: Setup, load: FloatArray, films: list[PadFilm]) -> tuple[f
     carrying = [f for f in films if f.forces is not None]
     pads = np.zeros((len(carrying), _COLUMNS))
     for row, film in zip(pads, carrying, strict=True):
-        forces = film.forces if film.step is None else film.step.forces
+        forces = film.foreseen if film.step is None else film.step.forces
         assert forces is not None
         law, radial = laws[film.number - 1], float(forces.force[0])
         row[0:4] = *film.normal, *film.tangent

@@ -136,16 +136,27 @@ def _softest_shapes(compliance: FloatArray, area: FloatArray) -> FloatArray:
     return np.asarray(basis[:, :SHAPES] / root[:, None])
 
 
-def wanted_shapes(gives: list[PadGive], works: list[FilmWork], supply: float, factor: float) -> list[FloatArray]:
-    """Deformation that every film asks of its pad, Eq. (6)-(8) [m]; pads of one shape are done in one product."""
+def wanted_shapes(
+    gives: list[PadGive], pressures: list[FloatArray], rises: list[FloatArray], factor: float
+) -> list[FloatArray]:
+    """Deformation that every film asks of its pad, Eq. (6)-(8) [m]; pads of one shape are done in one product.
+
+    Parameters
+    ----------
+    gives : list of PadGive
+    pressures, rises : list of (nt + 1, nz + 1) ndarray
+        Pressure [Pa] and temperature above supply [K].
+    factor : float
+        On the computed deformation.
+    """
     wanted: list[FloatArray] = [np.empty(0)] * len(gives)
     for give in {id(g): g for g in gives}.values():
         same = [k for k, g in enumerate(gives) if g is give]
-        pressure = np.column_stack([works[k].pressure.ravel() for k in same])
-        rise = np.column_stack([works[k].temperature.ravel() for k in same]) - supply
+        pressure = np.column_stack([pressures[k].ravel() for k in same])
+        rise = np.column_stack([rises[k].ravel() for k in same])
         shape = factor * (give.compliance @ pressure + give.expansion @ (give.warmth @ rise))
         for column, k in enumerate(same):
-            wanted[k] = shape[:, column].reshape(works[k].pressure.shape)
+            wanted[k] = shape[:, column].reshape(pressures[k].shape)
     return wanted
 
 

@@ -12,6 +12,7 @@ from model.bearing import Oil, Pad
 from model.energy import solve_energy
 from model.film import FilmForces, solve_film
 from model.film_mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film_slopes import warmer_pressure
 from model.film_state import set_viscosity
 from model.pad_bending import BendingStep, PadGive, pad_give
 from model.setup import Setup
@@ -44,6 +45,11 @@ class PadFilm:
     idle : bool
         No loaded attitude: carries nothing.
     forces : FilmForces or None
+        At the temperature that the pressure was solved with.
+    foreseen : FilmForces or None
+        At the temperature found since, to first order: what a Newton step should go by.
+    warming : (unknowns,) ndarray or None
+        The change of pressure from the one to the other [Pa].
     bent : (nt + 1, nz + 1) ndarray
         The pad's deformation, part of `work.extra` [m].
     give : PadGive or None
@@ -68,6 +74,8 @@ class PadFilm:
     deflection: float = 0.0
     idle: bool = False
     forces: FilmForces | None = None
+    foreseen: FilmForces | None = None
+    warming: FloatArray | None = None
     branch: Branch | None = None
     flips: int = 0
     held: int = 0
@@ -82,6 +90,23 @@ class PadFilm:
         a = self.reach(position) - self.deflection
         b = float(self.tangent @ position) + self.pivot_radius * self.tilt
         return a, b
+
+    def foresee(self, surface_speed: float, oil: Oil) -> None:
+        """Say what the new temperature will do to the pressure; see `foreseen`."""
+        assert self.forces is not None
+        if self.warming is None:
+            self.warming = np.empty_like(self.work.unknown)
+        change = warmer_pressure(self.grid, self.work, surface_speed, oil_constants(oil), self.warming)
+        self.foreseen = self.forces._replace(force=self.forces.force + change)
+
+    def foreseen_pressure(self) -> FloatArray:
+        """Pressure at the new temperature, (nt + 1, nz + 1) [Pa]."""
+        if self.warming is None:
+            return self.work.pressure
+        pressure = self.work.pressure.copy()
+        inner = pressure[1:-1, self.grid.first : -1]
+        inner += self.warming.reshape(inner.shape)
+        return pressure
 
 
 def pad_films(setup: Setup) -> list[PadFilm]:

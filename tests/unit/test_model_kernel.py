@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import model.energy
 import model.film
 import model.newton_step
-import model.pad_film
 from model import kernel
 
 FOLDER = Path(kernel.__file__).parent
@@ -32,7 +32,7 @@ def test_stamp_follows_every_source(tmp_path, monkeypatch):
 
 
 def test_cached_code_carries_the_stamp():
-    for function in (model.film.solve_film, model.pad_film.film_step, model.newton_step.eliminate):
+    for function in (model.film.solve_film, model.energy.march, model.newton_step.eliminate):
         assert function._cache._cache_file._source_stamp == kernel.STAMP
 
 
