@@ -53,7 +53,8 @@ def load_deflection(
         _points(axes, curve)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     axes.set_ylim(bottom=0.0)
-    add_legend(axes)
+    named = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    add_legend(axes, handles=[named[name] for name in sorted(named)])  # pad by pad, what was left out last
     return figure
 
 
@@ -73,7 +74,7 @@ def _points(axes: Axes, curve: PivotCurve) -> None:
     bad = steps.weight == 0
     if bad.any():
         axes.plot(1e6 * steps.deflection[bad], steps.load[bad] / 1e3, linestyle="none", marker="x", markersize=6,
-                  color=LIGHT["red"], label=f"pad #{curve.pad}, left out", zorder=5)  # fmt: skip
+                  color=LIGHT["ink"], label="step left out", zorder=5)  # fmt: skip
 
 
 def _law(axes: Axes, curve: PivotCurve, top: float, level: float) -> None:

@@ -62,7 +62,7 @@ def gap_controls(
         axes.annotate(f"{value:.3g}", (end, y), xytext=(4, 0), textcoords="offset points", va="center",
                       fontsize=FONT_SIZE - 1, color=LIGHT["ink"])  # fmt: skip
     axes.set_yticks(range(len(rows)), [r[0] for r in rows])
-    axes.invert_yaxis()
+    axes.set_ylim(len(rows) - 0.2, -0.6)
     axes.grid(axis="y", visible=False)
     axes.set_xlim(left=0.0)
     if noise_floor is not None:

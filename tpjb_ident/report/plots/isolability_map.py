@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from tpjb_ident.diagnose.plan import CampaignPlan
 
 CELL = 0.3  # [inches]
+TALL = 2.0  # the colour bar needs it [inches]
 CONFUSABLE = 3.0
 SEEN = 6.0
 
@@ -57,8 +58,10 @@ def isolability(
     words = [name.replace("_", " ") for name in names]
     room = CHARACTER * max(len(word) for word in words)
     # the panel's own margins and the colour bar come on top of cells and names
-    figure, ((axes,),) = new_pictures(1, 1, title=title, width=CELL * k + room + 2.0, height=CELL * k + room + 1.0)
-    label(axes, "could pass for", "effect at work")
+    figure, ((axes,),) = new_pictures(
+        1, 1, title=title, width=CELL * k + room + 2.0, height=max(CELL * k, TALL) + room + 1.0
+    )
+    label(axes, "could pass for (framed: closer than 3)", "effect at work")
     shrink(axes, left=room - 0.1, bottom=room - 0.1)
     image = axes.imshow(matrix, cmap=SEQUENTIAL, vmin=0.0, vmax=SEEN, aspect="auto", interpolation="nearest")
     axes.grid(False)
@@ -66,5 +69,5 @@ def isolability(
     axes.set_yticks(range(k), words, fontsize=FONT_SIZE - 1)
     for i, j in zip(*np.nonzero(matrix < CONFUSABLE), strict=True):
         axes.add_patch(Rectangle((j - 0.45, i - 0.45), 0.9, 0.9, fill=False, edgecolor=LIGHT["red"], linewidth=1.2))
-    add_colour_bar(axes, image, "distance, standard deviations (framed: < 3)")
+    add_colour_bar(axes, image, "distance, standard deviations")
     return figure
