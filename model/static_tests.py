@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from model.equilibrium import Equilibrium
 from model.predict import Prediction, predict_setup
 from model.setup import Setup
+from model.warm_start import carried_on
 
 FloatArray = NDArray[np.float64]
 
@@ -76,6 +78,23 @@ class PolygonSides:
     pushed: FloatArray
     angle: FloatArray
 
+    def corners(self, pushed: bool = False) -> FloatArray:
+        """Where neighbouring sides meet, (n_pads, 2) [m], counter-clockwise: corner k is that of sides k and k + 1.
+
+        With `pushed` both sides are taken where the whole push load holds them; in a corner two pads share it, and
+        the shaft stops a little short (see `corner_positions`).
+        """
+        order = np.argsort(self.angle % (2.0 * math.pi))
+        distance = (self.pushed if pushed else self.clearance)[order]
+        return _crossings(self.angle[order], distance)
+
+
+def _crossings(angle: FloatArray, distance: FloatArray) -> FloatArray:
+    """Points where every line n . x = distance meets the next one."""
+    normals = np.column_stack([np.cos(angle), np.sin(angle)])
+    pairs = [(k, (k + 1) % len(angle)) for k in range(len(angle))]
+    return np.array([np.linalg.solve(normals[[i, j]], distance[[i, j]]) for i, j in pairs])
+
 
 def polygon_sides(setup: Setup, push_load: float) -> PolygonSides:
     """Predict a cold clearance sweep with a push load [N]."""
@@ -96,6 +115,35 @@ def polygon_sides(setup: Setup, push_load: float) -> PolygonSides:
     return PolygonSides(table[:, 0], table[:, 1], table[:, 2])
 
 
+def corner_positions(setup: Setup, push_load: float) -> FloatArray:
+    """Where a push along the bisector of two neighbouring pads takes the shaft: both pivots give under their share.
+
+    Parameters
+    ----------
+    setup : Setup
+    push_load : float
+        [N]
+
+    Returns
+    -------
+    (n_pads, 2) ndarray
+        As read [m], counter-clockwise as `PolygonSides.corners`.
+    """
+    angles = np.array([pad.pivot_angle for pad in setup.bearing.pads])
+    order = np.argsort(angles % (2.0 * math.pi))
+    out = []
+    for i, j in zip(order, np.roll(order, -1), strict=True):
+        half = 0.5 * ((angles[j] - angles[i]) % (2.0 * math.pi))
+        if half >= 0.5 * math.pi:
+            raise ValueError(f"pads {i + 1} and {j + 1} stand {math.degrees(2 * half):.0f} deg apart: no corner there")
+        share = 0.5 * push_load / math.cos(half)
+        pair = np.array([[math.cos(angles[k]), math.sin(angles[k])] for k in (i, j)])
+        reach = [setup.bearing.pads[k].assembled_clearance + setup.pivots[k].deflection(share) for k in (i, j)]
+        bisector = np.array([math.cos(angles[i] + half), math.sin(angles[i] + half)])
+        out.append(np.linalg.solve(pair, reach) + setup.series_compliance * push_load * bisector)
+    return np.asarray(np.array(out) @ setup.instruments.displacement_map(0.0).real.T)
+
+
 def sweep(
     setup: Setup, points: Sequence[tuple[float, float, float, FloatArray]], start: Equilibrium | None = None
 ) -> list[Prediction]:
@@ -107,13 +155,31 @@ def sweep(
     points : sequence of (load [N], load_direction [rad], speed [rad/s], excitation (n,) [rad/s])
     start : Equilibrium, optional
         For the first point.
+
+    Returns
+    -------
+    list of Prediction
+        One per point. A point without equilibrium has its status and NaN, and the next one starts afresh.
     """
-    out = []
-    for load, direction, speed, excitation in points:
-        prediction = predict_setup(setup, load, direction, speed, excitation, start)
+    out: list[Prediction] = []
+    behind: Equilibrium | None = None
+    for at, (load, direction, speed, excitation) in enumerate(points):
+        guess = start
+        if behind is not None and start is not None:
+            guess = carried_on(behind, start, _step_share(points[at - 2], points[at - 1], points[at]))
+        prediction = predict_setup(setup, load, direction, speed, excitation, guess)
         out.append(prediction)
-        start = prediction.equilibrium if prediction.converged else None
+        behind, start = start if at else None, prediction.equilibrium if prediction.converged else None
     return out
+
+
+def _step_share(*points: tuple[float, float, float, FloatArray]) -> float:
+    """The last step of three points over the first, where one of load, direction, speed alone changes; else 0."""
+    shares = []
+    for before, last, new in zip(*(p[:3] for p in points), strict=True):
+        if not before == last == new:
+            shares.append((new - last) / (last - before) if last != before else math.inf)
+    return shares[0] if len(shares) == 1 and abs(shares[0]) <= 2.0 else 0.0
 
 
 def locus(setup: Setup, load: float, directions: FloatArray, speed: float) -> FloatArray:
@@ -126,3 +192,45 @@ def locus(setup: Setup, load: float, directions: FloatArray, speed: float) -> Fl
     """
     points = [(load, float(d), speed, np.array([speed])) for d in directions]
     return np.array([p.position if p.converged else (math.nan, math.nan) for p in sweep(setup, points)])
+
+
+def load_sweep(
+    setup: Setup, loads: FloatArray, direction: float, speed: float, excitation: FloatArray
+) -> list[Prediction]:
+    """Predict over static loads [N] at one direction [rad], speed and excitation frequencies [rad/s]."""
+    return sweep(setup, [(float(load), direction, speed, excitation) for load in loads])
+
+
+def speed_sweep(
+    setup: Setup, load: float, direction: float, speeds: FloatArray, ratio: float = 1.0
+) -> list[Prediction]:
+    """Predict over shaft speeds [rad/s], each excited at `ratio` times its speed (1: synchronous)."""
+    return sweep(setup, [(load, direction, float(w), np.array([ratio * w])) for w in speeds])
+
+
+#: Columns of `sweep_table`: one number per point.
+SWEEP_COLUMNS = (
+    "load", "load_direction", "speed", "min_film", "max_pressure", "max_temperature", "power_loss",
+)  # fmt: skip
+
+
+def sweep_table(predictions: Sequence[Prediction]) -> dict[str, NDArray[Any]]:
+    """What a sweep found, as columns (SI, degC): NaN where a point has no equilibrium.
+
+    Returns
+    -------
+    dict of ndarray
+        `SWEEP_COLUMNS` (n,), ``x``, ``y`` as read (n,), ``pad_load`` (n, n_pads), ``status`` (n,) of text.
+    """
+    out: dict[str, NDArray[Any]] = {}
+    for name in SWEEP_COLUMNS:
+        known = name in {"load", "load_direction", "speed"}
+        out[name] = np.array([getattr(p, name) if known or p.converged else math.nan for p in predictions])
+    pads = len(predictions[0].pad_load) if predictions else 0
+    nothing = (math.nan, math.nan)
+    position = np.array([p.position if p.converged else nothing for p in predictions]).reshape(len(predictions), 2)
+    out["x"], out["y"] = position[:, 0], position[:, 1]
+    rows = [p.pad_load if p.converged else np.full(pads, math.nan) for p in predictions]
+    out["pad_load"] = np.array(rows).reshape(len(predictions), pads)
+    out["status"] = np.array(["; ".join(p.status) for p in predictions])
+    return out

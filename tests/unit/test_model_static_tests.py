@@ -1,0 +1,178 @@
+"""What static tests would show: dry curves, the clearance polygon, loci and sweeps with warm starts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from model.bearing import Bearing, load_bearing
+from model.effects import Effect, apply_effects
+from model.pivots import pivot_laws
+from model.predict import predict_setup
+from model.setup import Mesh, Setup
+from model.static_tests import (
+    SWEEP_COLUMNS,
+    corner_positions,
+    dry_curve,
+    load_sweep,
+    locus,
+    polygon_sides,
+    speed_sweep,
+    sweep,
+    sweep_table,
+)
+
+SPEED, OMEGA, DOWN = 2 * math.pi * 22.0, np.array([2 * math.pi * 25.0]), -math.pi / 2
+LOADS = np.linspace(2500.0, 8750.0, 6)
+
+
+@pytest.fixture(scope="module")
+def rocker(rocker_file) -> Bearing:
+    return load_bearing(rocker_file)
+
+
+def setup(bearing: Bearing, *effects: Effect, pivots: object = "kirk") -> Setup:
+    return apply_effects(Setup(bearing, pivot_laws(pivots, bearing), mesh=Mesh(40, 4)), effects)
+
+
+def test_dry_curve_is_the_law_through_structure_and_instruments(rocker):
+    load = np.linspace(0.0, 5000.0, 11)
+    plain = dry_curve(setup(rocker), 1, load)
+    law = pivot_laws("kirk", rocker)[0]
+    np.testing.assert_allclose(plain.deflection, [law.deflection(w) for w in load])
+    np.testing.assert_allclose(plain.load, load)
+    read = dry_curve(
+        setup(
+            rocker,
+            Effect("housing_flexibility", stiffness=1e9),
+            Effect("probe_gain", factor=1.1),
+            Effect("loadcell_gain", factor=0.9),
+        ),
+        1,
+        load,
+    )
+    np.testing.assert_allclose(read.deflection, 1.1 * (plain.deflection + load / 1e9), atol=1e-15)
+    np.testing.assert_allclose(read.load, 0.9 * load)
+
+
+def test_polygon_of_equal_pads_is_regular(rocker):
+    sides = polygon_sides(setup(rocker), 0.0)
+    np.testing.assert_allclose(sides.clearance, rocker.pads[0].assembled_clearance)
+    np.testing.assert_allclose(sides.pushed, sides.clearance)
+    corners = sides.corners()
+    np.testing.assert_allclose(np.hypot(*corners.T), sides.clearance[0] / math.cos(math.pi / 5))
+    turn = np.diff(np.unwrap(np.arctan2(corners[:, 1], corners[:, 0])))
+    np.testing.assert_allclose(turn, 2 * math.pi / 5)
+
+
+def test_push_load_enlarges_the_polygon_by_what_pivots_and_housing_give(rocker):
+    spring = setup(
+        rocker, Effect("housing_flexibility", stiffness=4e8), Effect("soft_pivot", pad=3, stiffness_factor=0.3)
+    )
+    sides = polygon_sides(spring, 200.0)
+    give = [law.deflection(200.0) for law in spring.pivots]
+    np.testing.assert_allclose(sides.pushed - sides.clearance, np.array(give) + 200.0 / 4e8)
+    assert np.argmax(sides.pushed) == 2
+    # running conditions do not change what is measured cold
+    warm = polygon_sides(setup(rocker, Effect("thermal_growth", clearance_change=1e-5)), 200.0)
+    np.testing.assert_allclose(warm.clearance, rocker.pads[0].assembled_clearance)
+    moved = polygon_sides(setup(rocker, Effect("pad_offset", pad=3, radial_offset=1e-5)), 200.0)
+    assert moved.clearance[2] == pytest.approx(rocker.pads[2].assembled_clearance + 1e-5)
+
+
+def test_corners_balance_the_push_on_two_pads(rocker):
+    one = setup(rocker, Effect("soft_pivot", pad=2, stiffness_factor=0.3), pivots=2e8)
+    push = 1000.0
+    normals = np.array([[math.cos(p.pivot_angle), math.sin(p.pivot_angle)] for p in rocker.pads])
+    for point in corner_positions(one, push):
+        depth = normals @ point - [p.assembled_clearance for p in rocker.pads]
+        touched = np.flatnonzero(depth > 0.0)
+        assert len(touched) == 2
+        stiffness = np.array([one.pivots[k].stiffness(1.0) for k in touched])
+        force = (stiffness * depth[touched]) @ normals[touched]
+        bisector = normals[touched].sum(axis=0)
+        np.testing.assert_allclose(force, push * bisector / np.hypot(*bisector), atol=1e-6 * push)
+    # less than if either pad held the whole push, more than if nothing gave
+    sides = polygon_sides(one, push)
+    size = np.hypot(*corner_positions(one, push).T)
+    assert (size < np.hypot(*sides.corners(True).T)).all()
+    assert (size > np.hypot(*sides.corners().T)).all()
+
+
+def test_corners_are_read_by_the_probes(rocker):
+    true = corner_positions(setup(rocker), 300.0)
+    read = corner_positions(setup(rocker, Effect("probe_gain", factor=1.05)), 300.0)
+    np.testing.assert_allclose(read, 1.05 * true)
+
+
+def test_pads_too_far_apart_have_no_corner(rocker):
+    with pytest.raises(ValueError, match="deg apart"):
+        corner_positions(setup(rocker.with_pads(rocker.pads[:2])), 100.0)
+
+
+def test_sweeps_up_and_down_meet_cold_starts(rocker):
+    one = setup(rocker)
+    up = load_sweep(one, LOADS, DOWN, SPEED, OMEGA)
+    down = load_sweep(one, LOADS[::-1], DOWN, SPEED, OMEGA)[::-1]
+    for load, a, b in zip(LOADS, up, down, strict=True):
+        cold = predict_setup(one, load, DOWN, SPEED, OMEGA)
+        for warm in (a, b):
+            assert warm.converged
+            np.testing.assert_allclose(warm.h, cold.h, rtol=2e-5, atol=2e-5 * np.abs(cold.h).max())
+            np.testing.assert_allclose(warm.position, cold.position, atol=1e-10)
+    assert sum(p.equilibrium.iterations for p in up[1:]) < sum(
+        predict_setup(one, load, DOWN, SPEED, OMEGA).equilibrium.iterations for load in LOADS[1:]
+    )
+
+
+def test_speed_sweep_excites_with_the_speed(rocker):
+    speeds = 2 * math.pi * np.array([11.0, 22.0, 44.0])
+    for ratio in (1.0, 0.5):
+        found = speed_sweep(setup(rocker), 5000.0, DOWN, speeds, ratio)
+        assert [p.speed for p in found] == speeds.tolist()
+        np.testing.assert_allclose([p.excitation[0] for p in found], ratio * speeds)
+    films = [p.min_film for p in found]
+    assert films == sorted(films)
+
+
+def test_locus_of_equal_pads_repeats_every_pad(rocker):
+    directions = np.linspace(-math.pi, math.pi, 20, endpoint=False)
+    points = locus(setup(rocker), 5000.0, directions, 2 * math.pi * 20.0)
+    assert points.shape == (20, 2)
+    turned = points[4:8]  # 72 deg further
+    c, s = math.cos(2 * math.pi / 5), math.sin(2 * math.pi / 5)
+    np.testing.assert_allclose(turned, points[:4] @ np.array([[c, s], [-s, c]]), atol=2e-9)
+    # inside the clearance polygon
+    sides = polygon_sides(setup(rocker), 5000.0)
+    normals = np.column_stack([np.cos(sides.angle), np.sin(sides.angle)])
+    assert (points @ normals.T < sides.pushed).all()
+
+
+def test_a_point_that_fails_does_not_spoil_the_next(rocker):
+    one = setup(rocker.with_pads(rocker.pads[:1]))
+    points = [(5000.0, d, SPEED, OMEGA) for d in (DOWN, 1.5, DOWN)]
+    found = sweep(one, points)
+    assert [p.converged for p in found] == [True, False, True]
+    np.testing.assert_allclose(found[2].h, found[0].h, rtol=1e-6)
+    table = sweep_table(found)
+    assert "not converged" in table["status"][1]
+    for name in (*SWEEP_COLUMNS[3:], "x", "y"):
+        assert np.isnan(table[name]).tolist() == [False, True, False], name
+    assert np.isnan(table["pad_load"][1]).all()
+    assert np.isnan(locus(one, 5000.0, np.array([1.5]), SPEED)).all()
+
+
+def test_table_has_what_is_asked_of_a_sweep(rocker):
+    found = load_sweep(setup(rocker), LOADS, DOWN, SPEED, OMEGA)
+    table = sweep_table(found)
+    np.testing.assert_allclose(table["load"], LOADS)
+    np.testing.assert_allclose(table["min_film"], [p.min_film for p in found])
+    assert (np.diff(table["min_film"]) < 0.0).all()
+    assert (np.diff(table["max_pressure"]) > 0.0).all()
+    assert (np.diff(table["max_temperature"]) > 0.0).all()
+    assert (table["power_loss"] > 0.0).all()
+    assert table["pad_load"].shape == (6, 5)
+    assert (table["status"] == "").all()
+    assert sweep_table([])["pad_load"].shape == (0, 0)
