@@ -27,8 +27,10 @@ import numpy as np
 from numba import njit
 
 from model.bearing import load_bearing
+from model.pivots import pivot_laws
 from model.predict import Prediction, predict
-from model.setup import Mesh
+from model.setup import Mesh, Setup
+from model.static_tests import locus, sweep
 
 FILE = Path(__file__).resolve().parents[2] / "model" / "bearings" / "rocker.toml"
 BEARING = load_bearing(FILE)
@@ -63,17 +65,15 @@ def point(thermal: str, mesh: Mesh | None = None) -> Prediction:
 
 
 def comparison() -> None:
-    """The paper's: 6 loads x 5 frequencies x 3 pivot models, each load from the one before."""
+    """The paper's: 6 loads x 5 frequencies x 3 pivot models, each load from those before."""
     for pivots in ("rigid", "kirk", 5e8):
-        last = None
-        for load in np.linspace(2500.0, 8750.0, 6):
-            last = predict(BEARING, float(load), DOWN, SPEED, EXCITATION, pivots=pivots, start=last)
+        setup = Setup(BEARING, pivot_laws(pivots, BEARING))
+        sweep(setup, [(float(load), DOWN, SPEED, EXCITATION) for load in np.linspace(2500.0, 8750.0, 6)])
 
 
-def locus() -> None:
-    last = None
-    for direction in np.linspace(-math.pi, math.pi, 20, endpoint=False):
-        last = predict(BEARING, 5000.0, float(direction), SPEED, start=last)
+def locus_of_20() -> None:
+    setup = Setup(BEARING, pivot_laws("kirk", BEARING))
+    locus(setup, 5000.0, np.linspace(-math.pi, math.pi, 20, endpoint=False), SPEED)
 
 
 CASES = (
@@ -81,7 +81,7 @@ CASES = (
     Case("adiabatic, 5 frequencies", lambda: point("adiabatic"), 20.0),
     Case("tehd (compliance cached), 5 frequencies", lambda: point("tehd"), 50.0),
     Case("adiabatic, 6 loads x 5 frequencies x 3 pivots", comparison, 200.0),
-    Case("adiabatic, locus of 20 directions", locus, 300.0),
+    Case("adiabatic, locus of 20 directions", locus_of_20, 300.0),
 )
 
 

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing, load_bearing
-from model.predict import Prediction, predict
-from model.setup import Mesh
+from model.pivots import pivot_laws
+from model.predict import Prediction, predict, predict_setup
+from model.setup import Mesh, Setup
+from model.static_tests import sweep
 
 SPEED, OMEGA, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, -math.pi / 2
 
@@ -110,3 +112,28 @@ def test_power_loss_grows_with_speed(rocker):
     losses = [predict(rocker, 5000.0, DOWN, 2 * math.pi * hz).power_loss for hz in (11.0, 22.0, 44.0)]
     assert losses[0] < losses[1] < losses[2]
     assert 50.0 < losses[1] < 2000.0
+
+
+def test_a_sweep_carries_on_and_ends_where_single_points_do(rocker_file):
+    setup = Setup(load_bearing(rocker_file), pivot_laws("kirk", load_bearing(rocker_file)), "adiabatic")
+    speed, line = 2 * math.pi * 22, np.array([2 * math.pi * 25])
+    loads = [2500.0, 3750.0, 5000.0, 6250.0, 7500.0]
+    down = -math.pi / 2
+    swept = sweep(setup, [(w, down, speed, line) for w in loads])
+    alone = [predict_setup(setup, w, down, speed, line) for w in loads]
+    for one, other in zip(swept, alone, strict=True):
+        np.testing.assert_allclose(one.h, other.h, rtol=2e-5)
+    assert sum(p.equilibrium.iterations for p in swept) < sum(p.equilibrium.iterations for p in alone)
+
+
+def test_a_sweep_over_a_change_of_regime_finds_what_single_points_find(rocker_file):
+    bearing = load_bearing(rocker_file)
+    setup = Setup(bearing, pivot_laws(5e8, bearing), "isothermal")
+    speed, line = 2 * math.pi * 22, np.array([2 * math.pi * 25])
+    loads = [float(w) for w in np.arange(6000.0, 10001.0, 500.0)]
+    swept = sweep(setup, [(w, -math.pi / 2, speed, line) for w in loads])
+    assert swept[0].idle_pads != swept[-1].idle_pads
+    for w, p in zip(loads, swept, strict=True):
+        single = predict_setup(setup, w, -math.pi / 2, speed, line)
+        assert p.idle_pads == single.idle_pads
+        np.testing.assert_allclose(p.h, single.h, rtol=1e-4)
