@@ -47,11 +47,14 @@ class LineSet:
         Distinct from the excitation lines and from one another.
     conditions : tuple of Condition
         ``"mains on excitation line"`` and the like.
+    speed : float
+        Shaft speed that they were made for [Hz].
     """
 
     excitation: tuple[Line, ...]
     nuisance: tuple[Line, ...]
     conditions: tuple[Condition, ...] = ()
+    speed: float = 0.0
 
     @property
     def frequencies(self) -> FloatArray:
@@ -64,7 +67,7 @@ class LineSet:
             replace(line, frequency=speed * int(line.name[:-1])) if re.fullmatch(r"\d+X", line.name) else line
             for line in self.nuisance
         )
-        return replace(self, nuisance=moved)
+        return replace(self, nuisance=moved, speed=speed)
 
 
 @dataclass(frozen=True)
@@ -133,7 +136,7 @@ def known_lines(
             conditions.append(_on_excitation(line, struck[0]))
         elif all(abs(o.frequency - line.frequency) > max(o.wander, line.wander) for o in nuisance):
             nuisance.append(line)
-    return LineSet(driven, tuple(nuisance), tuple(conditions))
+    return LineSet(driven, tuple(nuisance), tuple(conditions), speed)
 
 
 def _candidates(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:

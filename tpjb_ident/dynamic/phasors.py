@@ -26,6 +26,8 @@ MAX_LOST = 0.5
 SETTLED = 0.02
 _LAD_ROUNDS = 15
 _ROUNDS = 12
+#: Outlying samples may bend a fit by this share of the residual's scale and still be told by it.
+MAX_PULL = 0.02
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,12 @@ class LineFitter:
         coefficients = coefficients.reshape(2, n, -1).transpose(1, 0, 2).copy()
         offset = _by_window(offset[:, 0])
         for i in np.flatnonzero(~clean):
-            coefficients[i], scale[i], lost[i] = _refit(self.design, rows[:, i].T - offset[i], usual)
+            pair = rows[:, i].T - offset[i]
+            quick = self._without_few(pair, residual.reshape(2, n, -1)[:, i], coefficients[i], scale[i], usual)
+            if quick is not None:
+                coefficients[i], lost[i] = quick
+            else:
+                coefficients[i], scale[i], lost[i] = _refit(self.design, pair, usual)
         mean = coefficients[:, :, 2 * len(self.frequencies)] + offset
         return PhasorBlock(self._phasors(coefficients, start), mean, scale, lost)
 
@@ -119,6 +126,34 @@ class LineFitter:
             coefficients = self._blocks.project(rows) @ self._gram_inverse
             self._blocks.subtract(rows, coefficients)
         return coefficients
+
+    def _without_few(
+        self, pair: FloatArray, residual: FloatArray, coefficients: FloatArray, scale: FloatArray, usual: FloatArray
+    ) -> tuple[FloatArray, float] | None:
+        """Leave out the few outlying samples of a long window, too few to have bent its fit; None where they are many.
+
+        Their rows are taken off the normal equations: no need to go through all samples again.
+
+        Parameters
+        ----------
+        pair : (length, 2) ndarray
+            Samples, X and Y.
+        residual : (2, length) ndarray
+        coefficients : (2, n_columns) ndarray
+        scale, usual : (2,) ndarray
+            Residual scale of this window, and of the run's.
+        """
+        limit = GLITCH_LIMIT * scale[:, None]
+        size = np.abs(residual)
+        pulled = 2 * np.where(size > limit, size, 0.0).sum(axis=1) / self.length
+        if self._blocks is None or not (pulled <= MAX_PULL * scale).all() or not (scale <= SCALE_LIMIT * usual).all():
+            return None
+        bad = (size > limit).any(axis=0)
+        wide = np.flatnonzero(np.convolve(bad, np.ones(2 * GLITCH_MARGIN + 1), mode="same") > 0)
+        rows = self.design[wide]
+        gram = np.linalg.inv(np.linalg.inv(self._gram_inverse) - rows.T @ rows)
+        # the residual of the left-out samples is what they contributed beyond the fit
+        return coefficients - residual[:, wide] @ rows @ gram, len(wide) / self.length
 
     def _phasors(self, coefficients: FloatArray, start: FloatArray) -> ComplexArray:
         n = 2 * len(self.frequencies)

@@ -112,6 +112,7 @@ def _plan(run: Any, quantity: str) -> _Plan | None:
     inverse = inverse_directions(tuple(c.axis for c in chosen))
     if not np.isfinite(inverse).all() or abs(np.sin(chosen[0].axis - chosen[1].axis)) <= 0.05:
         return None
+    inverse = np.where(np.abs(inverse) < 1e-12, 0.0, inverse)  # cos 90 deg is not quite zero, but a pass over the data
     matrix = inverse * np.array([c.slope for c in chosen])
     return _Plan(tuple(c.name for c in chosen), matrix, inverse @ np.array([c.zero for c in chosen]))
 
@@ -125,8 +126,11 @@ def _rows(plan: _Plan, readings: dict[str, FloatArray]) -> FloatArray | None:
             return None
     rows = np.empty((2, len(first)))
     for i in range(2):
-        np.multiply(first, plan.matrix[i, 0], out=rows[i])
-        rows[i] += second * plan.matrix[i, 1]
+        own, other = (first, second) if plan.matrix[i, 0] != 0.0 else (second, first)
+        mine = plan.matrix[i] if plan.matrix[i, 0] != 0.0 else plan.matrix[i, ::-1]
+        np.multiply(own, mine[0], out=rows[i])
+        if mine[1] != 0.0:
+            rows[i] += other * mine[1]
         if plan.shift[i] != 0.0:
             rows[i] += plan.shift[i]
     return rows

@@ -36,6 +36,7 @@ class WaveBlocks:
         # line_design's own columns in tau; its drift columns are replaced by 1 and tau
         self._waves = line_design(tau, frequencies, 1)
         self._waves[:, -1] = tau
+        self._rows = np.ascontiguousarray(self._waves.T)
         starts = np.arange(self.full + (self.rest > 0)) * BLOCK / rate
         self._turn: ComplexArray = np.exp(2j * np.pi * np.multiply.outer(starts, frequencies))
         half = 0.5 * (length - 1) / rate
@@ -63,6 +64,6 @@ class WaveBlocks:
         local[:, :, -2] = coefficients[:, None, -2] + coefficients[:, None, -1] * self._place
         local[:, :, -1] = coefficients[:, None, -1] * self._slope
         main = rows[:, : self.full * BLOCK].reshape(len(rows), self.full, BLOCK)
-        main -= local[:, : self.full] @ self._waves.T
+        main -= local[:, : self.full] @ self._rows
         if self.rest:
-            rows[:, self.full * BLOCK :] -= local[:, self.full] @ self._waves[: self.rest].T
+            rows[:, self.full * BLOCK :] -= local[:, self.full] @ self._rows[:, : self.rest]
