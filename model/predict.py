@@ -311,7 +311,8 @@ def _solve_as_it_runs(
     journal = setup.inlet_temperature if growth.journal is None else growth.journal
     settled = False
     for _ in range(MAX_GROWTH_STEPS):
-        running = setup.change(bearing=grown(setup.bearing, growth, setup.inlet_temperature, journal))
+        bearing = grown(setup.bearing, growth, setup.inlet_temperature, journal)
+        running = setup.change(bearing=bearing, options=replace(setup.options, growth=None))
         equilibrium = start = solve_equilibrium(running, force, speed, start)
         felt = growth.journal if growth.journal is not None else equilibrium.mean_journal_temperature
         settled = not equilibrium.converged or abs(felt - journal) < GROWTH_TOLERANCE

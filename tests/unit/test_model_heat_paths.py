@@ -129,6 +129,7 @@ class TestGrowth:
         again = run(by_hand)
         np.testing.assert_allclose(again.h, p.h, rtol=1e-4)
         assert p.setup.bearing.pads[0].assembled_clearance < rocker.pads[0].assembled_clearance
+        assert p.mesh_error < 0.01  # the coarser mesh does not grow once more
 
     def test_no_clearance_left_is_said(self, rocker):
         with pytest.raises(ValueError, match="no clearance left"):

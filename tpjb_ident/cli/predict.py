@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,6 +13,7 @@ from tpjb_ident.cli.errors import BadInputError, NotTrustedError, guarded
 from tpjb_ident.cli.inputs import refuse_special
 from tpjb_ident.cli.options import BearingPath, EffectsFile, Out, Thermal, out_folder
 from tpjb_ident.cli.outdir import output_folder
+from tpjb_ident.cli.physics import HousingTemperature, Physics, parse_physics
 from tpjb_ident.cli.quantities import MAX_VALUES, parse_value, parse_values
 from tpjb_ident.cli.record import write_record
 from tpjb_ident.cli.show import progress, say, table
@@ -36,6 +38,8 @@ def predict(
     ] = "kirk",
     thermal: Thermal = "adiabatic",
     effects: EffectsFile = None,
+    physics: Physics = None,
+    housing_temperature: HousingTemperature = None,
     out: Out = None,
 ) -> None:
     """Predict coefficients, shaft position and pad data.
@@ -45,7 +49,7 @@ def predict(
     """
     points = operating_points(load, load_direction, speed, excitation)
     choice = pivot_choice(pivots)
-    settings = model_settings(choice, thermal, effects)
+    settings = replace(model_settings(choice, thermal, effects), options=parse_physics(physics, housing_temperature))
     refuse_special(bearing)
     from model.bearing import load_bearing
     from tpjb_ident.compare.predictions import predict_points, prediction_frame
@@ -55,7 +59,7 @@ def predict(
     inputs = {p.name: sha256(p) for p in (bearing, effects, choice) if isinstance(p, Path)}
     options = {"bearing": bearing, "load": load, "load_direction": load_direction, "speed": speed,
                "excitation": excitation or "synchronous", "pivots": pivots, "thermal": thermal,
-               "effects": effects}  # fmt: skip
+               "effects": effects, "physics": physics, "housing_temperature": housing_temperature}  # fmt: skip
     with output_folder(target, "predict") as folder:
         with progress("predicting") as show:
             predictions = predict_points(loaded, points, settings, show)

@@ -16,6 +16,7 @@ check_model()
 
 from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
 from model.effects import Effect  # noqa: E402
+from model.options import Options  # noqa: E402
 from model.predict import Prediction, predict  # noqa: E402
 
 if TYPE_CHECKING:
@@ -36,11 +37,14 @@ class ModelSettings:
         As `model.predict.predict` takes them.
     thermal : {"isothermal", "adiabatic", "tehd"}
     effects : tuple of Effect
+    options : Options
+        Physics beyond the paper's model.
     """
 
     pivots: Any = "kirk"
     thermal: str = "adiabatic"
     effects: tuple[Effect, ...] = ()
+    options: Options = field(default_factory=Options)
 
 
 @dataclass(frozen=True)
@@ -117,6 +121,7 @@ def predict_points(
             thermal=settings.thermal,
             effects=settings.effects,
             start=before,
+            options=settings.options,
         )
         before = prediction if prediction.converged else None
         found[static] = prediction
