@@ -68,7 +68,8 @@ def parsed(text):
 
 def test_nothing_from_outside_becomes_markup(page_and_svg):
     tags = parsed(page_and_svg[0])
-    assert not [t for t, _ in tags if t in ("script", "img", "iframe", "object", "link", "b")]
+    assert not [t for t, _ in tags if t in ("img", "iframe", "object", "link", "b")]
+    assert [a for t, a in tags if t == "script"] == [{}]  # our own, held by its hash
     assert not [a for _, attrs in tags for a in attrs if a.startswith("on")]
     assert page_and_svg[0].count("&lt;script&gt;") >= 10
 
@@ -125,3 +126,24 @@ def test_no_global_matplotlib_setting_is_left_behind():
     figure, _ = new_picture("x", "y")
     svg_text(figure, "z")
     assert dict(matplotlib.rcParams) == before
+
+
+def test_the_only_script_is_ours_and_the_policy_lets_no_other_run(page_and_svg):
+    import base64
+    import hashlib
+    from pathlib import Path
+
+    import tpjb_ident.report
+
+    (script,) = re.findall(r"<script>(.*?)</script>", page_and_svg[0], flags=re.S)
+    source = Path(tpjb_ident.report.__file__).parent / "templates" / "sort.js"
+    assert script.strip() == source.read_text(encoding="utf-8").strip()
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in page_and_svg[0]
+
+
+def test_markers_carry_their_values(page_and_svg):
+    _, texts, _ = page_and_svg
+    assert texts["one"].count("<title>kxx ") == 3
+    assert "<title>kxx 2 MN/m at static load 2 kN</title>" in texts["one"]
+    assert texts["two"].count("<title>") == 2

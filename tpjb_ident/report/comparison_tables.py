@@ -71,8 +71,8 @@ def predicted_table(frame: pd.DataFrame) -> Table:
 
 
 def flag_table(comparison: Comparison) -> Table:
-    """Every flag of points, pivot curves, polygon and locus, in plain words."""
-    rows = []
+    """Every flag of points, pivot curves, polygon and locus, in plain words; what says the same stands in one row."""
+    rows: list[list[str]] = []
     for p in comparison.identification.points:
         rows += [[point_label(p), str(c), getattr(c, "detail", ""), meaning(c)] for c in p.quality]
     rows += [["campaign", str(c), c.detail, meaning(c)] for c in comparison.identification.conditions]
@@ -85,7 +85,19 @@ def flag_table(comparison: Comparison) -> Table:
         for condition in status:
             name, _, detail = condition.partition(":")
             rows.append([where, name, detail.strip(), meaning(condition)])
-    return Table("Flags", ["where", "flag", "found", "what it means"], rows, frozenset(range(4)))
+    return Table("Flags", ["flag", "what it means", "where", "found"], _gathered(rows), frozenset(range(4)))
+
+
+def _gathered(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """One row per flag and meaning, with every place; what was found where it differs from place to place."""
+    kept: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for where, name, found, means in rows:
+        kept.setdefault((name, means), []).append((where, found))
+    out = []
+    for (name, means), places in kept.items():
+        details = list(dict.fromkeys(found for _, found in places if found))
+        out.append([name, means, "; ".join(where for where, _ in places), "; ".join(details)])
+    return out
 
 
 def pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -> Table:

@@ -16,6 +16,7 @@ from pathlib import Path
 import matplotlib
 from matplotlib.figure import Figure
 
+from tpjb_ident.report.hover import mark_lines, with_titles
 from tpjb_ident.report.plots.look import LIGHT
 from tpjb_ident.tables import write_atomic, write_text
 
@@ -45,6 +46,12 @@ class Panel:
     group: str
 
 
+def is_wide(figure: Figure) -> bool:
+    """Whether a picture holds several panels side by side and wants the whole width of a page."""
+    width, height = figure.get_size_inches()
+    return bool(width > 1.35 * height and width > 6.5)
+
+
 def panel(name: str, title: str, figure: Figure, group: str) -> Panel:
     """Make a panel of a picture, without its white ground: the page's own shows through."""
     figure.patch.set_alpha(0.0)
@@ -52,11 +59,12 @@ def panel(name: str, title: str, figure: Figure, group: str) -> Panel:
 
 
 def svg_text(figure: Figure, name: str) -> str:
-    """Draw a figure as SVG with text as text; the same figure gives the same bytes."""
+    """Draw a figure as SVG with text as text, markers with their values; the same figure gives the same bytes."""
     buffer = io.StringIO()
+    spots = mark_lines(figure)
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return buffer.getvalue()
+    return with_titles(buffer.getvalue(), spots)
 
 
 def inline_svg(text: str, name: str, title: str) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import datetime
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +13,7 @@ import jinja2
 import markupsafe
 
 from tpjb_ident.provenance import versions
-from tpjb_ident.report.figure import Panel, inline_svg
+from tpjb_ident.report.figure import Panel, inline_svg, is_wide
 from tpjb_ident.tables import printable
 
 
@@ -93,7 +95,7 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
     Returns
     -------
     str
-        One file: no script, nothing loaded from anywhere.
+        One file, nothing loaded from anywhere. Its one script sorts tables; the page is complete without it.
     """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
@@ -103,11 +105,16 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    script = environment.get_template("sort.js").render()
+    wide = {p.name for section in page.sections for p in section.panels if is_wide(p.figure)}
     drawn = {p.name: _element(svg[p.name], p) for section in page.sections for p in section.panels}
     return environment.get_template("report.html").render(
         page=page,
         drawn=drawn,
         style=markupsafe.Markup(environment.get_template("style.css").render()),  # our own text, no data in it
+        script=markupsafe.Markup(script),  # likewise
+        script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+        wide=wide,
         versions=versions(),
         finished=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
     )

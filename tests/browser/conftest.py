@@ -1,0 +1,169 @@
+"""Headless Chromium over its debugging protocol: open a page, measure it, take its picture."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars",
+         "--remote-debugging-port=0", "--remote-allow-origins=*", "--no-first-run", "--disable-extensions",
+         "--disable-background-networking", "--disable-component-update", "--mute-audio")  # fmt: skip
+
+
+def find_chromium() -> str | None:
+    """Path of a browser: what TPJB_CHROMIUM names, or the first on the PATH."""
+    named = os.environ.get("TPJB_CHROMIUM")
+    return named or next((found for name in NAMES if (found := shutil.which(name))), None)
+
+
+class Tab:
+    """One page of the browser; everything that it logs is kept."""
+
+    def __init__(self, socket: Any) -> None:
+        self.socket = socket
+        self.count = 0
+        self.logged: list[str] = []
+        self.requested: list[str] = []
+        self.loaded = False
+        for domain in ("Page", "Runtime", "Log", "Network", "DOM", "Accessibility"):
+            self.call(f"{domain}.enable")
+
+    def call(self, method: str, **parameters: Any) -> dict[str, Any]:
+        """Send a command and wait for its answer."""
+        self.count += 1
+        mine = self.count
+        self.socket.send(json.dumps({"id": mine, "method": method, "params": parameters}))
+        while True:
+            message = json.loads(self.socket.recv())
+            if message.get("id") == mine:
+                if "error" in message:
+                    raise RuntimeError(f"{method}: {message['error']}")
+                return message["result"]
+            self._event(message)
+
+    def _event(self, message: dict[str, Any]) -> None:
+        method, p = message.get("method"), message.get("params", {})
+        if method == "Runtime.exceptionThrown":
+            self.logged.append(f"exception: {json.dumps(p['exceptionDetails'])[:500]}")
+        elif method == "Runtime.consoleAPICalled" and p["type"] in ("error", "warning", "assert"):
+            self.logged.append(f"console {p['type']}: {json.dumps(p['args'])[:500]}")
+        elif method == "Log.entryAdded" and p["entry"]["level"] in ("error", "warning"):
+            self.logged.append(f"log: {p['entry'].get('text', '')[:500]} {p['entry'].get('url', '')}")
+        elif method == "Network.requestWillBeSent":
+            self.requested.append(p["request"]["url"])
+        elif method == "Page.loadEventFired":
+            self.loaded = True
+
+    def open(self, url: str, seconds: float = 60.0) -> None:
+        """Go to `url` and wait until it is loaded."""
+        self.loaded = False
+        self.call("Page.navigate", url=url)
+        self.until(lambda: self.loaded, seconds)
+
+    def until(self, condition: Any, seconds: float = 30.0) -> None:
+        """Wait for a condition: a callable, or JavaScript that becomes true."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            if condition() if callable(condition) else self.js(condition):
+                return
+            self.js("1")  # lets events come in
+            time.sleep(0.1)
+        raise TimeoutError(f"{condition} did not come true in {seconds} s; logged: {self.logged[:3]}")
+
+    def js(self, code: str) -> Any:
+        """Evaluate JavaScript and return its value."""
+        result = self.call("Runtime.evaluate", expression=code, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in result:
+            raise RuntimeError(json.dumps(result["exceptionDetails"])[:800])
+        return result["result"].get("value")
+
+    def size(self, width: int, height: int = 900, mobile: bool = False) -> None:
+        """Set the window."""
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=mobile)
+
+    def prefer(self, scheme: str) -> None:
+        """Choose the colour scheme, "light" or "dark"."""
+        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+
+    def picture(self, path: Path, full: bool = True) -> bytes:
+        """Write a PNG of the page."""
+        data = base64.b64decode(self.call("Page.captureScreenshot", captureBeyondViewport=full, format="png")["data"])
+        path.write_bytes(data)
+        return data
+
+    def pdf(self, path: Path) -> None:
+        """Print to PDF."""
+        path.write_bytes(base64.b64decode(self.call("Page.printToPDF", preferCSSPageSize=True)["data"]))
+
+    def accessible(self) -> list[dict[str, Any]]:
+        """Nodes of the accessibility tree that are not ignored."""
+        return [n for n in self.call("Accessibility.getFullAXTree")["nodes"] if not n.get("ignored")]
+
+
+@contextlib.contextmanager
+def browser(javascript: bool = True) -> Iterator[Tab]:
+    """Start Chromium with a profile of its own; give one tab; end it for certain."""
+    import websocket
+
+    found = find_chromium()
+    if found is None:
+        raise FileNotFoundError("no Chromium")
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        process = subprocess.Popen(
+            [found, *FLAGS, f"--user-data-dir={profile}", "about:blank"],
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        try:
+            address = _tab_address(Path(profile) / "DevToolsActivePort", process)
+            socket = websocket.create_connection(address, timeout=90)
+            try:
+                tab = Tab(socket)
+                if not javascript:
+                    tab.call("Emulation.setScriptExecutionDisabled", value=True)
+                yield tab
+            finally:
+                socket.close()
+        finally:
+            process.terminate()
+            try:
+                process.wait(20)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait(20)
+
+
+def _tab_address(port_file: Path, process: subprocess.Popen) -> str:
+    import urllib.request
+
+    for _ in range(600):
+        if port_file.exists() and port_file.read_text().strip():
+            port = port_file.read_text().split()[0]
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=20) as answer:
+                tabs = [t for t in json.load(answer) if t["type"] == "page"]
+            if tabs:
+                return tabs[0]["webSocketDebuggerUrl"]
+        if process.poll() is not None:
+            raise RuntimeError("Chromium ended at once")
+        time.sleep(0.1)
+    raise TimeoutError("Chromium did not open its debugging port")
+
+
+@pytest.fixture
+def chromium():
+    """Open a browser: ``with chromium() as tab``; the test is skipped where none can be found."""
+    if find_chromium() is None:
+        pytest.skip(f"no Chromium on the PATH ({', '.join(NAMES)}); TPJB_CHROMIUM can name one")
+    pytest.importorskip("websocket", reason="the extra test brings websocket-client")
+    return browser
