@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -43,9 +43,15 @@ def open_readonly(path: Path, file: str, run: str | None = None, cache: int | No
     """
     import h5py
 
+    with _faults_told(file, run), h5py.File(path, "r", locking="best-effort", rdcc_nbytes=cache) as handle:
+        yield handle
+
+
+@contextmanager
+def _faults_told(file: str, run: str | None) -> Iterator[None]:
+    """Turn what h5py raises on a broken file into `RigDataError`."""
     try:
-        with h5py.File(path, "r", locking="best-effort", rdcc_nbytes=cache) as handle:
-            yield handle
+        yield
     except RigDataError:
         raise
     except FileNotFoundError as error:
@@ -175,7 +181,8 @@ class Hdf5Reader:
         import h5py
 
         if _GROUP in self.held:
-            yield self.held[_GROUP]
+            with _faults_told(self.base, self.run):
+                yield self.held[_GROUP]
             return
         with open_readonly(self.path, self.base, self.run, cache) as handle:
             group = resolve(handle, f"runs/{self.run}", self.base, self.run)
@@ -192,14 +199,24 @@ class Hdf5Reader:
         The library's cache then holds a whole stored chunk of every dataset: slices that are no multiples of the
         chunks would else be unpacked again and again.
         """
+        if _GROUP in self.held:  # by whoever called
+            yield
+            return
+        opened = ExitStack()
+        self.held[_GROUP] = opened.enter_context(self._group(self._cache_bytes()))
+        try:
+            yield
+        finally:  # closed without the block's own errors, which are no faults of the file
+            self.held.clear()
+            opened.close()
+
+    def _cache_bytes(self) -> int:
+        """Two stored chunks of the largest of a few datasets; they are stored alike as a rule."""
+        if self._known().length * 8 <= _LEAST_CACHE:
+            return _LEAST_CACHE
         with self._group() as group:
-            largest = max((_chunk_bytes(group, name) for name in itertools.islice(group, _MAX_MEMBERS)), default=0)
-        with self._group(min(max(2 * largest, _LEAST_CACHE), _MOST_CACHE)) as group:
-            self.held[_GROUP] = group
-            try:
-                yield
-            finally:
-                self.held.clear()
+            largest = max(_chunk_bytes(group, name) for name in self._known().members[:4])
+        return min(max(2 * largest, _LEAST_CACHE), _MOST_CACHE)
 
     def counted(self) -> bool:
         """Whether times are counted from the rate, not read from the file."""

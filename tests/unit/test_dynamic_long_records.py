@@ -78,6 +78,9 @@ def test_a_kept_file_serves_many_requests_and_lets_go(run):
         parts = [reader.read(["X1A"], i, i + 500)[0] for i in range(0, 5000, 500)]
     np.testing.assert_array_equal(np.concatenate(parts), reader.read(["X1A"], 0, 5000)[0])
     assert reader.held == {}
+    with pytest.raises(KeyError, match="mine"), reader.kept_open():
+        raise KeyError("mine")  # no fault of the file
+    assert reader.held == {}
 
 
 def test_a_long_run_is_read_once_and_says_the_same():

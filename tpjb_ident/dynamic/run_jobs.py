@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from tpjb_ident.dynamic.run_phasors import PhasorSettings, RunPhasors, run_phasors
+from tpjb_ident.dynamic.stretches import kept_open
 from tpjb_ident.dynamic.windows import RecordTooShortError
 from tpjb_ident.executors import Here, Workers, in_order
 
@@ -77,11 +78,12 @@ def _anywhere(run: Any) -> Any:
 
 def one_run(run: Any, housing_mass: float, settings: PhasorSettings) -> RunResult:
     """Phasors and temperatures of one run."""
-    try:
-        phasors = run_phasors(run, housing_mass, settings)
-    except RecordTooShortError as error:
-        raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
-    return RunResult(phasors, mean_temperatures(run))
+    with kept_open(run):
+        try:
+            phasors = run_phasors(run, housing_mass, settings)
+        except RecordTooShortError as error:
+            raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
+        return RunResult(phasors, mean_temperatures(run))
 
 
 def mean_temperatures(run: Any) -> dict[int, float]:

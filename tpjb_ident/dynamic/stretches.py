@@ -8,7 +8,7 @@ that does not apply (missing values, three probes, a run held in memory), the ru
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -92,11 +92,16 @@ class Stretches:
         return Stretch(rows, time, None if speed is None else speed.values)
 
 
+def kept_open(run: Any) -> AbstractContextManager[None]:
+    """Keep a run's file open while the block runs, where its reader can do that; nested blocks share it."""
+    reader: Any = getattr(run, "reader", None)
+    return reader.kept_open() if hasattr(reader, "kept_open") else nullcontext()
+
+
 @contextmanager
 def open_stretches(run: Any, quantities: Sequence[str]) -> Iterator[Stretches]:
-    """Open a run for many requests; its file stays open while the block runs, where the reader can do that."""
-    keep = getattr(getattr(run, "reader", None), "kept_open", nullcontext)
-    with keep():
+    """Open a run for many requests."""
+    with kept_open(run):
         yield Stretches(run, quantities)
 
 
