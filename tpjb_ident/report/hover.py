@@ -43,6 +43,8 @@ def mark_lines(figure: Figure) -> tuple[Spots, ...]:
     """
     found = []
     for i, axes in enumerate(figure.axes):
+        axes.get_xlim(), axes.get_ylim()  # limits are set late: asking settles them
+        axes.apply_aspect()
         labels, halves = _errorbars(axes)
         for j, line in enumerate(axes.lines):
             if line.get_marker() in ("", "None", " ", None) or len(np.asarray(line.get_xdata())) > 400:
