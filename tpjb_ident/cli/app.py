@@ -10,12 +10,14 @@ from tpjb_ident.cli.check import check
 from tpjb_ident.cli.compare import compare
 from tpjb_ident.cli.demo import demo
 from tpjb_ident.cli.diagnose import diagnose
+from tpjb_ident.cli.evaluate import evaluate
 from tpjb_ident.cli.export import export
 from tpjb_ident.cli.identify import identify
 from tpjb_ident.cli.init import init
 from tpjb_ident.cli.locus import locus
 from tpjb_ident.cli.look import show
 from tpjb_ident.cli.pivot import pivot
+from tpjb_ident.cli.plan import plan
 from tpjb_ident.cli.predict import predict
 from tpjb_ident.cli.simulate import simulate
 from tpjb_ident.cli.spoken import add_command
@@ -46,5 +48,8 @@ def _common(
     pass
 
 
-for command in (init, show, check, identify, pivot, locus, predict, compare, diagnose, simulate, demo, export):
+COMMANDS = (
+    init, show, check, identify, pivot, locus, predict, compare, diagnose, plan, evaluate, simulate, demo, export,
+)  # fmt: skip
+for command in COMMANDS:
     add_command(app, command)

@@ -10,7 +10,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "compare": (f"tpjb compare {DEMO}", f'tpjb compare {DEMO} --pivots "kirk, measured" --thermal tehd'),
     "demo": ("tpjb demo", "tpjb demo --out /tmp/look"),
     "diagnose": (f"tpjb diagnose {DEMO}", f"tpjb diagnose {DEMO} --pivots measured --out found"),
-    "evaluate": (),
+    "evaluate": (
+        f"tpjb evaluate {ROCKER}",
+        f"tpjb evaluate {ROCKER} --none 100 --seeds 1 --raw 20 --workers 2",
+    ),
     "export": (
         "tpjb export tpjb-identify-out --to ross",
         "tpjb export tpjb-predict-out --to excel",
@@ -20,6 +23,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "init": ("tpjb init exports", "tpjb init exports --bearing rocker.toml"),
     "locus": (f"tpjb locus {DEMO}",),
     "pivot": (f"tpjb pivot {DEMO}",),
+    "plan": (
+        f"tpjb plan {ROCKER}",
+        f'tpjb plan {ROCKER} --load "5, 10 kN" --excitation "20..60:10 Hz" --locus 0',
+    ),
     "predict": (
         f'tpjb predict {ROCKER} --load "2.5..8.75:1.25 kN" --excitation "25 Hz"',
         f'tpjb predict {ROCKER} --pivots rigid --speed "1000, 2000, 3000 rpm"',

@@ -88,6 +88,8 @@ def _refusals(problem: Problem, found: Search, settings: DiagnoseSettings) -> tu
     reasons = []
     if model.at_bound:
         reasons.append(f"the best fit ({model.label}) runs into a physical bound")
+    if len(model.candidates) > 1 and _cancelling(problem, model) > settings.cancelling:
+        reasons.append(f"the effects of the best fit ({model.label}) mostly cancel each other")
     left = share_left(problem, found)
     if after.structure.p < settings.adequate and left > settings.closed:
         reasons.append(
@@ -97,6 +99,14 @@ def _refusals(problem: Problem, found: Search, settings: DiagnoseSettings) -> tu
     if after.held_p < settings.held and left > settings.closed:
         reasons.append(f"points that the best fit ({model.label}) has not seen contradict it (p = {after.held_p:.1g})")
     return tuple(reasons)
+
+
+def _cancelling(problem: Problem, model: Fit) -> float:
+    """Whitened size of the largest effect over that of all together."""
+    moved = model.amplitudes - np.array([c.neutral for c in model.candidates])
+    alone = np.linalg.norm(problem.misfit.whiten(model.jacobian * moved), axis=0)
+    together = np.linalg.norm(problem.misfit.whiten(model.prediction - problem.base))
+    return float(alone.max() / together)
 
 
 def share_left(problem: Problem, found: Search) -> float:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from model.setup import Setup
 from tpjb_ident.diagnose.candidates import candidates
+from tpjb_ident.diagnose.closure import closure
 from tpjb_ident.diagnose.decide import decide
 from tpjb_ident.diagnose.forward import Forward, ForwardModel
+from tpjb_ident.diagnose.laws import frequency_laws, sensor_map_test
 from tpjb_ident.diagnose.next_test import designs, rank_designs, say
 from tpjb_ident.diagnose.nuisance import nuisances
 from tpjb_ident.diagnose.observe import Observations
@@ -72,7 +75,23 @@ def diagnose(
         found = search(run, problem, settings, progress)
     verdict = decide(problem, found, settings)
     verdict = replace(verdict, next_test=_next_test(verdict, found, setup, observations, settings))
-    return Diagnosis(verdict, problem, found)
+    return Diagnosis(_with_evidence(verdict, problem, found), problem, found)
+
+
+def _with_evidence(verdict: Verdict, problem: Problem, found: Search) -> Verdict:
+    """Add what the contract does not ask for: tests of structure, closure beside its controls, laws."""
+    sensors, measured = sensor_map_test(problem), closure(problem, found)
+    notes: dict[str, Any] = {
+        "structure": {
+            "p_before": found.before.structure.p, "p_after": found.after.structure.p,
+            "left_in": [t.label for t in found.after.structure.tests[:3] if t.p < 0.01],
+            "scatter_over_stated": found.after.scale,
+        },
+        "closure": measured.to_dict() if measured is not None else None,
+        "sensor_map": None if sensors is None else {**vars(sensors), "words": sensors.words},
+        "frequency_laws": [{**vars(law), "words": law.words} for law in frequency_laws(problem)],
+    }  # fmt: skip
+    return replace(verdict, notes={**verdict.notes, **notes})
 
 
 def pose(observations: Observations, forward: Forward, settings: DiagnoseSettings) -> Problem:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,38 @@ class CampaignPlan:
             if min(self.separation[i, j], self.separation[j, i]) < CONFUSABLE
         )
 
+    @property
+    def pairs(self) -> int:
+        """Pairs of candidates that have an effect at all."""
+        n = int(np.sum(self.detectable > 0.0))
+        return n * (n - 1) // 2
+
+    @property
+    def below_floor(self) -> tuple[str, ...]:
+        """Effects that this campaign would not see at their typical size."""
+        return tuple(c.label for c, d in zip(self.candidates, self.detectable, strict=True) if d < 3.0)
+
+    def matrix(self) -> pd.DataFrame:
+        """Isolability matrix: row A at d' = 6 against everything that column B can imitate, in standard deviations."""
+        import pandas as pd
+
+        labels = [c.label for c in self.candidates]
+        frame = pd.DataFrame(self.separation, columns=labels)
+        frame.insert(0, "effect", labels)
+        return frame
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``plan.json``."""
+        rows = self.to_frame().to_dict("records")
+        effects = [{str(k): _finite(v) for k, v in row.items()} for row in rows]
+        return {
+            "schema": "tpjb-plan/1",
+            "effects": effects,
+            "below_floor": list(self.below_floor),
+            "confusable": [list(pair) for pair in self.confusable],
+            "pairs": self.pairs,
+        }
+
     def to_frame(self) -> pd.DataFrame:
         """One row per effect: detection floor and what it could be mistaken for."""
         import pandas as pd
@@ -83,6 +115,10 @@ class CampaignPlan:
                 }
             )
         return pd.DataFrame(rows)
+
+
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def plan(

@@ -6,7 +6,9 @@ allow, sensors with drawn gains and zeros, and all the noise of a rig.
 
 from __future__ import annotations
 
+import math
 import tempfile
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -22,12 +24,27 @@ from tpjb_ident.compare.predictions import ModelSettings
 from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 from tpjb_ident.diagnose.bench import FINER, Bench, seed
 from tpjb_ident.diagnose.campaign import diagnose_campaign
+from tpjb_ident.diagnose.closure import closure
 from tpjb_ident.diagnose.nuisance import Certificates
 from tpjb_ident.diagnose.settings import DiagnoseSettings
 from tpjb_ident.diagnose.trials import Trial, sized, summary
 
 #: An effect that only truths have.
 MESH_NAME = "finer_mesh_of_the_truth"
+
+
+def raw_trials(labels: Sequence[str], count: int) -> list[Trial]:
+    """List `count` trials: nothing hidden, d' = 12, the same left out, d' = 6 or 36, over all candidates in turn."""
+    order = [labels[i] for i in np.random.default_rng(5).permutation(len(labels))]
+    out: list[Trial] = []
+    for i in range(math.ceil(count / 4)):
+        label = (order[i % len(order)],)
+        again = i // len(order)
+        out.append(Trial("none", noise=(1.0, 2.0)[i % 2], number=i))
+        out.append(Trial("hidden", label, 12.0, 1.0, again))
+        out.append(Trial("left out", label, 12.0, 1.0, again))
+        out.append(Trial("hidden", label, (6.0, 36.0)[i % 2], 1.0, again))
+    return out[:count]
 
 
 def run_raw_trial(bench: Bench, bearing: Bearing, trial: Trial) -> dict[str, Any]:
@@ -56,6 +73,9 @@ def run_raw_trial(bench: Bench, bearing: Bearing, trial: Trial) -> dict[str, Any
     row |= summary(result.diagnosis.verdict, effects)
     row["p_before"], row["p_after"] = found.before.structure.p, found.after.structure.p
     row["held_p"], row["scale"] = found.after.held_p, found.after.scale
+    measured = closure(result.diagnosis.problem, found)
+    if measured is not None:
+        row |= {"closed": measured.closed, "closed_wrong": measured.wrong, "closed_ceiling": measured.ceiling}
     return row
 
 

@@ -20,6 +20,8 @@ class DiagnoseSettings:
         p-value of the baseline's residual, all tests considered, below which something is the matter.
     adequate : float
         p-value below which what a model leaves is still structured.
+    cancelling : float
+        Whitened size of one effect, in units of what all together do, above which effects merely cancel each other.
     held : float
         p-value below which held-out points contradict a model.
     detect, further : float
@@ -42,7 +44,8 @@ class DiagnoseSettings:
     tolerance: Tolerance = field(default_factory=Tolerance)
     certificates: Certificates = field(default_factory=Certificates)
     alarm: float = 0.01
-    adequate: float = 0.01
+    adequate: float = 0.005
+    cancelling: float = 2.5
     held: float = 0.001
     detect: float = 12.0
     further: float = 25.0

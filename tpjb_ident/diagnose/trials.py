@@ -11,8 +11,11 @@ import numpy as np
 from model.effects import Effect
 from tpjb_ident.diagnose.bench import Bench, seed
 from tpjb_ident.diagnose.candidates import Candidate
+from tpjb_ident.diagnose.closure import closure, held_out_misfit
 from tpjb_ident.diagnose.diagnose import solve
 from tpjb_ident.diagnose.naive import naive_names
+from tpjb_ident.diagnose.problem import Problem
+from tpjb_ident.diagnose.search import Search
 from tpjb_ident.diagnose.settings import DiagnoseSettings
 from tpjb_ident.diagnose.verdict import Verdict
 
@@ -59,6 +62,8 @@ class Plan:
         Per effect, at d' = 12 and 24.
     two : int
         Campaigns with two effects at d' = 12 each.
+    raw : int
+        Campaigns as raw volts.
     """
 
     sizes: tuple[float, ...] = (3.0, 6.0, 12.0, 36.0)
@@ -67,6 +72,7 @@ class Plan:
     none: int = 300
     left_out: int = 2
     two: int = 60
+    raw: int = 0
 
 
 def trials(labels: Sequence[str], plan: Plan) -> Iterator[Trial]:
@@ -107,7 +113,18 @@ def run_trial(bench: Bench, trial: Trial) -> dict[str, Any]:
     row["held_p"], row["scale"] = found.after.held_p, found.after.scale
     row["size_all"] = bench.size(effects, bench.factor(trial.noise))
     row["naive"] = naive_names(problem, found, rng)
+    measured = closure(problem, found)
+    if measured is not None:
+        row |= {"closed": measured.closed, "closed_wrong": measured.wrong, "closed_ceiling": measured.ceiling}
+        row["placebo_fall"] = _forced_fall(problem, found, measured.before)
     return row
+
+
+def _forced_fall(problem: Problem, found: Search, before: float) -> float:
+    """Fall of the squared misfit per held-out point when the effect of the largest score is simply added."""
+    best = found.first_scores[0]
+    forced = found.baseline.prediction + best.column * (best.amplitude - best.candidate.neutral)
+    return before - held_out_misfit(problem, forced)
 
 
 def sized(

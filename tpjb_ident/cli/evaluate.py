@@ -1,0 +1,137 @@
+"""`tpjb evaluate`: how often a diagnosis is right, from campaigns with hidden effects; regenerates the evidence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tpjb_ident.cli.errors import BadInputError, guarded
+from tpjb_ident.cli.options import BearingPath, Out, Scheduler, WorkerCount, out_folder
+from tpjb_ident.cli.outdir import output_folder
+from tpjb_ident.cli.record import write_record
+from tpjb_ident.cli.show import progress, say, table
+from tpjb_ident.provenance import sha256
+from tpjb_ident.tables import write_table, write_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tpjb_ident.diagnose.bench import Bench
+    from tpjb_ident.executors import Workers
+
+PRELOAD = ("tpjb_ident.diagnose.trials",)
+
+
+@guarded
+def evaluate(
+    bearing: BearingPath,
+    sizes: Annotated[str, typer.Option(help="Sizes d' of the hidden effects, in standard deviations.")] = "3,6,12,36",
+    noises: Annotated[str, typer.Option(help="Factors on the noise of identification.")] = "1,2",
+    seeds: Annotated[int, typer.Option(min=0, help="Campaigns per effect, size and noise.")] = 2,
+    none: Annotated[int, typer.Option(min=0, help="Campaigns with calibration errors and nothing hidden.")] = 300,
+    left_out: Annotated[int, typer.Option(min=0, help="Campaigns per effect that the library lacks.")] = 4,
+    two: Annotated[int, typer.Option(min=0, help="Campaigns with two effects.")] = 60,
+    raw: Annotated[int, typer.Option(min=0, help="Campaigns written as raw volts and identified (30 s each).")] = 0,
+    workers: WorkerCount = None,
+    scheduler: Scheduler = None,
+    out: Out = None,
+) -> None:
+    """Draw campaigns with hidden effects, diagnose them, and count: the evidence behind `tpjb diagnose`.
+
+    Writes trials, summary, confusion, figures and rules as .csv and .parquet, and evidence.md. The same seed gives
+    the same campaigns, whatever the workers.
+    """
+    if scheduler is not None and workers is not None:
+        raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")
+    from model.bearing import load_bearing
+    from tpjb_ident.diagnose.bench import paper_layout, prepare
+    from tpjb_ident.diagnose.trials import Plan
+    from tpjb_ident.executors import open_workers
+
+    plan = Plan(_numbers(sizes, "--sizes"), _numbers(noises, "--noises"), seeds, none, left_out, two, raw)
+    drawn = load_bearing(bearing)
+    target = out_folder(out, "evaluate")
+    options = {"bearing": bearing, "sizes": sizes, "noises": noises, "seeds": seeds, "none": none,
+               "left_out": left_out, "two": two, "raw": raw}  # fmt: skip
+    with output_folder(target, "evaluate") as folder:
+        with progress("evaluating") as show:
+            show("tabling the model", 0, 100)
+            bench = prepare(drawn, paper_layout(len(drawn.pads)))
+            with open_workers(workers, scheduler, PRELOAD) as team:
+                rows = _run(team, bench, drawn, plan, show)
+        summary = _write(folder, rows)
+        write_record(folder, target, "evaluate", options, {bearing.name: sha256(bearing)})
+    _show(summary)
+    say(f"Results: {target}")
+
+
+def _numbers(text: str, name: str) -> tuple[float, ...]:
+    try:
+        values = tuple(float(part) for part in text.split(",") if part.strip())
+    except ValueError as error:
+        raise BadInputError(f"{name} {text!r}: must be numbers with commas between them, such as 6,12.") from error
+    if not all(0 < value < 1e6 for value in values):
+        raise BadInputError(f"{name} {text!r}: numbers must be positive and below a million.")
+    return values
+
+
+def _run(team: Workers, bench: Bench, drawn: Any, plan: Any, show: Any) -> list[dict[str, Any]]:
+    from tpjb_ident.diagnose.raw_trials import raw_trials, run_raw_trial
+    from tpjb_ident.diagnose.trials import run_trial, trials
+    from tpjb_ident.executors import in_order
+
+    labels = [c.label for c in bench.pool]
+    drawn_trials, whole = list(trials(labels, plan)), list(raw_trials(labels, plan.raw))
+    total = len(drawn_trials) + 50 * len(whole)
+    rows = []
+    for row in in_order(team, run_trial, [(trial,) for trial in drawn_trials], bench):
+        rows.append(row)
+        show(f"{row['kind']} {' + '.join(row['truth'])}", len(rows), total)
+    for row in in_order(team, run_raw_trial, [(drawn, trial) for trial in whole], bench):
+        rows.append(row)
+        show(f"raw volts, {row['kind']}", total - 50 * (len(drawn_trials) + len(whole) - len(rows)), total)
+    return rows
+
+
+def _write(folder: Path, rows: list[dict[str, Any]]) -> pd.DataFrame:
+    import pandas as pd
+
+    from tpjb_ident.diagnose.evidence import (
+        confusion_table,
+        figures_table,
+        markdown,
+        outcome,
+        rules_table,
+        summary_table,
+    )
+
+    flat = [
+        {**{k: " | ".join(map(str, v)) if isinstance(v, tuple) else v for k, v in row.items() if k != "naive"},
+         "outcome": outcome(row)}
+        for row in rows
+    ]  # fmt: skip
+    write_table(folder, "trials", pd.DataFrame(flat))
+    tables = {
+        "summary": summary_table(rows),
+        "figures": figures_table(rows),
+        "rules": rules_table(rows),
+        "confusion": confusion_table(rows),
+        "impostors": confusion_table(rows, "left out"),
+    }
+    texts = []
+    for name, frame in tables.items():
+        write_table(folder, name, frame)
+        texts.append(f"## {name}\n\n{markdown(frame)}")
+    write_text(folder / "evidence.md", "\n".join(texts))
+    return tables["summary"]
+
+
+def _show(summary: pd.DataFrame) -> None:
+    columns = ["rung", "kind", "size_sigma", "noise_factor", "trials", "right_share", "abstained_share", "errors"]
+    rows = [
+        [f"{v:.3g}" if isinstance(v, float) else str(v) for v in row]
+        for row in summary[columns].itertuples(index=False)
+    ]
+    table("Outcomes", columns, rows, (0, 1))
