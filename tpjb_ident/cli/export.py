@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,7 +10,7 @@ import typer
 
 from tpjb_ident.cli.errors import BadInputError, NotTrustedError, guarded
 from tpjb_ident.cli.inputs import open_campaign
-from tpjb_ident.cli.options import Method, Norm, Out, out_folder
+from tpjb_ident.cli.options import Method, Norm, Out, one_of, out_folder
 from tpjb_ident.cli.outdir import output_folder
 from tpjb_ident.cli.record import write_record
 from tpjb_ident.cli.show import note_line, progress, say
@@ -18,6 +19,7 @@ from tpjb_ident.provenance import sha256
 if TYPE_CHECKING:
     import pandas as pd
 
+FORMATS = ("ross", "csv", "parquet", "excel", "mat", "xltrc", "dyrobes", "ansys")
 TABLES = ("coefficients.csv", "prediction.csv")
 Source = Annotated[
     Path,
@@ -28,16 +30,22 @@ Source = Annotated[
 @guarded
 def export(
     source: Source,
-    to: Annotated[str, typer.Option("--to", help="ross, csv or mat.")],
+    to: Annotated[str, typer.Option("--to", help=f"{', '.join(FORMATS)}.", autocompletion=one_of(*FORMATS))],
     method: Method = "mm-eiv",
     norm: Norm = None,
     out: Out = None,
 ) -> None:
-    """Write coefficients as ROSS bearing elements (one TOML file per static point), a CSV table, or a MATLAB file."""
+    """Write coefficients as other programs read them.
+
+    ROSS bearing elements (one TOML file per static point), tables (CSV, Parquet, Excel), a MATLAB file, or text over
+    shaft speed for XLTRC, Dyrobes and ANSYS (one file per load and excitation frequency).
+    """
     from tpjb_ident.export import WRITERS, static_points
 
     if to not in WRITERS:
-        raise BadInputError(f"--to: {to!r} is not known. Use {', '.join(WRITERS)}.")
+        near = difflib.get_close_matches(to, WRITERS, n=1)
+        hint = f"Did you mean {near[0]!r}?" if near else f"Use one of {', '.join(WRITERS)}."
+        raise BadInputError(f"--to: {to!r} is not known. {hint}")
     frame, name, inputs = _coefficients(source, method, norm)
     points, left_out = static_points(frame)
     target = out_folder(out, "export")
@@ -49,6 +57,8 @@ def export(
     say(f"Results: {target}")
     if to == "ross":
         note_line("note", "ROSS extrapolates outside the frequencies given; K holds Re h, the masses are zero.")
+    if to in ("xltrc", "dyrobes", "ansys"):
+        note_line("note", "these programs know K and C over shaft speed only: one file per excitation frequency.")
     if left_out:
         raise NotTrustedError(f"left out, because their coefficients are not finite: {'; '.join(left_out[:5])}")
 

@@ -1,0 +1,127 @@
+"""Text tables for rotordynamic programs that read coefficients over shaft speed: XLTRC, Dyrobes, ANSYS.
+
+They know one set of K and C per speed. A static point identified at several frequencies therefore gives one file per
+excitation frequency; which one belongs into a model depends on what is computed with it, and the file says so.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from tpjb_ident.export.points import ENTRIES, FloatArray, StaticPoint
+from tpjb_ident.tables import printable, write_text
+
+
+@dataclass(frozen=True)
+class SpeedTable:
+    """Coefficients over shaft speed, of one static load and one excitation frequency.
+
+    Attributes
+    ----------
+    load, direction : float
+        [N], [deg]
+    frequency : float
+        Excitation [rad/s]; NaN where it was the running speed everywhere.
+    speed : (n,) ndarray
+        [Hz], rising.
+    k, c : (n, 4) ndarray
+        xx, xy, yx, yy [N/m], [N s/m].
+    """
+
+    load: float
+    direction: float
+    frequency: float
+    speed: FloatArray = field(repr=False)
+    k: FloatArray = field(repr=False)
+    c: FloatArray = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        """For a file name."""
+        line = "synchronous" if np.isnan(self.frequency) else f"{self.frequency / (2 * np.pi):g}Hz"
+        return f"{self.load:.0f}N_{self.direction:g}deg_{line}"
+
+    @property
+    def words(self) -> str:
+        """What it is, in one line."""
+        line = "the running speed" if np.isnan(self.frequency) else f"{self.frequency / (2 * np.pi):g} Hz"
+        return f"static load {self.load:g} N at {self.direction:g} deg, excitation at {line}"
+
+
+def speed_tables(points: tuple[StaticPoint, ...]) -> tuple[SpeedTable, ...]:
+    """Sort coefficients by load, direction and excitation frequency, each over shaft speed."""
+    rows = []
+    for p in points:
+        for i, omega in enumerate(p.frequency):
+            synchronous = abs(omega - 2 * np.pi * p.speed) < 1e-6 * omega
+            k, c = ([p.coefficients[f"{kind}{e}"][i] for e in ENTRIES] for kind in "kc")
+            line = -1.0 if synchronous else round(float(omega), 9)
+            rows.append(((p.load, p.direction, line), p.speed, k, c))
+    rows.sort(key=lambda row: (row[0], row[1]))
+    out = []
+    for (load, direction, line), group in itertools.groupby(rows, key=lambda row: row[0]):
+        own = list(group)
+        out.append(
+            SpeedTable(
+                load, direction, float("nan") if line < 0 else line, np.array([r[1] for r in own]),
+                np.array([r[2] for r in own]), np.array([r[3] for r in own]),
+            )
+        )  # fmt: skip
+    return tuple(out)
+
+
+def _rows(table: SpeedTable) -> Iterator[tuple[float, FloatArray, FloatArray]]:
+    yield from zip(60.0 * table.speed, table.k, table.c, strict=True)
+
+
+def xltrc_text(table: SpeedTable, source: str) -> str:
+    """Tab-separated table in the order of XLTRC's user-defined bearing sheet: paste it below the sheet's head."""
+    names = [f"{kind}{e}" for kind in "KC" for e in ENTRIES]
+    head = "\t".join(["Speed (rpm)", *(f"{n} ({'N/m' if n[0] == 'K' else 'N-s/m'})" for n in names)])
+    lines = [f"* {_one_line(source)}", f"* {table.words}; SI units", head]
+    lines += ["\t".join([f"{rpm:.6g}", *(f"{v:.8e}" for v in (*k, *c))]) for rpm, k, c in _rows(table)]
+    return "\n".join(lines) + "\n"
+
+
+def dyrobes_text(table: SpeedTable, source: str) -> str:
+    """External bearing file of Dyrobes: points, unit system 4 (N, m, s), 8 coefficients, then one line per speed."""
+    lines = [f"{len(table.speed)}, 4, 8, 0, 0, 0, 0   {_one_line(source)}; {table.words}"]
+    lines += [", ".join([f"{rpm:.6g}", *(f"{v:.8e}" for v in (*k, *c))]) for rpm, k, c in _rows(table)]
+    return "\n".join(lines) + "\n"
+
+
+def ansys_text(table: SpeedTable, source: str) -> str:
+    """File that ANSYS reads for COMBI214: titles, count and unit keys (0: SI; 1: rpm to rad/s), K and C by speed."""
+    lines = [_one_line(source)[:80], table.words[:80], "K11 K12 K21 K22, C11 C12 C21 C22 in N/m, N s/m"]
+    lines.append(f"{len(table.speed):10d}{0:10d}{1:10d}")
+    for i, (rpm, k, c) in enumerate(_rows(table), start=1):
+        lines.append(f"{i:10d}{rpm:10.2f}")
+        lines += ["".join(f"{v:15.7E}" for v in values) for values in (k, c)]
+    return "\n".join(lines) + "\n"
+
+
+def _one_line(text: str) -> str:
+    return printable(text).replace("\n", " ")
+
+
+def write_xltrc(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
+    """Write xltrc_*.txt, one per load and excitation frequency."""
+    for table in speed_tables(points):
+        write_text(folder / f"xltrc_{table.name}.txt", xltrc_text(table, source))
+
+
+def write_dyrobes(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
+    """Write dyrobes_*.txt, one per load and excitation frequency."""
+    for table in speed_tables(points):
+        write_text(folder / f"dyrobes_{table.name}.txt", dyrobes_text(table, source))
+
+
+def write_ansys(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
+    """Write ansys_*.txt, one per load and excitation frequency."""
+    for table in speed_tables(points):
+        write_text(folder / f"ansys_{table.name}.txt", ansys_text(table, source))
