@@ -90,7 +90,13 @@ class Workers(Protocol):
         """
 
 
-def in_order(workers: Workers, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[Any]:
+def in_order(
+    workers: Workers,
+    task: Task,
+    jobs: Sequence[Job],
+    shared: Any = None,
+    finished: Callable[[int, Any], None] | None = None,
+) -> Iterator[Any]:
     """Yield the values of all jobs in their order; raise the error of the first job, in order, that has one.
 
     Parameters
@@ -98,11 +104,15 @@ def in_order(workers: Workers, task: Task, jobs: Sequence[Job], shared: Any = No
     workers : Workers
     task, jobs, shared
         As of `Workers.outcomes`.
+    finished : callable, optional
+        Called with (index, value) as soon as a job has ended well, before earlier ones have.
     """
     early: dict[int, Outcome] = {}
     due = 0
     for index, outcome in workers.outcomes(task, jobs, shared):
         early[index] = outcome
+        if finished is not None and outcome.error is None:
+            finished(index, outcome.value)
         while due in early:
             yield early.pop(due).get()
             due += 1

@@ -19,7 +19,7 @@ from rigdata.readers.csv_table import Source, Table, read_table
 from rigdata.readers.dialect import Dialect, DialectFinder
 
 #: Parsed columns kept by a campaign before the oldest run is let go [bytes].
-CACHE_BYTES = 256 * 2**20
+CACHE_BYTES = 96 * 2**20
 #: A file above this size is parsed column by column, not all channels at once [bytes].
 _LARGE_FILE = 2**29
 _MAX_DIALECTS = 10_000

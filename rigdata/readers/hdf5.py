@@ -343,6 +343,20 @@ class Hdf5Reader:
                     columns.append(np.asarray(dataset[start:stop], dtype=np.float64))
             return columns
 
+    def stored_hash(self) -> str:
+        """SHA-256 of the run as it is stored: its datasets' packed bytes and its attributes."""
+        from rigdata.readers.hdf5_hash import group_hash
+
+        with self._group() as group:
+            usable = []
+            for name in self._known().members:
+                try:
+                    self._dataset(group, name)
+                except RigDataError:  # told when that channel is asked for; no result can come from it
+                    continue
+                usable.append(name)
+            return group_hash(self.path, group, tuple(usable))
+
     def time(self, start: int, stop: int) -> FloatArray:
         """Seconds: the time dataset where there is one, else counted from the rate."""
         if self.clock is not None and self._known().has_time:

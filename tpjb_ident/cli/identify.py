@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -33,9 +34,12 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from tpjb_ident.dynamic.identification import Identification
     from tpjb_ident.dynamic.run_phasors import PhasorSettings
+    from tpjb_ident.dynamic.run_store import RunStore
 
 #: Records [bytes] above which several processes are quicker than one.
 WORTH_PROCESSES = 100 * 2**20
+#: Folder in the output folder in which finished runs wait for the others.
+KEPT = ".tpjb-finished-runs"
 #: What worker processes need, imported once for all of them.
 PRELOAD = ("tpjb_ident.dynamic.run_jobs", "rigdata.readers.hdf5", "rigdata.readers.csv", "h5py")
 
@@ -66,8 +70,12 @@ def identify(
     count = worker_count(source, workers, scheduler)
     target = out_folder(out, "identify")
     with output_folder(target, "identify", (campaign,)) as folder:
-        with open_workers(count, scheduler, PRELOAD) as team, progress("identifying") as show:
-            result = run_identification(source, settings, show, team)
+        with (
+            open_workers(count, scheduler, PRELOAD) as team,
+            finished_runs(target) as store,
+            progress("identifying") as show,
+        ):
+            result = run_identification(source, settings, show, team, store)
         write_identification(folder, result)
         options = {"campaign": campaign, "method": method, "norm": norm, "lines": lines, "delay": delay}
         write_record(folder, target, "identify", options, source.fingerprint(), result.remarks())
@@ -77,6 +85,24 @@ def identify(
         say(f"note: {remark}")
     say(f"Results: {target}")
     refuse_untrusted(result)
+
+
+@contextmanager
+def finished_runs(target: Path) -> Iterator[RunStore]:
+    """Give a store of finished runs inside the output folder; only a kill or Ctrl-C leaves it there.
+
+    Results come into the folder whole or not at all; what is kept for a rerun stands apart from them, in a folder of
+    its own, and goes when the command ends, well or with an error.
+    """
+    from tpjb_ident.dynamic.run_store import RunStore
+
+    store = RunStore(target / KEPT)
+    try:
+        yield store
+    except Exception:
+        store.clear()
+        raise
+    store.clear()
 
 
 def worker_count(campaign: Campaign, asked: int | None, scheduler: str | None) -> int | None:

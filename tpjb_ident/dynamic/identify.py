@@ -23,6 +23,7 @@ from tpjb_ident.dynamic.quality import amplitude, coherence, directional_pattern
 from tpjb_ident.dynamic.rlm import RlmSettings
 from tpjb_ident.dynamic.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.run_phasors import PhasorSettings, RunPhasors
+from tpjb_ident.dynamic.run_store import RunStore
 from tpjb_ident.dynamic.stiffness import DynamicStiffness
 from tpjb_ident.executors import Workers
 
@@ -64,6 +65,7 @@ def identify(
     settings: IdentifySettings | None = None,
     progress: Progress | None = None,
     workers: Workers | None = None,
+    store: RunStore | None = None,
 ) -> Identification:
     """Identify every operating point of a campaign.
 
@@ -75,6 +77,8 @@ def identify(
         Called as progress(text, done, total).
     workers : tpjb_ident.executors.Workers, optional
         Processes or machines over which the reading of runs is spread; the numbers are the same.
+    store : RunStore, optional
+        Keeps finished runs, so that another call after a kill goes on where this one stopped.
 
     Returns
     -------
@@ -94,7 +98,7 @@ def identify(
     if not runs:
         raise ValueError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     tell = progress or (lambda text, done, total: None)
-    results = all_runs(campaign, settings.phasors, tell, workers)
+    results = all_runs(campaign, settings.phasors, tell, workers, store)
     tell("estimating", len(runs), len(runs))
     temperatures = {result.phasors.run: result.temperatures for result in results}
     return assemble(campaign, [result.phasors for result in results], temperatures, settings)

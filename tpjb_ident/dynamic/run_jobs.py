@@ -7,12 +7,14 @@ travel back.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from tpjb_ident.dynamic.run_phasors import PhasorSettings, RunPhasors, run_phasors
+from tpjb_ident.dynamic.run_phasors import PhasorSettings, run_phasors
+from tpjb_ident.dynamic.run_result import RunResult
+from tpjb_ident.dynamic.run_store import RunStore, fingerprint
 from tpjb_ident.dynamic.stretches import kept_open
 from tpjb_ident.dynamic.windows import RecordTooShortError
 from tpjb_ident.executors import Here, Workers, in_order
@@ -22,23 +24,12 @@ Progress = Callable[[str, int, int], None]
 TEMPERATURE_SAMPLES = 2**17
 
 
-@dataclass(frozen=True)
-class RunResult:
-    """What is kept of a run.
-
-    Attributes
-    ----------
-    phasors : RunPhasors
-    temperatures : dict of int to float
-        Mean per pad [K].
-    """
-
-    phasors: RunPhasors
-    temperatures: dict[int, float]
-
-
 def all_runs(
-    campaign: Any, settings: PhasorSettings, progress: Progress, workers: Workers | None = None
+    campaign: Any,
+    settings: PhasorSettings,
+    progress: Progress,
+    workers: Workers | None = None,
+    store: RunStore | None = None,
 ) -> list[RunResult]:
     """Phasors and temperatures of every dynamic run, in the campaign's order.
 
@@ -50,6 +41,8 @@ def all_runs(
         Called as progress(text, done, total).
     workers : Workers, optional
         Who reads the runs; the numbers are the same.
+    store : RunStore, optional
+        Where finished runs are kept, and taken from if nothing has changed since.
 
     Raises
     ------
@@ -59,13 +52,54 @@ def all_runs(
         Workers were lost again and again.
     """
     runs = campaign.of_kind("dynamic")
-    jobs = [(_anywhere(run), campaign.housing_mass, settings) for run in runs]
-    results: list[RunResult] = []
+    mass = campaign.housing_mass
     progress(runs[0].id if runs else "", 0, len(runs))
-    for result in in_order(workers or Here(), one_run, jobs):
-        results.append(result)
-        progress(result.phasors.run, len(results), len(runs))
-    return results
+    if store is None:
+        jobs = [(_anywhere(run), mass, settings) for run in runs]
+        results: list[RunResult] = []
+        for result in in_order(workers or Here(), one_run, jobs):
+            results.append(result)
+            progress(result.phasors.run, len(results), len(runs))
+        return results
+    marked = [(_anywhere(run), mass, settings, store.known(run.id)) for run in runs]
+    done = 0
+
+    def finished(index: int, answer: tuple[str, RunResult | None]) -> None:
+        nonlocal done
+        mark, result = answer
+        if result is not None and mark:
+            store.keep(mark, result)
+        done += 1
+        progress(runs[index].id, done, len(runs))
+
+    answers = list(in_order(workers or Here(), unless_known, marked, finished=finished))
+    found = []
+    for run, (mark, result) in zip(runs, answers):
+        kept = result or store.load(run, mark, mass)
+        # what was kept may be gone by now: another run into the same folder has ended
+        found.append(kept or one_run(run, mass, settings))
+    return found
+
+
+def unless_known(run: Any, housing_mass: float, settings: PhasorSettings, known: str) -> tuple[str, RunResult | None]:
+    """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
+
+    The fingerprint is "" where the record changed while it was read: such a result must not be kept.
+    """
+    mark = fingerprint(run, housing_mass, settings)
+    if mark and mark == known:
+        return mark, None
+    before = _state(run)
+    result = one_run(run, housing_mass, settings)
+    return (mark if before == _state(run) else ""), result
+
+
+def _state(run: Any) -> tuple[int, int] | None:
+    path = getattr(getattr(run, "reader", None), "path", None)
+    if path is None:
+        return None
+    state = path.stat()
+    return state.st_size, state.st_mtime_ns
 
 
 def _anywhere(run: Any) -> Any:

@@ -1,0 +1,185 @@
+"""A rerun goes on where a kill stopped it: finished runs are not repeated, stale ones are, tables stay the same."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigdata.campaign import load_campaign
+from rigdata.virtual_rig import write_campaign
+from tests.unit.test_dynamic_identify import rig
+from tpjb_ident.cli.identify import KEPT
+from tpjb_ident.dynamic import run_jobs
+from tpjb_ident.dynamic.run_jobs import all_runs
+from tpjb_ident.dynamic.run_phasors import PhasorSettings
+from tpjb_ident.dynamic.run_store import RunStore, fingerprint
+from tpjb_ident.executors import local_workers
+
+TABLES = ("coefficients", "estimators", "windows", "frequency_fits")
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    path = tmp_path_factory.mktemp("rig") / "c.h5"
+    write_campaign(path, rig([(2500.0, 25.0), (5000.0, 25.0)], seed=8))
+    return path
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """Ids of the runs that are read, one after the other."""
+    done: list[str] = []
+    plain = run_jobs.one_run
+
+    def one_run(run, *arguments):
+        done.append(run.id)
+        return plain(run, *arguments)
+
+    monkeypatch.setattr(run_jobs, "one_run", one_run)
+    return done
+
+
+def silent(text, done, total):
+    pass
+
+
+def stop_after(count):
+    def progress(text, done, total):
+        if done == count:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def same(first, second) -> bool:
+    for a, b in zip(first, second, strict=True):
+        pairs = [(getattr(a.phasors, n), getattr(b.phasors, n)) for n in ("displacement", "cell_force", "acceleration")]
+        blocks = [(getattr(x, n), getattr(y, n)) for x, y in pairs for n in ("phasors", "mean", "noise", "lost")]
+        blocks += [(a.phasors.start, b.phasors.start), (a.phasors.speeds, b.phasors.speeds)]
+        if not all(np.array_equal(x, y, equal_nan=True) for x, y in blocks):
+            return False
+        if (a.temperatures, a.phasors.lines) != (b.temperatures, b.phasors.lines):
+            return False
+        if [c.sentence() for c in a.phasors.conditions] != [c.sentence() for c in b.phasors.conditions]:
+            return False
+    return True
+
+
+def test_finished_runs_are_not_repeated_and_come_back_bit_for_bit(path, tmp_path, counted):
+    campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
+    whole = all_runs(campaign, settings, silent)
+    counted.clear()
+    with pytest.raises(KeyboardInterrupt):
+        all_runs(campaign, settings, stop_after(7), store=store)
+    assert len(counted) == 7
+    again = all_runs(campaign, settings, silent, store=store)
+    assert sorted(counted) == sorted(run.id for run in campaign.of_kind("dynamic"))  # each of the twelve once
+    assert same(again, whole)
+    counted.clear()
+    with local_workers(2) as workers:
+        assert same(all_runs(campaign, settings, silent, workers, store), whole)
+    assert counted == []
+    store.clear()
+    assert not (tmp_path / "kept").exists()
+
+
+def test_what_has_changed_is_done_again(path, tmp_path, counted):
+    import h5py
+
+    copy = tmp_path / "copy.h5"
+    shutil.copy(path, copy)
+    store, settings = RunStore(tmp_path / "kept"), PhasorSettings()
+    all_runs(load_campaign(copy), settings, silent, store=store)
+    counted.clear()
+    all_runs(load_campaign(copy), settings, silent, store=store)
+    assert counted == []
+    with h5py.File(copy, "r+") as file:  # one sample of one channel of one run
+        file["runs/d-05000-25-03/X1A"][5] += 1e-3
+    all_runs(load_campaign(copy), settings, silent, store=store)
+    assert counted == ["d-05000-25-03"]
+    counted.clear()
+    campaign = load_campaign(copy)
+    all_runs(campaign, replace(settings, find_lines=False), silent, store=store)
+    assert len(counted) == 12
+    gain = replace(campaign.channels["X1A"], gain=1.01 * campaign.channels["X1A"].gain)
+    runs = tuple(replace(run, channels={**run.channels, "X1A": gain}) for run in campaign.runs)
+    counted.clear()
+    all_runs(replace(campaign, runs=runs), replace(settings, find_lines=False), silent, store=store)
+    assert len(counted) == 12
+
+
+def test_a_damaged_or_foreign_file_is_no_result(path, tmp_path, counted):
+    campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
+    whole = all_runs(campaign, settings, silent, store=store)
+    files = sorted(store.folder.iterdir())
+    files[0].write_bytes(files[0].read_bytes()[:500])
+    files[1].write_bytes(b"")
+    files[2].write_text("hello")
+    shutil.copy(files[4], files[3])  # another run's
+    counted.clear()
+    assert same(all_runs(campaign, settings, silent, store=store), whole)
+    assert len(counted) == 4
+
+
+def test_csv_runs_have_fingerprints_of_their_own_bytes(tmp_path):
+    write_campaign(tmp_path / "folder", rig([(2500.0, 25.0)], seed=8), "csv-german")
+    run, other = load_campaign(tmp_path / "folder").of_kind("dynamic")[:2]
+    mark = fingerprint(run, 30.0, PhasorSettings())
+    assert mark != fingerprint(other, 30.0, PhasorSettings())
+    assert mark == fingerprint(load_campaign(tmp_path / "folder").run(run.id), 30.0, PhasorSettings())
+    file = run.reader.path
+    text = file.read_bytes()
+    last = max(i for i, byte in enumerate(text) if chr(byte).isdigit())
+    file.write_bytes(text[:last] + (b"1" if text[last : last + 1] != b"1" else b"2") + text[last + 1 :])
+    assert mark != fingerprint(load_campaign(tmp_path / "folder").run(run.id), 30.0, PhasorSettings())
+
+
+def tables(out: Path) -> list[bytes]:
+    return [(out / f"{name}.csv").read_bytes() for name in TABLES]
+
+
+def command(path: Path, out: Path, *options: str) -> list[str]:
+    return [sys.executable, "-P", "-m", "tpjb_ident", "identify", str(path), "--out", str(out), *options]
+
+
+@pytest.mark.slow
+def test_a_killed_command_goes_on_and_ends_with_the_same_tables(path, tmp_path):
+    subprocess.run(command(path, tmp_path / "whole"), check=True, capture_output=True)
+    assert sorted(p.name for p in (tmp_path / "whole").iterdir() if p.name.startswith(".")) == []
+    out = tmp_path / "killed"
+    process = subprocess.Popen(command(path, out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    until = time.monotonic() + 60
+    while len(list((out / KEPT).glob("*.npz"))) < 3 and time.monotonic() < until and process.poll() is None:
+        time.sleep(0.002)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert not (out / "coefficients.csv").exists()
+    assert len(list((out / KEPT).glob("*.npz"))) >= 3
+    subprocess.run(command(path, out, "--workers", "2"), check=True, capture_output=True)
+    assert tables(out) == tables(tmp_path / "whole")
+    assert not (out / KEPT).exists()
+
+
+def test_an_error_leaves_nothing_behind(path, tmp_path):
+    import h5py
+
+    copy = tmp_path / "copy.h5"
+    shutil.copy(path, copy)
+    with h5py.File(copy, "r+") as file:
+        del file["runs/d-05000-25-03/X1A"]
+    from typer.testing import CliRunner
+
+    from tpjb_ident.cli.app import app
+
+    result = CliRunner().invoke(app, ["identify", str(copy), "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2
+    assert "X1A" in result.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["copy.h5"]
