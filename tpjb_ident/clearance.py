@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 FEWEST_BLOCKS = 4  # per pad
+SAME_WARMTH = 4.0  # [K]
 IRREGULAR = 3.0  # standard errors
 DISAGREES = 0.1  # share: a shaft that slides into its corner slowly makes up for some per cent
 
@@ -58,6 +59,8 @@ class ClearancePolygon:
         By how much the pivots give in the sweep, over what the curves say; 1 when both tests agree. NaN without curves.
     noise : NoiseModel
         Of the displacement channels in this run.
+    temperature : float
+        Mean of the run's temperature channels [K]; NaN without any. Tells hot from cold.
     centre_rule : str
         How the centre was chosen.
     status : tuple of str
@@ -80,6 +83,7 @@ class ClearancePolygon:
     pivot_scale: float
     pivot_scale_se: float
     noise: NoiseModel = field(repr=False)
+    temperature: float = np.nan
     centre_rule: CentreRule = "least-absolute"
     status: tuple[str, ...] = ()
 
@@ -100,9 +104,16 @@ class ClearancePolygon:
                 "corner_x_m": self.corners[:, 0],
                 "corner_y_m": self.corners[:, 1],
                 "push_load_N": self.push_load,
+                "shaft_speed_Hz": self.point.shaft_speed_hz,
+                "temperature_K": self.temperature,
                 "run": self.run,
             }
         )
+
+    @property
+    def regular(self) -> bool:
+        """Whether all clearances are one and the same, within their errors or half a micrometre."""
+        return not any(s.startswith("irregular") for s in self.status)
 
     def __str__(self) -> str:
         pads = ", ".join(
@@ -146,8 +157,7 @@ def measure_clearance(
         raise RigDataError(
             Problem("error", "campaign.toml", "runs", "has no run of kind clearance", "Record a clearance sweep")
         )
-    coldest = min(runs, key=lambda run: (run.point.shaft_speed, run.point.static_load))
-    return measure_run(coldest, pivot_angles, curves, rule)
+    return measure_run(coldest_run(runs), pivot_angles, curves, rule)
 
 
 def measure_clearances(
@@ -176,7 +186,8 @@ def measure_run(
     fit = fit_sides(touch, angles, reached, curves)
     pads = np.flatnonzero(reached)
     centre = find_centre(angles[pads], fit.distance[pads], fit.covariance[np.ix_(pads, pads)], rule)
-    return _polygon(run, touch, angles, fit, centre, rule)
+    found = _polygon(run, touch, angles, fit, centre, rule)
+    return replace(found, status=(*found.status, *_extrapolated(touch.push, curves)))
 
 
 def _polygon(
@@ -216,9 +227,40 @@ def _polygon(
         pivot_scale=fit.scale,
         pivot_scale_se=fit.scale_se,
         noise=fit.noise,
+        temperature=mean_temperature(run),
         centre_rule=rule,
         status=_status(fit, clearance, se, len(pads)),
     )
+
+
+def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[str, ...]:
+    """The push lies outside what the dry tests measured: true of most sweeps, and to be said."""
+    outside = [c for c in curves or () if bool(c.is_extrapolated(push))]
+    if not outside:
+        return ()
+    pads = ", ".join(str(c.pad) for c in outside)
+    lowest = min(c.valid_from for c in outside)
+    return (f"give-extrapolated: pushed with {push:.0f} N, dry tests of pads {pads} hold from {lowest:.0f} N on",)
+
+
+def mean_temperature(run: Run) -> float:
+    """Mean over time and over all temperature channels of a run [K]; NaN without any."""
+    names = [name for name, channel in run.channels.items() if channel.quantity == "temperature"]
+    records = [np.asarray(run.record(name).values) for name in names]
+    means = [float(np.mean(v[np.isfinite(v)])) for v in records if np.isfinite(v).any()]
+    return float(np.mean(means)) if means else float("nan")
+
+
+def coldest_run(runs: Sequence[Run]) -> Run:
+    """The sweep at rest, or at the lowest speed, that is cold; of several such the one with the smallest push."""
+    if len(runs) == 1:
+        return runs[0]
+    slowest = min(run.point.shaft_speed for run in runs)
+    slow = [(run, mean_temperature(run)) for run in runs if run.point.shaft_speed == slowest]
+    cold = float(np.nanmin([t for _, t in slow])) if np.isfinite([t for _, t in slow]).any() else np.nan
+    # a temperature that nobody measured does not rule a sweep out
+    fit = [run for run, t in slow if not t > cold + SAME_WARMTH]
+    return min(fit, key=lambda run: run.point.static_load)
 
 
 def _status(fit: SideFit, clearance: FloatArray, se: FloatArray, reached: int) -> tuple[str, ...]:

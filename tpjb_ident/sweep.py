@@ -110,7 +110,13 @@ def read_sweep(run: Run, angles: FloatArray, give: FloatArray | None = None, lon
     depth = CONTACT_DEPTH + (np.full(len(angles), LARGEST_GIVE) if give is None else 1.3 * give)
     touched = _touched(position, angles, depth)
     carried = _carried(load, angles, touched)
-    return _blocks(time, position, angles, touched, carried, push)
+    return _blocks(time, position, angles, touched, carried, push, _piece_length(run.point.shaft_speed))
+
+
+def _piece_length(shaft_speed: float) -> float:
+    """Length of the averages [s]: whole turns of a shaft that turns, so that its runout averages out."""
+    turn = 2.0 * np.pi / shaft_speed if shaft_speed > 0.0 else BLOCK
+    return float(turn * max(round(BLOCK / turn), 1))
 
 
 def _refused(run: Run, what: str, cure: str) -> RigDataError:
@@ -170,10 +176,11 @@ def _blocks(
     touched: NDArray[np.bool_],
     carried: FloatArray,
     push: float,
+    length: float,
 ) -> Touch:
-    """Average per pad over pieces of `BLOCK` seconds in which the same pads are touched."""
+    """Average per pad over pieces of `length` seconds in which the same pads are touched."""
     state = touched @ (1 << np.arange(len(angles)))
-    piece = np.floor((time - time[0]) / BLOCK).astype(int)
+    piece = np.floor((time - time[0]) / length).astype(int)
     cuts = np.flatnonzero((np.diff(state) != 0) | (np.diff(piece) != 0)) + 1
     starts, stops = np.r_[0, cuts], np.r_[cuts, len(time)]
     long = (stops - starts) >= SHORTEST

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
+from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
 from rigdata.virtual_rig import (
     ClearanceSweep,
@@ -20,9 +21,9 @@ from rigdata.virtual_rig import (
     VirtualRig,
     write_campaign,
 )
-from tpjb_ident.clearance import measure_clearance, measure_clearances
+from tpjb_ident.clearance import coldest_run, measure_clearance, measure_clearances, measure_run
 from tpjb_ident.pivot import fit_pivots
-from tpjb_ident.polygon_pairs import clearance_change, radial_stiffness
+from tpjb_ident.polygon_pairs import clearance_change, pairs_frame, radial_stiffness
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 CLEARANCE = np.array([80.0, 80.0, 86.0, 80.0, 80.0]) * 1e-6
@@ -105,6 +106,68 @@ def test_a_bearing_that_grew_shows_it_on_every_pad(whole, tmp_path):
     assert np.abs(change.centre_shift).max() < 1e-6
     with pytest.raises(ValueError, match="one bearing"):
         clearance_change(cold, replace(cold, angles=ANGLES + 0.1))
+
+
+def test_sweeps_side_by_side(whole):
+    source, _, curves = whole
+    light, heavy = measure_clearances(source, ANGLES, curves)
+    assert coldest_run(source.of_kind("clearance")).id == light.run
+    hot = replace(heavy, run="hot", temperature=light.temperature + 20.0, clearance=light.clearance + 5e-6)
+    frame = pairs_frame(light, [heavy, hot])
+    assert frame.groupby("compared")["run"].unique().map(list).to_dict() == {
+        "push load": [heavy.run], "condition": ["hot"]}  # fmt: skip
+    push, condition = frame[frame["run"] == heavy.run], frame[frame["run"] == "hot"]
+    assert push["stiffness_N_per_m"].to_numpy() == pytest.approx(radial_stiffness(light, heavy).stiffness)
+    assert condition["change_m"].to_numpy() == pytest.approx(5e-6)
+    assert condition["stiffness_N_per_m"].isna().all()
+    assert light.temperature == pytest.approx(273.15 + 24.0, abs=1.0)
+    assert not light.regular
+
+
+def test_the_cold_sweep_counts_however_small_the_hot_ones_push(whole):
+    source, _, _ = whole
+    light, heavy = source.of_kind("clearance")
+
+    class Warm:
+        id, point, channels = "warm", light.point, light.channels
+
+        def record(self, name):
+            record = light.record(name)
+            return replace(record, values=record.values + 20.0)
+
+    assert coldest_run([Warm(), heavy]).id == heavy.id
+    assert coldest_run([Warm()]).id == "warm"
+
+
+def test_the_push_below_the_dry_tests_is_marked_as_extrapolated(whole):
+    source, _, curves = whole
+    light, _ = measure_clearances(source, ANGLES, curves)
+    assert any(s.startswith("give-extrapolated") and "pads 1, 2, 3, 4, 5" in s for s in light.status)
+
+
+def test_a_turning_shafts_runout_averages_out(whole):
+    """The sweep of a turning shaft: 1.1 um of runout on top, found again as on the shaft at rest."""
+    source, _, curves = whole
+    run = source.of_kind("clearance")[0]
+    speed = 2 * np.pi * 22.0
+
+    class Turning:
+        id, file, kind, channels, sample_rate = "turning", run.file, "clearance", run.channels, run.sample_rate
+        point = OperatingPoint(run.point.static_load, run.point.static_load_direction, speed)
+
+        def record(self, name):
+            return run.record(name)
+
+        def vector(self, quantity):
+            record = run.vector(quantity)
+            if quantity == "displacement":
+                turn = 1.0009 * speed * record.time  # the set point is missed by as much as on the samples
+                record.values[:] += 1.1e-6 * np.column_stack([np.cos(turn), np.sin(turn)])
+            return record
+
+    still, turning = (measure_run(r, ANGLES, curves) for r in (run, Turning()))
+    assert turning.clearance == pytest.approx(still.clearance, abs=0.1e-6)
+    assert np.all(turning.clearance_se < 2 * still.clearance_se + 1e-8)
 
 
 def test_without_curves_zero_load_is_extrapolated(whole):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from tpjb_ident.pivot import pivot_table, pivots_text, write_pivots
+from tpjb_ident.pivot import pads_table, pivot_table, pivots_text, write_pivots
 from tpjb_ident.pivot.choice import keep_likely, posterior_weights
 from tpjb_ident.pivot.contact import contact_onset, contact_onset_se
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
@@ -213,7 +213,7 @@ def test_loop_area_of_friction():
     loop = measure_loop(
         np.r_[load, load[::-1]],
         np.r_[up, down[::-1]],
-        np.full(362, 1e-9),
+        np.diag(np.full(362, 1e-9) ** 2),
         np.r_[np.ones(181, dtype=int), -np.ones(181, dtype=int)],
     )
     area = s * mu * (5000.0**2 - 500.0**2)
@@ -221,4 +221,38 @@ def test_loop_area_of_friction():
     assert loop.loss_factor == pytest.approx(area / (np.pi / 4 * 4500.0 * (up[-1] - up[0])), rel=1e-3)
     assert loop.load_range == (500.0, 5000.0)
     assert 0 < loop.energy_se < 0.05 * loop.energy
-    assert measure_loop(load, up, 0 * up + 1e-9, np.ones(181, dtype=int)) is None
+    assert measure_loop(load, up, np.eye(181) * 1e-18, np.ones(181, dtype=int)) is None
+
+
+def test_a_drift_from_up_to_down_is_an_error_of_the_whole_loop():
+    load = np.linspace(500.0, 5000.0, 10)
+    both, branch = np.r_[load, load[::-1]], np.r_[np.ones(10, dtype=int), -np.ones(10, dtype=int)]
+    shift = np.outer(branch < 0, branch < 0) * 1e-7**2
+    loop = measure_loop(both, 1e-9 * both, shift, branch)
+    assert loop.energy_se == pytest.approx(1e-7 * 4500.0, rel=1e-6)
+    assert "loop from 500 to 5000 N" in str(loop)
+
+
+def test_steps_show_what_the_law_says_with_its_way_into_contact():
+    law = fit(contact=True, gap=3e-6, seed=5)
+    one = curve(fits=(law,), onset_load=2000.0, valid_from=2000.0)
+    load = np.array([500.0, 2500.0, 5000.0, 7500.0])
+    value, lo, hi = one.reading_band(load)
+    applied = load / (1.0 - law.theta[1])
+    assert value == pytest.approx(law.reading(applied, np.ones(4)) - law.theta[0])
+    assert value[0] < one.deflection(500.0) - 0.8e-6
+    width = hi - lo
+    # tight among the points, wider beyond them
+    assert width[2] < 0.05e-6
+    assert width[3] > 2 * width[2]
+
+
+def test_one_row_per_pad_says_what_the_curve_holds():
+    frame = pads_table(
+        [curve(), curve(pad=2, onset_load=1800.0, onset_load_se=60.0, status=("contact-incomplete: x",))]
+    )
+    assert frame["includes_housing"].all()
+    assert frame["onset_N"].tolist() == [0.0, 1800.0]
+    assert frame["status"].tolist() == ["ok", "contact-incomplete: x"]
+    assert frame["load_off_pad_deg"].iloc[0] == pytest.approx(np.degrees(0.02))
+    assert np.isnan(frame["loop_energy_J"]).all()

@@ -17,10 +17,12 @@ from tpjb_ident.tables import write_table
 def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None) -> None:
     """Fit the pivot stiffness curves to the dry tests.
 
-    Writes pivot_curves.csv and .parquet, and pivots.toml, which `tpjb predict --pivots` reads.
+    Writes pivot_curves and pivot_pads (.csv, .parquet), pivots.toml, which `tpjb predict --pivots` reads, and figures.
     """
     from tpjb_ident.compare.pivot_formula import printed_formula
-    from tpjb_ident.pivot import fit_pivots, pivot_table, write_pivots
+    from tpjb_ident.pivot import fit_pivots, pads_table, pivot_table, write_pivots
+    from tpjb_ident.report.figure import save_panels
+    from tpjb_ident.report.pivot_panels import pivot_panels
 
     source = open_campaign(campaign)
     drawn, given = open_bearing(source, bearing)
@@ -28,12 +30,15 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
     with output_folder(target, "pivot", (campaign,)) as folder:
         with progress("fitting pivot curves"):
             curves = fit_pivots(source, [pad.pivot_angle for pad in drawn.pads])
-        frame = pivot_table(curves, formula=printed_formula(drawn))
-        write_table(folder, "pivot_curves", frame)
+        formula = printed_formula(drawn)
+        write_table(folder, "pivot_curves", pivot_table(curves, formula=formula))
+        write_table(folder, "pivot_pads", pads_table(curves))
         write_pivots(folder / "pivots.toml", curves, source.id)
+        with progress("drawing figures"):
+            save_panels(pivot_panels(curves, formula), folder / "figures")
         write_record(folder, target, "pivot", {"campaign": campaign, "bearing": bearing or source.bearing_name},
                      source.fingerprint() | given)  # fmt: skip
-    show_curves(curves, source.id)
+    show_curves(curves, source.id, formula)
     say(f"Results: {target}")
     from tpjb_ident.report.words import is_serious
 
@@ -45,8 +50,8 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
         raise NotTrustedError("; ".join(bad))
 
 
-def show_curves(curves: Any, name: str) -> None:
-    """Print the tangent stiffness of every pad at half and at full measured load."""
+def show_curves(curves: Any, name: str, formula: Any = None) -> None:
+    """Print the tangent stiffness of every pad at half and at full measured load, and the share of Kirk's formula."""
     rows = []
     for curve in curves:
         cells = [f"#{curve.pad}"]
@@ -54,6 +59,11 @@ def show_curves(curves: Any, name: str) -> None:
             low, high = (float(v) for v in curve.stiffness_band(load))
             cells += [f"{load / 1e3:.2f}", f"{float(curve.stiffness(load)) / 1e6:.0f}",
                       f"{low / 1e6:.0f}..{high / 1e6:.0f}"]  # fmt: skip
+        if formula is not None:
+            one = 0.01 * formula(curve.pad, curve.valid_to)[1]
+            low, high = (float(v) for v in curve.stiffness_band(curve.valid_to))
+            cells.append(f"{float(curve.stiffness(curve.valid_to)) / one:.0f} ({low / one:.0f}..{high / one:.0f})")
         rows.append([*cells, curve.law.name])
     headings = ["load kN", "MN/m", "95 %"]
-    table(f"{name}: tangent stiffness of the pivots", ["pad", *headings, *headings, "law"], rows, words=(0, 7))
+    headings = ["pad", *headings, *headings, *(["of Kirk, %"] if formula is not None else []), "law"]
+    table(f"{name}: tangent stiffness of the pivots", headings, rows, words=(0, len(headings) - 1))

@@ -3,6 +3,7 @@
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
 from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.pivot.hysteresis import Hysteresis
+from tpjb_ident.pivot.pads_table import pads_table
 from tpjb_ident.pivot.pivots_toml import pivots_text, write_pivots
 from tpjb_ident.pivot.settings import PivotSettings
 from tpjb_ident.pivot.table import pivot_table
@@ -13,6 +14,7 @@ __all__ = [
     "PivotSettings",
     "PivotSteps",
     "fit_pivots",
+    "pads_table",
     "pivot_table",
     "pivots_text",
     "write_pivots",

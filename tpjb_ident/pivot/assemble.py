@@ -154,10 +154,15 @@ def _steps(record: DryRecord, good: BoolArray, law: LawFit, noise: NoiseModel, r
 
 
 def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:
-    """Loop over the loads as applied: taking off the friction would close it."""
+    """Loop over the loads as applied: taking off the friction would close it.
+
+    The deflections are those of the fit at the steps: it knows drift from friction by what goes on within the holds,
+    while the area between the points themselves takes every drift from the way up to the way down for a loss.
+    """
     used = steps.weight > 0
-    applied = steps.load / (1.0 - law.theta[FRICTION] * steps.branch)
-    return measure_loop(applied[used], steps.deflection[used], steps.deflection_se[used], steps.branch[used])
+    applied = (steps.load / (1.0 - law.theta[FRICTION] * steps.branch))[used]
+    reading, gradient = law.reading_gradient(applied, steps.branch[used].astype(float))
+    return measure_loop(applied, reading, gradient @ law.covariance @ gradient.T, steps.branch[used])
 
 
 def _calibration(channels: Mapping[str, Channel], angle: float) -> float:
@@ -179,6 +184,9 @@ def _status(
         found.append(f"bad-steps: {int(np.sum(steps.weight == 0.0))} left out")
     if abs(choice.directions[0][0].angle) > settings.angle_warning:
         found.append(f"load-off-pad: {choice.directions[0][0]}")
+    aside = choice.directions[0][1]
+    if abs(aside.angle) > 0.5 * settings.displacement_angle_limit:
+        found.append(f"moves-aside: the shaft goes {aside}")
     if onset > 0.0:
         found.append(f"contact-incomplete: below {onset:.0f} N")
     if onset >= float(np.max(steps.load)):

@@ -250,6 +250,10 @@ class PivotCurve:
             f"  tangent stiffness at {at:.0f} N: {float(self.stiffness(at)):.4g} N/m (95 %: {lo:.4g} to {hi:.4g})",
             f"  holds from {self.valid_from:.0f} to {self.valid_to:.0f} N; load {self.load_direction}",
         ]
+        if self.onset_load > 0.0:
+            lines.append(f"  fully in contact from {self.onset_load:.0f} N (se {self.onset_load_se:.0f} N)")
+        if self.hysteresis is not None:
+            lines.append(f"  {self.hysteresis}")
         if self.status:
             lines.append("  status: " + ", ".join(self.status))
         return "\n".join(lines)

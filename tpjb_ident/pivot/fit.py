@@ -75,18 +75,20 @@ def fit_pivots(
         "skip"`` refused records are left out as long as any are left, and the curves say so.
     """
     chosen = settings or PivotSettings()
-    records, problems = _read(campaign, np.asarray(pivot_angles, dtype=float), chosen)
+    angles = np.asarray(pivot_angles, dtype=float)
+    records, problems = _read(campaign, angles, chosen)
     problems += check_placement(records) + check_pickup(records)
     refused = {problem.run for problem in problems}
     noise = noise_within_holds(records, chosen.drift_rate) if records else NoiseModel(1.0, 1.0, 1.0)
     pads: dict[int, list[tuple[DryRecord, tuple[Direction, Direction]]]] = {}
     for record in records:
-        if record.run.id in refused:
-            continue
         try:
-            pads.setdefault(record.pad, []).append((record, check_directions(record, noise, chosen)))
+            directions = check_directions(record, noise, chosen, angles)
         except RigDataError as error:
             problems += error.problems
+            continue
+        if record.run.id not in refused:
+            pads.setdefault(record.pad, []).append((record, directions))
     if problems and (chosen.on_refusal == "raise" or not pads):
         raise RigDataError(problems)
     return _curves(pads, noise, chosen, tuple(sorted({str(p.run) for p in problems})))

@@ -33,16 +33,28 @@ class Hysteresis:
     loss_factor_se: float
     load_range: tuple[float, float]
 
+    def __str__(self) -> str:
+        low, high = self.load_range
+        return (
+            f"loop from {low:.0f} to {high:.0f} N: {self.energy:.3g} J (se {self.energy_se:.1g}), "
+            f"loss factor {self.loss_factor:.3g} (se {self.loss_factor_se:.1g})"
+        )
 
-def measure_loop(load: FloatArray, deflection: FloatArray, se: FloatArray, branch: IntArray) -> Hysteresis | None:
+
+def measure_loop(
+    load: FloatArray, deflection: FloatArray, covariance: FloatArray, branch: IntArray
+) -> Hysteresis | None:
     """Area between loading and unloading points.
 
     Parameters
     ----------
     load : (n,) ndarray
         As measured, along the pad [N] (what friction holds back not taken off: it is the loop).
-    deflection, se : (n,) ndarray
-        [m], with standard errors.
+    deflection : (n,) ndarray
+        [m].
+    covariance : (n, n) ndarray
+        Of the deflections [m^2]: the errors of a loop are those that its points share (drift from one branch to the
+        other), not their scatter.
     branch : (n,) ndarray
         +1 loading, -1 unloading.
 
@@ -70,7 +82,7 @@ def measure_loop(load: FloatArray, deflection: FloatArray, se: FloatArray, branc
     trapezoid[[0, -1]] *= 0.5
     energy = float(trapezoid @ width)
     sensitivity = trapezoid @ (gains[0] - gains[1])
-    energy_se = float(np.sqrt(np.sum((sensitivity * se) ** 2)))
+    energy_se = float(np.sqrt(max(sensitivity @ covariance @ sensitivity, 0.0)))
     ends = np.interp([low, high], np.sort(load[up]), deflection[up][np.argsort(load[up])])
     stored = math.pi / 4.0 * float(high - low) * abs(float(ends[1] - ends[0]))
     if stored == 0.0:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.pivot.dry_record import DryRecord, axial_channels, refusal
@@ -14,13 +15,17 @@ from tpjb_ident.pivot.pickup import mistakes
 from tpjb_ident.pivot.projection import Direction, displacement_direction, load_direction
 from tpjb_ident.pivot.settings import PivotSettings
 
+FloatArray = NDArray[np.float64]
+
 ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
 ASIDE_SPREAD = 5.0  # robust standard deviations of the campaign's own runs, where they stand less orderly than that
 ALONG = 0.5  # of the clearance: pads may differ, but not by this much
 CURE = "Check the run's pad number, the channels' axes, polarities and order, and the pad angles of the bearing file"
 
 
-def check_directions(record: DryRecord, noise: NoiseModel, settings: PivotSettings) -> tuple[Direction, Direction]:
+def check_directions(
+    record: DryRecord, noise: NoiseModel, settings: PivotSettings, pad_angles: FloatArray
+) -> tuple[Direction, Direction]:
     """Directions of load and displacement, or a refusal.
 
     Parameters
@@ -31,6 +36,8 @@ def check_directions(record: DryRecord, noise: NoiseModel, settings: PivotSettin
         Of the displacement channels.
     settings : PivotSettings
         Limits of both angles.
+    pad_angles : (n_pads,) ndarray
+        Of all pads [rad]: the error says which of them a record fits better.
 
     Returns
     -------
@@ -43,22 +50,44 @@ def check_directions(record: DryRecord, noise: NoiseModel, settings: PivotSettin
         When either points elsewhere by more than its limit and its uncertainty.
     """
     load = load_direction(record.projection, record.blocks)
-    if abs(load.angle) > settings.load_angle_limit:
-        raise _elsewhere(record, "force", load, settings.load_angle_limit)
     displacement = displacement_direction(record.projection, record.blocks, noise)
-    if abs(displacement.angle) > settings.displacement_angle_limit:
-        raise _elsewhere(record, "displacement", displacement, settings.displacement_angle_limit)
+    for quantity, found, limit in (
+        ("force", load, settings.load_angle_limit),
+        ("displacement", displacement, settings.displacement_angle_limit),
+    ):
+        if abs(found.angle) > limit:
+            guess = _suspect(record, load, displacement, settings, pad_angles)
+            raise _elsewhere(record, quantity, found, limit, guess)
     return load, displacement
 
 
-def _elsewhere(record: DryRecord, quantity: str, direction: Direction, limit: float) -> RigDataError:
+def _elsewhere(record: DryRecord, quantity: str, direction: Direction, limit: float, guess: str) -> RigDataError:
     degrees = math.degrees(direction.angle)
     reading = "opposite to" if abs(degrees) > 135.0 else "away from"
     what = (
         f"says pad {record.pad} at {math.degrees(record.angle):g} deg, but its {quantity} grows {degrees:+.1f} deg "
-        f"{reading} that direction (limit {math.degrees(limit):g} deg): wrong pad, wrong channel or wrong angle"
+        f"{reading} that direction (limit {math.degrees(limit):g} deg): {guess}"
     )
     return refusal(record.run, f"{quantity} channels", what, CURE)
+
+
+def _suspect(
+    record: DryRecord, load: Direction, displacement: Direction, settings: PivotSettings, pad_angles: FloatArray
+) -> str:
+    """Which of wrong pad, wrong channel and wrong angle explains both directions."""
+    off_load = abs(load.angle) > settings.load_angle_limit
+    off_move = abs(displacement.angle) > settings.displacement_angle_limit
+    together = abs(math.remainder(load.angle - displacement.angle, 2 * math.pi)) < settings.displacement_angle_limit
+    if off_load and together:
+        turned = [abs(math.remainder(record.angle + load.angle - a, 2 * math.pi)) for a in pad_angles]
+        nearest = int(np.argmin(turned))
+        if turned[nearest] < settings.load_angle_limit and nearest != record.pad - 1:
+            return f"wrong pad: load and displacement both point at pad {nearest + 1}"
+        return f"wrong angle: load and displacement turn together by {math.degrees(load.angle):+.0f} deg"
+    if off_load != off_move:
+        which = "force" if off_load else "displacement"
+        return f"wrong channel: the other vector points at the pad, so {which} channels are exchanged or reversed"
+    return "wrong pad, wrong channel or wrong angle: load and displacement point neither at a pad nor the same way"
 
 
 def check_placement(records: Sequence[DryRecord]) -> list[Problem]:

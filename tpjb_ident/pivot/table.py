@@ -87,6 +87,8 @@ def _rows(curve: PivotCurve, loads: FloatArray, formula: Formula | None, level: 
             "formula_secant_N_per_m": printed[:, 0],
             "formula_tangent_N_per_m": printed[:, 1],
             "ratio_secant": secant / printed[:, 0],
+            "ratio_secant_lo": secant_lo / printed[:, 0],
+            "ratio_secant_hi": secant_hi / printed[:, 0],
             "ratio_tangent": stiffness / printed[:, 1],
             "ratio_tangent_lo": lo / printed[:, 1],
             "ratio_tangent_hi": hi / printed[:, 1],

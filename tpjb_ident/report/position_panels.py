@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +24,7 @@ def position_panels(
     drawn: tuple[FloatArray, FloatArray],
     measured: Locus | FloatArray | None,
     predicted: Mapping[str, FloatArray],
+    others: Sequence[ClearancePolygon] = (),
 ) -> list[Panel]:
     """Draw polygon and locus in one square panel.
 
@@ -36,9 +37,12 @@ def position_panels(
         Measured positions [m].
     predicted : mapping of str to (n, 2) ndarray
         Predicted ones by pivot model.
+    others : sequence of ClearancePolygon
+        Of further sweeps.
     """
     nothing = measured is None or (isinstance(measured, np.ndarray) and not len(measured))
     if polygon is None and nothing:
         return []
-    figure = clearance_and_locus(polygon, None if nothing else measured, predicted, drawing=drawn)
+    polygons = None if polygon is None else {"measured": polygon} | {f"run {p.run}": p for p in others}
+    figure = clearance_and_locus(polygons, None if nothing else measured, predicted, drawing=drawn)
     return [panel("locus-and-clearance", "Shaft centre locus inside the clearance polygon", figure, GROUP)]

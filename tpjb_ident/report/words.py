@@ -65,6 +65,10 @@ MEANING = {
     "law-undecided": "Several laws fit about equally well; the band holds their difference.",
     "load-off-pad": "The load is off the pad's direction; it was projected.",
     "misfit": "The points scatter more than their noise: something moved during the test.",
+    "moves-aside": "The shaft slides far across the pad while it is pressed: only the part along the pad counts, but "
+    "look at the pad's fit and at the probes.",
+    "give-extrapolated": "The sweep pushes with less than the dry tests did: what the pivots give is extrapolated, and "
+    "the sweep itself corrects it.",
     "no-holds": "The load never stood still, so drift cannot be told from deflection.",
     "no-physical-law": "No contact law describes the points; a smooth monotone curve stands in.",
     "runs-refused": "Some dry runs were refused as not what they claim to be.",
