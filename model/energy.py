@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.film_mesh import FilmGrid, FilmWork
+from model.film_slopes import warmer_pressure
 from model.kernel import compiled
 
 FloatArray = NDArray[np.float64]
@@ -122,6 +123,57 @@ def march(
             for j in range(nz + 1):
                 fields[m, i + 1, j] = right[j, m]
     return limited
+
+
+@compiled
+def heat_step(
+    grid: FilmGrid,
+    work: FilmWork,
+    speed: float,
+    oil: tuple[float, float, float, float],
+    heat: tuple[float, float],
+    thermal: tuple[float, float, float],
+    warming: FloatArray,
+) -> tuple[float, float, float, float]:
+    """Temperature for the pressure at hand, and what it will do to that pressure: one call for one film.
+
+    Parameters
+    ----------
+    grid, work, speed, heat
+        As for `solve_energy`; `work.temperature` is moved towards the new one.
+    oil : tuple of float
+        See `model.pad_film.oil_constants`.
+    thermal : tuple of float
+        Inlet temperature [degC]; relaxation of the temperature; largest step [K].
+    warming : (unknowns,) ndarray
+        Overwritten; see `model.film_slopes.warmer_pressure`.
+
+    Returns
+    -------
+    tuple of float
+        Largest change of temperature that the pressure asks for [K]; limited share of a flow, see `march`; change of
+        the radial and of the tangential force [N].
+    """
+    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
+    fields = np.empty((1, nt + 1, nz + 1))
+    sources = np.empty((1, nt + 1, nz + 1))
+    made = dissipation(grid, work, speed)
+    for i in range(nt + 1):
+        for j in range(nz + 1):
+            sources[0, i, j] = made[i, j] + work.gained[i, j]
+    for j in range(nz + 1):
+        fields[0, 0, j] = thermal[0]
+    limited = march(grid, work, speed, heat, fields, sources)
+    change = 0.0
+    for i in range(nt + 1):
+        for j in range(nz + 1):
+            change = max(change, abs(fields[0, i, j] - work.temperature[i, j]))
+    share = thermal[1] * min(1.0, thermal[2] / max(change, 1e-30))
+    for i in range(nt + 1):
+        for j in range(nz + 1):
+            work.temperature[i, j] += share * (fields[0, i, j] - work.temperature[i, j])
+    force = warmer_pressure(grid, work, speed, oil, warming)
+    return change, limited, force[0], force[1]
 
 
 @compiled

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.acceleration import Anderson
+from model.bearing import Oil
 from model.carrying import (
     MAX_FLIPS,
     find_branch,
@@ -31,7 +32,7 @@ from model.first_position import first_position
 from model.heat_paths import couples_heat, settle_temperatures
 from model.newton_step import newton_step
 from model.pad_bending import bending_step, change_of_shape, wanted_shapes
-from model.pad_film import PadFilm, film_step, oil_constants, pad_films
+from model.pad_film import PadFilm, pad_films
 from model.setup import Setup
 
 FloatArray = NDArray[np.float64]
@@ -205,7 +206,7 @@ def _iterate(search: _Search) -> Equilibrium:
     for iteration in range(1, MAX_ITERATIONS + 1):
         if wake_or_rest(search.setup, search.films, search.position, search.surface_speed):
             memory.reset()
-        before = None if isothermal else _state(search)
+        before = _state(search) if left > SLOW * best_left and not isothermal else None
         heat_change = _solve_films(search)
         if any(not f.idle and f.forces is not None and f.forces.steps < 0 for f in search.films):
             return _result(search, iteration, math.inf, heat_change, ("film lost", "not converged"))
@@ -274,51 +275,48 @@ def _set_state(search: _Search, state: FloatArray) -> None:
 
 def _solve_films(search: _Search) -> float:
     """One step of every film at the present geometry; returns the largest temperature change asked for."""
-    setup = search.setup
-    change = 0.0
+    setup, oil = search.setup, search.setup.bearing.oil
     search.limited = 0.0
     for film in search.films:
         if not film.idle:
-            change = max(change, _solve_film(search, film))
-            assert film.forces is not None
-            if film.forces.steps > 0 and not film.forces.force[0] > 0.0 and setup.rotational_stiffness == 0:
-                # the unloaded attitude, in which nothing holds the pad: the loaded one counts
-                set_loaded(film, search.position)
-                change = max(change, 0.0 if film.idle else _solve_film(search, film))
-                film.idle = film.idle or not film.forces.force[0] > 0.0
+            _solve_pressure(search, film)
         if film.idle:
             film.forces = film.foreseen = film.step = None
             film.work.pressure[:] = 0.0
-    if couples_heat(setup):
-        limits = (search.relaxation, HEATING_STEP)
-        heated, search.limited, search.journal = settle_temperatures(
-            setup, search.films, search.surface_speed, search.journal, limits
-        )
-        change = max(change, heated)
-    for film in search.films:
-        if film.forces is None or film.forces.steps < 0:
-            continue
-        if setup.thermal == "isothermal":
-            film.foreseen = film.forces
-        else:
-            film.foresee(search.surface_speed, setup.bearing.oil)
+    change = 0.0
+    if setup.thermal != "isothermal":
+        change = _warm_films(search, [f for f in search.films if f.forces is not None and f.forces.steps > 0], oil)
     if setup.flexible_pads:
         # a deformation counts like a temperature change of the same weight in the film's resistance
         change = max(change, HEAT_PER_FORCE * _bend_pads(search))
     return change
 
 
-def _solve_film(search: _Search, film: PadFilm) -> float:
-    setup, oil = search.setup, search.setup.bearing.oil
-    own = setup.thermal != "isothermal" and not couples_heat(setup)
-    relaxation = search.relaxation if own else 0.0
-    a, b = film.approach(search.position)
-    film.forces, film.temperature_change, limited = film_step(
-        film.grid, film.work, (film.pad.pad_clearance, a, b), search.surface_speed,
-        oil_constants(oil), (oil.specific_heat, oil.conductivity), (film.inlet, relaxation, HEATING_STEP),
-    )  # fmt: skip
-    search.limited = max(search.limited, limited)
-    return film.temperature_change
+def _solve_pressure(search: _Search, film: PadFilm) -> None:
+    """Pressure of one film; on its loaded attitude, where it has slipped off that."""
+    oil = search.setup.bearing.oil
+    film.solve(search.position, search.surface_speed, oil)
+    assert film.forces is not None
+    if film.forces.steps > 0 and not film.forces.force[0] > 0.0 and search.setup.rotational_stiffness == 0:
+        # the unloaded attitude, in which nothing holds the pad: the loaded one counts
+        set_loaded(film, search.position)
+        if not film.idle:
+            film.solve(search.position, search.surface_speed, oil)
+            film.idle = not film.forces.force[0] > 0.0
+
+
+def _warm_films(search: _Search, carrying: list[PadFilm], oil: Oil) -> float:
+    """Temperatures of the films that carry; returns the largest change asked for [K]."""
+    limits = (search.relaxation, HEATING_STEP)
+    if not couples_heat(search.setup):
+        search.limited = max((f.warm(search.surface_speed, oil, limits) for f in carrying), default=0.0)
+        return max((f.temperature_change for f in carrying), default=0.0)
+    change, search.limited, search.journal = settle_temperatures(
+        search.setup, search.films, search.surface_speed, search.journal, limits
+    )
+    for film in carrying:
+        film.foresee(search.surface_speed, oil)
+    return change
 
 
 def _bend_pads(search: _Search) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -99,6 +100,7 @@ class FilmWork(NamedTuple):
     slopes: FloatArray
 
 
+@lru_cache(maxsize=64)
 def film_grid(
     start: float, end: float, radius: float, length: float, shape: tuple[int, int], symmetric: bool
 ) -> FilmGrid:
@@ -114,6 +116,11 @@ def film_grid(
         Intervals along the arc and across (half width if `symmetric`); both even.
     symmetric : bool
         The film is mirrored about mid-length.
+
+    Returns
+    -------
+    FilmGrid
+        The same object for the same arguments; nobody writes to it.
     """
     nt, nz = shape
     if nt < 4 or nz < 2 or nt % 2 or nz % 2:

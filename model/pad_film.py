@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.bearing import Oil, Pad
-from model.energy import solve_energy
+from model.energy import heat_step
 from model.film import FilmForces, solve_film
 from model.film_mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.film_slopes import warmer_pressure
@@ -48,7 +48,7 @@ class PadFilm:
         At the temperature that the pressure was solved with.
     foreseen : FilmForces or None
         At the temperature found since, to first order: what a Newton step should go by.
-    warming : (unknowns,) ndarray or None
+    warming : (unknowns,) ndarray
         The change of pressure from the one to the other [Pa].
     bent : (nt + 1, nz + 1) ndarray
         The pad's deformation, part of `work.extra` [m].
@@ -68,6 +68,7 @@ class PadFilm:
     work: FilmWork
     inlet: float
     bent: FloatArray
+    warming: FloatArray
     give: PadGive | None = None
     step: BendingStep | None = None
     tilt: float = 0.0
@@ -75,7 +76,6 @@ class PadFilm:
     idle: bool = False
     forces: FilmForces | None = None
     foreseen: FilmForces | None = None
-    warming: FloatArray | None = None
     branch: Branch | None = None
     flips: int = 0
     held: int = 0
@@ -91,18 +91,38 @@ class PadFilm:
         b = float(self.tangent @ position) + self.pivot_radius * self.tilt
         return a, b
 
-    def foresee(self, surface_speed: float, oil: Oil) -> None:
-        """Say what the new temperature will do to the pressure; see `foreseen`."""
+    def solve(self, position: FloatArray, surface_speed: float, oil: Oil) -> None:
+        """Solve the film's pressure for a journal position, at its present temperature and shape."""
+        a, b = self.approach(position)
+        set_viscosity(self.work, oil_constants(oil))
+        wedge = (self.pad.pad_clearance, a, b)
+        self.forces = self.foreseen = solve_film(self.grid, self.work, wedge, surface_speed, False)
+
+    def warm(self, surface_speed: float, oil: Oil, limits: tuple[float, float]) -> float:
+        """Move the temperature towards what the pressure makes it, by `limits`: relaxation, and largest step [K].
+
+        Returns
+        -------
+        float
+            See `model.energy.solve_energy`.
+        """
         assert self.forces is not None
-        if self.warming is None:
-            self.warming = np.empty_like(self.work.unknown)
+        change, limited, radial, tangential = heat_step(
+            self.grid, self.work, surface_speed, oil_constants(oil), (oil.specific_heat, oil.conductivity),
+            (self.inlet, *limits), self.warming,
+        )  # fmt: skip
+        self.temperature_change = change
+        self.foreseen = self.forces._replace(force=self.forces.force + np.array([radial, tangential]))
+        return limited
+
+    def foresee(self, surface_speed: float, oil: Oil) -> None:
+        """Say what a temperature that was found otherwise will do to the pressure; see `foreseen`."""
+        assert self.forces is not None
         change = warmer_pressure(self.grid, self.work, surface_speed, oil_constants(oil), self.warming)
         self.foreseen = self.forces._replace(force=self.forces.force + change)
 
     def foreseen_pressure(self) -> FloatArray:
         """Pressure at the new temperature, (nt + 1, nz + 1) [Pa]."""
-        if self.warming is None:
-            return self.work.pressure
         pressure = self.work.pressure.copy()
         inner = pressure[1:-1, self.grid.first : -1]
         inner += self.warming.reshape(inner.shape)
@@ -135,6 +155,7 @@ def pad_films(setup: Setup) -> list[PadFilm]:
                 work=work,
                 inlet=setup.inlet_temperature,
                 bent=np.zeros_like(work.extra),
+                warming=np.zeros_like(work.unknown),
                 give=pad_give(pad, bearing, grid) if setup.flexible_pads or setup.options.conduction else None,
             )
         )
@@ -144,49 +165,3 @@ def pad_films(setup: Setup) -> list[PadFilm]:
 def oil_constants(oil: Oil) -> tuple[float, float, float, float]:
     """What the compiled viscosity and density need: mu_40, kappa, rho_40, alpha_v."""
     return oil.viscosity_40, oil.viscosity_exponent, oil.density_40, oil.thermal_expansion
-
-
-def film_step(
-    grid: FilmGrid,
-    work: FilmWork,
-    wedge: tuple[float, float, float],
-    speed: float,
-    oil: tuple[float, float, float, float],
-    heat: tuple[float, float],
-    thermal: tuple[float, float, float],
-) -> tuple[FilmForces, float, float]:
-    """Solve pressure for the present temperature, then the temperature for that pressure.
-
-    Parameters
-    ----------
-    grid, work
-        Mesh and arrays.
-    wedge : tuple of float
-        Cp, a, b [m].
-    speed : float
-        [m/s]
-    oil : tuple of float
-        See `oil_constants`.
-    heat : tuple of float
-        Specific heat and conductivity.
-    thermal : tuple of float
-        Inlet temperature [degC]; relaxation of the temperature, 0 leaves it alone (isothermal); largest step [K].
-
-    Returns
-    -------
-    forces : FilmForces
-    change : float
-        Largest change of temperature that the new pressure asks for [K].
-    limited : float
-        See `solve_energy`.
-    """
-    set_viscosity(work, oil)
-    forces = solve_film(grid, work, wedge, speed, False)
-    if thermal[1] == 0.0 or forces.steps < 0:
-        return forces, 0.0, 0.0
-    new = np.empty_like(work.temperature)
-    limited = solve_energy(grid, work, thermal[0], speed, heat, new)
-    new -= work.temperature
-    change = float(np.abs(new).max())
-    work.temperature[:] += thermal[1] * min(1.0, thermal[2] / max(change, 1e-30)) * new
-    return forces, change, limited
