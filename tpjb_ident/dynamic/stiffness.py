@@ -33,7 +33,7 @@ class DynamicStiffness:
     omega : float
         Excitation frequency [rad/s].
     covariance : (8, 8) ndarray
-        Random covariance of [Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...] [N^2/m^2].
+        Random covariance of [Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...], in N^2/m^2.
     dof : (8,) ndarray
         Degrees of freedom of each variance, for Student's t; infinite where it is known.
     method : str

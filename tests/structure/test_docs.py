@@ -1,0 +1,128 @@
+"""Documentation: every link leads somewhere, every code block runs, every command line is one."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+#: Blocks that describe files of a user, so they are checked for being Python and are not run.
+NEEDS_FILES_OF_YOUR_OWN = ("rocker-A",)
+LANGUAGES = {"python", "toml", "sh", "text", "json"}
+
+
+def blocks():
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for i, match in enumerate(re.finditer(r"^```(\w*)\n(.*?)^```", text, flags=re.S | re.M), start=1):
+            yield pytest.param(match[1], match[2], id=f"{page.relative_to(ROOT).as_posix()}:{match[1] or 'plain'}{i}")
+
+
+BLOCKS = list(blocks())
+
+
+def of(*languages):
+    return [p for p in BLOCKS if p.values[0] in languages]
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory):
+    """A folder where the checkout's relative paths hold but nothing is written into the checkout."""
+    folder = tmp_path_factory.mktemp("desk")
+    for name in ("rigdata", "model"):
+        (folder / name).symlink_to(ROOT / name, target_is_directory=True)
+    return folder
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere(page):
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.S | re.M)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if not target.startswith(("http", "#")):
+            assert (page.parent / target.partition("#")[0]).exists(), target
+
+
+def test_the_site_lists_pages_that_exist_and_the_whole_guide():
+    listed = set(re.findall(r":\s+(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), flags=re.M))
+    pages = {p.relative_to(ROOT / "docs").as_posix() for p in (ROOT / "docs").rglob("*.md")}
+    assert listed <= pages
+    assert {p for p in pages if p.startswith("guide/")} <= listed
+
+
+@pytest.mark.parametrize(("language", "text"), [p for p in BLOCKS if not p.values[0]] or [pytest.param("", "")])
+def test_blocks_without_a_language_are_pictures(language, text):
+    assert "import " not in text
+    assert not re.search(r"^(tpjb|python3?|pip) ", text, flags=re.M)
+
+
+def test_every_language_is_one_that_is_tested():
+    assert {p.values[0] for p in BLOCKS} <= LANGUAGES | {""}
+    assert len(of("python")) >= 5
+    assert len(of("sh")) >= 3
+
+
+@pytest.mark.parametrize(("language", "text"), of("toml"))
+def test_toml_is_toml(language, text):
+    assert tomllib.loads(text)
+
+
+def test_the_described_campaign_and_effects_are_understood():
+    from model.effects import load_effects
+    from rigdata.manifest import parse_manifest
+
+    text = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
+    assert parse_manifest(re.search(r"```toml\n(.*?)```", text, flags=re.S)[1]).runs
+    assert load_effects
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("language", "text"), of("python"))
+def test_python_runs_as_it_stands(language, text, desk):
+    ast.parse(text)
+    if any(word in text for word in NEEDS_FILES_OF_YOUR_OWN):
+        return
+    done = subprocess.run([sys.executable, "-W", "error", "-P", "-c", text], cwd=desk, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+@pytest.mark.parametrize(("language", "text"), of("sh"))
+def test_command_lines_have_commands_and_options_that_exist(language, text):
+    from typer.testing import CliRunner
+
+    from tpjb_ident.cli.app import app
+
+    for line in text.splitlines():
+        words = shlex.split(line, comments=True)
+        if words[:1] == ["tpjb"] and len(words) > 1:
+            shown = CliRunner().invoke(app, [words[1], "--help"])
+            assert shown.exit_code == 0, line
+            for word in words[2:]:
+                if word.startswith("--"):
+                    assert word in shown.stdout, line
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path):
+    pytest.importorskip("mkdocstrings", reason="the extra docs is not installed")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")],
+        cwd=ROOT, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    pages = list((tmp_path / "site").rglob("*.html"))
+    assert len(pages) >= 12
+    for page in pages:
+        if page.name == "404.html":  # its links are those of a server's root
+            continue
+        html = page.read_text(encoding="utf-8")
+        for target in re.findall(r'href="([^"#:]+\.html)', html):
+            assert (page.parent / target).resolve().exists(), (page.name, target)
