@@ -1,6 +1,6 @@
 """Pivot curves, contact onset, clearance and refusals over many virtual campaigns, against their truth.
 
-    python -m tests.benchmarks.evaluate_pivots [--seeds 100] [--first 1000] [--faults 4] [--out pivots.npz]
+    python -m tests.benchmarks.evaluate_pivots [--seeds 100] [--first 1000] [--faults 4] [--programme up] [--out p.npz]
 
 Prints Markdown tables. Every seed is a campaign of its own kind (rocker or sphere, alone or on a housing that gives);
 its five pads differ by a factor of up to three. `--faults` draws that many faults per seed from all that one dry run
@@ -12,16 +12,18 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from rigdata.problem import RigDataError
-from rigdata.virtual_rig import ClearanceSweep, Fault
+from rigdata.virtual_rig import ClearanceSweep, DryTest, Fault
 from tests.benchmarks.pivot_cases import (
     ANGLES,
     KINDS,
     LOADS,
+    PROGRAMMES,
     UPPER_PADS,
     bearing,
     campaign,
@@ -37,11 +39,13 @@ COLUMNS = ("seed", "kind", "pad", "law", *(f"error{w:g}" for w in AT), *(f"se{w:
            "onset", "onset_se", "onset_true", "miss", "miss_se", "pushed_miss", "seconds")  # fmt: skip
 
 
-def one_campaign(seed: int, path: Path) -> list[tuple[float, ...]]:
+def one_campaign(seed: int, path: Path, programme: str = "up") -> list[tuple[float, ...]]:
     """Rows of the five pads of one campaign."""
     kind = seed % len(KINDS)
     laws = bearing(KINDS[kind], seed)
-    source, truth = campaign(path, laws, seed, clearance=(ClearanceSweep(),))
+    test = DryTest(1) if programme == "up" else PROGRAMMES[programme]
+    dry = tuple(replace(test, pad=pad) for pad in range(1, 6))
+    source, truth = campaign(path, laws, seed, dry=dry, clearance=(ClearanceSweep(),))
     before = time.process_time()
     curves = fit_pivots(source, ANGLES)
     seconds = time.process_time() - before
@@ -49,7 +53,7 @@ def one_campaign(seed: int, path: Path) -> list[tuple[float, ...]]:
     push = float(truth.runs["c-1"]["push_N"])
     rows = []
     for k, (curve, law) in enumerate(zip(curves, laws, strict=True)):
-        gap = float(truth.runs[f"p-{curve.pad}-up"]["contact_gap_m"])
+        gap = float(truth.runs[curve.runs[0]]["contact_gap_m"])
         onset = true_onset(law, gap) if curve.pad in UPPER_PADS else 0.0
         rows.append((
             seed, kind, curve.pad, hash_of(curve.law.name), *np.log(curve.stiffness(AT) * law.compliance(AT)),
@@ -146,6 +150,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--first", type=int, default=1000)
     parser.add_argument("--faults", type=int, default=4, help="per seed")
+    parser.add_argument("--programme", choices=("up", *PROGRAMMES), default="up", help="how the load goes")
     parser.add_argument("--out", type=Path, help="all rows as .npz")
     given = parser.parse_args()
     rows: list[tuple[float, ...]] = []
@@ -154,7 +159,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="tpjb-") as folder:
         path = Path(folder) / "c.h5"
         for seed in range(given.first, given.first + given.seeds):
-            rows += one_campaign(seed, path)
+            rows += one_campaign(seed, path, given.programme)
             rng = np.random.default_rng(seed)
             drawn = rng.choice(len(cases), min(given.faults, len(cases)), replace=False)
             found += [(cases[k], seed, one_fault(seed, cases[k], path)) for k in drawn]

@@ -31,6 +31,16 @@ KINDS = ("rocker", "rocker on housing", "sphere", "sphere on housing")
 UPPER_PADS = (3, 4)
 
 
+#: Load programmes, one test each; `dataclasses.replace` gives them another pad.
+PROGRAMMES = {
+    "down": DryTest(1, branch="down"),
+    "cycle": DryTest(1, branch="cycle"),
+    "unequal": DryTest(1, hold=(0.5, 2.0, 1.0, 0.6, 3.0, 1.0, 0.8, 1.5, 0.5, 2.0), overshoot=0.1, load_drift=-0.003),
+    "few": DryTest(1, levels=(1000.0, 2500.0, 5000.0), hold=3.0, ramp=1.0),
+    "ramp": DryTest(1, levels=(5000.0,), hold=0.1, ramp=12.0),
+}
+
+
 class Line:
     """Rocker: the printed formula's shape, softer by `f`, with a housing of compliance `housing` in series."""
 

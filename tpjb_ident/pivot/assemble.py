@@ -191,10 +191,11 @@ def _status(
         found.append(f"contact-incomplete: below {onset:.0f} N")
     if onset >= float(np.max(steps.load)):
         found.append("contact-never-complete")
-    if choice.weights[0] < CLEAR_CHOICE:
-        found.append(
-            "law-undecided: " + ", ".join(f"{f.name} {w:.2f}" for f, w in zip(choice.fits, choice.weights, strict=True))
-        )
+    shares: dict[str, float] = {}
+    for fit, weight in zip(choice.fits, choice.weights, strict=True):
+        shares[fit.name] = shares.get(fit.name, 0.0) + float(weight)
+    if shares[law.name] < CLEAR_CHOICE:
+        found.append("law-undecided: " + ", ".join(f"{name} {share:.2f}" for name, share in shares.items()))
     if law.name == "spline":
         found.append("no-physical-law")
     if _misfits(law):

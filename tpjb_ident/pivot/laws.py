@@ -4,22 +4,19 @@ Every law is :math:`\delta(W) = s\,W_r\,\varphi(W/W_r; q)` with the compliance
 :math:`d\delta/dW = s\,\psi(W/W_r; q)`, :math:`\psi = \varphi'`: a scale `s` [m/N] and a shape `q`. The reference
 load `W_r` lies in the middle of the test, so scale and shape are nearly independent.
 
-=================  ====================================================  =========================================
-law                psi(u)                                                where it comes from
-=================  ====================================================  =========================================
-hertz-line         1 - kappa ln u                                        line contact (rocker): Kirk and
-Reedy's
-                                                                         W {2/3 + ln(B/W)}; a linear
-                                                                         compliance in series only lowers
-                                                                         kappa
-hertz-point        u^(-1/3)                                              point contact (sphere)
-power              u^(p-1)                                               contact of any conformity
-linear             1                                                     housing, shim, flexure
-point-in-series    (1-lam) u^(-1/3) + lam                                sphere on a linear housing
-bilinear           1 + (r-1)/{1 + exp[(u-b)/(b/10)]}                     two contacts one after the other,
-play spline             exp(piecewise linear in ln u)                         no physics: only monotone and
-smooth =================  ====================================================
-=========================================
+===============  ==================================  ==================================================
+law              psi(u)                              where it comes from
+===============  ==================================  ==================================================
+hertz-line       1 - kappa ln u                      line contact (rocker): the printed W {2/3 + ln(B/W)};
+                                                     a linear compliance in series only lowers kappa
+hertz-point      u^(-1/3)                            point contact (sphere)
+power            u^(p-1)                             contact of any conformity
+linear           1                                   housing, shim, flexure
+point-in-series  (1-lam) u^(-1/3) + lam              sphere on a housing that gives
+bilinear         1 + (r-1)/{1 + exp[(u-b)/(b/10)]}   two contacts one after the other; a play before the
+                                                     first is the contact loss that every law may carry
+spline           exp(piecewise linear in ln u)       no physics: only monotone and smooth
+===============  ==================================  ==================================================
 
 Each shape has a weak prior (mean, standard deviation) that says what is physically plausible; it keeps the
 extrapolation sane where the records say nothing, and it makes the laws' evidences comparable.

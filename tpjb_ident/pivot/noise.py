@@ -22,6 +22,7 @@ from scipy import optimize
 FloatArray = NDArray[np.float64]
 
 DRIFT_OVER_FLICKER = 0.7  # [1/sqrt(s)], drift rate to be expected over the square root of the 1/f power density
+PINNED = 0.01  # of ln(drift rate): as good as given
 # time constants [s] of the exponentially correlated processes whose sum has a 1/f spectrum from some 5 mHz
 # to 5 Hz
 FLICKER_TIMES = 0.05 * 4.0 ** np.arange(7)
@@ -139,7 +140,7 @@ class _Rotated:
         return 0.5 * float(log_det + yy - xy @ np.linalg.solve(xx, xy))
 
 
-def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float) -> NoiseModel:
+def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float, learn_drift: bool = True) -> NoiseModel:
     """Estimate the noise levels common to several series.
 
     Parameters
@@ -148,6 +149,9 @@ def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float) -> NoiseMod
         Any number, of any length above their number of signal columns.
     drift_rate : float
         Centre of the log-normal prior (factor e) of the drift rate [m/s].
+    learn_drift : bool
+        False where the signal itself grows with time (a ramp): what looks like drift there is the signal's own shape,
+        and the prior is all that is known of drift.
 
     Returns
     -------
@@ -165,6 +169,7 @@ def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float) -> NoiseMod
     unit = np.sqrt(white)
     rotated = [_Rotated(s, unit) for s in usable]
     prior = np.log(drift_rate / unit)
+    spread = 1.0 if learn_drift else PINNED
 
     def objective(logs: FloatArray) -> float:
         w, f, d = np.exp(np.clip(logs, -30.0, 30.0))
@@ -172,7 +177,8 @@ def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float) -> NoiseMod
         # probes that flicker more drift more; beyond that, a level that the data do not feel (no 1/f at all) must
         # not run away to minus infinity
         expected = 0.5 * np.log(np.exp(2.0 * prior) + DRIFT_OVER_FLICKER**2 * f)
-        return total + 0.5 * (logs[2] - expected) ** 2 + 0.5 * (logs[1] / 5.0) ** 2 + 0.5 * (logs[0] / 5.0) ** 2
+        total += 0.5 * ((logs[2] - expected) / spread) ** 2
+        return total + 0.5 * (logs[1] / 5.0) ** 2 + 0.5 * (logs[0] / 5.0) ** 2
 
     found = optimize.minimize(
         objective,

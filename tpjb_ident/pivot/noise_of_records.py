@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 def noise_within_holds(records: Sequence[DryRecord], drift_rate: float) -> NoiseModel:
     """Noise from what happens within holds alone: every hold's level is free, so a bad step does no harm."""
     series: list[NoiseSeries] = []
-    for record in records:
+    for record in _with_holds(records):
         used = record.blocks.hold >= 0
         if not used.any():
             series += _smooth_series(record, np.ones(len(record.blocks), dtype=bool))
@@ -27,7 +27,16 @@ def noise_within_holds(records: Sequence[DryRecord], drift_rate: float) -> Noise
         mean = (blocks.hold[:, None] == levels[None, :]).astype(float)
         for values in (record.projection.deflection, record.projection.across):
             series.append(NoiseSeries(blocks.time, blocks.duration, values[used], mean))
-    return estimate_noise(series, drift_rate)
+    return estimate_noise(series, drift_rate, learn_drift=_any_hold(records))
+
+
+def _any_hold(records: Sequence[DryRecord]) -> bool:
+    return any(record.holds for record in records)
+
+
+def _with_holds(records: Sequence[DryRecord]) -> Sequence[DryRecord]:
+    """The records that have holds, since only they tell drift from deflection; all, where none has."""
+    return [record for record in records if record.holds] or records
 
 
 def noise_about_curve(records: Sequence[DryRecord], good: Sequence[NDArray[np.bool_]], drift_rate: float) -> NoiseModel:
@@ -48,9 +57,11 @@ def noise_about_curve(records: Sequence[DryRecord], good: Sequence[NDArray[np.bo
     """
     series = []
     for record, mask in zip(records, good, strict=True):
+        if _any_hold(records) and not record.holds:
+            continue
         held = record.blocks.hold >= 0
         series += _smooth_series(record, mask & held if (mask & held).sum() > 20 else mask)
-    return estimate_noise(series, drift_rate)
+    return estimate_noise(series, drift_rate, learn_drift=_any_hold(records))
 
 
 def _smooth_series(record: DryRecord, used: NDArray[np.bool_]) -> list[NoiseSeries]:
@@ -66,6 +77,8 @@ def _smooth_columns(load: FloatArray, blocks: Blocks) -> FloatArray:
     """Columns (m, p) that span every law of `laws.py` well within the noise, and a soft toe."""
     u = np.maximum(load / np.max(load), 1e-3)
     columns = [np.ones_like(u), u, u * np.log(u), np.exp(-u / 0.06), np.exp(-u / 0.15)]
+    if np.all(blocks.hold < 0):
+        columns.append(np.cbrt(u) ** 2)  # a ramp has points enough for a sphere's law as it is
     if len(np.unique(blocks.branch)) > 1:
         down = (blocks.branch < 0).astype(float)
         columns += [down, down * u]
