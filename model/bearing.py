@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import difflib
 import math
-import tomllib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from model.toml_text import parse_toml
 from model.units import UnitError, parse_quantity
 
 
@@ -293,8 +293,8 @@ def load_bearing(source: str | Path) -> Bearing:
 def parse_bearing(text: str, name: str) -> Bearing:
     """Build a `Bearing` from TOML text; `name` is what error messages call the file."""
     try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        data = parse_toml(text)
+    except ValueError as error:
         raise BearingError(f"{name}: not valid TOML: {error}. Mend that line.") from error
     sections = {key: _section(data, key, name) for key in _KEYS}
     _check_schema(sections[""], name)

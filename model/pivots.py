@@ -8,7 +8,6 @@ vibrations too, which is what the paper compares.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.bearing import Bearing, BearingError, Pivot
+from model.toml_text import parse_toml
 
 FloatArray = NDArray[np.float64]
 
@@ -336,10 +336,10 @@ def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ..
             raise BearingError(
                 f"{path.name}: larger than 20 MB. A pivots.toml holds some hundred numbers; check the path."
             )
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        data = parse_toml(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError as error:
         raise BearingError(f"{path}: no such file. `tpjb pivot CAMPAIGN` writes a pivots.toml.") from error
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    except (OSError, ValueError) as error:  # not text, not TOML
         raise BearingError(f"{path}: cannot be read: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
     if data.get("schema") != "tpjb-pivots/1":
         raise BearingError(f"{path.name}, schema: need 'tpjb-pivots/1', got {data.get('schema')!r}.")
@@ -370,6 +370,6 @@ def _read_pad(table: Any, name: str, housing: bool) -> tuple[int, MeasuredPivot]
             str(table.get("law", "measured")),
             housing,
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:  # the last: whole numbers of 400 digits
         raise BearingError(f"{name}, pad {number}: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
     return number, law

@@ -90,7 +90,10 @@ def parse_quantity(value: str | float | int, dimension: str, name: str = "value"
             raise UnitError(
                 f'{name}: {value!r} has no unit; write it with one of {dimension}, e.g. "{value} {SI_UNITS[dimension]}"'
             )
-        return _finite(float(value), name)
+        try:
+            return _finite(float(value), name)
+        except OverflowError as error:
+            raise UnitError(f"{name}: a whole number of hundreds of digits is not a quantity") from error
     match = _QUANTITY.fullmatch(value)
     if match is None:
         raise UnitError(f"{name}: {value!r} is not a number with a unit")

@@ -10,13 +10,13 @@ import difflib
 import functools
 import importlib
 import pkgutil
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from model.effects.kind import Effect, EffectError, EffectKind, Parameter
 from model.setup import Setup
+from model.toml_text import parse_toml
 
 __all__ = [
     "Effect",
@@ -111,10 +111,10 @@ def load_effects(path: str | Path) -> tuple[Effect, ...]:
     try:
         if path.stat().st_size > 1_000_000:
             raise EffectError(f"{path.name}: larger than 1 MB. An effects file is a page of text; check the path.")
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        data = parse_toml(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError as error:
         raise EffectError(f"{path}: no such file. Give the path of an effects file (TOML).") from error
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    except (OSError, ValueError) as error:  # not text, not TOML
         raise EffectError(f"{path}: cannot be read: {error}. Mend that line.") from error
     schema = data.get("schema", "tpjb-effects/1")
     if schema != "tpjb-effects/1":

@@ -130,8 +130,10 @@ def _number(value: Any, parameter: Parameter, where: str) -> float:
         value = parse_quantity(value, parameter.dimension, where)
     if isinstance(value, bool) or not hasattr(value, "__float__"):
         raise EffectError(f"{where}: must be a number [{parameter.unit}], got {value!r}.")
-    if not isinstance(value, (int, float)):
-        value = float(value)
+    try:
+        value = int(value) if isinstance(value, int) and abs(value) < 2**53 else float(value)
+    except OverflowError as error:
+        raise EffectError(f"{where}: a whole number of hundreds of digits is outside any physical range.") from error
     if not parameter.low <= value <= parameter.high:
         bounds = f"{parameter.low:g} to {parameter.high:g} [{parameter.unit}]"
         raise EffectError(f"{where}: {value:g} is outside the physical range {bounds}.")

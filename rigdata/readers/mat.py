@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rigdata.problem import Problem, RigDataError
+from rigdata.readers.mat5_elements import check_mat5
 from rigdata.readers.series import Series, equidistant
 from rigdata.readers.time_names import is_time
 
@@ -59,6 +60,7 @@ def _load(path: Path) -> dict[str, Any]:
         return _load_hdf5(path)
     from scipy.io import loadmat
 
+    check_mat5(path)
     return {k: v for k, v in loadmat(path, simplify_cells=True).items() if not k.startswith("__")}
 
 

@@ -1,0 +1,51 @@
+"""TOML from a stranger: parsed, or refused with a `ValueError` before it can take long."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from typing import Any
+
+#: Keys with more dots than this nest deeper than any file of ours; parsing them takes the square of their length.
+MAX_DEPTH = 64
+#: A step of a dotted key: a bare or quoted piece and its dot.
+_STEP = re.compile(r"""(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*""")
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Parse TOML text.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    ValueError
+        Not TOML, nested too deeply, or a whole number of thousands of digits; says the line where it is known.
+    """
+    for number, line in enumerate(text.split("\n"), start=1):
+        if line.count(".") > MAX_DEPTH and not line.lstrip().startswith("#") and _longest_key(line) > MAX_DEPTH:
+            raise ValueError(f"line {number} nests far too deeply")
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise ValueError("nested far too deeply") from error
+    except tomllib.TOMLDecodeError:
+        raise
+    except ValueError as error:  # Python refuses to read whole numbers of more than 4300 digits
+        raise ValueError("a whole number has thousands of digits") from error
+
+
+def _longest_key(line: str) -> int:
+    """Most dots of one dotted key in `line`."""
+    longest = run = at = 0
+    for step in _STEP.finditer(line):
+        run = run + 1 if step.start() == at else 1
+        at = step.end()
+        longest = max(longest, run)
+    return longest

@@ -1,0 +1,80 @@
+"""MATLAB 5 files that brought the process down inside scipy, found by fuzzing: now refused with their byte."""
+
+from __future__ import annotations
+
+import random
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from rigdata.problem import RigDataError
+from rigdata.readers import mat5_elements
+from rigdata.readers.foreign import read_foreign
+from rigdata.readers.mat5_elements import check_mat5
+
+TIME = np.arange(120) / 100.0
+
+
+@pytest.fixture
+def good(tmp_path):
+    path = tmp_path / "a.mat"
+    savemat(path, {"time": TIME, "X1A": np.sin(TIME), "X1B": 2 * TIME})
+    return path
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_sound_files_of_every_class_pass(tmp_path, compressed):
+    import scipy.sparse
+
+    cell = np.empty((1, 2), dtype=object)
+    cell[0, 0], cell[0, 1] = TIME, "text"
+    content = {
+        "z": TIME + 1j, "s": {"a": TIME, "b": {"c": np.int16([1, 2])}}, "cell": cell, "word": "Zeit µ",
+        "sparse": scipy.sparse.csc_matrix(np.eye(9)), "flag": np.array([True, False]), "none": np.zeros((0, 0)),
+        "records": np.array([(1, 2.0)] * 9, dtype=[("i", "i4"), ("x", "f8")]), "single": np.float32(TIME),
+    }  # fmt: skip
+    path = tmp_path / "all.mat"
+    savemat(path, content, do_compression=compressed)
+    check_mat5(path)
+    assert {s.name for s in read_foreign(path, "all.mat")} >= {"s.a", "single"}
+
+
+@pytest.mark.parametrize("kind", [0, 8, 10, 11, 14, 19, 0xFFFF, 0x7FFFFFFF])
+def test_a_type_that_is_none_is_refused_before_scipy_looks_it_up(good, kind):
+    data = bytearray(good.read_bytes())
+    at = data.index(struct.pack("<II", 9, 8 * len(TIME)))
+    struct.pack_into("<I", data, at, kind)
+    good.write_bytes(data)
+    with pytest.raises(RigDataError, match="damaged"):
+        read_foreign(good, "a.mat")
+
+
+def test_any_changed_byte_ends_in_numbers_or_in_a_named_error(good):
+    whole = good.read_bytes()
+    rng = random.Random(5)
+    outcomes = set()
+    for _ in range(400):
+        data = bytearray(whole)
+        data[128 + rng.randrange(64) + 1016 * rng.randrange(3)] = rng.randrange(256)
+        good.write_bytes(data)
+        try:
+            read_foreign(good, "a.mat")
+            outcomes.add("read")
+        except RigDataError:
+            outcomes.add("refused")
+    assert outcomes == {"read", "refused"}
+
+
+def test_a_compressed_bomb_is_refused_and_the_limit_can_be_moved(tmp_path, monkeypatch):
+    body = struct.pack("<II", 14, 2**22) + bytes(2**22)
+    packed = zlib.compress(body, 9)
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
+    path = tmp_path / "bomb.mat"
+    path.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
+    assert path.stat().st_size < 2**14
+    monkeypatch.setattr(mat5_elements, "LARGEST", 2**20)
+    with pytest.raises(RigDataError, match="unpacks to more than 1 MB"):
+        read_foreign(path, "bomb.mat")

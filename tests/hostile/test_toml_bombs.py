@@ -1,0 +1,98 @@
+"""TOML that is meant to hurt: deep nesting, huge keys and numbers, in every file that a stranger may have written."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from model.bearing import BearingError, load_bearing, parse_bearing
+from model.effects import EffectError, load_effects
+from model.pivots import load_pivots
+from model.toml_text import MAX_DEPTH, parse_toml
+from rigdata.manifest import parse_manifest
+from rigdata.problem import RigDataError
+
+BOMBS = {
+    "dotted key": "a." * 16_000 + "a = 1",
+    "dotted key in an inline table": "x = {" + "a." * 16_000 + "a = 1}",
+    "dotted table name": "[" + "a." * 16_000 + "a]",
+    "quoted dotted key": '"a".' * 10_000 + "a = 1",
+    "nested arrays": "x = " + "[" * 20_000,
+    "nested inline tables": "x = " + "{a=" * 20_000,
+    "digits": "x = " + "9" * 5000,
+    "one huge key": "k" * 500_000 + " = 1",
+    "thousands of keys": "\n".join(f"k{i} = 1" for i in range(20_000)),
+}
+
+
+def feed_manifest(text, folder):
+    with pytest.raises(RigDataError) as caught:
+        parse_manifest(text)
+    return str(caught.value)
+
+
+def feed_bearing(text, folder):
+    with pytest.raises(BearingError) as caught:
+        parse_bearing(text, "b.toml")
+    return str(caught.value)
+
+
+def feed_pivots(text, folder):
+    (folder / "p.toml").write_text(text)
+    with pytest.raises(BearingError) as caught:
+        load_pivots(folder / "p.toml")
+    return str(caught.value)
+
+
+def feed_effects(text, folder):
+    path = folder / "e.toml"
+    path.write_text(f'schema = "tpjb-effects/2"\n{text}')
+    with pytest.raises(EffectError) as caught:
+        load_effects(path)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", BOMBS)
+@pytest.mark.parametrize("feed", [feed_manifest, feed_bearing, feed_pivots, feed_effects], ids=lambda f: f.__name__)
+def test_a_bomb_is_refused_at_once(feed, name, tmp_path):
+    began = time.process_time()
+    message = feed(BOMBS[name], tmp_path)
+    # the dotted keys took more than four seconds each, and their square at twice the length
+    assert time.process_time() - began < 2.0
+    assert message.count("\n") < 2000
+
+
+def test_the_line_of_a_deep_key_is_named():
+    with pytest.raises(ValueError, match="line 3 nests far too deeply"):
+        parse_toml("a = 1\nb = 2\n" + "x." * (MAX_DEPTH + 1) + "y = 3\n")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x." * MAX_DEPTH + "y = 3",
+        "# " + "." * 500,
+        "force_N = [" + ", ".join(["0.5"] * 500) + "]",
+        'description = "' + "a. b, " * 100 + '"',
+    ],
+)
+def test_what_only_looks_deep_is_taken(text):
+    assert isinstance(parse_toml(text), dict)
+
+
+def test_numbers_beyond_floats_are_named(rocker_file, tmp_path):
+    huge = "9" * 400
+    text = rocker_file.read_text("utf-8")
+    with pytest.raises(ValueError, match="hundreds of digits"):
+        load_bearing(text.replace("poissons_ratio = ", f"poissons_ratio = {huge} #", 1))
+    (tmp_path / "e.toml").write_text(f'[[effects]]\nname = "soft_pivot"\npad = 5\nstiffness_factor = {huge}\n')
+    with pytest.raises(EffectError, match="outside any physical range"):
+        load_effects(tmp_path / "e.toml")
+    for key in ("force_N", "deflection_m", "valid_to_N"):
+        pad = {"force_N": "[0.0, 1.0, 2.0]", "deflection_m": "[0.0, 1e-6, 2e-6]", "valid_to_N": "2.0"}
+        pad[key] = pad[key].replace("2.0", huge).replace("2e-6", huge)
+        lines = "\n".join(f"{k} = {v}" for k, v in pad.items())
+        (tmp_path / "p.toml").write_text(f'schema = "tpjb-pivots/1"\n[[pads]]\npad = 1\n{lines}\n')
+        with pytest.raises(BearingError, match="pad 1"):
+            load_pivots(tmp_path / "p.toml")
