@@ -164,7 +164,7 @@ def _mm(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
 
 
 def _mm_eiv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
-    start = mm_fit(table.D, table.F, table.direction)
+    start = mm_fit(table.D, table.F, table.direction, tolerance=1e-7)  # tells which windows are good, no more
     repeated = repeats(table, readmitted(table, start.weights))
     if repeated is None:
         plain = _mm(table, omega, name)

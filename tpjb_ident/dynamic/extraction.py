@@ -42,7 +42,7 @@ def extract(
     length, count = plan_windows(run.length, run.sample_rate, lines, settings.windows)
     present = {c.quantity for c in run.channels.values()}
     quantities = tuple(q for q in QUANTITIES if q in present or q != "acceleration")
-    work = _Work(length, run.sample_rate, lines, follow)
+    work = _Work(length, run.sample_rate, lines, follow, run.point.shaft_speed_hz)
     parts: list[_Fitted] = []
     with open_stretches(run, quantities) as stretches:
         for first, stop in _chunks(length, count):
@@ -51,7 +51,7 @@ def extract(
         if len(parts) > 1:
             _look_again(work, stretches, blocks)
     starts = np.concatenate([part.start for part in parts])
-    speeds = np.concatenate([window_speeds(p.speed, len(p.start), run.point.shaft_speed_hz) for p in parts])
+    speeds = np.concatenate([part.speeds for part in parts])
     found = {q: _undelayed(block, lines, settings.delays.get(q, 0.0)) for q, block in blocks.items()}
     return RunPhasors(
         run.id,
@@ -87,18 +87,20 @@ def _look_again(work: _Work, stretches: Stretches, blocks: dict[str, PhasorBlock
 
 @dataclass(frozen=True)
 class _Fitted:
-    """Windows of one chunk: phasors by quantity, start of every window [s], samples of the tachometer [rad/s]."""
+    """Windows of one chunk: phasors by quantity, start [s] and shaft speed [Hz] of every window."""
 
     blocks: dict[str, PhasorBlock]
     start: FloatArray
-    speed: FloatArray | None
+    speeds: FloatArray
 
 
 class _Work:
     """What all windows of a run are fitted with."""
 
-    def __init__(self, length: int, rate: float, lines: LineSet, follow: FloatArray | None) -> None:
-        self.length = length
+    def __init__(
+        self, length: int, rate: float, lines: LineSet, follow: FloatArray | None, nominal_speed: float
+    ) -> None:
+        self.length, self.nominal_speed = length, nominal_speed
         self.fitter = LineFitter(length, rate, lines.frequencies)
         self.followers = _Followers(length, rate, lines, follow)
 
@@ -111,7 +113,7 @@ class _Work:
             rows = values.reshape(2, stop - first, self.length)
             blocks[quantity] = _fit_windows(self.fitter, rows, times, None if usual is None else usual[quantity])
             self.followers.refit(blocks[quantity], rows, times, first)
-        return _Fitted(blocks, times.start, stretch.speed)
+        return _Fitted(blocks, times.start, window_speeds(stretch.speed, stop - first, self.nominal_speed))
 
 
 @dataclass(frozen=True)

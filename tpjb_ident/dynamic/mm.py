@@ -17,7 +17,7 @@ import numpy as np
 from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.conditions import Condition
 from tpjb_ident.dynamic.robust_constants import bisquare_weight, efficiency_constant
-from tpjb_ident.dynamic.trimmed_start import Regression, distance2, products, robust_start
+from tpjb_ident.dynamic.trimmed_start import Regression, distance2, robust_start
 
 #: Fewer windows than this leave nothing to be robust with: least squares, and said so.
 MIN_WINDOWS = 8
@@ -50,7 +50,7 @@ class RobustFit:
     conditions: tuple[Condition, ...]
 
 
-def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1) -> RobustFit:
+def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1, tolerance: float = 1e-12) -> RobustFit:
     """Robust multivariate complex regression of Y on X.
 
     Parameters
@@ -61,6 +61,8 @@ def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1)
         Starts are drawn from windows of different directions where possible.
     seed : int
         Of the drawing of starts.
+    tolerance : float
+        Relative change of the coefficients at which the M-steps end.
     """
     n, q = len(Y), Y.shape[1]
     if n < max(MIN_WINDOWS, 2 * (q + 1) + 2):
@@ -72,11 +74,11 @@ def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1)
     B, scatter = start.coefficients, start.scatter
     constant = efficiency_constant(2 * q)
     steps, change = 0, np.inf
-    distance = distance2(products(regression.residual(B)), scatter)
-    while change > 1e-12 and steps < _MAX_ITERATIONS:
+    distance = distance2(regression.terms(B), scatter)
+    while change > tolerance and steps < _MAX_ITERATIONS:
         steps += 1
         B_new = regression.fit(bisquare_weight(np.sqrt(distance), constant))
-        distance = distance2(products(regression.residual(B_new)), scatter)
+        distance = distance2(regression.terms(B_new), scatter)
         change = float(np.abs(B_new - B).max() / np.abs(B).max())
         B = B_new
     conditions: tuple[Condition, ...] = ()

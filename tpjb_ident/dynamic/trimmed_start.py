@@ -39,7 +39,8 @@ class Regression:
         power = X.real**2 + X.imag**2
         self._terms = np.concatenate([power, cross.real[:, None], cross.imag[:, None], right.real, right.imag], axis=1)
         #: Scatter of the forces themselves: any equivariant metric does for a first ordering, this one is at hand.
-        self.metric = scatter(products(Y), np.ones(self.n), self.q)
+        self._x, self._y = np.ascontiguousarray(X.T), np.ascontiguousarray(Y.T)
+        self.metric = scatter(products(self._y), np.ones(self.n), self.q)
 
     def fit(self, weights: FloatArray) -> ComplexArray:
         """Weighted least squares, (..., n) -> (..., q, 2), by Cramer's rule; a singular system gives large numbers."""
@@ -57,8 +58,12 @@ class Regression:
         return B
 
     def residual(self, B: ComplexArray) -> ComplexArray:
-        """Y - X B', (..., n, q)."""
-        return np.asarray(self.Y - self.X @ np.swapaxes(B, -1, -2))
+        """Y - X B', (n, q)."""
+        return np.asarray(self.Y - self.X @ B.T)
+
+    def terms(self, B: ComplexArray) -> FloatArray:
+        """`products` of the residual, (..., q^2, n)."""
+        return products(self._y - B @ self._x)
 
 
 @functools.cache
@@ -67,12 +72,17 @@ def _pairs(q: int) -> tuple[IntArray, IntArray]:
     return np.triu_indices(q, 1)
 
 
-def products(residual: ComplexArray) -> FloatArray:
-    """Terms of r r^H as reals, (..., n, q) -> (..., q^2, n): |r_a|^2, then Re and Im of conj(r_a) r_b for a < b."""
-    rows = np.swapaxes(residual, -1, -2)
-    first, second = _pairs(rows.shape[-2])
+def products(rows: ComplexArray) -> FloatArray:
+    """Terms of r r^H as reals, (..., q, n) -> (..., q^2, n): |r_a|^2, then Re and Im of conj(r_a) r_b for a < b."""
+    q = rows.shape[-2]
+    first, second = _pairs(q)
     pairs = rows[..., first, :].conj() * rows[..., second, :]
-    return np.concatenate([rows.real**2 + rows.imag**2, pairs.real, pairs.imag], axis=-2)
+    result = np.empty((*rows.shape[:-2], q * q, rows.shape[-1]))
+    np.square(rows.real, out=result[..., :q, :])
+    result[..., :q, :] += np.square(rows.imag)
+    result[..., q : q + len(first), :] = pairs.real
+    result[..., q + len(first) :, :] = pairs.imag
+    return result
 
 
 def scatter(terms: FloatArray, weights: FloatArray, q: int) -> ComplexArray:
@@ -130,17 +140,17 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Star
         Starts are drawn from windows of different directions where possible.
     seed : int
     """
-    pairs = _start_pairs(direction, seed)
-    B, exact = _concentrated(regression, pairs, 0.5)
+    seeds = _first_fits(regression, _start_pairs(direction, seed))
+    B, exact = _concentrated(regression, seeds, 0.5)
     if exact:
         return Start(B, np.zeros((regression.q, regression.q), dtype=complex), True)
     majority = Start(*_reweighted(regression, B, 0.5))
-    B, exact = _concentrated(regression, pairs, _SMALL_CORE)
+    B, exact = _concentrated(regression, seeds, _SMALL_CORE)
     if exact:
         return majority
     core = Start(*_reweighted(regression, B, _SMALL_CORE))
     limit = trimming_limits(2 * regression.q)[0]
-    accepted = distance2(products(regression.residual(core.coefficients)), core.scatter) <= limit
+    accepted = distance2(regression.terms(core.coefficients), core.scatter) <= limit
     everywhere = len(np.unique(direction[accepted])) == len(np.unique(direction))
     tighter = _log_det(core.scatter) < _log_det(majority.scatter) - np.log(4.0**regression.q)
     return core if everywhere and tighter else majority
@@ -161,19 +171,27 @@ def _core_size(regression: Regression, share: float) -> int:
     return int(share * regression.n + 0.5 * (2 + regression.q + 1))
 
 
-def _concentrated(regression: Regression, pairs: IntArray, share: float) -> tuple[ComplexArray, bool]:
-    """Best of many concentrated two-window starts, and whether its core fits exactly."""
-    h = _core_size(regression, share)
+def _first_fits(regression: Regression, pairs: IntArray) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Fits through pairs of windows, the terms of their residuals, and the windows' distances from them."""
     chosen = np.zeros((len(pairs), regression.n))
     np.put_along_axis(chosen, pairs, 1.0, axis=1)
     B = regression.fit(chosen)
-    terms = products(regression.residual(B))
+    terms = regression.terms(B)
     spread = np.broadcast_to(regression.metric, (len(B), regression.q, regression.q))
+    return B, terms, distance2(terms, spread)
+
+
+def _concentrated(
+    regression: Regression, seeds: tuple[ComplexArray, FloatArray, FloatArray], share: float
+) -> tuple[ComplexArray, bool]:
+    """Best of many concentrated two-window starts, and whether its core fits exactly."""
+    h = _core_size(regression, share)
+    B, terms, distance = seeds
     for step in range(_STEPS):
         previous = B
-        weights = _nearest(distance2(terms, spread), h)
+        weights = _nearest(distance, h)
         B = regression.fit(weights)
-        terms = products(regression.residual(B))
+        terms = regression.terms(B)
         spread = _regular(scatter(terms, weights, regression.q), regression.metric)
         exact = _fits_exactly(spread, regression.Y)
         if exact.any():
@@ -183,6 +201,7 @@ def _concentrated(regression: Regression, pairs: IntArray, share: float) -> tupl
             B, spread, terms = B[best], spread[best], terms[best]
         elif np.array_equal(B, previous):
             break  # every start keeps the same windows
+        distance = distance2(terms, spread)
     return B[int(np.argmin(_log_det(spread)))], False
 
 
@@ -213,7 +232,7 @@ def _reweighted(regression: Regression, B: ComplexArray, share: float) -> tuple[
     """Fit and scatter of the windows that belong together, from the concentrated core."""
     n, q, metric = regression.n, regression.q, regression.metric
     h = _core_size(regression, share)
-    terms = products(regression.residual(B))
+    terms = regression.terms(B)
     spread = _regular(scatter(terms, np.ones(n), q), metric)
     # The core's own scatter is self-consistent after a few looks at which windows it holds.
     for _ in range(4):
@@ -223,7 +242,7 @@ def _reweighted(regression: Regression, B: ComplexArray, share: float) -> tuple[
     for _ in range(2):
         weights = trimming_weight(distance2(terms, spread), lower, upper)
         B = regression.fit(weights)
-        terms = products(regression.residual(B))
+        terms = regression.terms(B)
         freedom = (weights.sum() - 2) / weights.sum()
         spread = _regular(scatter(terms, weights, q) / (shrinkage * freedom), metric)
     return B, spread
