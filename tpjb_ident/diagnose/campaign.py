@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from tpjb_ident.compare.comparison import ComparisonError, measure_dry
 from tpjb_ident.compare.measured_pivots import measured_laws
 from tpjb_ident.diagnose.diagnose import Diagnosis, diagnose
+from tpjb_ident.diagnose.housing import with_housing
 from tpjb_ident.diagnose.nuisance import Certificates
 from tpjb_ident.diagnose.observe import observe
 from tpjb_ident.diagnose.settings import DiagnoseSettings
@@ -90,7 +91,7 @@ def diagnose_campaign(
     curves, polygon, locus = measure_dry(campaign, bearing)
     measured = baseline.pivots == "measured"
     laws = measured_laws(curves, len(bearing.pads), campaign.id) if measured else pivot_laws(baseline.pivots, bearing)
-    setup = apply_effects(Setup(bearing, laws, baseline.thermal), baseline.effects)
+    setup = apply_effects(with_housing(Setup(bearing, laws, baseline.thermal), campaign), baseline.effects)
     # curves that the model was given cannot testify about it
     observations = observe(found, () if measured else curves, locus, polygon, settings.tolerance)
     certain = replace(settings, certificates=certificates(campaign, settings.certificates))

@@ -18,6 +18,8 @@ from tpjb_ident.diagnose.sensor_map import MAP_NAMES, sensor_map_columns
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+#: Root mean square gap [sigma] below which gains within their certificates are all there is to see.
+NOTABLE = 3.0
 #: Share from which a constant map counts as the story.
 MOSTLY = 0.9
 #: Root mean square [sigma] that a constant map may leave if it is the story.
@@ -50,7 +52,7 @@ class SensorMapTest:
     @property
     def words(self) -> str:
         """In a sentence."""
-        if self.size < 1.5:
+        if self.size < NOTABLE:
             return "no gap in h, locus and load readings for which a sensor map would be needed"
         percent = f"{100 * self.share:.0f} %"
         left = self.size * math.sqrt(1.0 - min(self.share, 1.0))
@@ -98,7 +100,8 @@ def sensor_map_test(problem: Problem) -> SensorMapTest | None:
     columns = sensor_map_columns(observations.elements, problem.base)
     load = coordinate(observations.elements, "load")[:, None]
     residual = observations.value - problem.base
-    weigh = _weigher(problem, mine)
+    # sensor gains are what is asked
+    weigh = _weigher(problem, mine, _others(problem))
     r, c, drift = weigh(residual), weigh(columns), weigh(columns * load)
     amplitude, share = _explained(r, c)
     _, drifting = _explained(r, np.column_stack([c, drift]))
@@ -112,7 +115,7 @@ def frequency_laws(problem: Problem) -> tuple[FrequencyLaw, ...]:
     observations = problem.observations
     out = []
     for load, mine in _sweeps(observations):
-        weigh = _weigher(problem, mine)
+        weigh = _weigher(problem, mine, problem.nuisances.columns)
         residual = weigh(observations.value - problem.base)
         if np.mean(residual**2) < 2.0:
             continue
@@ -151,10 +154,17 @@ def _law_columns(observations: Observations, base: FloatArray, mine: BoolArray) 
     ]
 
 
-def _weigher(problem: Problem, mine: BoolArray):  # type: ignore[no-untyped-def]
-    """Whitening of a part of the elements; nuisances that are sensor gains are left out: they are what is asked."""
+def _others(problem: Problem) -> FloatArray:
+    """Nuisances that are no sensor gains, (n, m)."""
+    known = problem.nuisances
+    return known.columns[:, [not name.startswith("gain of") for name in known.names]]
+
+
+def _weigher(problem: Problem, mine: BoolArray, others: FloatArray):  # type: ignore[no-untyped-def]
+    """Whitening of a part of the elements with noise, tolerance and some nuisances."""
     observations = problem.observations
-    part = (observations.covariance + np.diag(observations.fine**2))[np.ix_(mine, mine)]
+    total = observations.covariance + np.diag(observations.fine**2) + others @ others.T
+    part = total[np.ix_(mine, mine)]
     scale = np.sqrt(np.diag(part))
     factor = scale[:, None] * np.linalg.cholesky(part / np.outer(scale, scale))
     return lambda vector: np.linalg.solve(factor, vector[mine])

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tpjb_ident.report.diagnosis_evidence import evidence_sections
 from tpjb_ident.report.diagnosis_panels import GROUP, diagnosis_panels
 from tpjb_ident.report.diagnosis_words import effect_rows, verdict_sentences
 from tpjb_ident.report.figure import save_panels
@@ -88,6 +89,7 @@ def _sections(result: CampaignDiagnosis) -> list[Section]:
             ],
         )
     ]
+    sections += evidence_sections(verdict)
     if tried:
         text = "Chi-square per element is the whitened misfit of the training points with calibration errors left free."
         columns = ["explanation", "chi-square per element", "held-out gap"]

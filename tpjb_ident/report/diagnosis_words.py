@@ -13,7 +13,7 @@ def verdict_sentences(name: str, verdict: Verdict) -> list[str]:
     gap = verdict.gap
     change = f"{gap['heldout_before']:.2f} to {gap['heldout_after']:.2f} sigma"
     held = f"on points that no fit has seen the gap goes from {change}"
-    names = " and ".join(_spoken(e.name) for e in verdict.effects)
+    names = " and ".join(_spoken(e.label) for e in verdict.effects)
     verb = "explain" if len(verdict.effects) > 1 else "explains"
     first = {
         "consistent": f"{name}: consistent. Model and measurement agree within noise and tolerance "
@@ -33,6 +33,9 @@ def verdict_sentences(name: str, verdict: Verdict) -> list[str]:
             f"It shows most in {worst.observable} at {worst.where}: {worst.size_sigma:.1f} sigma, "
             f"{100 * worst.share:.0f} % of the squared gap."
         )
+    sensors = verdict.notes.get("sensor_map")
+    if verdict.verdict != "consistent" and sensors:
+        out.append(f"Sensors or physics: {sensors['words']}.")
     worse = [o for o, g in verdict.gap_by_observable.items() if _worse(g)]
     if verdict.effects and worse:
         out.append(f"With the effect added, {', '.join(worse)} fits worse than before.")
