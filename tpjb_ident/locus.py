@@ -131,18 +131,20 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
         )
     read = [_read(run) for run in runs]
     noise = _noise(read)
-    drift, drifts = _drift(read, noise)
     centre = np.zeros(2) if polygon is None else polygon.centre
+    drift = _drift(read, noise, centre)
+    known = np.isfinite(drift.rate).all()
+    drifts, drift_variance = (drift.rate, drift.variance) if known else (np.zeros(2), 0.0)
     centre_covariance = np.zeros((2, 2)) if polygon is None else polygon.centre_covariance
     points = []
     for order, (run, record) in enumerate(zip(runs, read, strict=True)):
         position = record.position - drifts * order - centre
-        variance = noise.mean_variance(record.span) * np.eye(2)
+        variance = (noise.mean_variance(record.span) + order**2 * drift_variance) * np.eye(2)
         points.append(
             LocusPoint(run.id, run.point, record.load, record.direction, position, variance + centre_covariance)
         )
     points.sort(key=lambda p: (p.point.static_load, p.point.shaft_speed, _from_down(p.point.static_load_direction)))
-    return Locus(tuple(points), np.asarray(centre), drift, _status(points, polygon, drift))
+    return Locus(tuple(points), np.asarray(centre), drift.rate, _status(points, polygon, drift.rate))
 
 
 @dataclass(frozen=True)
@@ -215,30 +217,45 @@ def _noise(read: list[_Read]) -> NoiseModel:
     return estimate_noise(series, DRIFT_RATE)
 
 
-def _drift(read: list[_Read], noise: NoiseModel) -> tuple[FloatArray, FloatArray]:
-    """Drift per run from repeats of one set point, (2,); NaN and zero where nothing was repeated.
+@dataclass(frozen=True)
+class _Drift:
+    """Drift per run: `rate` (2,) [m], NaN where nothing was repeated, and the variance [m^2] of either component."""
 
-    Runs are evenly spaced in time as far as anyone knows: the drift is taken as proportional to the run's number.
+    rate: FloatArray
+    variance: float
+
+
+def _drift(read: list[_Read], noise: NoiseModel, centre: FloatArray) -> _Drift:
+    """Drift from repeats of one set point.
+
+    Runs are evenly spaced in time as far as anyone knows: the drift is taken as proportional to the run's number. A
+    repeat meets its set point otherwise than the first time: by as much, times its distance from the centre, the shaft
+    may stand elsewhere without any drift.
     """
     pairs = []
     for i, first in enumerate(read):
         for j in range(i + 1, len(read)):
             other = read[j]
-            turn = abs(
-                math.remainder(first.point.static_load_direction - other.point.static_load_direction, 2 * math.pi)
-            )
-            same = (
-                first.point.static_load == other.point.static_load
-                and first.point.shaft_speed == other.point.shaft_speed
-            )
-            if same and turn < SAME_DIRECTION:
-                pairs.append((j - i, other.position - first.position))
+            if _same_set_point(first.point, other.point):
+                miss = math.hypot(
+                    other.load / max(first.load, 1e-300) - 1.0,
+                    math.remainder(other.direction - first.direction, 2 * math.pi),
+                )
+                elsewhere = miss * float(np.hypot(*(first.position - centre)))
+                variance = noise.mean_variance(first.span) + noise.mean_variance(other.span) + elsewhere**2
+                pairs.append((j - i, other.position - first.position, variance))
     if not pairs:
-        return np.full(2, np.nan), np.zeros(2)
+        return _Drift(np.full(2, np.nan), np.nan)
     apart = np.array([p[0] for p in pairs], dtype=float)
     moved = np.array([p[1] for p in pairs])
-    rate = apart @ moved / (apart @ apart)
-    return rate, rate
+    weight = apart / (apart @ apart)
+    return _Drift(weight @ moved, float(weight**2 @ np.array([p[2] for p in pairs])))
+
+
+def _same_set_point(one: OperatingPoint, other: OperatingPoint) -> bool:
+    turn = abs(math.remainder(one.static_load_direction - other.static_load_direction, 2 * math.pi))
+    same = one.static_load == other.static_load and one.shaft_speed == other.shaft_speed
+    return same and turn < SAME_DIRECTION
 
 
 def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, drift: FloatArray) -> tuple[str, ...]:

@@ -87,6 +87,9 @@ def test_a_repeated_direction_shows_the_drift(campaign):
     assert found.drift * 6 == pytest.approx([4e-6, -2e-6], abs=0.3e-6)
     positions = {p.run: p.position for p in found.points}
     assert positions["again"] == pytest.approx(positions[runs[0].id], abs=0.3e-6)
+    # what the correction itself is unsure of grows from run to run
+    se = {p.run: np.sqrt(p.covariance[0, 0]) for p in found.points}
+    assert se["again"] > 1.2 * se[runs[0].id]
 
 
 def moved(run):
