@@ -77,9 +77,27 @@ def _judge(
             f"held-out gap {gaps[0]:.2f} -> {gaps[1]:.2f}; what is left is small but structured, most in "
             f"{after.structure.words}"
         )
+    undecided = _undecided(found, after.scale, settings)
     if groups:
-        return "ambiguous", (*(f"{' or '.join(group)}: these data cannot tell" for group in groups), text)
-    return "named", (text,)
+        return "ambiguous", (*(f"{' or '.join(group)}: these data cannot tell" for group in groups), *undecided, text)
+    return "named", (*undecided, text)
+
+
+def _undecided(found: Search, scale: float, settings: DiagnoseSettings) -> tuple[str, ...]:
+    """Effects of one name that these data cannot tell apart, such as two pads: the name stands, the rest is open."""
+    out = []
+    for candidate, rivals in zip(found.model.candidates, found.rivals, strict=True):
+        labels = [
+            c.label for rival in rivals for c in rival.candidates
+            if c.name == candidate.name and c not in found.model.candidates and _alike(found, rival, scale, settings)
+        ]  # fmt: skip
+        if labels:
+            out.append(f"{' or '.join([candidate.label, *dict.fromkeys(labels)])}: these data cannot tell")
+    return tuple(out)
+
+
+def _alike(found: Search, rival: Fit, scale: float, settings: DiagnoseSettings) -> bool:
+    return (rival.chi_square - found.model.chi_square) / scale < settings.rivals and not rival.at_bound
 
 
 def _refusals(problem: Problem, found: Search, settings: DiagnoseSettings) -> tuple[str, ...]:
@@ -123,7 +141,7 @@ def _groups(found: Search, scale: float, settings: DiagnoseSettings) -> tuple[tu
         names = {candidate.name}
         for rival in rivals:
             other = [c.name for c in rival.candidates if c not in found.model.candidates]
-            if (rival.chi_square - found.model.chi_square) / scale < settings.rivals and not rival.at_bound:
+            if _alike(found, rival, scale, settings):
                 names |= set(other)
         if len(names) > 1:
             out.append((candidate.name, *sorted(names - {candidate.name})))
