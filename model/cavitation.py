@@ -21,6 +21,8 @@ J. Tribology 132 (2010) 041702 (complementarity); L. Portugal, J. Judice, L. Vic
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,6 +35,7 @@ from model.cavitation_matrix import (
 )
 from model.cavitation_slopes import jfo_slopes
 from model.film import FilmForces, solve_film
+from model.film_matrix import assemble, factorise
 from model.film_mesh import FilmGrid, FilmWork
 from model.kernel import compiled
 
@@ -44,7 +47,6 @@ MAX_STEPS = 4000
 PATIENCE = 8
 
 
-@compiled
 def solve_film_jfo(
     grid: FilmGrid,
     work: FilmWork,
@@ -77,18 +79,54 @@ def solve_film_jfo(
     forces = solve_film(grid, work, wedge, speed, sharp)
     if forces.steps < 0:
         return forces
-    faces = face_flows(grid, work, wedge, speed, filling)
-    if not np.any(work.ruptured[1:]) and _starved(work, faces) == 0:
+    steps, force, stiffness, damping = _conserve(grid, work, wedge, speed, sharp, filling)
+    if steps == 0:
         return forces
+    return FilmForces(force, stiffness, damping, forces.min_film, steps)
+
+
+#: Grid, work, (Cp, a, b), surface speed, sharp: pressure and derivatives of one film.
+FilmSolver = Callable[[FilmGrid, FilmWork, tuple[float, float, float], float, bool], FilmForces]
+
+
+def film_solver(cavitation: str) -> FilmSolver:
+    """The solver of a film that is flooded where it enters, by what happens where it ruptures."""
+    return _flooded_jfo if cavitation == "jfo" else solve_film
+
+
+def _flooded_jfo(
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool
+) -> FilmForces:
+    return solve_film_jfo(grid, work, wedge, speed, sharp, 1.0)
+
+
+@compiled
+def _conserve(
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool, filling: float
+) -> tuple[int, FloatArray, FloatArray, FloatArray]:
+    """Go on from Swift and Stieber's film: steps (0: it was right; -2: not settled), force, stiffness, damping."""
+    force, stiffness, damping = np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2))
+    faces = face_flows(grid, work, wedge, speed, filling)
+    if not _any_ruptured(work.ruptured) and _starved(work, faces) == 0:
+        return 0, force, stiffness, damping
     x = np.empty((work.unknown.shape[0], 1))
     band = np.empty((work.unknown.shape[0], 2 * (work.band.shape[1] - 1) + 1))
     steps = _pivot(grid, work, faces, (band, x))
     _read(work, x, grid.first)
-    if steps < 0:
-        return FilmForces(np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2)), forces.min_film, -2)
-    weight, slopes = jfo_slopes(grid, work, faces, x, sharp)
-    force, stiffness, damping = _integrate(grid, work, weight, slopes)
-    return FilmForces(force, stiffness, damping, forces.min_film, steps)
+    if steps > 0:
+        weight, slopes = jfo_slopes(grid, work, faces, x, sharp)
+        _leave_behind(grid, work, faces, slopes)
+        _integrate(grid, work, weight, slopes, (force, stiffness, damping))
+    return steps, force, stiffness, damping
+
+
+@compiled
+def _any_ruptured(ruptured: BoolArray) -> bool:
+    for i in range(1, ruptured.shape[0]):
+        for j in range(ruptured.shape[1]):
+            if ruptured[i, j]:
+                return True
+    return False
 
 
 @compiled
@@ -181,22 +219,39 @@ def _read(work: FilmWork, x: FloatArray, first: int) -> None:
 
 
 @compiled
-def _integrate(
-    grid: FilmGrid, work: FilmWork, weight: FloatArray, slopes: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    force, total = np.zeros(2), np.zeros((2, 4))
+def _leave_behind(grid: FilmGrid, work: FilmWork, faces: FaceFlows, slopes: FloatArray) -> None:
+    """Factor and slopes of the film that is full now, for those who go on with them (heat, pads that bend)."""
+    assemble(work.band, faces.along, faces.across, work.ruptured, grid.first)
+    factorise(work.band)
     nt, nz = work.pressure.shape[0] - 1, work.pressure.shape[1] - 1
     for i in range(1, nt):
-        direction = (grid.cos[i], grid.sin[i])
+        for j in range(grid.first, nz):
+            k = (i - 1) * (nz - grid.first) + j - grid.first
+            for m in range(4):
+                work.slopes[k, m] = 0.0 if work.ruptured[i, j] else slopes[k, m]
+
+
+@compiled
+def _integrate(
+    grid: FilmGrid,
+    work: FilmWork,
+    weight: FloatArray,
+    slopes: FloatArray,
+    totals: tuple[FloatArray, FloatArray, FloatArray],
+) -> None:
+    force, stiffness, damping = totals
+    nt, nz = work.pressure.shape[0] - 1, work.pressure.shape[1] - 1
+    for i in range(1, nt):
         for j in range(grid.first, nz):
             k = (i - 1) * (nz - grid.first) + j - grid.first
             if work.ruptured[i, j]:
                 continue
             for n in range(2):
-                force[n] += direction[n] * grid.area[i, j] * work.unknown[k]
-                for m in range(4):
-                    total[n, m] += direction[n] * weight[i, j] * slopes[k, m]
-    return force, total[:, :2].copy(), total[:, 2:].copy()
+                direction = grid.cos[i] if n == 0 else grid.sin[i]
+                force[n] += direction * grid.area[i, j] * work.unknown[k]
+                for m in range(2):
+                    stiffness[n, m] += direction * weight[i, j] * slopes[k, m]
+                    damping[n, m] += direction * weight[i, j] * slopes[k, m + 2]
 
 
 def fluid_fraction(

@@ -56,7 +56,9 @@ def face_flows(
             height[i, j] = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
             density = 0.5 * (work.density[i, j] + work.density[i + 1, j])
             couette[i, j] = 0.5 * speed * height[i, j] * density * grid.height[j]
-    supply = 0.5 * filling * speed * work.thickness[0] * work.density[0] * grid.height
+    supply = np.empty(along.shape[1])
+    for j in range(len(supply)):
+        supply[j] = 0.5 * filling * speed * work.thickness[0, j] * work.density[0, j] * grid.height[j]
     return FaceFlows(along, across, couette, height, supply)
 
 

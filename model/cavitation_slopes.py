@@ -49,8 +49,10 @@ def jfo_slopes(
     _stored(grid, work, faces, x, static, rate)
     substitute_columns(band, rate)
     slopes = np.empty((x.shape[0], 4))
-    slopes[:, :2] = static
-    slopes[:, 2:] = rate
+    for k in range(x.shape[0]):
+        for m in range(2):
+            slopes[k, m] = static[k, m]
+            slopes[k, m + 2] = rate[k, m]
     _flows(work, faces)
     return weight, slopes
 

@@ -26,7 +26,7 @@ from model.carrying import (
     shorten,
     wake_or_rest,
 )
-from model.film import solve_film
+from model.conditions import overloaded_pads, unsupported
 from model.film_state import least_share
 from model.first_position import first_position
 from model.heat_paths import couples_heat, settle_temperatures
@@ -342,8 +342,8 @@ def _sharpen(search: _Search) -> None:
     """Derivatives once more, with the rupture line between the nodes; the pressure stays."""
     for film in search.films:
         if film.forces is not None:
-            a, b = film.approach(search.position)
-            film.forces = solve_film(film.grid, film.work, (film.pad.pad_clearance, a, b), search.surface_speed, True)
+            wedge = (film.pad.pad_clearance, *film.approach(search.position))
+            film.forces = film.solver(film.grid, film.work, wedge, search.surface_speed, True)
 
 
 def _apply(search: _Search, step: tuple[FloatArray, FloatArray], damping: float) -> bool:
@@ -379,6 +379,11 @@ _NO_CHANGE = np.empty((0, 0))
 
 def _result(search: _Search, iterations: int, residual: float, heat: float, status: tuple[str, ...]) -> Equilibrium:
     names = list(status)
+    if "not converged" in names and unsupported(search.setup, search.load):
+        names.insert(0, "no pads against the load")
+    overloaded = overloaded_pads(search.films)
+    if overloaded and "not converged" not in names:
+        names.append("overloaded pads " + ", ".join(map(str, overloaded)))
     idle = [f.number for f in search.films if f.idle]
     if idle:
         names.append("idle pads " + ", ".join(map(str, idle)))

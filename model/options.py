@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from model.growth import Growth
 
-CAVITATION = ("swift-stieber",)
+CAVITATION = ("swift-stieber", "jfo")
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,9 @@ class Options:
         The journal passes heat from hot films to cold ones and keeps none.
     growth : Growth, optional
         Clearances change with the temperatures of journal, housing and pads; see `model.growth`.
-    cavitation : {"swift-stieber"}
-        What happens where the film ruptures.
+    cavitation : {"swift-stieber", "jfo"}
+        What happens where the film ruptures: p = 0 and dp/dn = 0 alone, or with the oil conserved (Jakobsson, Floberg
+        and Olsson), see `model.cavitation`.
     """
 
     conduction: bool = False

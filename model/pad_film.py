@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.bearing import Oil, Pad
+from model.cavitation import FilmSolver, film_solver
 from model.energy import heat_step
 from model.film import FilmForces, solve_film
 from model.film_mesh import FilmGrid, FilmWork, film_grid, film_work
@@ -56,6 +57,8 @@ class PadFilm:
         How the pad gives way; None for a rigid one.
     step : BendingStep or None
         Its part of the present Newton step.
+    solver : callable
+        Solves the film's pressure, with or without its mass conserved.
     """
 
     number: int
@@ -80,6 +83,7 @@ class PadFilm:
     flips: int = 0
     held: int = 0
     temperature_change: float = field(default=math.inf)
+    solver: FilmSolver = solve_film
 
     def reach(self, position: FloatArray) -> float:
         """Approach a of the film if the pivot did not give way [m]."""
@@ -96,7 +100,7 @@ class PadFilm:
         a, b = self.approach(position)
         set_viscosity(self.work, oil_constants(oil))
         wedge = (self.pad.pad_clearance, a, b)
-        self.forces = self.foreseen = solve_film(self.grid, self.work, wedge, surface_speed, False)
+        self.forces = self.foreseen = self.solver(self.grid, self.work, wedge, surface_speed, False)
 
     def warm(self, surface_speed: float, oil: Oil, limits: tuple[float, float]) -> float:
         """Move the temperature towards what the pressure makes it, by `limits`: relaxation, and largest step [K].
@@ -135,6 +139,7 @@ def pad_films(setup: Setup) -> list[PadFilm]:
     symmetric = setup.misalignment[0] == 0.0
     angle, toward = setup.misalignment
     films = []
+    solver = film_solver(setup.options.cavitation)
     for number, pad in enumerate(bearing.pads, start=1):
         start = pad.leading_edge + setup.starvation * pad.arc
         shape = (setup.mesh.along, setup.mesh.across * (1 if symmetric else 2))
@@ -157,6 +162,7 @@ def pad_films(setup: Setup) -> list[PadFilm]:
                 bent=np.zeros_like(work.extra),
                 warming=np.zeros_like(work.unknown),
                 give=pad_give(pad, bearing, grid) if setup.flexible_pads or setup.options.conduction else None,
+                solver=solver,
             )
         )
     return films

@@ -184,6 +184,19 @@ def test_what_forms_again_is_not():
     assert solve_film(*one, lengths((-1.0, 0.1)), SPEED, True).force[0] > 2.5 * jfo > 0.0
 
 
+@pytest.mark.parametrize(("ratio", "eccentricity", "attitude"), [(0.5, 0.477, 51.01), (1.0, 0.224, 63.54)])
+def test_upper_film_of_a_two_groove_bearing_carries_nothing(ratio, eccentricity, attitude):
+    # Lund and Thomsen's bearing: the gap of the upper pad opens first, what then closes has not enough oil to press
+    turn = np.radians(attitude)
+    wedge = (-CLEARANCE * eccentricity * np.cos(turn), -CLEARANCE * eccentricity * np.sin(turn))
+    grid = film_grid(-np.radians(80.0), np.radians(80.0), RADIUS, 2 * RADIUS * ratio, (80, 6), True)
+    work = film_work(grid, 40.0)
+    work.viscosity[:], work.density[:] = MU, RHO
+    assert solve_film(grid, work, (CLEARANCE, *wedge), SPEED, True).force[0] > 0.1
+    work.ruptured[:] = False
+    assert (solve_film_jfo(grid, work, (CLEARANCE, *wedge), SPEED, True, 1.0).force == 0.0).all()
+
+
 CASES = [((0.9, 0.08), 1.0), ((-1.0, 0.1), 1.0), ((-0.8, 0.1), 1.0), ((0.3, 0.4), 0.7), ((0.85, 0.1), 0.8)]
 
 
