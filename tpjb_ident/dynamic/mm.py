@@ -17,10 +17,12 @@ import numpy as np
 from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.conditions import Condition
 from tpjb_ident.dynamic.robust_constants import bisquare_weight, efficiency_constant
-from tpjb_ident.dynamic.trimmed_start import Regression, distance2, robust_start
+from tpjb_ident.dynamic.trimmed_start import Regression, distance2, evenly_chosen, robust_start
 
 #: Fewer windows than this leave nothing to be robust with: least squares, and said so.
 MIN_WINDOWS = 8
+#: The start looks at no more windows than this: as many tell what the majority is, and its memory grows with them.
+MANY_WINDOWS = 640
 _MAX_ITERATIONS = 200
 
 
@@ -68,7 +70,9 @@ def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1,
     if n < max(MIN_WINDOWS, 2 * (q + 1) + 2):
         return _least_squares_only(X, Y)
     regression = Regression(X, Y)
-    start = robust_start(regression, direction, seed)
+    some = evenly_chosen(direction, MANY_WINDOWS)
+    first = regression if len(some) == n else Regression(X[some], Y[some])
+    start = robust_start(first, direction[some], seed)
     if start.exact:
         return _exact_fit(regression, start.coefficients)
     B, scatter = start.coefficients, start.scatter

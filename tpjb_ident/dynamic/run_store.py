@@ -112,9 +112,10 @@ class RunStore:
             "conditions": _packed(phasors.conditions),
             "temperatures": {str(pad): value for pad, value in result.temperatures.items()},
         }
-        self.folder.mkdir(parents=True, exist_ok=True)
         text = np.array(json.dumps(meta))
-        write_atomic(self._file(phasors.run), lambda path: np.savez(path, meta=text, **arrays))
+        with suppress(FileNotFoundError):  # another run into the same folder has ended and cleared it
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_atomic(self._file(phasors.run), lambda path: np.savez(path, meta=text, **arrays))
 
     def load(self, run: Any, mark: str, housing_mass: float) -> RunResult | None:
         """Give a kept run back; None if it is not there, or not under this fingerprint.

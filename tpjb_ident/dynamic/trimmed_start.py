@@ -156,6 +156,15 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Star
     return core if everywhere and tighter else majority
 
 
+def evenly_chosen(direction: IntArray, most: int) -> IntArray:
+    """Indices of at most about `most` windows, the same share of every direction, spread over its time."""
+    n = len(direction)
+    if n <= most:
+        return np.arange(n)
+    by_direction = np.argsort(direction, kind="stable")
+    return np.sort(by_direction[np.round(np.linspace(0, n - 1, most)).astype(int)])
+
+
 def _start_pairs(direction: IntArray, seed: int) -> IntArray:
     """Pairs of windows from different directions, shape (STARTS, 2)."""
     rng = np.random.default_rng(seed)
