@@ -21,6 +21,7 @@ from tpjb_ident.cli.plan import plan
 from tpjb_ident.cli.predict import predict
 from tpjb_ident.cli.simulate import simulate
 from tpjb_ident.cli.spoken import add_command
+from tpjb_ident.cli.view import view
 
 # plain help: the markup renderer costs more start-up time than all the rest together
 app = typer.Typer(
@@ -49,7 +50,7 @@ def _common(
 
 
 COMMANDS = (
-    init, show, check, identify, pivot, locus, predict, compare, diagnose, plan, evaluate, simulate, demo, export,
+    init, show, check, identify, pivot, locus, predict, compare, diagnose, plan, evaluate, simulate, demo, export, view,
 )  # fmt: skip
 for command in COMMANDS:
     add_command(app, command)

@@ -1,0 +1,104 @@
+"""`tpjb view` as somebody uses it: in a browser, on this machine only."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("bokeh", reason="the extra view is not installed")
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[2]
+DEMO = ROOT / "rigdata" / "samples" / "demo.h5"
+IDLE = "window.Bokeh && Bokeh.documents.length > 0 && Bokeh.documents[0].is_idle"
+
+
+@contextlib.contextmanager
+def viewing(*arguments):
+    """Run the command and give its address."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tpjb_ident", "view", *map(str, arguments), "--no-browser", "--seconds", "240"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )  # fmt: skip
+    try:
+        line = process.stdout.readline()
+        found = re.search(r"http://127\.0\.0\.1:(\d+)/", line)
+        assert found, line + (process.stderr.read() if process.poll() is not None else "")
+        yield found[0], int(found[1])
+    finally:
+        process.terminate()
+        process.communicate(timeout=30)
+
+
+def model(name: str, what: str) -> str:
+    return f"Bokeh.documents[0].get_model_by_name('{name}').{what}"
+
+
+def test_a_campaign_can_be_browsed_and_the_model_moved(chromium):
+    with viewing(DEMO) as (address, _), chromium() as tab:
+        tab.size(1280)
+        tab.open(address)
+        tab.until(IDLE, 90)
+        assert tab.js(model("tabs", "tabs.map((t) => t.title)")) == [
+            "records", "points and windows", "prediction and measurement"]  # fmt: skip
+        before = tab.js(model("run-facts", "text"))
+        assert "dynamic, 2.5 kN" in before
+        tab.js(model("run", "value = 'p-1-up'"))
+        tab.until(f"{model('run-facts', 'text')} !== {before!r}", 30)
+        assert "dry_pivot" in tab.js(model("run-facts", "text"))
+        shown = model("weights-plot", "renderers[0].data_source.data.window.length")
+        assert tab.js(shown) == 54
+        assert tab.js(model("coefficients", "source.data.value[0]")) == "53.10"
+        said = tab.js(model("model-said", "text"))
+        assert re.match(r"2\.5 kN, 25 Hz, measured pivots: kxx 53\.", said)
+        assert "1 measured point at" in said
+        tab.js(model("load", "value = 5.0"))
+        tab.until(f"{model('model-said', 'text')}.startsWith('5 kN')", 60)
+        assert "3 measured points" in tab.js(model("model-said", "text"))
+        tab.js(model("pivots", "active = 0"))
+        tab.until(f"{model('model-said', 'text')}.includes('rigid')", 60)
+        assert [r for r in tab.requested if not r.startswith((address, "data:"))] == []
+        assert tab.logged == []
+
+
+def test_it_listens_on_loopback_only_and_refuses_pages_from_elsewhere():
+    with viewing(DEMO) as (_, port):
+        with socket.create_connection(("127.0.0.1", port), timeout=10):
+            pass
+        # 127.0.0.2 is this machine too: a server that listens on every address would answer there
+        with pytest.raises(OSError), socket.create_connection(("127.0.0.2", port), timeout=10):
+            pass
+        pytest.importorskip("websocket")
+        import websocket
+
+        with pytest.raises(websocket.WebSocketBadStatusException):
+            websocket.create_connection(f"ws://127.0.0.1:{port}/ws", origin="http://example.invalid", timeout=20)
+
+
+def test_a_folder_of_results_shows_its_tables(chromium, tmp_path):
+    out = tmp_path / "found"
+    subprocess.run([sys.executable, "-m", "tpjb_ident", "locus", str(DEMO), "--out", str(out), "-q"], check=True)
+    with viewing(out) as (address, _), chromium() as tab:
+        tab.open(address)
+        tab.until(IDLE, 60)
+        assert tab.js(model("table", "options")) == ["clearance", "locus"]
+        tab.js(model("table", "value = 'locus'"))
+        tab.until(f"{model('grid', 'columns.map((c) => c.title)')}.includes('x_m')", 30)
+        assert tab.logged == []
+
+
+def test_without_its_library_it_names_the_extra(monkeypatch):
+    from tpjb_ident.view.server import ViewError, serve
+    from tpjb_ident.view.session import Session
+
+    monkeypatch.setitem(sys.modules, "bokeh.application", None)
+    with pytest.raises(ViewError, match=r"tpjb-ident\[view\]"):
+        serve(Session("x"), 0, print)

@@ -1,0 +1,85 @@
+"""Serves the page on this machine only, from Bokeh's own files: nothing is loaded from anywhere else."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+from typing import Any
+
+from tpjb_ident.tables import printable
+from tpjb_ident.view.session import Session
+
+#: The only address that is ever listened on.
+LOOPBACK = "127.0.0.1"
+
+
+class ViewError(ValueError):
+    """The page cannot be served; says why and what to do."""
+
+
+def serve(session: Session, port: int, ready: Callable[[str], None], seconds: float | None = None) -> None:
+    """Serve until interrupted.
+
+    Parameters
+    ----------
+    session : Session
+    port : int
+        0: any free one.
+    ready : callable
+        Called with the address as soon as the page can be opened.
+    seconds : float, optional
+        Stop after this time.
+
+    Raises
+    ------
+    ViewError
+        Bokeh is not installed, or the port is taken.
+    """
+    try:
+        from bokeh.application import Application
+        from bokeh.application.handlers.function import FunctionHandler
+        from bokeh.server.server import Server
+    except ModuleNotFoundError as error:
+        raise ViewError('tpjb view needs Bokeh. Install it: pip install "tpjb-ident[view]"') from error
+    application = Application(FunctionHandler(lambda document: build(document, session)))
+    try:
+        # without `allow_websocket_origin` Bokeh takes connections from pages of this very address only
+        server = Server({"/": application}, address=LOOPBACK, port=port, num_procs=1)
+    except OSError as error:
+        raise ViewError(f"port {port} cannot be used ({error.strerror}). Give another with --port, or 0.") from error
+    server.start()
+    if seconds is not None:
+        server.io_loop.call_later(seconds, server.io_loop.stop)
+    ready(f"http://{LOOPBACK}:{server.port}/")
+    try:
+        server.io_loop.start()
+    finally:
+        server.stop()
+
+
+def build(document: Any, session: Session) -> None:
+    """Fill a Bokeh document with the tabs that the session has something for."""
+    from bokeh.layouts import column
+    from bokeh.models import Div, TabPanel, Tabs
+
+    document.title = f"tpjb: {printable(session.name)}"
+    panels = []
+    if session.campaign is not None and session.campaign.runs:
+        from tpjb_ident.view.records_tab import records_tab
+
+        panels.append(TabPanel(child=records_tab(session.campaign), title="records"))
+    if session.identification is not None:
+        from tpjb_ident.view.points_tab import points_tab
+
+        panels.append(TabPanel(child=points_tab(session.identification), title="points and windows"))
+        if session.predict is not None:
+            from tpjb_ident.view.model_tab import model_tab
+
+            panels.append(TabPanel(child=model_tab(session), title="prediction and measurement"))
+    if session.tables:
+        from tpjb_ident.view.tables_tab import tables_tab
+
+        panels.append(TabPanel(child=tables_tab(session.tables), title="tables"))
+    head = Div(text=f"<h1 style='font-size:1.3rem;margin:.3rem 0'>{html.escape(printable(session.name))}</h1>")
+    document.add_root(column(head, Tabs(tabs=panels, name="tabs", sizing_mode="stretch_width"),
+                             sizing_mode="stretch_width"))  # fmt: skip
