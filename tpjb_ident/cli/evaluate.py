@@ -61,7 +61,9 @@ def evaluate(
             bench = prepare(drawn, paper_layout(len(drawn.pads)))
             with open_workers(workers, scheduler, PRELOAD) as team:
                 rows = _run(team, bench, drawn, plan, show)
-        summary = _write(folder, rows)
+            show("next tests", 99, 100)
+            tests = _next_tests(bench, drawn)
+        summary = _write(folder, rows, tests)
         write_record(folder, target, "evaluate", options, {bearing.name: sha256(bearing)})
     _show(summary)
     say(f"Results: {target}")
@@ -95,7 +97,15 @@ def _run(team: Workers, bench: Bench, drawn: Any, plan: Any, show: Any) -> list[
     return rows
 
 
-def _write(folder: Path, rows: list[dict[str, Any]]) -> pd.DataFrame:
+def _next_tests(bench: Bench, drawn: Any) -> pd.DataFrame:
+    from model.pivots import pivot_laws
+    from model.setup import Setup
+    from tpjb_ident.diagnose.next_test_trials import alike_pairs, next_test_table
+
+    return next_test_table(bench, Setup(drawn, pivot_laws("kirk", drawn)), alike_pairs(bench))
+
+
+def _write(folder: Path, rows: list[dict[str, Any]], tests: pd.DataFrame) -> pd.DataFrame:
     import pandas as pd
 
     from tpjb_ident.diagnose.evidence import (
@@ -117,6 +127,7 @@ def _write(folder: Path, rows: list[dict[str, Any]]) -> pd.DataFrame:
         "summary": summary_table(rows),
         "figures": figures_table(rows),
         "rules": rules_table(rows),
+        "next_tests": tests,
         "confusion": confusion_table(rows),
         "impostors": confusion_table(rows, "left out"),
     }

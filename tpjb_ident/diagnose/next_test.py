@@ -73,6 +73,10 @@ def designs(setup: Setup, layout: Layout) -> tuple[Design, ...]:
             Layout(dynamic([low], sweep, speed, direction, 0)),
         ),
         Design(
+            f"a frequency sweep 60-150 Hz at {load:.0f} N, {hertz:.0f} Hz shaft speed, if the actuators reach that far",
+            Layout(dynamic([load], [2 * np.pi * f for f in (60.0, 90.0, 120.0, 150.0)], speed, direction, 0)),
+        ),
+        Design(
             f"dynamic tests at half the load, {0.5 * low:.0f} N, {hertz:.0f} Hz",
             Layout(dynamic([0.5 * low], lines, speed, direction, 0)),
         ),
