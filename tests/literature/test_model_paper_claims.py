@@ -96,3 +96,10 @@ def test_every_claim_has_a_row_with_a_verdict():
     claims = paper.all_claims()
     assert [c.number for c in claims] == list(range(1, 17))
     assert {c.verdict for c in claims} <= {"yes", "in part", "no", "not of the model"}
+
+
+def test_the_documentation_has_the_table(checkout):
+    rows = (checkout / "docs" / "model.md").read_text(encoding="utf-8")
+    rows = rows.split(paper.BEGIN)[1].split(paper.END)[0].strip().splitlines()[2:]
+    cells = [[c.strip() for c in row.strip("|").split("|")] for row in rows]
+    assert [(int(c[0]), c[1], c[3]) for c in cells] == [(c.number, c.says, c.verdict) for c in paper.all_claims()]
