@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tpjb_ident.cli.errors import BadInputError
+from tpjb_ident.cli.moving_in import READY
 from tpjb_ident.cli.outdir import former_runs, output_folder
 from tpjb_ident.cli.record import write_record
 
@@ -140,3 +141,63 @@ def test_a_record_cannot_make_us_delete_outside_the_folder(tmp_path):
     (out / "run.json").write_text(json.dumps(lie))
     fill(out, "pivot", ["a.csv"])
     assert victim.exists()
+
+
+def moved_half(target):
+    """Make a folder as a kill leaves it between the first and the last file of a set."""
+    fill(target, "identify", ["a.csv", "old.csv"])
+    with output_folder(target.parent / "other", "identify") as folder:
+        (folder / "a.csv").write_text("new a")
+        (folder / "b.csv").write_text("new b")
+        (folder / ".stale").write_text(json.dumps(["old.csv", "../victim.txt"]))
+        write_record(folder, target, "identify", {"a": 2}, {})
+    (target.parent / "other").rename(target / READY)
+    (target / READY / "a.csv").replace(target / "a.csv")
+    (target / "run.json").unlink()
+
+
+def test_what_a_kill_left_half_moved_is_finished_by_the_next_command(tmp_path):
+    target = tmp_path / "out"
+    (tmp_path / "victim.txt").write_text("x")
+    moved_half(target)
+    assert former_runs(target) == {}
+    fill(target, "pivot", ["c.csv"])
+    assert names_in(target) == ["a.csv", "b.csv", "c.csv", "run.json"]
+    assert (target / "b.csv").read_text() == "new b"
+    assert former_runs(target)["identify"]["settings"] == {"a": 2}
+    assert (tmp_path / "victim.txt").exists()
+
+
+def test_a_folder_that_a_killed_run_left_beside_is_cleared_and_a_living_one_is_not(tmp_path):
+    dead = tmp_path / ".out.part-dead"
+    dead.mkdir()
+    (dead / "half.csv").write_text("x")
+    with output_folder(tmp_path / "out", "pivot") as living:
+        assert not dead.exists()
+        fill(tmp_path / "out", "identify", ["a.csv"])
+        assert living.exists()
+        (living / "b.csv").write_text("b")
+        write_record(living, tmp_path / "out", "pivot", {}, {})
+    assert names_in(tmp_path) == ["out/a.csv", "out/b.csv", "out/run.json"]
+
+
+def test_two_commands_at_once_both_stand_in_the_record(tmp_path):
+    target = tmp_path / "out"
+    fill(target, "predict", ["p.csv"])
+    with output_folder(target, "pivot") as folder:
+        (folder / "b.csv").write_text("b")
+        write_record(folder, target, "pivot", {}, {})
+        fill(target, "identify", ["a.csv"])  # begins and ends between the other's record and its end
+    assert set(former_runs(target)) == {"predict", "pivot", "identify"}
+
+
+def test_every_output_is_recorded_with_its_fingerprint_and_where_the_inputs_lie(tmp_path):
+    source = tmp_path / "data" / "in.h5"
+    source.parent.mkdir()
+    source.write_text("x")
+    with output_folder(tmp_path / "out", "pivot") as folder:
+        (folder / "a.csv").write_text("")
+        write_record(folder, tmp_path / "out", "pivot", {"campaign": source, "gone": tmp_path / "none"}, {})
+    entry = former_runs(tmp_path / "out")["pivot"]
+    assert entry["outputs_sha256"] == {"a.csv": "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"}
+    assert entry["inputs_at"] == {"campaign": "../data/in.h5"}

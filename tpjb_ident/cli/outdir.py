@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import json
+import glob
 import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from tpjb_ident.cli.errors import BadInputError
+from tpjb_ident.cli.locks import hold, is_abandoned, locked, release
+from tpjb_ident.cli.moving_in import RECORD, flush, former_runs, move_in
 
-RECORD = "run.json"
+__all__ = ["RECORD", "former_runs", "output_folder"]
 
 
 @contextlib.contextmanager
@@ -44,16 +46,35 @@ def output_folder(out: Path, command: str, inputs: tuple[Path, ...] = ()) -> Ite
         staging = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}.part-"))
     except OSError as error:
         raise BadInputError(f"--out {out}: cannot be made ({error.strerror or error}). Give another folder.") from error
+    lock = hold(staging)
+    _clear_abandoned(target)
     try:
         yield staging
         staging.chmod(0o755)
-        if target.exists():
-            _merge(staging, target, command)
-        else:
-            staging.rename(target)
+        _bring(staging, target, command)
     finally:
+        release(lock)
         if staging.exists():
             shutil.rmtree(staging)
+
+
+def _bring(staging: Path, target: Path, command: str) -> None:
+    """Give the results their place: a new folder in one step, an existing one under its lock."""
+    if not target.exists():
+        flush(staging)
+        with contextlib.suppress(OSError):  # another run has made it in this moment
+            staging.rename(target)
+            flush(target.parent, deep=False)
+            return
+    with locked(target):
+        move_in(staging, target, command)
+
+
+def _clear_abandoned(target: Path) -> None:
+    """Delete what killed runs into the same folder have left beside it."""
+    for rest in target.parent.glob(f".{glob.escape(target.name)}.part-*"):
+        if is_abandoned(rest):
+            shutil.rmtree(rest, ignore_errors=True)  # whoever else clears it at the same time may be quicker
 
 
 def _checked(out: Path, inputs: tuple[Path, ...]) -> Path:
@@ -69,34 +90,3 @@ def _checked(out: Path, inputs: tuple[Path, ...]) -> Path:
             raise BadInputError(f"--out {out}: lies inside the campaign {source}, whose raw data stays untouched. "
                            "Give a folder outside it.")  # fmt: skip
     return target
-
-
-def former_runs(folder: Path) -> dict[str, dict]:
-    """Return what run.json of an output folder tells, by command; empty if there is none."""
-    try:
-        data = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    if not isinstance(data, dict) or data.get("schema") != "tpjb-run/1":
-        return {}
-    return {k: v for k, v in data.get("commands", {}).items() if isinstance(v, dict)}
-
-
-def _merge(staging: Path, target: Path, command: str) -> None:
-    """Move file by file into an existing folder; drop what the same command left there before."""
-    new = sorted(p.relative_to(staging).as_posix() for p in staging.rglob("*") if p.is_file())
-    before = former_runs(target)
-    ours = {name for entry in before.values() for name in entry.get("outputs", ())} | {RECORD}
-    foreign = [name for name in new if (target / name).exists() and name not in ours]
-    if foreign:
-        raise BadInputError(
-            f"--out {target}: already holds {', '.join(foreign[:3])}, which tpjb did not write there. "
-            "Give another folder or move the file."
-        )
-    for name in new:
-        (target / name).parent.mkdir(parents=True, exist_ok=True)
-        (staging / name).replace(target / name)
-    for name in set(before.get(command, {}).get("outputs", ())) - set(new):
-        stale = (target / name).resolve()
-        if target in stale.parents:
-            stale.unlink(missing_ok=True)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
-import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tpjb_ident.cli.outdir import RECORD, former_runs
+from tpjb_ident.cli.moving_in import RECORD, former_runs, record_text
 from tpjb_ident.cli.voice import voice
-from tpjb_ident.provenance import versions
+from tpjb_ident.provenance import sha256, versions
 from tpjb_ident.tables import write_text
 
 
@@ -52,13 +53,31 @@ def write_record(
         "versions": versions(),
         "inputs_sha256": dict(inputs),
         "outputs": outputs,
+        "outputs_sha256": {name: sha256(staging / name) for name in outputs},
+        "inputs_at": places(settings, target),
         **({"remarks": list(remarks)} if remarks else {}),
     }
-    commands = {**former_runs(target), command: entry}
-    text = json.dumps({"schema": "tpjb-run/1", "commands": commands}, indent=1, ensure_ascii=False) + "\n"
-    write_text(staging / RECORD, text)
+    write_text(staging / RECORD, record_text({**former_runs(target), command: entry}))
     voice().wrote(target, outputs)
     return entry
+
+
+def places(settings: Mapping[str, Any], target: Path) -> dict[str, str]:
+    """Where the files and folders among `settings` lie, as seen from the output folder; only those that exist.
+
+    Parameters
+    ----------
+    settings : mapping
+        Options; values that are paths count.
+    target : Path
+        Output folder.
+    """
+    found = {}
+    for name, value in settings.items():
+        if isinstance(value, Path) and value.exists():
+            with contextlib.suppress(ValueError):  # another drive: there is no relative way
+                found[name] = Path(os.path.relpath(value.resolve(), target.resolve())).as_posix()
+    return found
 
 
 def _plain(value: Any) -> Any:
