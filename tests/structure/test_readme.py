@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 #: Run by other tests (the demo from the wheel, the recovery tests); here only their spelling is checked.
-RUN_ELSEWHERE = ("compare", "diagnose")
+RUN_ELSEWHERE = ("compare", "diagnose", "plan", "view")
 
 
 def blocks(language: str) -> list[str]:
