@@ -162,7 +162,7 @@ class Bench:
         return state != (self.digest, self.mode)
 
 
-def make_bench(folder: Path) -> Bench:
+def make_bench(folder: Path, commands: tuple[str, ...]) -> Bench:
     """Campaign and libraries, ready to fork from."""
     from typer.testing import CliRunner
 
@@ -170,7 +170,7 @@ def make_bench(folder: Path) -> Bench:
 
     campaign = write_small_campaign(folder / "campaign.h5")
     bench = Bench(campaign, "", 0, folder)
-    for command in COMMANDS:  # once in this process, so that what they import late is there for all forks
+    for command in commands:  # once in this process, so that what they import late is there for all forks
         CliRunner().invoke(app, bench.words(command, folder / f"warm-{command}"))
     digest = hashlib.sha256(campaign.read_bytes()).hexdigest()
     return Bench(campaign, digest, campaign.stat().st_mode, folder)
@@ -243,7 +243,7 @@ def run(kills: int, seed: int, commands: tuple[str, ...]) -> tuple[Counter[str],
     outcomes: Counter[str] = Counter()
     wrong: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as scratch:
-        bench = make_bench(Path(scratch))
+        bench = make_bench(Path(scratch), commands)
         references = {command: bench.reference(command) for command in commands}
         for number in range(kills):
             command = commands[number % len(commands)]

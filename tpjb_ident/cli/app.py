@@ -21,6 +21,7 @@ from tpjb_ident.cli.plan import plan
 from tpjb_ident.cli.predict import predict
 from tpjb_ident.cli.simulate import simulate
 from tpjb_ident.cli.spoken import add_command
+from tpjb_ident.cli.verify import verify
 from tpjb_ident.cli.view import view
 
 # plain help: the markup renderer costs more start-up time than all the rest together
@@ -51,6 +52,7 @@ def _common(
 
 COMMANDS = (
     init, show, check, identify, pivot, locus, predict, compare, diagnose, plan, evaluate, simulate, demo, export, view,
+    verify,
 )  # fmt: skip
 for command in COMMANDS:
     add_command(app, command)

@@ -41,5 +41,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         f"tpjb simulate {ROCKER} --plan short --seed 1",
         f'tpjb simulate {ROCKER} --load "5 kN" --excitation "10..50:10 Hz" --fault "dead run=d-* channel=X1A"',
     ),
+    "verify": ("tpjb verify tpjb-identify-out", "tpjb verify tpjb-identify-out --input campaigns/rocker-A"),
     "view": (f"tpjb view {DEMO}", "tpjb view tpjb-compare-out"),
 }

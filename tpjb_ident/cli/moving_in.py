@@ -2,7 +2,7 @@
 
 The whole set first takes the name `READY` inside the folder, in one step: from then on it will come in. Then run.json
 goes, which vouches for what is there, then the files are moved, run.json last. What a kill leaves of it is finished by
-the next command that writes there, or by `tpjb verify`.
+the next command that writes there; `tpjb verify` tells of it.
 """
 
 from __future__ import annotations
