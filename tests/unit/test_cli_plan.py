@@ -1,0 +1,55 @@
+"""`tpjb plan` and `tpjb evaluate` at the command line."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from tpjb_ident.cli.app import app
+
+ROCKER = Path(__file__).parents[2] / "model" / "bearings" / "rocker.toml"
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.mark.slow
+def test_plan_tells_floor_and_look_alikes_of_a_thin_campaign(tmp_path):
+    result = run(
+        "plan", ROCKER, "--load", "5 kN", "--excitation", "25 Hz", "--locus", 0, "--no-dry", "--push", 0,
+        "--no-temperatures", "--out", tmp_path / "out",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    data = json.loads((tmp_path / "out" / "plan.json").read_text(encoding="utf-8"))
+    assert data["schema"] == "tpjb-plan/1"
+    assert ["oil_viscosity", "supply_temperature"] in data["confusable"]
+    assert {"effect", "parameter", "unit", "seen_from", "mistaken_for"} <= set(data["effects"][0])
+    with (tmp_path / "out" / "isolability.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0][1:] == [row[0] for row in rows[1:]]
+
+
+def test_plan_without_dynamic_tests_is_refused(tmp_path):
+    result = run("plan", ROCKER, "--load", "abc", "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [("--sizes", "six", "--sizes 'six'"), ("--noises", "-1", "positive"), ("--sizes", "1e9", "million")],
+)
+def test_evaluate_refuses_sizes_that_are_none(tmp_path, option, value, said):
+    result = run("evaluate", ROCKER, f"{option}={value}", "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert said in result.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_evaluate_takes_processes_or_a_cluster_not_both(tmp_path):
+    result = run("evaluate", ROCKER, "--workers", 2, "--scheduler", "tcp://nobody:1", "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "exclude each other" in result.output
