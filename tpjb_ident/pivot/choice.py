@@ -2,7 +2,7 @@
 
 The pads of a bearing are of one make, so a law that four pads favour is likely on the fifth. The prior share of
 each law on a pad is therefore the mean of the other pads' posterior shares (an empirical-Bayes mixture, iterated),
-with one pseudo-pad spread over the laws, so that a pad of its own kind keeps its own law. Contact loss is each
+with half a pseudo-pad spread over the laws, so that a pad of its own kind keeps its own law. Contact loss is each
 pad's own affair.
 """
 
@@ -17,7 +17,8 @@ from tpjb_ident.pivot.law_fit import LawFit
 
 FloatArray = NDArray[np.float64]
 
-PSEUDO_PADS = 1.0
+PSEUDO_PADS = 0.5
+CONTACT_VOTE = 0.3  # what a pad with incomplete contact says of the law counts: it saw the upper loads only
 CONTACT_LOSS_PRIOR = 0.3  # share of pads with incomplete contact at low load: two of five in the paper
 SPLINE_PRIOR = 0.02  # of a physical law's prior: a spline takes contact loss for a soft pivot, so physics goes first
 SMALLEST_WEIGHT = 1e-3  # laws below it are dropped
@@ -42,7 +43,7 @@ def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> tuple[FloatArray, ...
     weights = [_pad_weights(pad, prior) for pad in fits]
     for _ in range(30):
         held = [
-            {name: float(w[[fit.name == name for fit in pad]].sum()) for name in names}
+            {name: float(sum(x * _vote(f) for f, x in zip(pad, w, strict=True) if f.name == name)) for name in names}
             for pad, w in zip(fits, weights, strict=True)
         ]
         new = []
@@ -55,6 +56,10 @@ def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> tuple[FloatArray, ...
         if moved < 1e-4:
             break
     return tuple(weights)
+
+
+def _vote(fit: LawFit) -> float:
+    return CONTACT_VOTE if fit.contact else 1.0
 
 
 def _pad_weights(pad: Sequence[LawFit], share: dict[str, float]) -> FloatArray:

@@ -22,6 +22,7 @@ from scipy import optimize
 FloatArray = NDArray[np.float64]
 
 DRIFT_OVER_FLICKER = 0.7  # [1/sqrt(s)], drift rate to be expected over the square root of the 1/f power density
+BEND = 0.5  # of a drift: its rate at either end differs from that in the middle by half of it, standard deviation
 PINNED = 0.01  # of ln(drift rate): as good as given
 # time constants [s] of the exponentially correlated processes whose sum has a 1/f spectrum from some 5 mHz
 # to 5 Hz
@@ -65,10 +66,12 @@ class NoiseModel:
             [m^2], positive definite.
         """
         centred = time - np.mean(time)
+        span = max(float(np.ptp(time)), 1e-300)
+        bent = BEND * (centred**2 - np.mean(centred**2)) / span * 2.0
         return np.asarray(
             np.diag(self.white / duration)
             + self.flicker * flicker_kernel(time, duration)
-            + self.drift**2 * np.outer(centred, centred)
+            + self.drift**2 * (np.outer(centred, centred) + np.outer(bent, bent))
         )
 
     def mean_variance(self, duration: float) -> float:

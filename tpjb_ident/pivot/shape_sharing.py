@@ -21,7 +21,7 @@ from tpjb_ident.pivot.law_fit import SCALE, LawFit, ShapePrior
 FloatArray = NDArray[np.float64]
 Refit = Callable[[LawFit, ShapePrior], LawFit]
 
-ALIKE = 0.4  # spread of the shape among pads of one make, as a share of what is plausible for any pivot
+ALIKE = 0.25  # spread of the shape among pads of one make, as a share of what is plausible for any pivot
 SMALLEST_SHARE = 0.05  # that the other pads give a law, together, for its shape to be asked for
 HOPELESS = 25.0  # below the pad's best log-evidence: no prior makes up for that
 
