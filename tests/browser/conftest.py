@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import functools
 import json
 import os
 import shutil
 import subprocess
 import tempfile
 import time
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -113,10 +115,8 @@ class Tab:
 
 
 @contextlib.contextmanager
-def browser(javascript: bool = True) -> Iterator[Tab]:
-    """Start Chromium with a profile of its own; give one tab; end it for certain."""
-    import websocket
-
+def running_browser() -> Iterator[str]:
+    """Start Chromium with a profile of its own, give its debugging address, end it for certain."""
     found = find_chromium()
     if found is None:
         raise FileNotFoundError("no Chromium")
@@ -126,15 +126,7 @@ def browser(javascript: bool = True) -> Iterator[Tab]:
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         try:
-            address = _tab_address(Path(profile) / "DevToolsActivePort", process)
-            socket = websocket.create_connection(address, timeout=90)
-            try:
-                tab = Tab(socket)
-                if not javascript:
-                    tab.call("Emulation.setScriptExecutionDisabled", value=True)
-                yield tab
-            finally:
-                socket.close()
+            yield _address(Path(profile) / "DevToolsActivePort", process)
         finally:
             process.terminate()
             try:
@@ -144,26 +136,47 @@ def browser(javascript: bool = True) -> Iterator[Tab]:
                 process.wait(20)
 
 
-def _tab_address(port_file: Path, process: subprocess.Popen) -> str:
-    import urllib.request
-
+def _address(port_file: Path, process: subprocess.Popen) -> str:
     for _ in range(600):
         if port_file.exists() and port_file.read_text().strip():
-            port = port_file.read_text().split()[0]
-            with urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=20) as answer:
-                tabs = [t for t in json.load(answer) if t["type"] == "page"]
-            if tabs:
-                return tabs[0]["webSocketDebuggerUrl"]
+            return f"http://127.0.0.1:{port_file.read_text().split()[0]}"
         if process.poll() is not None:
             raise RuntimeError("Chromium ended at once")
         time.sleep(0.1)
     raise TimeoutError("Chromium did not open its debugging port")
 
 
-@pytest.fixture
-def chromium():
-    """Open a browser: ``with chromium() as tab``; the test is skipped where none can be found."""
+@contextlib.contextmanager
+def open_tab(address: str, javascript: bool = True) -> Iterator[Tab]:
+    """Open a fresh tab of a running browser and close it again."""
+    import websocket
+
+    request = urllib.request.Request(f"{address}/json/new?about:blank", method="PUT")
+    with urllib.request.urlopen(request, timeout=60) as answer:
+        target = json.load(answer)
+    socket = websocket.create_connection(target["webSocketDebuggerUrl"], timeout=90)
+    try:
+        tab = Tab(socket)
+        if not javascript:
+            tab.call("Emulation.setScriptExecutionDisabled", value=True)
+        yield tab
+    finally:
+        socket.close()
+        with urllib.request.urlopen(f"{address}/json/close/{target['id']}", timeout=60):
+            pass
+
+
+@pytest.fixture(scope="session")
+def chromium_address() -> Iterator[str]:
+    """One browser for all tests of a worker; skipped where none can be found."""
     if find_chromium() is None:
         pytest.skip(f"no Chromium on the PATH ({', '.join(NAMES)}); TPJB_CHROMIUM can name one")
     pytest.importorskip("websocket", reason="the extra test brings websocket-client")
-    return browser
+    with running_browser() as address:
+        yield address
+
+
+@pytest.fixture
+def chromium(chromium_address):
+    """Open a tab: ``with chromium() as tab``."""
+    return functools.partial(open_tab, chromium_address)
