@@ -219,9 +219,11 @@ def trial(bench: Bench, command: str, reference: Reference, rng: random.Random) 
     """One kill and one rerun: how it came out, and what is wrong."""
     place = Path(tempfile.mkdtemp(dir=bench.folder))
     out, log = place / "out", place / "log"
-    old = prepare(bench, out, command, former=rng.random() < 0.5)
-    # half of the kills hit the disk steps, the last of which put the results in place
-    step = max(1, reference.steps - rng.randrange(40)) if rng.random() < 0.5 else None
+    former = rng.random() < 0.5
+    old = prepare(bench, out, command, former)
+    # Half of the kills hit the disk steps, the last of which put the results in place: one step where the folder is
+    # new, some twenty more where it holds former results.
+    step = None if rng.random() < 0.5 else max(1, reference.steps + 25 * former - rng.randrange(40))
     child = start(bench.words(command, out), log, step)
     if step is None:
         time.sleep(rng.uniform(0.0, 1.1) * reference.seconds)

@@ -115,7 +115,7 @@ def load_tables(path: Path, elements: tuple[Element, ...], pool: Sequence[Candid
     """Read a surrogate; None where the file is missing or belongs to another library or layout."""
     if not path.exists():
         return None
-    with np.load(path) as data:
+    with np.load(path, allow_pickle=False) as data:
         labels = [str(label) for label in data["labels"]]
         if labels != [c.label for c in pool] or len(data["base"]) != len(elements):
             return None

@@ -1,0 +1,130 @@
+"""A kill, Ctrl-C, a full disk, a vanished file, two runs at once: results are whole or absent, raw data untouched."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")]
+ROOT = Path(__file__).parents[2]
+TABLES = ("coefficients", "estimators", "windows", "frequency_fits")
+
+
+def command(*words, **options):
+    return subprocess.Popen(
+        [sys.executable, "-m", "tpjb_ident", *(str(w) for w in words)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT, **options,
+    )  # fmt: skip
+
+
+def end(process):
+    told, errors = process.communicate(timeout=300)
+    assert "Traceback" not in errors
+    return process.returncode, told, errors
+
+
+def names_below(folder):
+    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*"))
+
+
+def test_killed_at_random_moments_a_rerun_gives_the_same_bits(tmp_path):
+    bench = ROOT / "tests" / "benchmarks" / "fault_kills.py"
+    done = subprocess.run(
+        [sys.executable, bench, "--kills", "4", "--seed", "11", "--commands", "locus"],
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "killed" in done.stdout
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_ctrl_c_ends_with_a_message_and_leaves_no_table(small_campaign, tmp_path, workers):
+    out = tmp_path / "out"
+    process = command("identify", small_campaign, "--workers", workers, "--out", out, start_new_session=True)
+    until = time.time() + 120
+    while not list(tmp_path.glob(".out.part-*")) and time.time() < until:
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGINT)  # the terminal sends it to every process of the command
+    code, _, errors = end(process)
+    assert code == 130, errors
+    assert errors.count("interrupted") == 1
+    assert not [name for name in names_below(tmp_path) if name.endswith((".csv", ".parquet", "run.json"))]
+    assert not list(tmp_path.glob(".out.part-*"))
+
+
+def test_a_full_disk_is_one_message_and_nothing_is_left(small_campaign, tmp_path):
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000))  # what a full disk allows
+
+    out = tmp_path / "out"
+    code, _, errors = end(command("identify", small_campaign, "--workers", 1, "--out", out, preexec_fn=limit))
+    assert code == 2, errors
+    assert "File too large" in errors
+    assert "room on the disk" in errors
+    assert names_below(tmp_path) == []
+
+
+def test_two_runs_into_one_folder_at_once_leave_one_whole_set(small_campaign, tmp_path):
+    out = tmp_path / "out"
+    both = [command("identify", small_campaign, "--workers", 1, "--out", out) for _ in range(2)]
+    for process in both:
+        code, _, errors = end(process)
+        assert code == 0, errors
+    code, told, errors = end(command("verify", out))
+    assert code == 0, told + errors
+    assert names_below(tmp_path) == sorted(
+        ["out", "out/run.json", *(f"out/{t}.{suffix}" for t in TABLES for suffix in ("csv", "parquet"))]
+    )
+
+
+def test_the_bits_do_not_depend_on_the_number_of_workers(small_campaign, tmp_path):
+    for workers in (1, 3):
+        code, _, errors = end(
+            command("identify", small_campaign, "--workers", workers, "--out", tmp_path / str(workers))
+        )
+        assert code == 0, errors
+    marks = [
+        json.loads((tmp_path / str(w) / "run.json").read_text())["commands"]["identify"]["outputs_sha256"]
+        for w in (1, 3)
+    ]
+    assert marks[0] == marks[1]
+    assert len(marks[0]) == 8
+
+
+def test_a_file_that_vanishes_costs_its_run_and_no_other(tmp_path):
+    folder = _as_csv(tmp_path / "csv")
+    victim = next((folder / "runs").glob("d-*-02.csv"))
+    victim.unlink()
+    code, told, errors = end(command("identify", folder, "--workers", 1, "--out", tmp_path / "out"))
+    assert victim.stem in told + errors
+    assert code in (0, 2, 3)
+    if code != 2:
+        assert pd.read_csv(tmp_path / "out" / "coefficients.csv")["n_records"].tolist() == [2]
+    else:
+        assert not (tmp_path / "out").exists()
+
+
+def _as_csv(path):
+    import math
+
+    import numpy as np
+
+    from rigdata.virtual_rig import Noise, RigPlan, RigTruth, Timing, VirtualRig, operating_points, write_campaign
+
+    truth = RigTruth.constant(np.diag([1.0e8, 2.0e8]), np.diag([5e5, 7e5]))
+    plan = RigPlan(
+        dynamic=operating_points([(5000.0, 25.0)]),
+        directions=tuple(math.radians(45.0 * i) for i in range(3)),
+        timing=Timing(dynamic_seconds=1.0),
+    )
+    write_campaign(path, VirtualRig(truth, plan, noise=Noise.like_samples(), seed=2), "csv")
+    return path

@@ -1,0 +1,111 @@
+"""No source of ours unpickles, evaluates, starts a shell or speaks to the network; exceptions are named one by one."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SOURCES = sorted(p for top in ("rigdata", "model", "tpjb_ident") for p in (ROOT / top).rglob("*.py"))
+#: Modules that run what they read, or reach out of the machine.
+MODULES = {
+    "pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "code", "codeop", "ctypes", "yaml",
+    "socket", "ssl", "http", "urllib", "urllib3", "requests", "httpx", "aiohttp", "ftplib", "smtplib", "telnetlib",
+    "xmlrpc", "socketserver", "asyncio",
+}  # fmt: skip
+CALLS = {"eval", "exec", "__import__", "breakpoint", "input"}
+ATTRIBUTES = {
+    ("os", "system"), ("os", "popen"), ("os", "startfile"), ("pd", "read_pickle"), ("pandas", "read_pickle"),
+    ("np", "fromregex"), ("numexpr", "evaluate"),
+}  # fmt: skip
+#: file: what it may do, and why.
+ALLOWED = {
+    "tpjb_ident/compare/warm_up.py": {"subprocess"},  # this interpreter, to load libraries
+    "tpjb_ident/executors.py": {"pickle"},  # what its own processes send each other, never a file
+}
+
+
+def dangers(source: str) -> list[str]:
+    """What `source` does that a reader of strangers' files must not."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found += [a.name for a in node.names if a.name.split(".")[0] in MODULES | {"subprocess"}]
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in MODULES | {"subprocess"}:
+            found.append(str(node.module))
+        elif isinstance(node, ast.Call):
+            found += _dangerous_call(node)
+    return found
+
+
+def _dangerous_call(node: ast.Call) -> list[str]:
+    found = []
+    if isinstance(node.func, ast.Name) and node.func.id in CALLS:
+        found.append(node.func.id)
+    if isinstance(node.func, ast.Attribute):
+        owner = node.func.value.id if isinstance(node.func.value, ast.Name) else ""
+        if (owner, node.func.attr) in ATTRIBUTES:
+            found.append(f"{owner}.{node.func.attr}")
+        if node.func.attr in {"eval", "query"} and owner not in {"self"}:
+            found.append(f".{node.func.attr}")
+        if node.func.attr == "load" and owner in {"np", "numpy"}:
+            allow = [k.value for k in node.keywords if k.arg == "allow_pickle"]
+            if not (allow and isinstance(allow[0], ast.Constant) and allow[0].value is False):
+                found.append("np.load without allow_pickle=False")
+    for keyword in node.keywords:
+        value = getattr(keyword.value, "value", None)
+        if (keyword.arg, value) in {("shell", True), ("allow_pickle", True)}:
+            found.append(f"{keyword.arg}=True")
+    return found
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_no_source_runs_what_it_reads(path):
+    name = path.relative_to(ROOT).as_posix()
+    assert set(dangers(path.read_text(encoding="utf-8"))) <= ALLOWED.get(name, set())
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import pickle", "from urllib.request import urlopen", "eval(x)", "exec(x)", "import os\nos.system(x)",
+        "import numpy as np\nnp.load(x)", "np.load(x, allow_pickle=True)", "pd.read_pickle(x)", "frame.query(x)",
+        "f(shell=True)", "import subprocess", "import http.server", "__import__(x)",
+    ],
+)  # fmt: skip
+def test_a_danger_is_seen(source):
+    assert dangers(source)
+
+
+@pytest.mark.parametrize("source", ["import json", "np.load(x, allow_pickle=False)", "a.evaluate(b)", "import tomllib"])
+def test_what_is_harmless_is_none(source):
+    assert not dangers(source)
+
+
+def test_raw_data_are_opened_for_reading_only():
+    """In rigdata nothing but the virtual rig opens a file to write, or an HDF5 file other than with "r"."""
+    found = []
+    for path in (ROOT / "rigdata").rglob("*.py"):
+        if "virtual_rig" in path.parts:
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call):
+                function = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+                values = [
+                    a.value for a in [*node.args, *(k.value for k in node.keywords)] if isinstance(a, ast.Constant)
+                ]
+                modes = [v for v in values if isinstance(v, str) and v.strip("rwaxbt+") == "" and v]
+                writes = function in {
+                    "write_text",
+                    "write_bytes",
+                    "unlink",
+                    "rename",
+                    "replace_file",
+                    "rmtree",
+                    "touch",
+                }
+                if writes or (function in {"open", "File"} and any(set(m) & set("wax+") for m in modes)):
+                    found.append(f"{path.name}:{node.lineno} {function}")
+    assert not found
