@@ -91,7 +91,9 @@ def safe_for_spreadsheets(frame: pd.DataFrame) -> pd.DataFrame:
 def _disarm(cell: Any) -> Any:
     if not isinstance(cell, str):
         return cell
-    return "'" + cell if cell.startswith(_FORMULA_STARTS) else cell
+    safe = "'" + cell if cell.startswith(_FORMULA_STARTS) else cell
+    # A carriage return within a cell is not quoted by the csv module: what follows it would begin a line of its own.
+    return safe.replace("\r", " ")
 
 
 def printable(text: object) -> str:

@@ -21,8 +21,8 @@ def test_csv_and_parquet_hold_the_same_numbers_to_the_last_bit(tmp_path):
 @pytest.mark.parametrize("text", ['=HYPERLINK("x")', "+1", "-cmd", "@SUM(A1)", "\t=1", "\r=1"])
 def test_formulas_are_disarmed(text):
     safe = safe_for_spreadsheets(pd.DataFrame({text: [text, "plain", None]}))
-    assert safe.columns[0] == "'" + text
-    assert safe.iloc[0, 0] == "'" + text
+    assert safe.columns[0] == "'" + text.replace("\r", " ")
+    assert safe.iloc[0, 0] == "'" + text.replace("\r", " ")
     assert safe.iloc[1, 0] == "plain"
 
 
