@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -195,6 +195,10 @@ class ScaledPivot:
         return self.law.vibration_stiffness(load) * self.stiffness_factor
 
 
+#: Least part of a measured give that a pivot keeps when a housing is taken off it.
+LEAST_SHARE = 0.02
+
+
 @dataclass(frozen=True, eq=False)  # arrays have no single truth value: a curve equals itself only
 class MeasuredPivot:
     """A measured monotone curve, interpolated with a continuous tangent (PCHIP in load).
@@ -267,6 +271,19 @@ class MeasuredPivot:
     def extrapolated(self, load: float) -> bool:
         """Whether `load` lies beyond what was measured."""
         return not self.valid_from <= load <= self.valid_to
+
+    def without_housing(self, compliance: float) -> MeasuredPivot:
+        """Return the pivot alone, where a housing of this compliance [m/N] is modelled apart from it.
+
+        What is left keeps at least `LEAST_SHARE` of the measured give: a housing softer than the curve it is part of
+        cannot be taken off it. A curve that holds no housing is returned as it is.
+        """
+        if not self.includes_housing:
+            return self
+        give = np.diff(self.deflection_points)
+        alone = np.maximum(give - compliance * np.diff(self.load), LEAST_SHARE * give)
+        points = np.concatenate([[0.0], np.cumsum(alone)])
+        return replace(self, deflection_points=points, includes_housing=False)
 
 
 def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> PivotLaw:

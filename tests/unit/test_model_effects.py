@@ -20,9 +20,10 @@ from model.effects import (
     load_effects,
     register,
 )
-from model.pivots import pivot_laws
-from model.predict import Prediction, predict
+from model.pivots import MeasuredPivot, pivot_laws
+from model.predict import Prediction, predict, predict_setup
 from model.setup import Setup
+from model.static_tests import dry_curve
 
 SPEED, OMEGA, LOAD, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, 5000.0, -math.pi / 2
 PHYSICS_MD = {
@@ -109,6 +110,24 @@ def test_oil_effects_are_other_oils(rocker):
     same(run(rocker, Effect("oil_viscosity", factor=1.2)), run(thick))
     hot = replace(rocker, oil=replace(rocker.oil, supply_temperature=47.0))
     same(run(rocker, Effect("supply_temperature", change=7.0)), run(hot))
+
+
+def test_a_measured_curve_does_not_hold_the_housing_twice(rocker):
+    load = np.linspace(0.0, 8000.0, 30)
+    stiffness = 1.5e9
+    pivot = 4e-6 * (load / 4000.0) ** 0.8
+    measured = MeasuredPivot(load, pivot + load / stiffness)
+    alone = MeasuredPivot(load, pivot, includes_housing=False)
+    housing = [Effect("housing_flexibility", stiffness=stiffness)]
+    curves = [apply_effects(Setup(rocker, (law,) * 5), housing) for law in (measured, alone)]
+    for setup in curves:  # the dry test reads what was measured, once
+        np.testing.assert_allclose(dry_curve(setup, 1, load[5:]).deflection, (pivot + load / stiffness)[5:], rtol=1e-9)
+    h = [predict_setup(setup, 5000.0, -math.pi / 2, 138.0, 157.0).h for setup in curves]
+    np.testing.assert_allclose(h[0], h[1], rtol=1e-9)
+    # through a law that another effect has scaled, too; and never to nothing
+    soft = apply_effects(Setup(rocker, (measured,) * 5), [Effect("soft_pivot", pad=1, stiffness_factor=0.5), *housing])
+    assert soft.pivots[0].deflection(4000.0) == pytest.approx(2 * alone.deflection(4000.0))
+    assert 0.0 < measured.without_housing(1e-6).deflection(4000.0) < 0.03 * measured.deflection(4000.0)
 
 
 def test_housing_flexibility_is_a_spring_in_series(rocker, base):
