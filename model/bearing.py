@@ -372,6 +372,8 @@ def _read_value(value: Any, entry: str, dimension: str, where: str) -> Any:
             raise BearingError(f"{where}: must be text, got {value!r}. Put it in quotes.")
         return value
     if isinstance(value, list) and entry in _PER_PAD:
+        if any(isinstance(v, list) for v in value):
+            raise BearingError(f"{where}: must be a list of quantities, not of lists.")
         return tuple(_read_value(v, entry, dimension, f"{where}[{i}]") for i, v in enumerate(value))
     try:
         number = parse_quantity(value, dimension, where)

@@ -232,6 +232,10 @@ class MeasuredPivot:
             raise ValueError("a pivot curve must be finite")
         if np.any(np.diff(load) <= 0) or np.any(np.diff(points) <= 0):
             raise ValueError("a pivot curve must rise strictly in load and deflection")
+        with np.errstate(over="ignore"):
+            slopes = np.diff(points) / np.diff(load)
+        if not np.all((slopes > 1e-100) & (slopes < 1e100)):
+            raise ValueError("a pivot curve must have slopes that are numbers")
         if load[0] != 0.0 or points[0] != 0.0:
             load, points = np.concatenate([[0.0], load]), np.concatenate([[0.0], points])
             if load[1] <= 0 or points[1] <= 0:

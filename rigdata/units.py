@@ -327,7 +327,7 @@ def sensitivity_gain(value: object, signal_unit: str, dimension: str) -> float:
     number, unit = split_quantity(value, dimension)
     parsed, signal = parse_unit(unit, dimension), parse_unit(signal_unit)
     target = parse_unit(SI_UNITS[dimension])
-    if number <= 0:
+    if number <= 0 or number * parsed.factor == 0:  # the second: too small for a float
         raise UnitError(f"{_short(value)} must be above zero; a falling reading is polarity = -1")
     if parsed.same_dimension(signal * target**-1):
         return _finite(signal.factor / (number * parsed.factor))

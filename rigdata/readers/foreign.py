@@ -77,8 +77,8 @@ def read_foreign(path: Path, file: str, run: str | None = None) -> list[Series]:
     except ModuleNotFoundError as error:
         what = f"{path.suffix} files need the library {error.name}, which is not installed"
         raise refuse(what, f'Install it with: pip install "tpjb-ident[{extra}]"') from error
-    except MemoryError:
-        raise
+    except MemoryError as error:  # of a file that is small enough: it claims more than it holds
+        raise refuse("claims more data than fit in memory", "Export or copy it again, or split the run") from error
     except Exception as error:  # whatever another library raises on a broken file: it is the file's fault here
         what = f"cannot be read as {path.suffix.lstrip('.').upper()} ({type(error).__name__}: {str(error)[:120]})"
         raise refuse(what, "Export or copy it again from the logger") from error

@@ -78,3 +78,10 @@ def test_a_compressed_bomb_is_refused_and_the_limit_can_be_moved(tmp_path, monke
     monkeypatch.setattr(mat5_elements, "LARGEST", 2**20)
     with pytest.raises(RigDataError, match="unpacks to more than 1 MB"):
         read_foreign(path, "bomb.mat")
+
+
+def test_a_version_4_file_that_claims_more_than_fits(tmp_path):
+    path = tmp_path / "old.mat"
+    path.write_bytes(struct.pack("<5i", 0, 2**31 - 1, 2**30, 0, 2) + b"a\0" + bytes(64))
+    with pytest.raises(RigDataError, match=r"old\.mat"):
+        read_foreign(path, "old.mat")

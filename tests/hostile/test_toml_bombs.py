@@ -96,3 +96,18 @@ def test_numbers_beyond_floats_are_named(rocker_file, tmp_path):
         (tmp_path / "p.toml").write_text(f'schema = "tpjb-pivots/1"\n[[pads]]\npad = 1\n{lines}\n')
         with pytest.raises(BearingError, match="pad 1"):
             load_pivots(tmp_path / "p.toml")
+
+
+def test_what_long_fuzzing_found_is_refused_in_words(rocker_file, tmp_path):
+    """A list of lists of angles; a sensitivity below the smallest float; a pivot curve with slopes beyond floats."""
+    text = rocker_file.read_text("utf-8")
+    with pytest.raises(BearingError, match="not of lists"):
+        parse_bearing(text.replace("pivot_angles = [", 'pivot_angles = [["1 deg"], ', 1), "b.toml")
+    channel = '[channels.A]\nquantity = "displacement"\naxis = "0 deg"\nunit = "V"\nsensitivity = "1e-320 uV/Mm"\n'
+    with pytest.raises(RigDataError, match="must be above zero"):
+        parse_manifest('schema = "tpjb-rig/1"\nid = "x"\nbearing = "b.toml"\n' + channel)
+    for loads, points in (("0.0, 1e-310, 2.0", "0.0, 1.0, 2.0"), ("0.0, 1.0, 2.0", "0.0, 1e-320, 1e-6")):
+        curve = f"force_N = [{loads}]\ndeflection_m = [{points}]\n"
+        (tmp_path / "p.toml").write_text(f'schema = "tpjb-pivots/1"\n[[pads]]\npad = 1\n{curve}')
+        with pytest.raises(BearingError, match="slopes that are numbers"):
+            load_pivots(tmp_path / "p.toml")

@@ -48,6 +48,15 @@ def installed(wheel, tmp_path_factory):
     return python
 
 
+def test_the_same_source_gives_the_same_wheel_bit_for_bit(wheel, tmp_path):
+    environment = {k: v for k, v in os.environ.items() if k != "SOURCE_DATE_EPOCH"}
+    call(sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", tmp_path, ROOT, env=environment)
+    (again,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as one, zipfile.ZipFile(again) as other:
+        assert [i.filename for i in one.infolist()] == [i.filename for i in other.infolist()]
+    assert again.read_bytes() == wheel.read_bytes()
+
+
 def test_the_wheel_holds_three_packages_and_their_data(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())

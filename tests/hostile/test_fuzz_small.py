@@ -1,0 +1,54 @@
+"""A few hundred cases of the fuzzer (tests/benchmarks/fuzz_readers.py) per reader: only documented errors."""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+import random
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+CASES = {
+    "manifest": 100, "bearing": 100, "pivots": 150, "effects": 150, "csv": 40, "hdf5": 40, "mat": 150, "parquet": 60,
+    "tdms": 60, "uff": 60,
+}  # fmt: skip
+LIBRARIES = {"tdms": "nptdms", "uff": "pyuff"}
+
+
+def load(name):
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(name, BENCHMARKS / f"{name}.py")
+        sys.modules[name] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[name])
+    return sys.modules[name]
+
+
+@pytest.fixture
+def quiet_libraries():
+    """What nptdms tells its log of broken files is not a test's business."""
+    logging.disable(logging.CRITICAL)
+    yield
+    logging.disable(logging.NOTSET)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_spoilt_files_end_in_data_or_documented_errors(name, tmp_path, quiet_libraries):
+    if name in LIBRARIES:
+        pytest.importorskip(LIBRARIES[name])
+    mutated = load("fuzz_mutations").mutated
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")  # what other people's writers warn of is not ours to judge
+        target = load("fuzz_targets").make_target(name, tmp_path)
+    target.feed(target.seeds[0])  # the good file itself is read
+    refused = 0
+    for number in range(CASES[name]):
+        data = mutated(target.seeds, random.Random(f"ci-{name}-{number}"))
+        try:
+            target.feed(data)
+        except target.documented:
+            refused += 1
+    assert 0 < refused <= CASES[name]
