@@ -3,8 +3,8 @@
     python tests/benchmarks/fault_detection.py [--seeds 3] [--faults dead "wrong pad" ..] [--identify]
 
 Per fault: the share of campaigns in which the struck run is named with an error or a warning, the share in which
-another run is blamed, and with ``--identify`` what became of the coefficients: the largest error of the direct terms against
-the truth, and whether the point was flagged. Good campaigns give the rate of false alarms.
+another run is blamed, and with ``--identify`` what became of the coefficients: the largest error of the direct terms
+against the truth, and whether the point was flagged. Good campaigns give the rate of false alarms.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def _identified(path: Path) -> tuple[float, bool]:
         result = identify(rigdata.load_campaign(path), IdentifySettings())
     except ValueError:
         return math.nan, True
-    (point,) = result.points
+    point = max(result.points, key=lambda p: p.stiffness.weights.shape[0])  # a wrong label makes a point of its own
     h = point.stiffness.h
     omega = 2 * math.pi * 25.0
     errors = [abs(h[i, i] - STIFFNESS[i, i] - 1j * omega * DAMPING[i, i]) / abs(STIFFNESS[i, i]) for i in (0, 1)]
@@ -159,9 +159,8 @@ def main() -> None:
     parser.add_argument("--identify", action="store_true")
     given = parser.parse_args()
     began = time.time()
-    print(
-        "| fault | named | as | others blamed | worst error of direct terms | point flagged |\n|---|---|---|---|---|---|"
-    )
+    print("| fault | named | as | others blamed | worst error of direct terms | point flagged |")
+    print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         names = ["none (false alarms)", *FAULTS, MIXED]

@@ -27,7 +27,7 @@ from types import ModuleType
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-UNIT, RECOVERY = "tests/unit/", "tests/recovery/"
+UNIT = "tests/unit/"
 #: Source: the tests that are its own.
 TESTS = {
     "rigdata/calibration.py": (UNIT + "test_rigdata_calibration.py", UNIT + "test_rigdata_manifest.py"),
@@ -35,7 +35,7 @@ TESTS = {
     "tpjb_ident/dynamic/mm.py": (UNIT + "test_dynamic_estimate.py",),
     "tpjb_ident/dynamic/rlm.py": (UNIT + "test_dynamic_estimate.py",),
     "tpjb_ident/pivot/law_fit.py": (UNIT + "test_pivot_laws.py", UNIT + "test_pivot_curve.py"),
-    "tpjb_ident/pivot/projection.py": (UNIT + "test_pivot_steps.py", UNIT + "test_pivot_curve.py"),
+    "tpjb_ident/pivot/projection.py": (UNIT + "test_pivot_projection.py",),
 }
 #: Seconds of wall time after which a mutant counts as noticed: it does not end.
 LONGEST = 240.0
