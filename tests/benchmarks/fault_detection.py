@@ -175,6 +175,7 @@ def main() -> None:
                 if name == MIXED:
                     write(folder / "other.h5", seed + 100, None, 0.5)
                     mix(path, folder / "other.h5")
+                    (folder / "other.h5").unlink()
                 outcomes.append(judge(path, None if fault is None else fault.run, given.identify))
                 path.unlink()
             print(row(name, outcomes), flush=True)
