@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "notebooks"
 NOTEBOOKS = sorted(FOLDER.rglob("*.ipynb"))
 STORIES = ("01_identify", "02_pivots", "03_model", "04_compare_reproduce_the_paper", "05_hidden_effect",
-           "06_plan_a_campaign", "07_bring_your_own_data")  # fmt: skip
+           "06_plan_a_campaign", "07_bring_your_own_data", "08_the_papers_own_case")  # fmt: skip
 
 
 def cells(path: Path) -> list[dict]:
