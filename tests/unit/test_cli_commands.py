@@ -16,7 +16,8 @@ from typer.testing import CliRunner
 
 from tpjb_ident.cli.app import app
 
-COMMANDS = ("check", "identify", "pivot", "locus", "predict", "compare", "diagnose", "simulate", "demo", "export")
+COMMANDS = ("check", "identify", "pivot", "locus", "predict", "compare", "diagnose", "plan", "evaluate", "verify",
+            "simulate", "demo", "export")  # fmt: skip
 
 
 def tpjb(*arguments):
