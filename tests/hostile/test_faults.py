@@ -48,8 +48,13 @@ def test_killed_at_random_moments_a_rerun_gives_the_same_bits(tmp_path):
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_ctrl_c_ends_with_a_message_and_leaves_no_table(small_campaign, tmp_path, workers):
+    def heed():  # a job in the background of a shell is started with interrupts ignored, and so would its children be
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
     out = tmp_path / "out"
-    process = command("identify", small_campaign, "--workers", workers, "--out", out, start_new_session=True)
+    process = command(
+        "identify", small_campaign, "--workers", workers, "--out", out, start_new_session=True, preexec_fn=heed
+    )
     until = time.time() + 120
     while not list(tmp_path.glob(".out.part-*")) and time.time() < until:
         time.sleep(0.01)

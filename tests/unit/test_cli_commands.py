@@ -232,7 +232,7 @@ BAD = [
     (("simulate", "{bearing}", "--fault", "dead channel=X9"), "no channel matches"),
     (("simulate", "{bearing}", "--fault", "glitch channel=X1A value=big"), "not a number"),
     (("simulate", "{bearing}", "--format", "xlsx"), "xlsx"),
-    (("export", "{campaign}", "--to", "excel"), "is not known"),
+    (("export", "{campaign}", "--to", "exel"), "is not known"),
     (("export", "nowhere", "--to", "csv"), "no such file"),
 ]
 
