@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
 from tpjb_ident.diagnose.forward import ForwardModel
-
-_forward: ForwardModel | None = None
-
-
-def _initialise(forward: ForwardModel) -> None:
-    global _forward
-    _forward = forward
+from tpjb_ident.executors import cores, in_order, local_workers
 
 
-def _run(job: tuple[Callable[..., Any], tuple[Any, ...]]) -> Any:
-    task, arguments = job
-    assert _forward is not None
+def _run(forward: ForwardModel, task: Callable[..., Any], *arguments: Any) -> Any:
     # every job starts from the baseline's equilibria: its answer depends on nothing that ran before it
-    return task(_forward.fresh(), *arguments)
+    return task(forward.fresh(), *arguments)
 
 
 Map = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterator[Any]]
@@ -31,7 +21,7 @@ Map = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterator[Any]]
 
 @contextmanager
 def workers(forward: ForwardModel, count: int | None = None) -> Iterator[Map]:
-    """Open a pool whose tasks get a `Forward` as their first argument.
+    """Open workers whose tasks get a `Forward` as their first argument.
 
     Parameters
     ----------
@@ -45,11 +35,7 @@ def workers(forward: ForwardModel, count: int | None = None) -> Iterator[Map]:
     callable
         ``run(task, [(argument, ..), ..])`` yields ``task(forward, argument, ..)`` in order.
     """
-    count = count or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
-    if count == 1 or "fork" not in multiprocessing.get_all_start_methods():
-        yield lambda task, jobs: (task(forward.fresh(), *arguments) for arguments in jobs)
-        return
     # fork: effects that the user registered are known in the workers too
-    context = multiprocessing.get_context("fork")
-    with ProcessPoolExecutor(count, mp_context=context, initializer=_initialise, initargs=(forward,)) as pool:
-        yield lambda task, jobs: pool.map(_run, [(task, arguments) for arguments in jobs])
+    able = "fork" in multiprocessing.get_all_start_methods()
+    with local_workers((count or cores()) if able else 1, start="fork") as opened:
+        yield lambda task, jobs: in_order(opened, _run, [(task, *arguments) for arguments in jobs], shared=forward)
