@@ -25,6 +25,7 @@ FloatArray = NDArray[np.float64]
 LEAST_FLOW = 0.2
 
 
+@compiled
 def solve_energy(
     grid: FilmGrid, work: FilmWork, inlet: float, speed: float, heat: tuple[float, float], temperature: FloatArray
 ) -> float:
@@ -54,9 +55,15 @@ def solve_energy(
     rho c h (u T_x + w T_z) = k h T_zz + mu U^2 / h + h^3 / (12 mu) (p_x^2 + p_z^2) - exchange T + gained;
     the last two are what pad and journal take and give (`model.heat_paths`), zero in the adiabatic baseline.
     """
-    temperature[0] = inlet
-    sources = dissipation(grid, work, speed) + work.gained
-    return march(grid, work, speed, heat, temperature[None], sources[None])
+    fields = temperature.reshape((1, temperature.shape[0], temperature.shape[1]))
+    sources = np.empty((1, temperature.shape[0], temperature.shape[1]))
+    made = dissipation(grid, work, speed)
+    for i in range(temperature.shape[0]):
+        for j in range(temperature.shape[1]):
+            sources[0, i, j] = made[i, j] + work.gained[i, j]
+    for j in range(temperature.shape[1]):
+        temperature[0, j] = inlet
+    return march(grid, work, speed, heat, fields, sources)
 
 
 @compiled
@@ -155,23 +162,16 @@ def heat_step(
         the radial and of the tangential force [N].
     """
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    fields = np.empty((1, nt + 1, nz + 1))
-    sources = np.empty((1, nt + 1, nz + 1))
-    made = dissipation(grid, work, speed)
-    for i in range(nt + 1):
-        for j in range(nz + 1):
-            sources[0, i, j] = made[i, j] + work.gained[i, j]
-    for j in range(nz + 1):
-        fields[0, 0, j] = thermal[0]
-    limited = march(grid, work, speed, heat, fields, sources)
+    new = np.empty((nt + 1, nz + 1))
+    limited = solve_energy(grid, work, thermal[0], speed, heat, new)
     change = 0.0
     for i in range(nt + 1):
         for j in range(nz + 1):
-            change = max(change, abs(fields[0, i, j] - work.temperature[i, j]))
+            change = max(change, abs(new[i, j] - work.temperature[i, j]))
     share = thermal[1] * min(1.0, thermal[2] / max(change, 1e-30))
     for i in range(nt + 1):
         for j in range(nz + 1):
-            work.temperature[i, j] += share * (fields[0, i, j] - work.temperature[i, j])
+            work.temperature[i, j] += share * (new[i, j] - work.temperature[i, j])
     force = warmer_pressure(grid, work, speed, oil, warming)
     return change, limited, force[0], force[1]
 

@@ -204,7 +204,7 @@ def _balance(setup: Setup, order: list[PadFilm], parts: list[FloatArray | None])
         if part is not None:
             outlet = _outlet(film, part)
             if setup.options.isothermal_journal:
-                weight = _journal_exchange(setup, film)
+                weight = film.work.exchange.copy()  # all of it is the journal's, see `FilmHeat.answers`
                 weight[[0, -1]] *= 0.5
                 taken = np.tensordot(part, weight, 2)
                 kept += np.array([taken[0], 0.0, taken[2] - weight.sum()])
