@@ -13,7 +13,7 @@ from pathlib import Path
 
 import h5py
 
-from model.bearing import load_bearing
+from model.bearing_file import load_bearing
 from model.effects import Effect
 from rigdata.virtual_rig import (
     ClearanceSweep,

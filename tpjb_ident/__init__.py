@@ -39,7 +39,7 @@ _HOMES = {
     "measure_clearance": "tpjb_ident.clearance",
     "Bearing": "model.bearing",
     "BearingError": "model.bearing",
-    "load_bearing": "model.bearing",
+    "load_bearing": "model.bearing_file",
     "Effect": "model.effects",
     "EffectError": "model.effects",
     "load_effects": "model.effects",

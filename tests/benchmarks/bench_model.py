@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from model.bearing import load_bearing
+from model.bearing_file import load_bearing
 from model.pivots import pivot_laws
 from model.predict import Prediction, predict
 from model.setup import Mesh, Setup
@@ -41,7 +41,7 @@ FINE = Mesh(320, 24)
 FRESH = f"""
 import time; began = time.perf_counter()
 import resource
-from model.bearing import load_bearing
+from model.bearing_file import load_bearing
 from model.predict import predict
 point = (load_bearing({str(FILE)!r}), 5000.0, -1.5708, 138.23)
 predict(*point, thermal=THERMAL)

@@ -21,7 +21,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from model.bearing import Bearing, load_bearing
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
 from model.predict import Prediction, predict
 from model.setup import Mesh
 

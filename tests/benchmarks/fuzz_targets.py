@@ -89,8 +89,9 @@ def _demo_manifest() -> bytes:
 
 
 def bearing_target(folder: Path) -> Target:
-    """`model.bearing.parse_bearing`."""
-    from model.bearing import BearingError, parse_bearing
+    """`model.bearing_file.parse_bearing`."""
+    from model.bearing import BearingError
+    from model.bearing_file import parse_bearing
     from model.units import UnitError
 
     seeds = tuple(p.read_bytes() for p in sorted((ROOT / "model" / "bearings").glob("*.toml")))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from model.bearing import load_bearing
+from model.bearing_file import load_bearing
 from model.pad_solid import pad_solid
 from model.predict import Prediction, predict
 

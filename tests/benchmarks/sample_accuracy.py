@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import rigdata
-from model.bearing import parse_bearing
+from model.bearing_file import parse_bearing
 from tpjb_ident.clearance import measure_clearance
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.locus import measure_locus

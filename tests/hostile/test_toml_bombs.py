@@ -6,7 +6,8 @@ import time
 
 import pytest
 
-from model.bearing import BearingError, load_bearing, parse_bearing
+from model.bearing import BearingError
+from model.bearing_file import load_bearing, parse_bearing
 from model.effects import EffectError, load_effects
 from model.pivots import load_pivots
 from model.toml_text import MAX_DEPTH, parse_toml

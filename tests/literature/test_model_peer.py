@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, load_bearing
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
 from model.predict import Prediction, predict
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model.bearing import load_bearing
+from model.bearing_file import load_bearing
 from model.pivots import ScaledPivot, pivot_laws
 from model.predict import Mesh, Prediction, predict
 

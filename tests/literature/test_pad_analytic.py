@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from model.bearing import BABBITT, STEEL, Bearing, Material, load_bearing
+from model.bearing import BABBITT, STEEL, Bearing, Material
+from model.bearing_file import load_bearing
 from model.block_cholesky import BlockCholesky, factor_rows
 from model.pad_elasticity import ElasticSector
 from model.pad_line import Line

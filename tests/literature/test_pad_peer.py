@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model.bearing import load_bearing
+from model.bearing_file import load_bearing
 from model.pad_elasticity import ElasticSector
 from model.pad_mesh import MeshDensity, PadGeometry, sector_mesh
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from model.bearing import load_bearing
+from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.predict import predict
 from rigdata.operating_point import OperatingPoint

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model.bearing import load_bearing
+from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.pivots import pivot_laws
 from model.setup import Mesh, Setup

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from model.bearing import BABBITT, STEEL, BearingError, load_bearing
+from model.bearing import BABBITT, STEEL, BearingError
+from model.bearing_file import load_bearing
 from model.units import UnitError, parse_quantity, to_si
 
 SECTIONS = {

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, load_bearing
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.film import conductances, solve_film
 from model.film_slopes import shape_slopes

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, load_bearing
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
 from model.cavitation import film_solver, fluid_fraction
 from model.film import solve_film
 from model.frequency_model import reduced

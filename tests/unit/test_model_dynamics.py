@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, load_bearing
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
 from model.dynamics import bearing_impedance, mass_centre_offset, pad_matrices, reduce_pads
 from model.effects import Effect
 from model.predict import Prediction, predict

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, load_bearing
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
 from model.effects import (
     Effect,
     EffectError,

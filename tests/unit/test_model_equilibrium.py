@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, load_bearing
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
 from model.carrying import EDGE
 from model.pivots import ConstantPivot
 from model.predict import Prediction, predict

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, load_bearing
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
 from model.dynamics import bearing_impedance
 from model.effects import Effect
 from model.frequency_model import FullSet, fit_kcm, full_set, kcm, reduced

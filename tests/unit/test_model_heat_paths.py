@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, load_bearing
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.energy import dissipation, solve_energy
 from model.growth import Growth, grown

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, BearingError, Pivot, load_bearing
+from model.bearing import Bearing, BearingError, Pivot
+from model.bearing_file import load_bearing
 from model.pivots import (
     ConstantPivot,
     MeasuredPivot,

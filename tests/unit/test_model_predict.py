@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, load_bearing
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
 from model.pivots import pivot_laws
 from model.predict import Prediction, predict, predict_setup
 from model.setup import Mesh, Setup

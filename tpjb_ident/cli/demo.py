@@ -26,7 +26,7 @@ def demo(out: Out = None) -> None:
     The campaign is computed (docs/make_demo_campaign.py): the paper's rocker-backed bearing with pivots softer than the
     printed formula, recorded with noise and glitches.
     """
-    from model.bearing import parse_bearing
+    from model.bearing_file import parse_bearing
     from rigdata import check_campaign, load_campaign
     from tpjb_ident.compare.comparison import compare_campaign
     from tpjb_ident.compare.predictions import prediction_frame

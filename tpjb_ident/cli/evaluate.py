@@ -45,7 +45,7 @@ def evaluate(
     """
     if scheduler is not None and workers is not None:
         raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")
-    from model.bearing import load_bearing
+    from model.bearing_file import load_bearing
     from tpjb_ident.diagnose.bench import paper_layout, prepare
     from tpjb_ident.diagnose.trials import Plan
     from tpjb_ident.executors import open_workers

@@ -70,7 +70,7 @@ def open_bearing(campaign: Campaign, given: Path | None) -> tuple[Bearing, dict[
     BadInputError
         The campaign carries no bearing file and none was given.
     """
-    from model.bearing import load_bearing, parse_bearing
+    from model.bearing_file import load_bearing, parse_bearing
 
     refuse_special(given)
     if given is not None:

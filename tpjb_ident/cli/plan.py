@@ -44,7 +44,7 @@ def plan(
     .csv and .parquet.
     """
     refuse_special(bearing)
-    from model.bearing import load_bearing
+    from model.bearing_file import load_bearing
     from model.pivots import pivot_laws
     from model.setup import Setup
     from tpjb_ident.diagnose.plan import plan as work_out

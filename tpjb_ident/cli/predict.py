@@ -51,7 +51,7 @@ def predict(
     choice = pivot_choice(pivots)
     settings = replace(model_settings(choice, thermal, effects), options=parse_physics(physics, housing_temperature))
     refuse_special(bearing)
-    from model.bearing import load_bearing
+    from model.bearing_file import load_bearing
     from tpjb_ident.compare.predictions import predict_points, prediction_frame
 
     loaded = load_bearing(bearing)

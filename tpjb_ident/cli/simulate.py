@@ -75,7 +75,7 @@ def simulate(
 
 
 def _rig(bearing: Path, settings: Any, seed: int, noise: float) -> Any:
-    from model.bearing import load_bearing
+    from model.bearing_file import load_bearing
     from rigdata.virtual_rig import Instruments, Noise, VirtualRig
     from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 

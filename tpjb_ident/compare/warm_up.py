@@ -53,7 +53,7 @@ def _compiled_before() -> bool:
 
 def main(path: str) -> None:
     """Predict one point with yielding pivots, which runs through all compiled code of the adiabatic model."""
-    from model.bearing import load_bearing
+    from model.bearing_file import load_bearing
     from model.predict import predict
 
     predict(load_bearing(path), 5000.0, speed=2 * math.pi * 22, excitation=2 * math.pi * 25, pivots="kirk")

@@ -1,0 +1,270 @@
+"""Bearing files (`tpjb-bearing/1`, TOML): every key with its unit checked, every fault said with its place and cure."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from pathlib import Path
+from typing import Any
+
+from model.bearing import BABBITT, STEEL, Bearing, BearingError, Material, Oil, Pad, Pivot
+from model.toml_text import parse_toml
+from model.units import UnitError, parse_quantity
+
+_MATERIAL_KEYS = {
+    "youngs_modulus": "pressure",
+    "poissons_ratio": "ratio",
+    "thermal_expansion": "per kelvin",
+    "conductivity": "conductivity",
+}
+_KEYS: dict[str, dict[str, str]] = {
+    "": {"schema": "text", "name": "text"},
+    "journal": {"diameter": "length"},
+    "bearing": {"length": "length", "assembled_clearance": "length", "pad_clearance": "length"},
+    "pads": {
+        "pivot_angles": "angle",
+        "arc": "angle",
+        "pivot_offset": "ratio",
+        "thickness": "length",
+        "babbitt_thickness": "length",
+        "elastic_thickness": "length",
+        "mass": "mass",
+        "moment_of_inertia": "moment of inertia",
+        "back_convection": "heat transfer",
+    },
+    "pads.backing": _MATERIAL_KEYS,
+    "pads.babbitt": _MATERIAL_KEYS,
+    "pivot": {
+        "kind": "text",
+        "contact_length": "length",
+        "housing_diameter": "length",
+        "pivot_diameter": "length",
+        "sphere_diameter": "length",
+        "youngs_modulus": "pressure",
+        "poissons_ratio": "ratio",
+    },
+    "oil": {
+        "grade": "text",
+        "supply_temperature": "temperature",
+        "viscosity_40C": "viscosity",
+        "viscosity_exponent": "per kelvin",
+        "density_40C": "density",
+        "thermal_expansion": "per kelvin",
+        "specific_heat": "specific heat",
+        "conductivity": "conductivity",
+    },
+}
+_OPTIONAL = {
+    "schema", "name", "grade", "elastic_thickness", "babbitt_thickness", "back_convection", "pivot_offset",
+    "contact_length", "housing_diameter", "pivot_diameter", "sphere_diameter", "youngs_modulus", "poissons_ratio",
+    "pads.backing", "pads.babbitt",
+}  # fmt: skip
+_MAY_BE_ZERO = {"babbitt_thickness", "back_convection", "viscosity_exponent", "thermal_expansion", "mass",
+                "moment_of_inertia", "conductivity"}  # fmt: skip
+_PER_PAD = {"pivot_angles", "arc", "pivot_offset", "assembled_clearance", "pad_clearance"}
+
+
+def load_bearing(source: str | Path) -> Bearing:
+    """Read a bearing file.
+
+    Parameters
+    ----------
+    source : str or Path
+        Path of a ``tpjb-bearing/1`` TOML file, or its text (recognised by a line break).
+
+    Returns
+    -------
+    Bearing
+
+    Raises
+    ------
+    BearingError
+        The file is missing, not TOML, has an unknown or missing key, a wrong unit or an impossible value.
+    """
+    if isinstance(source, str) and "\n" in source:
+        return parse_bearing(source, "bearing")
+    path = Path(source)
+    try:
+        if path.stat().st_size > 1_000_000:
+            raise BearingError(f"{path.name}: larger than 1 MB. A bearing file is a page of text; check the path.")
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise BearingError(f"{path}: no such file. Give the path of a tpjb-bearing/1 TOML file.") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise BearingError(f"{path}: cannot be read ({error}). Save it as UTF-8 text.") from error
+    return parse_bearing(text, path.name)
+
+
+def parse_bearing(text: str, name: str) -> Bearing:
+    """Build a `Bearing` from TOML text; `name` is what error messages call the file."""
+    try:
+        data = parse_toml(text)
+    except ValueError as error:
+        raise BearingError(f"{name}: not valid TOML: {error}. Mend that line.") from error
+    sections = {key: _section(data, key, name) for key in _KEYS}
+    _check_schema(sections[""], name)
+    values = {key: _read_section(section, key, name) for key, section in sections.items()}
+    pads = _pads(values, name)
+    pivot = values["pivot"]
+    kind = pivot.pop("kind")
+    _check_pivot(kind, pivot, name)
+    oil = values["oil"]
+    bearing = Bearing(
+        name=values[""].get("name", name),
+        journal_diameter=values["journal"]["diameter"],
+        length=values["bearing"]["length"],
+        pads=pads,
+        pivot=Pivot(kind=kind, **pivot),
+        oil=Oil(
+            viscosity_40=oil["viscosity_40C"],
+            viscosity_exponent=oil["viscosity_exponent"],
+            density_40=oil["density_40C"],
+            thermal_expansion=oil["thermal_expansion"],
+            specific_heat=oil["specific_heat"],
+            conductivity=oil["conductivity"],
+            supply_temperature=oil["supply_temperature"],
+            grade=oil.get("grade", ""),
+        ),
+        source=name,
+    )
+    return bearing
+
+
+def _section(data: dict[str, Any], key: str, name: str) -> dict[str, Any]:
+    section: Any = data
+    for part in key.split(".") if key else []:
+        section = section.get(part, {} if key in _OPTIONAL else None)
+        if section is None:
+            raise BearingError(f"{name}: section [{key}] is missing. Add it; see the bundled rocker.toml.")
+        if not isinstance(section, dict):
+            raise BearingError(f"{name}, {key}: must be a table, got {section!r}. Write it as [{key}].")
+    known = set(_KEYS[key]) | {k[len(key) + 1 if key else 0 :].split(".")[0] for k in _KEYS if _is_child(k, key)}
+    for unknown in set(section) - known:
+        near = difflib.get_close_matches(unknown, known, n=1)
+        hint = f" Did you mean {near[0]!r}?" if near else f" Known keys: {', '.join(sorted(known))}."
+        raise BearingError(f"{name}, [{key}] {unknown}: unknown key.{hint}")
+    return section
+
+
+def _is_child(candidate: str, key: str) -> bool:
+    return bool(candidate) and (candidate.startswith(key + ".") if key else True)
+
+
+def _check_schema(top: dict[str, Any], name: str) -> None:
+    schema = top.get("schema", "tpjb-bearing/1")
+    if schema != "tpjb-bearing/1":
+        raise BearingError(f"{name}, schema: {schema!r} is not known. This version reads 'tpjb-bearing/1'.")
+
+
+def _read_section(section: dict[str, Any], key: str, name: str) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    material = key.startswith("pads.")
+    if material and not section:
+        return out
+    for entry, dimension in _KEYS[key].items():
+        where = f"{name}, [{key}] {entry}" if key else f"{name}, {entry}"
+        if entry not in section:
+            if entry in _OPTIONAL and not material:
+                continue
+            raise BearingError(f"{where}: missing. Add it with its unit; see the bundled rocker.toml.")
+        out[entry] = _read_value(section[entry], entry, dimension, where)
+    return out
+
+
+def _read_value(value: Any, entry: str, dimension: str, where: str) -> Any:
+    if dimension == "text":
+        if not isinstance(value, str):
+            raise BearingError(f"{where}: must be text, got {value!r}. Put it in quotes.")
+        return value
+    if isinstance(value, list) and entry in _PER_PAD:
+        if any(isinstance(v, list) for v in value):
+            raise BearingError(f"{where}: must be a list of quantities, not of lists.")
+        return tuple(_read_value(v, entry, dimension, f"{where}[{i}]") for i, v in enumerate(value))
+    try:
+        number = parse_quantity(value, dimension, where)
+    except UnitError as error:
+        raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
+    signed = dimension in {"temperature"} or entry == "pivot_angles"
+    if not signed and (number < 0 or (number == 0 and entry not in _MAY_BE_ZERO)):
+        raise BearingError(f"{where}: must be positive, got {value!r}.")
+    if entry == "poissons_ratio" and not number < 0.5:
+        raise BearingError(f"{where}: must be below 0.5, got {value!r}. Steel has 0.3.")
+    return number
+
+
+def _pads(values: dict[str, dict[str, Any]], name: str) -> tuple[Pad, ...]:
+    pads, bearing = values["pads"], values["bearing"]
+    angles = pads["pivot_angles"]
+    if not isinstance(angles, tuple) or not 1 <= len(angles) <= 40:
+        raise BearingError(f"{name}, [pads] pivot_angles: must be a list of 1 to 40 angles, pad #1 first.")
+
+    def per_pad(value: Any, key: str) -> tuple[float, ...]:
+        if not isinstance(value, tuple):
+            return (value,) * len(angles)
+        if len(value) != len(angles):
+            raise BearingError(
+                f"{name}, {key}: {len(value)} values for {len(angles)} pads. Give one each, or one for all."
+            )
+        return value
+
+    arc = per_pad(pads["arc"], "[pads] arc")
+    offset = per_pad(pads.get("pivot_offset", 0.5), "[pads] pivot_offset")
+    cb = per_pad(bearing["assembled_clearance"], "[bearing] assembled_clearance")
+    cp = per_pad(bearing["pad_clearance"], "[bearing] pad_clearance")
+    _check_arcs(angles, arc, offset, name)
+    thickness = pads["thickness"]
+    elastic = pads.get("elastic_thickness", thickness)
+    lining = pads.get("babbitt_thickness", 0.0)
+    if not lining < elastic <= thickness:
+        raise BearingError(f"{name}, [pads]: need babbitt_thickness < elastic_thickness <= thickness.")
+    return tuple(
+        Pad(
+            pivot_angle=angles[k],
+            arc=arc[k],
+            pivot_offset=offset[k],
+            pad_clearance=cp[k],
+            assembled_clearance=cb[k],
+            thickness=thickness,
+            babbitt_thickness=lining,
+            elastic_thickness=elastic,
+            mass=pads["mass"],
+            moment_of_inertia=pads["moment_of_inertia"],
+            back_convection=pads.get("back_convection", 50.0),
+            backing=Material(**values["pads.backing"]) if values["pads.backing"] else STEEL,
+            babbitt=Material(**values["pads.babbitt"]) if values["pads.babbitt"] else BABBITT,
+        )
+        for k in range(len(angles))
+    )
+
+
+def _check_arcs(angles: tuple[float, ...], arc: tuple[float, ...], offset: tuple[float, ...], name: str) -> None:
+    if any(not 0 < f < 1 for f in offset):
+        raise BearingError(f"{name}, [pads] pivot_offset: must lie between 0 and 1 (0.5 is the middle).")
+    edges = sorted(((a - f * s) % (2 * math.pi), s, k + 1) for k, (a, s, f) in enumerate(zip(angles, arc, offset)))
+    for i, (start, span, number) in enumerate(edges):
+        follower = edges[(i + 1) % len(edges)]
+        room = (follower[0] - start) % (2 * math.pi) or 2 * math.pi
+        if span > room + 1e-9:
+            raise BearingError(
+                f"{name}, [pads]: pad #{number} overlaps pad #{follower[2]} "
+                f"({math.degrees(span):.1f} deg of arc, {math.degrees(room):.1f} deg of room). Check arc, pivot_angles."
+            )
+
+
+def _check_pivot(kind: str, pivot: dict[str, Any], name: str) -> None:
+    need = {
+        "rocker": {"contact_length", "housing_diameter", "pivot_diameter"},
+        "spherical": {"sphere_diameter"},
+        "rigid": set(),
+    }
+    if kind not in need:
+        near = difflib.get_close_matches(kind, need, n=1)
+        raise BearingError(
+            f"{name}, [pivot] kind: {kind!r} is not known."
+            + (f" Did you mean {near[0]!r}?" if near else f" Use one of {', '.join(need)}.")
+        )
+    missing = sorted(need[kind] - set(pivot))
+    if missing:
+        raise BearingError(f"{name}, [pivot] {missing[0]}: missing; a {kind} pivot needs it.")
+    if kind == "rocker" and not pivot["pivot_diameter"] < pivot["housing_diameter"]:
+        raise BearingError(f"{name}, [pivot]: pivot_diameter must be smaller than housing_diameter.")
