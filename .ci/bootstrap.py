@@ -33,8 +33,6 @@ NETWORK_SIGNS = ("resolution", "NewConnectionError", "ConnectTimeout", "ReadTime
                  "Connection refused", "dns error", "Failed to fetch", "Network is unreachable")  # fmt: skip
 #: What of pip's or uv's talk the person who waits sees.
 SHOWN = ("Collecting", "Installing", "Building", "Downloading", "Resolved", "WARNING: Retrying")
-#: What of pip's or uv's talk the person who waits sees.
-SHOWN = ("Collecting", "Installing", "Building", "Downloading", "Resolved", "WARNING: Retrying")
 
 
 class SetupError(Exception):

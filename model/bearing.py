@@ -124,6 +124,12 @@ class Pad:
     backing: Material = STEEL
     babbitt: Material = BABBITT
 
+    def __str__(self) -> str:
+        return (
+            f"pad at {math.degrees(self.pivot_angle):.4g} deg, {math.degrees(self.arc):.4g} deg of arc, "
+            f"Cb {1e6 * self.assembled_clearance:.4g} um, preload {self.preload:.3g}"
+        )
+
     @property
     def leading_edge(self) -> float:
         """Angle of the leading edge from the pivot [rad], negative: the film enters there."""
@@ -195,6 +201,14 @@ class Bearing:
     def pivot_radius(self, pad: Pad) -> float:
         """R_P = journal radius + Cp + pad thickness [m] (physics.md)."""
         return self.journal_radius + pad.pad_clearance + pad.thickness
+
+    def __str__(self) -> str:
+        first = self.pads[0] if self.pads else None
+        sizes = f", Cb {1e6 * first.assembled_clearance:.4g} um, preload {first.preload:.3g} (pad #1)" if first else ""
+        return (
+            f"{self.name}: {len(self.pads)} pads, {1e3 * self.journal_diameter:.6g} x {1e3 * self.length:.6g} mm{sizes}"
+            f", {self.pivot.kind} pivots, oil {self.oil.grade or 'unnamed'} at {self.oil.supply_temperature:g} degC"
+        )
 
     def with_pads(self, pads: tuple[Pad, ...]) -> Bearing:
         """Return a copy with other pads."""

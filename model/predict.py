@@ -73,6 +73,14 @@ class Prediction:
     equilibrium: Equilibrium = field(repr=False)
     setup: Setup = field(repr=False)
 
+    def __str__(self) -> str:
+        x, y = 1e6 * self.position
+        return (
+            f"{self.load:g} N at {math.degrees(self.load_direction):.4g} deg, {self.speed / (2 * math.pi):.4g} Hz: "
+            f"shaft at ({x:.4g}, {y:.4g}) um, thinnest film {1e6 * self.min_film:.3g} um, "
+            f"hottest {self.max_temperature:.4g} degC; {', '.join(self.status) or 'all well'}"
+        )
+
     @property
     def converged(self) -> bool:
         """Whether the equilibrium was found."""

@@ -27,6 +27,12 @@ class OperatingPoint:
     shaft_speed: float = 0.0
     excitation: float = 0.0
 
+    def __str__(self) -> str:
+        parts = [f"{self.static_load:g} N at {self.static_load_direction_deg:g} deg"]
+        parts += [f"shaft {self.shaft_speed_hz:g} Hz"] if self.shaft_speed else ["shaft at rest"]
+        parts += [f"excited at {self.excitation_hz:g} Hz"] if self.excitation else []
+        return ", ".join(parts)
+
     @property
     def shaft_speed_hz(self) -> float:
         """Shaft speed in Hz, free of the rounding noise of 2 pi."""

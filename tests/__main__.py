@@ -1,4 +1,4 @@
-"""``python3 tests [pytest arguments]``: set up .venv and run the whole test suite there."""
+"""``python3 tests [--quick] [pytest arguments]``: set up .venv and run the test suite there, or its quick part."""
 
 # The lines before the version check must parse on any Python, so that an old one gets a sentence, not a traceback.
 import os
@@ -23,6 +23,8 @@ if __name__ == "__main__":
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     arguments = sys.argv[1:]
+    if "--quick" in arguments:
+        arguments = ["-m", "not slow"] + [a for a in arguments if a != "--quick"]
     if not any(a.startswith(("-n", "--numprocesses")) for a in arguments):
         arguments = ["-n", "2", "--dist", "loadfile"] + arguments  # noqa: RUF005 (parses on old Pythons)
     bootstrap.run("pytest", arguments)
