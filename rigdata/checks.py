@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rigdata.campaign import Campaign, load_campaign
+from rigdata.checking.consistency import check_housing, check_load_ratios
 from rigdata.checking.findings import Finding, merge
 from rigdata.checking.leftovers import leftovers
 from rigdata.checking.observation import Observation, observe
@@ -54,12 +55,14 @@ def _judge(campaign: Campaign, seen: Sequence[Observation]) -> list[Problem]:
     for one in seen:
         check_static_load(one)
         check_speed(one)
+    check_load_ratios(seen)
     check_positions(seen)
     check_excitation(of_kind["dynamic"], campaign.housing_mass)
     check_dry(of_kind["dry_pivot"])
     _spread_doubts(seen)
     check_responses(of_kind["dynamic"], campaign.housing_mass)
     check_accelerometers(of_kind["dynamic"])
+    check_housing(of_kind["dynamic"])
     check_shaft_follows(of_kind["dry_pivot"])
     check_sweeps(of_kind["clearance"])
     check_locus(of_kind["locus"])

@@ -98,6 +98,14 @@ ONE_RUN = {
     "no excitation": (Fault("missing_excitation", RUN), "error", "force", "no line at the excitation frequency"),
     "other frequency": (Fault("wrong_frequency", RUN, value=3.0), "error", "force", "other line is near 25 Hz"),
     "other direction": (Fault("wrong_direction", RUN, value=0.4), "warning", "force", "excitation_direction says"),
+    "load a tenth off": (Fault("wrong_load", RUN, value=1.1), "warning", "mean force", "other runs of the campaign"),
+    "accelerometers swapped": (
+        Fault("swapped", RUN, "A1H", other="A1V"),
+        "warning",
+        "channels A1H and A1V",
+        "the cell force and the other runs",
+    ),
+    "accelerometer inverted": (Fault("inverted", RUN, "A1H"), "warning", "channels A1H", "A1H had the wrong sign"),
     "other load": (Fault("wrong_load", RUN, value=1.6), "error", "mean force", "static_load says 8000 N"),
     "copied run": (
         Fault("duplicate_run", RUN, other="d-05000-25-02"),

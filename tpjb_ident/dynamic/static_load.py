@@ -29,6 +29,8 @@ UNKNOWN_EXPONENT = 0.6
 MAX_MISS = 0.05
 #: The same for its direction [rad].
 MAX_SIDEWAYS = 0.05
+#: Beyond these ratios of the cells to the set points in all runs, a sensitivity or a set point is wrong, not a gain.
+CONTRADICTS = (0.7, 1.4)
 
 
 @dataclass(frozen=True)
@@ -67,8 +69,12 @@ def load_misses(points: list[PointData]) -> tuple[list[LoadMiss], complex]:
     ratios = [load_ratio(data) for data in points]
     known = np.concatenate(ratios)
     known = known[np.isfinite(known)]
-    if not len(known) or not 0.5 < abs(np.median(known.real)) < 2.0:
+    if not len(known):
         return [LoadMiss(np.zeros(len(r)), np.zeros(len(r)), 0.0) for r in ratios], complex(1.0)
+    if not 0.5 < abs(np.median(known.real)) < 2.0:
+        # Nothing to correct by such cells, but the ratio itself must be told.
+        middle = complex(np.median(known.real), np.median(known.imag))
+        return [LoadMiss(np.zeros(len(r)), np.zeros(len(r)), 0.0) for r in ratios], middle
     distance = np.abs(known - (np.median(known.real) + 1j * np.median(known.imag)))
     inner = known[distance <= 4 * np.median(distance) + 1e-12]
     common = complex(inner.mean())
@@ -178,7 +184,15 @@ def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
                 f"a run's measured static load points {np.degrees(sideways):.1f} deg away from its set direction",
             )
         )
-    if abs(abs(common) - 1) > 0.01:
+    if not CONTRADICTS[0] <= abs(common) <= CONTRADICTS[1]:
+        found.append(
+            Condition(
+                "cells-contradict-set-points",
+                f"the cells read {abs(common):.3g} times the static load of the set points in all runs: every "
+                "coefficient is off by about as much if their sensitivity is wrong",
+            )
+        )
+    elif abs(abs(common) - 1) > 0.01:
         found.append(
             Condition(
                 "cells-against-set-points",

@@ -6,6 +6,9 @@ from __future__ import annotations
 MEANING = {
     "cells-against-set-points": "The load cells and the set points disagree alike in all runs: the "
     "gain of one or of the other is off.",
+    "cells-contradict-set-points": "The load cells read many times more or less than the set points in all runs, as if "
+    "their sensitivity were wrong; the coefficients are then off by as much. Check sensitivity, full_scale and "
+    "excitation of the cells.",
     "drive-not-locked": "The excitation's phase wandered between windows; they were turned to one phase first.",
     "drift-unknown": "No load direction was repeated, so a drift of the probes cannot be told from a position. "
     "Repeat the first direction at the end.",
@@ -77,6 +80,7 @@ MEANING = {
 #: With one of these the number is not to be trusted.
 SERIOUS = frozenset(
     {
+        "cells-contradict-set-points",
         "contact-never-complete",
         "outside-polygon",
         "fewer-than-two-directions",
