@@ -91,7 +91,7 @@ def _common_matrix(group: Sequence[tuple[Observation, ComplexArray, ComplexArray
         scaled = forces / np.linalg.norm(forces, axis=0)
         if np.linalg.svd(scaled, compute_uv=False)[-1] < 0.3:
             continue
-        matrix = np.linalg.solve(forces.T, np.stack([first[2], second[2]])).T
+        matrix = np.asarray(np.linalg.solve(forces.T, np.stack([first[2], second[2]])).T, dtype=np.complex128)
         misfit = float(np.median([_misfit(f, r, matrix) for _, f, r in group]))
         if best is None or misfit < best[0]:
             best = (misfit, matrix)
