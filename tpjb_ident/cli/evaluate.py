@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tpjb_ident.diagnose.bench import Bench
     from tpjb_ident.executors import Workers
 
-PRELOAD = ("tpjb_ident.diagnose.trials",)
+PRELOAD = ("tpjb_ident.diagnose.trials", "tpjb_ident.diagnose.raw_trials")
 
 
 @guarded
@@ -33,7 +33,11 @@ def evaluate(
     none: Annotated[int, typer.Option(min=0, help="Campaigns with calibration errors and nothing hidden.")] = 300,
     left_out: Annotated[int, typer.Option(min=0, help="Campaigns per effect that the library lacks.")] = 4,
     two: Annotated[int, typer.Option(min=0, help="Campaigns with two effects.")] = 60,
-    raw: Annotated[int, typer.Option(min=0, help="Campaigns written as raw volts and identified (30 s each).")] = 0,
+    raw: Annotated[int, typer.Option(min=0, help="Trials with campaigns written as raw volts and identified.")] = 0,
+    keep: Annotated[
+        Path | None,
+        typer.Option(help="Folder for tables, identified campaigns and rows: a killed evaluation goes on from there."),
+    ] = None,
     workers: WorkerCount = None,
     scheduler: Scheduler = None,
     out: Out = None,
@@ -41,7 +45,8 @@ def evaluate(
     """Draw campaigns with hidden effects, diagnose them, and count: the evidence behind `tpjb diagnose`.
 
     Writes trials, summary, confusion, figures and rules as .csv and .parquet, and evidence.md. The same seed gives
-    the same campaigns, whatever the workers.
+    the same campaigns, whatever the workers. With --keep, rows of raw trials are made anew where the code of the
+    diagnosis has changed since; delete the folder when the virtual rig or the identification has.
     """
     if scheduler is not None and workers is not None:
         raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")
@@ -54,13 +59,13 @@ def evaluate(
     drawn = load_bearing(bearing)
     target = out_folder(out, "evaluate")
     options = {"bearing": bearing, "sizes": sizes, "noises": noises, "seeds": seeds, "none": none,
-               "left_out": left_out, "two": two, "raw": raw}  # fmt: skip
+               "left_out": left_out, "two": two, "raw": raw, "keep": keep}  # fmt: skip
     with output_folder(target, "evaluate") as folder:
         with progress("evaluating") as show:
             show("tabling the model", 0, 100)
-            bench = prepare(drawn, paper_layout(len(drawn.pads)))
+            bench = prepare(drawn, paper_layout(len(drawn.pads)), _store(keep, bearing))
             with open_workers(workers, scheduler, PRELOAD) as team:
-                rows = _run(team, bench, drawn, plan, show)
+                rows = _run(team, bench, plan, show) + _run_raw(team, bench, drawn, raw, keep, show)
             show("next tests", 99, 100)
             tests = _next_tests(bench, drawn)
         summary = _write(folder, rows, tests)
@@ -79,22 +84,41 @@ def _numbers(text: str, name: str) -> tuple[float, ...]:
     return values
 
 
-def _run(team: Workers, bench: Bench, drawn: Any, plan: Any, show: Any) -> list[dict[str, Any]]:
-    from tpjb_ident.diagnose.raw_trials import raw_trials, run_raw_trial
+def _store(keep: Path | None, bearing: Path) -> Path | None:
+    """Where the tables of this very bearing are kept."""
+    if keep is None:
+        return None
+    keep.mkdir(parents=True, exist_ok=True)
+    return keep / f"{sha256(bearing)[:16]}.npz"
+
+
+def _run(team: Workers, bench: Bench, plan: Any, show: Any) -> list[dict[str, Any]]:
     from tpjb_ident.diagnose.trials import run_trial, trials
     from tpjb_ident.executors import in_order
 
-    labels = [c.label for c in bench.pool]
-    drawn_trials, whole = list(trials(labels, plan)), list(raw_trials(labels, plan.raw))
-    total = len(drawn_trials) + 50 * len(whole)
+    drawn_trials = list(trials([c.label for c in bench.pool], plan))
     rows = []
     for row in in_order(team, run_trial, [(trial,) for trial in drawn_trials], bench):
         rows.append(row)
-        show(f"{row['kind']} {' + '.join(row['truth'])}", len(rows), total)
-    for row in in_order(team, run_raw_trial, [(drawn, trial) for trial in whole], bench):
-        rows.append(row)
-        show(f"raw volts, {row['kind']}", total - 50 * (len(drawn_trials) + len(whole) - len(rows)), total)
+        show(f"{row['kind']} {' + '.join(row['truth'])}", len(rows), len(drawn_trials))
     return rows
+
+
+def _run_raw(team: Workers, bench: Bench, drawn: Any, count: int, keep: Path | None, show: Any) -> list[dict[str, Any]]:
+    if not count:
+        return []
+    from tpjb_ident.diagnose.raw_rows import raw_rows
+    from tpjb_ident.diagnose.raw_trials import raw_bench, raw_trials
+
+    shared = raw_bench(bench, drawn, keep)
+    groups = raw_trials([c.label for c in bench.pool], count)
+    total, done = sum(map(len, groups)), []
+
+    def told(row: dict[str, Any]) -> None:
+        done.append(row)
+        show(f"raw volts, {row['kind']}", len(done), total)
+
+    return raw_rows(team, shared, groups, told)
 
 
 def _next_tests(bench: Bench, drawn: Any) -> pd.DataFrame:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.compare.comparison import ComparisonError, measure_dry
@@ -17,14 +17,18 @@ from tpjb_ident.dynamic.identify import IdentifySettings, identify
 
 from model.effects import Effect, apply_effects  # isort: skip
 from model.pivots import pivot_laws  # isort: skip
-from model.setup import Setup  # isort: skip
+from model.setup import Instruments, Setup  # isort: skip
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from model.bearing import Bearing
     from rigdata.campaign import Campaign
+    from tpjb_ident.clearance import ClearancePolygon
+    from tpjb_ident.diagnose.memory import Memory
     from tpjb_ident.dynamic.identification import Identification
+    from tpjb_ident.locus import Locus
+    from tpjb_ident.pivot import PivotCurve
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,29 @@ class CampaignDiagnosis:
     setup: Setup
 
 
+@dataclass(frozen=True)
+class Measured:
+    """All that a diagnosis needs of a campaign, without its records; it can be kept and diagnosed again.
+
+    Attributes
+    ----------
+    identification : Identification
+    curves : tuple of PivotCurve
+    polygon : ClearancePolygon or None
+    locus : Locus or None
+    instruments : Instruments
+        Housing mass and stiffness of the cells under it, as the campaign shows them.
+    certificates : Certificates
+    """
+
+    identification: Identification = field(repr=False)
+    curves: tuple[PivotCurve, ...] = field(repr=False)
+    polygon: ClearancePolygon | None = field(repr=False)
+    locus: Locus | None = field(repr=False)
+    instruments: Instruments
+    certificates: Certificates
+
+
 def diagnose_campaign(
     campaign: Campaign,
     bearing: Bearing,
@@ -80,7 +107,32 @@ def diagnose_campaign(
     ComparisonError
         The campaign has no dynamic runs.
     """
-    baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
+    settings = settings or DiagnoseSettings()
+    measured = measure_campaign(campaign, bearing, settings.certificates, progress, estimator)
+    return diagnose_measured(measured, bearing, baseline, settings, progress)
+
+
+def measure_campaign(
+    campaign: Campaign,
+    bearing: Bearing,
+    known: Certificates | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+    estimator: IdentifySettings | None = None,
+) -> Measured:
+    """Identify a campaign and measure its static tests.
+
+    Parameters
+    ----------
+    campaign, bearing, progress, estimator
+        As of `diagnose_campaign`.
+    known : Certificates, optional
+        What counts where the manifest is silent.
+
+    Raises
+    ------
+    ComparisonError
+        The campaign has no dynamic runs.
+    """
     tell = progress or (lambda text, done, total: None)
     if not campaign.of_kind("dynamic"):
         raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to diagnose")
@@ -89,14 +141,42 @@ def diagnose_campaign(
     found = identify(campaign, chosen, lambda text, done, total: tell(f"identifying, {text}", 20 * done, 100 * total))
     tell("pivot curves, clearance and locus", 20, 100)
     curves, polygon, locus = measure_dry(campaign, bearing)
-    measured = baseline.pivots == "measured"
-    laws = measured_laws(curves, len(bearing.pads), campaign.id) if measured else pivot_laws(baseline.pivots, bearing)
-    setup = apply_effects(with_housing(Setup(bearing, laws, baseline.thermal), campaign), baseline.effects)
+    housing = with_housing(Setup(bearing, pivot_laws("rigid", bearing)), campaign).instruments
+    return Measured(found, tuple(curves), polygon, locus, housing, certificates(campaign, known or Certificates()))
+
+
+def diagnose_measured(
+    measured: Measured,
+    bearing: Bearing,
+    baseline: Baseline | None = None,
+    settings: DiagnoseSettings | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+    memory: Memory | None = None,
+) -> CampaignDiagnosis:
+    """Find what the model of an identified campaign lacks.
+
+    Parameters
+    ----------
+    measured : Measured
+    bearing, baseline, settings, progress
+        As of `diagnose_campaign`; the certificates are those of `measured`.
+    memory : Memory, optional
+        Answers of the model at this bearing's baseline, known from before.
+    """
+    baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
+    tell = progress or (lambda text, done, total: None)
+    found, curves = measured.identification, measured.curves
+    given = baseline.pivots == "measured"
+    laws = measured_laws(curves, len(bearing.pads), found.campaign) if given else pivot_laws(baseline.pivots, bearing)
+    plain = Setup(bearing, laws, baseline.thermal, instruments=measured.instruments)
+    setup = apply_effects(plain, baseline.effects)
     # curves that the model was given cannot testify about it
-    observations = observe(found, () if measured else curves, locus, polygon, settings.tolerance)
-    certain = replace(settings, certificates=certificates(campaign, settings.certificates))
+    observations = observe(
+        found, () if given else curves, measured.locus, measured.polygon, settings.tolerance
+    )  # fmt: skip
+    certain = replace(settings, certificates=measured.certificates)
     result = diagnose(
-        observations, setup, certain, lambda text, share: tell(f"diagnosing, {text}", 30 + int(70 * share), 100)
+        observations, setup, certain, lambda text, share: tell(f"diagnosing, {text}", 30 + int(70 * share), 100), memory
     )
     return CampaignDiagnosis(result, found, setup)
 

@@ -8,9 +8,10 @@ from typing import Any
 from model.setup import Setup
 from tpjb_ident.diagnose.candidates import candidates
 from tpjb_ident.diagnose.closure import closure
-from tpjb_ident.diagnose.decide import decide
+from tpjb_ident.diagnose.decide import decide, strongest_rival
 from tpjb_ident.diagnose.forward import Forward, ForwardModel
 from tpjb_ident.diagnose.laws import frequency_laws, sensor_map_test
+from tpjb_ident.diagnose.memory import Memory
 from tpjb_ident.diagnose.next_test import designs, rank_designs, say
 from tpjb_ident.diagnose.nuisance import nuisances
 from tpjb_ident.diagnose.observe import Observations
@@ -50,6 +51,7 @@ def diagnose(
     setup: Setup,
     settings: DiagnoseSettings | None = None,
     progress: Progress | None = None,
+    memory: Memory | None = None,
 ) -> Diagnosis:
     """Find the effects that a baseline lacks to describe a campaign.
 
@@ -62,6 +64,8 @@ def diagnose(
     settings : DiagnoseSettings, optional
     progress : callable, optional
         Called with a text and a share done.
+    memory : Memory, optional
+        Answers known from before; it is not changed.
 
     Raises
     ------
@@ -70,6 +74,8 @@ def diagnose(
     """
     settings = settings or DiagnoseSettings()
     forward = Forward(setup.change(accuracy=ACCURACY), observations.layout, observations.elements)
+    if memory is not None:
+        forward = forward.knowing(memory)
     problem = pose(observations, forward, settings)
     with workers(forward, settings.workers) as run:
         found = search(run, problem, settings, progress)
@@ -121,10 +127,9 @@ def _next_test(
         return f"repeat {worst.observable} at {worst.where}, where the unknown shows most, with another sensor set"
     if verdict.verdict == "named":
         return "none needed to tell these effects from the others in the library"
-    index = next(i for i, c in enumerate(found.model.candidates) if c.name == verdict.indistinguishable[0][0])
-    rival = next(
-        f for f in found.rivals[index] if {c.name for c in f.candidates} & set(verdict.indistinguishable[0][1:])
-    )
+    rival = strongest_rival(found, settings)
+    if rival is None:
+        return ""
     options = designs(setup, observations.layout)
     ranked = rank_designs(setup, found.model.effects, rival.effects, options, settings.certificates)
     return say(ranked[0], found.model.label, rival.label) if ranked else ""

@@ -1,7 +1,7 @@
 """Evidence: what many trials add up to, as tables and in words.
 
-A row is *right* when the verdict names exactly what was hidden, or a group of at most three that holds it; *wrong*
-when it names something else without a doubt; abstaining is neither.
+A row is *right* when the verdict names exactly what was hidden, pad and direction too, or a group of at most three
+that holds it; *wrong* when it names something else without a doubt; abstaining is neither.
 """
 
 from __future__ import annotations
@@ -26,9 +26,11 @@ OUTCOMES = (
 
 
 def outcome(row: Row) -> str:
-    """Judge a trial; one of `OUTCOMES`, or ``"unreachable"``."""
-    verdict, names, found = row["verdict"], sorted(row["names"]), sorted(row.get("found", ()))
-    if verdict in {"unreachable", "consistent", "unexplained"}:
+    """Judge a trial; one of `OUTCOMES`, ``"unreachable"`` or ``"no baseline"`` (the model finds no equilibrium)."""
+    spelt = "alternatives" in row  # another pad of the right effect is not what was hidden
+    truth, said = (row["truth"], row["labels"]) if spelt else (row["names"], row.get("found", ()))
+    verdict, names, found = row["verdict"], sorted(truth), sorted(said)
+    if verdict in {"unreachable", "no baseline", "consistent", "unexplained"}:
         return str(verdict)
     if row["kind"] in {"none", "left out"}:
         return "named wrong" if verdict == "named" else "group wrong"
@@ -36,8 +38,8 @@ def outcome(row: Row) -> str:
         if found == names:
             return "named right"
         return "part of it" if found and not Counter(found) - Counter(names) else "named wrong"
-    groups = {g[0]: g for g in row["groups"]}
-    sets = [set(groups.get(name, (name,))) for name in row["found"]]
+    groups = {g[0]: g for g in (row["alternatives"] if spelt else row["groups"])}
+    sets = [set(groups.get(name, (name,))) for name in said]
     if len(sets) != len(names) or not _matches(sets, names):
         return "group wrong"
     return "group right" if max(map(len, sets)) <= SMALL else "large group"
@@ -60,7 +62,7 @@ def summary_table(rows: Iterable[Row]) -> pd.DataFrame:
         groups.setdefault(key, Counter())[outcome(row)] += 1
     out = []
     for (rung, kind, size, noise), counts in sorted(groups.items()):
-        total = sum(counts.values()) - counts["unreachable"]
+        total = sum(counts[name] for name in OUTCOMES)
         if not total:
             continue
         right = counts["named right"] + counts["group right"]
@@ -91,7 +93,7 @@ def confusion_table(rows: Iterable[Row], kind: str = "hidden") -> pd.DataFrame:
 
     cells: dict[tuple[str, float], Counter[str]] = {}
     for row in rows:
-        if row["kind"] == kind and row["verdict"] != "unreachable":
+        if row["kind"] == kind and row["verdict"] not in {"unreachable", "no baseline"}:
             cells.setdefault((" + ".join(row["truth"]), row["size"]), Counter())[_said(row)] += 1
     return pd.DataFrame(
         [

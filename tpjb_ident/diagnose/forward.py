@@ -12,19 +12,16 @@ from numpy.typing import NDArray
 
 from model.effects import Effect, apply_effects
 from model.equilibrium import Equilibrium
-from model.predict import Prediction, predict_setup
 from model.setup import Setup
 from model.static_tests import dry_curve, polygon_sides
-from tpjb_ident.diagnose.layout import DryTest, Layout
+from tpjb_ident.diagnose.layout import DryTest, DynamicTest, Layout
+from tpjb_ident.diagnose.memory import Memory, NoEquilibriumError, Reading, StaticPoint
 from tpjb_ident.diagnose.observe import Element
+
+__all__ = ["Forward", "ForwardModel", "NoEquilibriumError"]
 
 FloatArray = NDArray[np.float64]
 Change = Callable[[Setup], Setup]
-StaticPoint = tuple[float, float, float]
-
-
-class NoEquilibriumError(ValueError):
-    """The model found no equilibrium at an operating point of the campaign."""
 
 
 class ForwardModel(Protocol):
@@ -41,7 +38,7 @@ class ForwardModel(Protocol):
 
 @dataclass
 class Forward:
-    """Predicts an observation vector; remembers equilibria to start the next call from.
+    """Predicts an observation vector; remembers what it has solved, and starts the next call from there.
 
     Attributes
     ----------
@@ -56,7 +53,7 @@ class Forward:
     layout: Layout
     elements: tuple[Element, ...] = field(repr=False)
     calls: int = 0
-    _start: dict[StaticPoint, Equilibrium] = field(default_factory=dict, repr=False)
+    memory: Memory = field(default_factory=Memory, repr=False)
     _shares: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)
 
     def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
@@ -84,9 +81,9 @@ class Forward:
         table = _Answers(setup)
         for test in self.layout.dynamic:
             point = (test.load, test.direction, test.speed)
-            prediction = self._solve(setup, point, test.excitation)
-            table.dynamic(test, prediction, self.layout)
-            for pad, load in enumerate(prediction.pad_load, start=1):
+            reading = self._solve(setup, point, test.excitation)
+            table.dynamic(test, reading)
+            for pad, load in enumerate(reading.pad_load, start=1):
                 self._shares[(*point, float(pad))] = float(load) / test.load
         for one in self.layout.locus:
             point = (one.load, one.direction, one.speed)
@@ -98,8 +95,17 @@ class Forward:
         return np.array([table.get(e) for e in self.elements])
 
     def fresh(self) -> Forward:
-        """Return a copy that starts from the same equilibria, whatever this one goes on to solve."""
-        return Forward(self.setup, self.layout, self.elements, 0, dict(self._start), dict(self._shares))
+        """Return a copy that knows what this one knows now, whatever this one goes on to solve."""
+        return Forward(self.setup, self.layout, self.elements, 0, self.memory.copy(), dict(self._shares))
+
+    def knowing(self, memory: Memory) -> Forward:
+        """Return a copy that begins with what is known of its bearing."""
+        return Forward(self.setup, self.layout, self.elements, 0, memory.copy())
+
+    def fresh_start(self, start: dict[StaticPoint, Equilibrium]) -> Forward:
+        """Return one that writes into this one's memory but starts from other equilibria."""
+        memory = Memory(self.memory.solved, dict(start))
+        return Forward(self.setup, self.layout, self.elements, 0, memory)
 
     def pad_shares(self) -> FloatArray:
         """Share of the static load on the pad of every temperature element at the last call; NaN elsewhere, (n,)."""
@@ -110,12 +116,8 @@ class Forward:
             [self._shares.get(place, math.nan) if m else math.nan for place, m in zip(places, mine, strict=True)]
         )
 
-    def _solve(self, setup: Setup, point: StaticPoint, excitation: Sequence[float]) -> Prediction:
-        prediction = predict_setup(setup, *point, np.array(excitation), self._start.get(point))
-        if not prediction.converged:
-            raise NoEquilibriumError(f"no equilibrium at {point[0]:.0f} N ({', '.join(prediction.status)})")
-        self._start[point] = prediction.equilibrium
-        return prediction
+    def _solve(self, setup: Setup, point: StaticPoint, excitation: Sequence[float]) -> Reading:
+        return self.memory.ask(setup, point, tuple(excitation), self.layout.temperature_position)
 
 
 _ROW = {"xx": (0, 0), "xy": (0, 1), "yx": (1, 0), "yy": (1, 1)}
@@ -129,20 +131,20 @@ class _Answers:
     def get(self, element: Element) -> float:
         return self.table[(element.observable, *(v for _, v in element.where))]
 
-    def dynamic(self, test, prediction: Prediction, layout: Layout) -> None:  # type: ignore[no-untyped-def]
+    def dynamic(self, test: DynamicTest, reading: Reading) -> None:
         point = (test.load, test.direction, test.speed)
-        for h, omega in zip(prediction.h, test.excitation, strict=True):
+        for h, omega in zip(reading.h, test.excitation, strict=True):
             for name, at in _ROW.items():
                 self.table[(f"k{name}", *point, omega)] = float(h[at].real)
                 self.table[(f"c{name}", *point, omega)] = float(h[at].imag)
-        for pad, t in enumerate(prediction.pad_temperature(layout.temperature_position), start=1):
+        for pad, t in enumerate(reading.temperature, start=1):
             self.table[("pad_temperature", *point, float(pad))] = float(t)
 
-    def locus(self, point: StaticPoint, prediction: Prediction) -> None:
-        self.table[("locus_x", *point)], self.table[("locus_y", *point)] = map(float, prediction.position)
-        reading = prediction.load_reading
-        self.table[("load_ratio", *point)] = float(np.hypot(*reading)) / point[0]
-        turn = np.arctan2(reading[1], reading[0]) - point[1]
+    def locus(self, point: StaticPoint, reading: Reading) -> None:
+        self.table[("locus_x", *point)], self.table[("locus_y", *point)] = map(float, reading.position)
+        load = reading.load
+        self.table[("load_ratio", *point)] = float(np.hypot(*load)) / point[0]
+        turn = np.arctan2(load[1], load[0]) - point[1]
         self.table[("load_turn", *point)] = float(np.arctan2(np.sin(turn), np.cos(turn)))
 
     def dry(self, test: DryTest) -> None:

@@ -1,15 +1,19 @@
 """Raw trials: whole campaigns as raw volts from the virtual rig, identified and diagnosed like any other.
 
 The truth has a finer film mesh, oil, clearances and supply temperature that miss their stated values as certificates
-allow, sensors with drawn gains and zeros, and all the noise of a rig.
+allow, sensors with drawn gains and zeros, and all the noise of a rig. An effect is hidden once and its campaign
+diagnosed twice where it is also left out of the library. What identification makes of a campaign can be kept, and
+diagnosed again after the decision code has changed.
 """
 
 from __future__ import annotations
 
-import math
+import hashlib
+import itertools
+import pickle
 import tempfile
-from collections.abc import Sequence
-from dataclasses import asdict, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,76 +21,199 @@ import numpy as np
 
 from model.bearing import Bearing
 from model.effects import Effect, EffectKind, register
+from model.pivots import pivot_laws
 from model.setup import Setup
 from rigdata.campaign import load_campaign
-from rigdata.virtual_rig import Instruments, Noise, RigPlan, VirtualRig, write_campaign
+from rigdata.virtual_rig import Instruments, Noise, VirtualRig, write_campaign
 from tpjb_ident.compare.predictions import ModelSettings
 from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 from tpjb_ident.diagnose.bench import FINER, Bench, seed
-from tpjb_ident.diagnose.campaign import diagnose_campaign
+from tpjb_ident.diagnose.campaign import Measured, diagnose_measured, measure_campaign
 from tpjb_ident.diagnose.closure import closure
-from tpjb_ident.diagnose.nuisance import Certificates
+from tpjb_ident.diagnose.diagnose import ACCURACY
+from tpjb_ident.diagnose.fit import slope
+from tpjb_ident.diagnose.forward import Forward, NoEquilibriumError
+from tpjb_ident.diagnose.memory import Memory
+from tpjb_ident.diagnose.nuisance import Certificates, nuisances
+from tpjb_ident.diagnose.observe import observe
+from tpjb_ident.diagnose.other_plans import PLANS, Test
 from tpjb_ident.diagnose.settings import DiagnoseSettings
 from tpjb_ident.diagnose.trials import Trial, sized, summary
+from tpjb_ident.dynamic.identify import IdentifySettings
 
 #: An effect that only truths have.
 MESH_NAME = "finer_mesh_of_the_truth"
+#: Size, in the paper's plan, of what is hidden in campaigns of other plans.
+ELSEWHERE = 24.0
 
 
-def raw_trials(labels: Sequence[str], count: int) -> list[Trial]:
-    """List `count` trials: nothing hidden, d' = 12, the same left out, d' = 6 or 36, over all candidates in turn."""
-    order = [labels[i] for i in np.random.default_rng(5).permutation(len(labels))]
-    out: list[Trial] = []
-    for i in range(math.ceil(count / 4)):
-        label = (order[i % len(order)],)
-        again = i // len(order)
-        out.append(Trial("none", noise=(1.0, 2.0)[i % 2], number=i))
-        out.append(Trial("hidden", label, 12.0, 1.0, again))
-        out.append(Trial("left out", label, 12.0, 1.0, again))
-        out.append(Trial("hidden", label, (6.0, 36.0)[i % 2], 1.0, again))
-    return out[:count]
+@dataclass(frozen=True)
+class RawTrial(Trial):
+    """A trial as raw volts.
+
+    Attributes
+    ----------
+    plan : str
+        One of `other_plans.PLANS`, or ``"paper"``.
+    """
+
+    plan: str = "paper"
 
 
-def run_raw_trial(bench: Bench, bearing: Bearing, trial: Trial) -> dict[str, Any]:
-    """Write a campaign, identify and diagnose it; a row as of `trials.run_trial`.
+@dataclass(frozen=True)
+class RawBench:
+    """What raw trials share.
 
-    Parameters
+    Attributes
     ----------
     bench : Bench
         Of the paper's layout: gives effects their sizes.
     bearing : Bearing
         As drawn.
-    trial : Trial
+    memory : Memory
+        The model's answers at the baseline, the same for every campaign.
+    keep : Path or None
+        Folder in which identified campaigns are kept.
     """
-    rng = seed("raw", *asdict(trial).values())
-    chosen = [next(c for c in bench.pool if c.label == label) for label in trial.truth]
-    effects = sized(bench, chosen, trial, rng)
-    row: dict[str, Any] = {**asdict(trial), "rung": "raw volts", "names": tuple(c.name for c in chosen)}
+
+    bench: Bench = field(repr=False)
+    bearing: Bearing = field(repr=False)
+    memory: Memory = field(default_factory=Memory, repr=False)
+    keep: Path | None = None
+
+
+def raw_trials(labels: Sequence[str], count: int) -> list[tuple[RawTrial, ...]]:
+    """List trials, those together that share a campaign; about `count` of them in all.
+
+    Every round has nothing hidden, d' = 12, the same left out, d' = 6 or 36, and another plan with and without an
+    effect; every other round d' = 24, left out too; every eighth round two effects. Noise alternates.
+    """
+    rounds = _rounds(labels)
+    out: list[tuple[RawTrial, ...]] = []
+    while sum(map(len, out)) < count:
+        out.append(next(rounds))
+    return out
+
+
+def _rounds(labels: Sequence[str]) -> Iterator[tuple[RawTrial, ...]]:
+    order = [labels[i] for i in np.random.default_rng(5).permutation(len(labels))]
+    plans = sorted(PLANS)
+    for i in itertools.count():
+        label, again = (order[i % len(order)],), i // len(order)
+        other = (order[(7 * i + 3) % len(order)],)
+        noise, plan = (1.0, 2.0)[i % 2], plans[i % len(plans)]
+        yield (RawTrial("none", noise=noise, number=i),)
+        yield tuple(RawTrial(kind, label, 12.0, noise, again) for kind in ("hidden", "left out"))  # type: ignore[arg-type]
+        yield (RawTrial("hidden", label, (6.0, 6.0, 36.0)[i % 3], (1.0, 2.0)[(i // 2) % 2], again),)
+        if i % 2:
+            yield tuple(RawTrial(kind, other, 24.0, 1.0, again) for kind in ("hidden", "left out"))  # type: ignore[arg-type]
+        yield (RawTrial("none", number=i // len(plans), plan=plan),)
+        yield (RawTrial("hidden", other, ELSEWHERE, 1.0, again, plan=plan),)
+        if i % 8 == 7:
+            pair = np.random.default_rng([i, 17]).choice(len(labels), 2, replace=False)
+            yield (RawTrial("two", tuple(labels[k] for k in sorted(pair)), 12.0, 1.0, i),)
+
+
+def run_raw_trials(shared: RawBench, group: tuple[RawTrial, ...]) -> list[dict[str, Any]]:
+    """Write or find one campaign, identify it, and diagnose it once per trial; rows as of `trials.run_trial`.
+
+    Parameters
+    ----------
+    shared : RawBench
+    group : tuple of RawTrial
+        With the same campaign.
+    """
+    register_truth()
+    first = group[0]
+    rng = seed("raw", *asdict(replace(first, kind="hidden" if first.truth else "none")).values())
+    chosen = [next(c for c in shared.bench.pool if c.label == label) for label in first.truth]
+    test = PLANS[first.plan](shared.bearing) if first.plan in PLANS else Test(shared.bearing)
+    absent = any(c.fixed.get("pad", 0) > len(test.bearing.pads) for c in chosen)
+    effects = None if absent else sized(shared.bench, chosen, replace(first, kind="hidden"), rng)
+    blank = [{**asdict(trial), "rung": _rung(trial), "names": tuple(c.name for c in chosen)} for trial in group]
     if effects is None:
-        return {**row, "verdict": "unreachable"}
-    skip = frozenset({MESH_NAME, *(row["names"] if trial.kind == "left out" else ())})
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "campaign.h5"
-        write_campaign(path, _rig(bearing, effects, rng, trial.noise))
-        result = diagnose_campaign(load_campaign(path), bearing, settings=DiagnoseSettings(skip=skip, workers=1))
-    found = result.diagnosis.found
-    row |= summary(result.diagnosis.verdict, effects)
-    row["p_before"], row["p_after"] = found.before.structure.p, found.after.structure.p
-    row["held_p"], row["scale"] = found.after.held_p, found.after.scale
-    measured = closure(result.diagnosis.problem, found)
-    if measured is not None:
-        row |= {"closed": measured.closed, "closed_wrong": measured.wrong, "closed_ceiling": measured.ceiling}
+        return [{**row, "verdict": "unreachable"} for row in blank]
+    rig = _rig(test, effects, rng, first.noise)
+    measured = _measured(rig, test.bearing, shared.keep, "-".join(map(str, asdict(first).values())))
+    memory = shared.memory if test.bearing == shared.bearing else None
+    return [row | _diagnosed(measured, test.bearing, effects, trial, memory)
+            for row, trial in zip(blank, group, strict=True)]  # fmt: skip
+
+
+def _rung(trial: RawTrial) -> str:
+    return "raw volts" if trial.plan == "paper" else f"raw volts, {trial.plan}"
+
+
+def _diagnosed(
+    measured: Measured, bearing: Bearing, effects: tuple[Effect, ...], trial: RawTrial, memory: Memory | None
+) -> dict[str, Any]:
+    missing = {e.name for e in effects} if trial.kind == "left out" else set()
+    settings = DiagnoseSettings(skip=frozenset({MESH_NAME, *missing}), workers=1)
+    try:
+        diagnosis = diagnose_measured(measured, bearing, settings=settings, memory=memory).diagnosis
+    except NoEquilibriumError as error:
+        return {"verdict": "no baseline", "reasons": (str(error),)}
+    found = diagnosis.found
+    row = summary(diagnosis.verdict, effects)
+    row |= {"p_before": found.before.structure.p, "p_after": found.after.structure.p}
+    row |= {"held_p": found.after.held_p, "scale": found.after.scale}
+    closed = closure(diagnosis.problem, found)
+    if closed is not None:
+        row |= {"closed": closed.closed, "closed_wrong": closed.wrong, "closed_ceiling": closed.ceiling}
     return row
 
 
-def _rig(bearing: Bearing, effects: tuple[Effect, ...], rng: np.random.Generator, noise: float) -> VirtualRig:
+def _measured(rig: VirtualRig, bearing: Bearing, keep: Path | None, name: str) -> Measured:
+    """Identify a rig's campaign, or take what is kept of it."""
+    path = None if keep is None else keep / f"{hashlib.sha256(name.encode()).hexdigest()[:20]}.measured"
+    if path is not None and path.exists():
+        kept = pickle.loads(path.read_bytes())
+        if isinstance(kept, Measured):
+            return kept
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "campaign.h5"
+        write_campaign(file, rig)
+        # one estimator is enough: the others only tell where they disagree
+        measured = measure_campaign(load_campaign(file), bearing, estimator=IdentifySettings(methods=()))
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as part:
+            part.write(pickle.dumps(measured, protocol=5))
+        Path(part.name).replace(path)
+    return measured
+
+
+def raw_bench(bench: Bench, bearing: Bearing, keep: Path | None = None) -> RawBench:
+    """Prepare raw trials: solve once what every campaign of the paper's plan asks at the baseline."""
+    register_truth()
+    shared = RawBench(bench, bearing, keep=keep)
+    name = asdict(RawTrial("none"))
+    rng = seed("raw", *name.values())
+    measured = _measured(_rig(Test(bearing), (), rng, 1.0), bearing, keep, "-".join(map(str, name.values())))
+    return replace(shared, memory=baseline_memory(measured, bearing, bench))
+
+
+def baseline_memory(measured: Measured, bearing: Bearing, bench: Bench) -> Memory:
+    """What a diagnosis of any campaign with these points asks of the model before it looks at a value."""
+    seen = observe(measured.identification, measured.curves, measured.locus, measured.polygon)
+    setup = Setup(bearing, pivot_laws("kirk", bearing), accuracy=ACCURACY, instruments=measured.instruments)
+    forward = Forward(setup, seen.layout, seen.elements)
+    base = forward()
+    start = dict(forward.memory.start)
+    nuisances(forward, (), base, Certificates())
+    for candidate in bench.pool:
+        slope(forward.fresh_start(start), (candidate,), np.array([candidate.neutral]), base, 0, 0.5 * candidate.step)
+    return Memory(forward.memory.solved, start)
+
+
+def _rig(test: Test, effects: tuple[Effect, ...], rng: np.random.Generator, noise: float) -> VirtualRig:
     number = int(rng.integers(2**31))
-    settings = ModelSettings(effects=(_finer_mesh(), *effects))
-    instruments = Instruments.like_paper(len(bearing.pads), number).with_drawn_errors(number)
+    settings = ModelSettings(effects=(Effect(MESH_NAME), *effects))
+    instruments = Instruments.like_paper(len(test.bearing.pads), number).with_drawn_errors(number)
     return VirtualRig(
-        truth=rig_truth(_as_built(bearing, rng), settings),
+        truth=rig_truth(_as_built(test.bearing, rng), settings),
         instruments=erring_instruments(instruments, effects),
-        plan=RigPlan.like_paper(),
+        plan=test.plan,
         noise=Noise.like_samples().scaled(noise),
         seed=number,
     )
@@ -112,9 +239,10 @@ def _as_built(bearing: Bearing, rng: np.random.Generator) -> Bearing:
     return replace(bearing, oil=oil).with_pads(pads)
 
 
-def _finer_mesh() -> Effect:
+def register_truth() -> None:
+    """Let truths have their finer mesh; diagnoses skip it."""
+
     def apply(setup: Setup) -> Setup:
         return setup.change(mesh=FINER)
 
     register(EffectKind(MESH_NAME, "bearing", (), apply))
-    return Effect(MESH_NAME)
