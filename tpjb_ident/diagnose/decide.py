@@ -39,6 +39,7 @@ def decide(problem: Problem, found: Search, settings: DiagnoseSettings) -> Verdi
         verdict=name,
         effects=_effects(found, scale) if model.candidates else (),
         indistinguishable=groups if name == "ambiguous" else (),
+        alternatives=_alternatives(found, scale, settings) if name == "ambiguous" else (),
         below_floor=_below_floor(found, settings),
         next_test="",
         candidates=_ranked(found, observations, held, int(problem.misfit.train.sum())),
@@ -77,23 +78,10 @@ def _judge(
             f"held-out gap {gaps[0]:.2f} -> {gaps[1]:.2f}; what is left is small but structured, most in "
             f"{after.structure.words}"
         )
-    undecided = _undecided(found, after.scale, settings)
     if groups:
-        return "ambiguous", (*(f"{' or '.join(group)}: these data cannot tell" for group in groups), *undecided, text)
-    return "named", (*undecided, text)
-
-
-def _undecided(found: Search, scale: float, settings: DiagnoseSettings) -> tuple[str, ...]:
-    """Effects of one name that these data cannot tell apart, such as two pads: the name stands, the rest is open."""
-    out = []
-    for candidate, rivals in zip(found.model.candidates, found.rivals, strict=True):
-        labels = [
-            c.label for rival in rivals for c in rival.candidates
-            if c.name == candidate.name and c not in found.model.candidates and _alike(found, rival, scale, settings)
-        ]  # fmt: skip
-        if labels:
-            out.append(f"{' or '.join([candidate.label, *dict.fromkeys(labels)])}: these data cannot tell")
-    return tuple(out)
+        spelt = _alternatives(found, after.scale, settings)
+        return "ambiguous", (*(f"{' or '.join(group)}: these data cannot tell" for group in spelt), text)
+    return "named", (text,)
 
 
 def _alike(found: Search, rival: Fit, scale: float, settings: DiagnoseSettings) -> bool:
@@ -134,18 +122,45 @@ def share_left(problem: Problem, found: Search) -> float:
     return max(after - floor, 0.0) / max(before - floor, 1e-12) if before > floor else 1.0
 
 
+def _others(found: Search, index: int, scale: float, settings: DiagnoseSettings) -> tuple[Candidate, ...]:
+    """Candidates that could stand in the place of one effect of the model as well, best first."""
+    ordered = sorted(found.rivals[index], key=lambda f: f.chi_square)
+    alike = (r for r in ordered if _alike(found, r, scale, settings))
+    return tuple(dict.fromkeys(c for r in alike for c in r.candidates if c not in found.model.candidates))
+
+
 def _groups(found: Search, scale: float, settings: DiagnoseSettings) -> tuple[tuple[str, ...], ...]:
-    """Per effect, the names of those that could stand in its place as well."""
+    """Per effect that has rivals, the names of all of them, its own first.
+
+    Another pad or direction of the same effect is a rival too; it is spelt out, since its name is the effect's own.
+    """
     out = []
-    for candidate, rivals in zip(found.model.candidates, found.rivals, strict=True):
-        names = {candidate.name}
-        for rival in rivals:
-            other = [c.name for c in rival.candidates if c not in found.model.candidates]
-            if _alike(found, rival, scale, settings):
-                names |= set(other)
-        if len(names) > 1:
-            out.append((candidate.name, *sorted(names - {candidate.name})))
+    for i, candidate in enumerate(found.model.candidates):
+        others = _others(found, i, scale, settings)
+        if others:
+            rest = {c.label if c.name == candidate.name else c.name for c in others}
+            out.append((candidate.name, *sorted(rest)))
     return tuple(out)
+
+
+def _alternatives(found: Search, scale: float, settings: DiagnoseSettings) -> tuple[tuple[str, ...], ...]:
+    """`_groups` with every pad and direction spelt out, likeliest first."""
+    rows = [
+        (candidate, _others(found, i, scale, settings)) for i, candidate in enumerate(found.model.candidates)
+    ]  # fmt: skip
+    return tuple((one.label, *(c.label for c in others)) for one, others in rows if others)
+
+
+def strongest_rival(found: Search, settings: DiagnoseSettings) -> Fit | None:
+    """Return the explanation that comes closest to the model without being told from it; None if none does.
+
+    Parameters
+    ----------
+    found : Search
+    settings : DiagnoseSettings
+    """
+    alike = [r for row in found.rivals for r in row if _alike(found, r, found.after.scale, settings)]
+    return min(alike, key=lambda f: f.chi_square, default=None)
 
 
 def _effects(found: Search, scale: float) -> tuple[FoundEffect, ...]:

@@ -150,6 +150,7 @@ def summary(verdict: Verdict, effects: Sequence[Effect]) -> dict[str, Any]:
         "found": tuple(e.name for e in verdict.effects),
         "labels": tuple(e.label for e in verdict.effects),
         "groups": tuple(tuple(g) for g in verdict.indistinguishable),
+        "alternatives": verdict.alternatives,
         "reasons": verdict.reasons,
         **{f"gap_{k}": v for k, v in verdict.gap.items()},
     }

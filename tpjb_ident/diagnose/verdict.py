@@ -84,7 +84,11 @@ class Disagreement:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of `diagnose`; `to_json` is ``diagnosis.json`` of `outputs.md`."""
+    """Result of `diagnose`; `to_json` is ``diagnosis.json`` of `outputs.md`.
+
+    `indistinguishable` holds names of effects; where another pad or direction of the same effect would do, that is
+    spelt out there. `alternatives` holds the same groups with every pad and direction spelt out, likeliest first.
+    """
 
     verdict: VerdictName
     effects: tuple[FoundEffect, ...]
@@ -96,6 +100,7 @@ class Verdict:
     gap_by_observable: dict[str, dict[str, float]]
     gap: dict[str, float]
     reasons: tuple[str, ...] = ()
+    alternatives: tuple[tuple[str, ...], ...] = ()
     notes: dict[str, Any] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -119,6 +124,7 @@ class Verdict:
             "gap_by_observable": self.gap_by_observable,
             "gap": self.gap,
             "reasons": list(self.reasons),
+            "alternatives": [list(group) for group in self.alternatives],
             **self.notes,
         }
 
