@@ -95,7 +95,6 @@ def in_order(
     task: Task,
     jobs: Sequence[Job],
     shared: Any = None,
-    finished: Callable[[int, Any], None] | None = None,
 ) -> Iterator[Any]:
     """Yield the values of all jobs in their order; raise the error of the first job, in order, that has one.
 
@@ -104,17 +103,42 @@ def in_order(
     workers : Workers
     task, jobs, shared
         As of `Workers.outcomes`.
-    finished : callable, optional
-        Called with (index, value) as soon as a job has ended well, before earlier ones have.
     """
     early: dict[int, Outcome] = {}
     due = 0
     for index, outcome in workers.outcomes(task, jobs, shared):
         early[index] = outcome
-        if finished is not None and outcome.error is None:
-            finished(index, outcome.value)
         while due in early:
             yield early.pop(due).get()
+            due += 1
+
+
+def each_finished(
+    workers: Workers, task: Task, jobs: Sequence[Job], finished: Callable[[int, Any], None], shared: Any = None
+) -> None:
+    """Hand every value to ``finished(index, value)`` as its job ends; nothing is held back to be put in order.
+
+    When all jobs before the first one in order that has an error have ended, that error is raised.
+
+    Parameters
+    ----------
+    workers : Workers
+    task, jobs, shared
+        As of `Workers.outcomes`.
+    finished : callable
+    """
+    ended = bytearray(len(jobs))
+    errors: dict[int, Outcome] = {}
+    due = 0
+    for index, outcome in workers.outcomes(task, jobs, shared):
+        ended[index] = 1
+        if outcome.error is not None:
+            errors[index] = outcome
+        else:
+            finished(index, outcome.get())
+        while due < len(jobs) and ended[due]:
+            if due in errors:
+                errors[due].get()
             due += 1
 
 

@@ -17,8 +17,8 @@ from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import write_campaign
 from tests.unit.test_dynamic_identify import rig
 from tpjb_ident.cli.identify import KEPT
-from tpjb_ident.dynamic import run_jobs
-from tpjb_ident.dynamic.run_jobs import all_runs
+from tpjb_ident.dynamic import run_jobs, run_shelf
+from tpjb_ident.dynamic.run_jobs import all_runs as shelved_runs
 from tpjb_ident.dynamic.run_phasors import PhasorSettings
 from tpjb_ident.dynamic.run_store import RunStore, fingerprint
 from tpjb_ident.executors import local_workers
@@ -47,6 +47,12 @@ def counted(monkeypatch):
     return done
 
 
+def all_runs(*arguments, **named):
+    """What the shelf gives back of every run: its digest and the phasors of its excitation lines."""
+    with shelved_runs(*arguments, **named) as shelf:
+        return [(shelf.take(i), digest) for i, digest in enumerate(shelf.digests)]
+
+
 def silent(text, done, total):
     pass
 
@@ -60,15 +66,17 @@ def stop_after(count):
 
 
 def same(first, second) -> bool:
-    for a, b in zip(first, second, strict=True):
-        pairs = [(getattr(a.phasors, n), getattr(b.phasors, n)) for n in ("displacement", "cell_force", "acceleration")]
+    for (a, of_a), (b, of_b) in zip(first, second, strict=True):
+        pairs = [(getattr(a, n), getattr(b, n)) for n in ("displacement", "cell_force", "acceleration")]
         blocks = [(getattr(x, n), getattr(y, n)) for x, y in pairs for n in ("phasors", "mean", "noise", "lost")]
-        blocks += [(a.phasors.start, b.phasors.start), (a.phasors.speeds, b.phasors.speeds)]
+        blocks += [(a.start, b.start), (a.speeds, b.speeds), (of_a.mean_load, of_b.mean_load)]
+        if of_a.mains is not None:
+            blocks.append((of_a.mains, of_b.mains))
         if not all(np.array_equal(x, y, equal_nan=True) for x, y in blocks):
             return False
-        if (a.temperatures, a.phasors.lines) != (b.temperatures, b.phasors.lines):
+        if (of_a.mains is None) != (of_b.mains is None) or (of_a.temperatures, a.lines) != (of_b.temperatures, b.lines):
             return False
-        if [c.sentence() for c in a.phasors.conditions] != [c.sentence() for c in b.phasors.conditions]:
+        if [c.sentence() for c in a.conditions] != [c.sentence() for c in b.conditions]:
             return False
     return True
 
@@ -89,6 +97,19 @@ def test_finished_runs_are_not_repeated_and_come_back_bit_for_bit(path, tmp_path
     assert counted == []
     store.clear()
     assert not (tmp_path / "kept").exists()
+
+
+def test_what_waits_on_disk_comes_back_bit_for_bit(path, tmp_path, monkeypatch, counted):
+    campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
+    whole = all_runs(campaign, settings, silent)
+    monkeypatch.setattr(run_shelf, "ROOM", 0)  # as if the campaign were large
+    counted.clear()
+    assert same(all_runs(campaign, settings, silent), whole)  # in a temporary folder
+    assert same(all_runs(campaign, settings, silent, store=store), whole)  # in the store
+    assert len(counted) == 24
+    with shelved_runs(campaign, settings, silent, store=store) as shelf:
+        store.clear()  # another command has ended
+        assert np.array_equal(shelf.take(3).displacement.phasors, whole[3][0].displacement.phasors)
 
 
 def test_what_has_changed_is_done_again(path, tmp_path, counted):

@@ -63,7 +63,7 @@ def identify(
     """
     source = open_campaign(campaign)
     phasors = phasor_settings(lines, delay or ())
-    settings = replace(identify_settings(source, method, norm), phasors=phasors)
+    settings = replace(identify_settings(source, method, norm), phasors=phasors, keep_weights=False)
     from tpjb_ident.dynamic.identify import identify as run_identification
     from tpjb_ident.executors import open_workers
 

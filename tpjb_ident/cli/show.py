@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import TYPE_CHECKING, Literal
 
@@ -12,6 +13,8 @@ from tpjb_ident.tables import printable
 if TYPE_CHECKING:
     from rich.console import Console
 
+#: Seconds between two lines about progress where there is no terminal.
+LINE_EVERY = 30.0
 #: Called with what is being done, how many are done, of how many.
 Progress = Callable[[str, int, int], None]
 
@@ -70,7 +73,7 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], wor
 
 @contextlib.contextmanager
 def progress(what: str) -> Iterator[Progress]:
-    """Show a bar on a terminal while the block runs; elsewhere only what is being done, once each.
+    """Show a bar with the time left on a terminal while the block runs; elsewhere a line now and then.
 
     Yields
     ------
@@ -78,13 +81,15 @@ def progress(what: str) -> Iterator[Progress]:
     """
     console = _console(stderr=True)
     if voice().silent or not console.is_terminal:
-        yield _plain_progress(what)
+        note_line("doing", what)
+        yield _Lines(what)
         return
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
 
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Bar(*columns, console=console, transient=True) as bar:
+    text, left = TextColumn("{task.description}", markup=False), TextColumn("left")
+    columns = (text, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn(), left)
+    with Bar(*columns, console=console, transient=True, speed_estimate_period=120.0) as bar:
         task = bar.add_task(what, total=1.0)
 
         def show(text: str, done: int, total: int) -> None:
@@ -96,10 +101,27 @@ def progress(what: str) -> Iterator[Progress]:
         yield show
 
 
-def _plain_progress(what: str) -> Progress:
-    note_line("doing", what)
+class _Lines:
+    """Progress for a log file: a line with the time left every half minute, none for what is quickly done."""
 
-    def silent(text: str, done: int, total: int) -> None:
-        """A log file has no use for a moving bar."""
+    def __init__(self, what: str) -> None:
+        self._what, self._step = what, 0
+        self._began = self._told = time.monotonic()
 
-    return silent
+    def __call__(self, text: str, done: int, total: int) -> None:
+        now = time.monotonic()
+        if done <= self._step:  # another step has begun to count
+            self._began = now
+        self._step = done
+        if now - self._told < LINE_EVERY or not 0 < done < total:
+            return
+        self._told = now
+        left = (now - self._began) * (total - done) / done
+        note_line("doing", f"{self._what}: {done} of {total}, about {_duration(left)} left ({text})")
+
+
+def _duration(seconds: float) -> str:
+    minutes = round(seconds / 60)
+    if minutes < 1:
+        return f"{max(1, round(seconds))} s"
+    return f"{minutes} min" if minutes < 120 else f"{minutes / 60:.1f} h"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from tpjb_ident.dynamic.mains import (
     without_mains,
 )
 from tpjb_ident.dynamic.point_data import PointData
-from tpjb_ident.dynamic.run_phasors import RunPhasors
+from tpjb_ident.dynamic.point_source import PointSource
 from tpjb_ident.dynamic.static_load import (
     LoadMiss,
     load_conditions,
@@ -68,8 +69,8 @@ class Correction:
 
 
 def find_corrections(
-    gathered: list[PointData],
-    runs: list[RunPhasors],
+    points: list[PointSource],
+    mains_lines: Sequence[ComplexArray | None],
     probe_axes: FloatArray,
     first: list[DynamicStiffness],
 ) -> list[Correction]:
@@ -77,23 +78,25 @@ def find_corrections(
 
     Parameters
     ----------
-    gathered : list of PointData
-    runs : list of RunPhasors
-        All dynamic runs.
+    points : list of PointSource
+    mains_lines : sequence
+        Displacement at the mains line of every dynamic run, as of `mains_line`.
     probe_axes : (m,) ndarray
         Axes of the displacement probes [rad].
     first : list of DynamicStiffness
         Estimates without corrections, one per point.
     """
-    misses, common = load_misses(gathered)
-    slopes = load_slopes(gathered, first)
-    loaded = [to_set_point(data, miss, slope) for data, miss, slope in zip(gathered, misses, slopes)]
-    struck = [any(MAINS_ON_LINE in run.conditions for run in data.runs) for data in gathered]
-    pickup = mains_pickup(runs, probe_axes) if any(struck) else None
-    scatter = relative_scatter(loaded, first) if pickup is not None else np.nan
+    misses, common = load_misses(points)
+    slopes = load_slopes(points, first)
+    struck = [source.found(MAINS_ON_LINE) for source in points]
+    pickup = mains_pickup(mains_lines, probe_axes) if any(struck) else None
+    at_set_point = (to_set_point(p.load(), miss, slope) for p, miss, slope in zip(points, misses, slopes))
+    scatter = relative_scatter(at_set_point, first) if pickup is not None else np.nan
     result = []
-    for data, miss, slope, hit in zip(loaded, misses, slopes, struck):
-        mains = fit_mains(data, pickup, scatter) if hit and pickup is not None else None
+    for source, miss, slope, hit in zip(points, misses, slopes, struck):
+        mains = None
+        if hit and pickup is not None:
+            mains = fit_mains(to_set_point(source.load(), miss, slope), pickup, scatter)
         conditions = load_conditions(miss, common) + _mains_conditions(pickup, mains)
         result.append(Correction(miss, slope, mains, conditions))
     return result

@@ -35,8 +35,8 @@ class Identification:
         Default method.
     points : tuple of PointResult
         Sorted by load, direction, speed, excitation.
-    systematic : (8 P, 8 P) ndarray
-        Calibration covariance over all P points, in their order [N^2/m^2].
+    calibration_changes : (n, 8 P) ndarray
+        What n draws of the calibration do to the entries of all P points, in their order [N/m].
     conditions : tuple of Condition
         About the campaign as a whole.
     """
@@ -44,8 +44,13 @@ class Identification:
     campaign: str
     method: str
     points: tuple[PointResult, ...]
-    systematic: FloatArray = field(repr=False)
+    calibration_changes: FloatArray = field(repr=False)
     conditions: tuple[Condition, ...] = ()
+
+    @property
+    def systematic(self) -> FloatArray:
+        """Calibration covariance over all P points, (8 P, 8 P) [N^2/m^2]; made when asked for: it grows with P^2."""
+        return np.asarray(self.calibration_changes.T @ self.calibration_changes / len(self.calibration_changes))
 
     def to_frame(self) -> pd.DataFrame:
         """One row per operating point, by the default method: ``coefficients.csv``."""

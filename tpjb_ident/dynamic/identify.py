@@ -17,12 +17,14 @@ from tpjb_ident.dynamic.estimate import REJECTED_WEIGHT, estimate_table
 from tpjb_ident.dynamic.identification import Identification
 from tpjb_ident.dynamic.nominal_drive import nominal_drive
 from tpjb_ident.dynamic.phasor_table import phasor_table
-from tpjb_ident.dynamic.point_data import PointData, gather
+from tpjb_ident.dynamic.point_data import PointData
 from tpjb_ident.dynamic.point_result import PointResult
+from tpjb_ident.dynamic.point_source import point_sources
 from tpjb_ident.dynamic.quality import amplitude, coherence, directional_pattern, flags, rejected_windows
 from tpjb_ident.dynamic.rlm import RlmSettings
 from tpjb_ident.dynamic.run_jobs import Progress, all_runs
-from tpjb_ident.dynamic.run_phasors import PhasorSettings, RunPhasors
+from tpjb_ident.dynamic.run_phasors import PhasorSettings
+from tpjb_ident.dynamic.run_shelf import RunShelf
 from tpjb_ident.dynamic.run_store import RunStore
 from tpjb_ident.dynamic.stiffness import DynamicStiffness
 from tpjb_ident.executors import Workers
@@ -49,6 +51,8 @@ class IdentifySettings:
         Monte-Carlo draws over the calibration uncertainties.
     seed : int
         Of those draws.
+    keep_weights : bool
+        Keep the weight of every window and method; without, only whether the window counted (nearly no memory).
     """
 
     method: str = "mm-eiv"
@@ -58,6 +62,7 @@ class IdentifySettings:
     correct: bool = True
     n_calibration: int = 400
     seed: int = 20190722
+    keep_weights: bool = True
 
 
 def identify(
@@ -98,47 +103,46 @@ def identify(
     if not runs:
         raise ValueError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     tell = progress or (lambda text, done, total: None)
-    results = all_runs(campaign, settings.phasors, tell, workers, store)
-    tell("estimating", len(runs), len(runs))
-    temperatures = {result.phasors.run: result.temperatures for result in results}
-    return assemble(campaign, [result.phasors for result in results], temperatures, settings)
+    with all_runs(campaign, settings.phasors, tell, workers, store) as shelf:
+        return assemble(campaign, shelf, settings, tell)
 
 
-def assemble(
-    campaign: Any,
-    extracted: list[RunPhasors],
-    temperatures: dict[str, dict[int, float]],
-    settings: IdentifySettings,
-) -> Identification:
-    """Estimate all points from runs already turned to phasors."""
+def assemble(campaign: Any, shelf: RunShelf, settings: IdentifySettings, tell: Progress) -> Identification:
+    """Estimate all points from runs already turned to phasors, one point's windows in memory at a time."""
     draws = gain_draws(campaign.channels, settings.n_calibration, settings.seed)
-    gathered = gather(extracted)
+    sources, digests = point_sources(shelf), shelf.digests
+    temperatures = {digest.run: digest.temperatures for digest in digests}
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
-    first = _first_estimates(gathered, settings)
-    corrections = find_corrections(gathered, extracted, axes, first)
+    tell("estimating", 0, len(sources))
+    first = [_first_estimate(source.load(), settings) for source in sources]
+    corrections = find_corrections(sources, [digest.mains for digest in digests], axes, first)
     differ = directions_differ(first)
     points, changes = [], []
-    for data, correction in zip(gathered, corrections):
+    for source, correction in zip(sources, corrections):
+        data = source.load()
         used = correction if settings.correct else correction.measured_only()
         point = identify_point(used.apply(data), temperatures, settings, differ)
         by_method = {name: used.widened(est) for name, est in point.by_method.items()}
         change = apparent_change(data, by_method[settings.method], draws)
         changes.append(change)
+        if not settings.keep_weights:
+            by_method = {name: _counted_only(est) for name, est in by_method.items()}
         points.append(_completed(point, by_method, np.cov(change.T, bias=True), settings.method, used))
+        tell("estimating", len(points), len(sources))
     joint = np.concatenate(changes, axis=1)
-    return Identification(
-        campaign.id,
-        settings.method,
-        tuple(points),
-        joint.T @ joint / len(joint),
-        _campaign_conditions(draws),
-    )
+    return Identification(campaign.id, settings.method, tuple(points), joint, _campaign_conditions(draws))
 
 
-def _first_estimates(gathered: list[PointData], settings: IdentifySettings) -> list[DynamicStiffness]:
-    """Estimates before any correction, for how H changes with load and how runs scatter."""
+def _first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffness:
+    """Estimate before any correction, for how H changes with load and how runs scatter; its weights are not needed."""
     method = "mm-eiv" if settings.method == "iv" else settings.method.partition(":")[0]
-    return [estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, method) for data in gathered]
+    found = estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, method)
+    return replace(found, weights=np.empty((0, 2)))
+
+
+def _counted_only(est: DynamicStiffness) -> DynamicStiffness:
+    """The estimate with a verdict per window in place of its weights: 1 byte instead of 16."""
+    return replace(est, weights=(est.weights.min(axis=1) >= REJECTED_WEIGHT)[:, None])
 
 
 def directions_differ(first: list[DynamicStiffness]) -> bool:

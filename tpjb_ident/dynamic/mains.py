@@ -8,6 +8,7 @@ equations than unknowns: H and the angles are found together by least squares.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -50,25 +51,28 @@ class Pickup:
     runs: int
 
 
-def mains_pickup(runs: list[RunPhasors], axes: FloatArray) -> Pickup | None:
+def mains_line(run: RunPhasors) -> ComplexArray | None:
+    """Typical displacement phasor (2,) at a run's mains line [m]; None where something else sits on it."""
+    names = [line.name for line in run.lines.nuisance]
+    if "mains" not in names or _shared(run, names.index("mains")):
+        return None
+    z = run.displacement.phasors[:, len(run.lines.excitation) + names.index("mains")]
+    z = z[np.isfinite(z).all(axis=1)]
+    return _median(z) if len(z) else None
+
+
+def mains_pickup(lines: Sequence[ComplexArray | None], axes: FloatArray) -> Pickup | None:
     """Size of the mains line in every probe, from runs where nothing else sits on it.
 
     Parameters
     ----------
-    runs : list of RunPhasors
+    lines : sequence
+        What `mains_line` says of every run.
     axes : (m,) ndarray
         Probe axes [rad].
     """
     directions = np.stack([np.cos(axes), np.sin(axes)], axis=1)
-    seen = []
-    for run in runs:
-        names = [line.name for line in run.lines.nuisance]
-        if "mains" not in names or _shared(run, names.index("mains")):
-            continue
-        z = run.displacement.phasors[:, len(run.lines.excitation) + names.index("mains")]
-        z = z[np.isfinite(z).all(axis=1)]
-        if len(z):
-            seen.append(directions @ _median(z))
+    seen = [directions @ line for line in lines if line is not None]
     if len(seen) < MIN_RUNS:
         return None
     probes = np.array(seen)
@@ -197,7 +201,7 @@ def corrected_condition(pickup: Pickup, fit: MainsFit) -> Condition:
     )
 
 
-def relative_scatter(points: list[PointData], first: list[DynamicStiffness]) -> float:
+def relative_scatter(points: Iterable[PointData], first: list[DynamicStiffness]) -> float:
     """Typical force residual of a run's mean, relative to its force, where no mains disturbs."""
     sizes = []
     for data, est in zip(points, first):

@@ -43,15 +43,15 @@ class PointData:
     @property
     def mean_loads(self) -> FloatArray:
         """Mean cell force of every run, shape (n_runs, 2) [N]."""
-        return np.array([_finite_mean(run.cell_force.mean) for run in self.runs])
+        return np.array([finite_mean(run.cell_force.mean) for run in self.runs])
 
     @property
     def mean_positions(self) -> FloatArray:
         """Mean displacement of every run, shape (n_runs, 2) [m]."""
-        return np.array([_finite_mean(run.displacement.mean) for run in self.runs])
+        return np.array([finite_mean(run.displacement.mean) for run in self.runs])
 
 
-def _finite_mean(rows: FloatArray) -> FloatArray:
+def finite_mean(rows: FloatArray) -> FloatArray:
     """Mean of the complete rows, (2,); NaN where there is none."""
     good = rows[np.isfinite(rows).all(axis=1)]
     return good.mean(axis=0) if len(good) else np.full(2, np.nan)
@@ -59,32 +59,45 @@ def _finite_mean(rows: FloatArray) -> FloatArray:
 
 def gather(runs: list[RunPhasors]) -> list[PointData]:
     """Group runs by operating point; a record with several excitation lines feeds several points."""
-    groups: dict[tuple[float, ...], list[tuple[RunPhasors, int, OperatingPoint]]] = {}
-    for run in runs:
-        for i, line in enumerate(run.lines.excitation):
-            point = _point_of(run, i, line.frequency)
+    lines = [(run.point, tuple(line.frequency for line in run.lines.excitation)) for run in runs]
+    return [point_data(point, [(runs[k], i) for k, i in members]) for point, members in group(lines)]
+
+
+def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[OperatingPoint, list[tuple[int, int]]]]:
+    """Operating points in order, each with the places of its runs and which line of the run is meant.
+
+    Parameters
+    ----------
+    runs : list of (OperatingPoint, tuple of float)
+        Set points and excitation frequencies as fitted [Hz] of every run.
+    """
+    groups: dict[tuple[float, ...], tuple[OperatingPoint, list[tuple[int, int]]]] = {}
+    for k, (stated, frequencies) in enumerate(runs):
+        for i, frequency in enumerate(frequencies):
+            point = _point_of(stated, frequency)
             key = (
                 point.static_load,
                 point.static_load_direction_deg,
                 point.shaft_speed_hz,
                 point.excitation_hz,
             )
-            groups.setdefault(key, []).append((run, i, point))
-    return [_point_data(members) for _, members in sorted(groups.items())]
+            groups.setdefault(key, (point, []))[1].append((k, i))
+    return [groups[key] for key in sorted(groups)]
 
 
-def _point_of(run: RunPhasors, line: int, frequency: float) -> OperatingPoint:
+def _point_of(stated: OperatingPoint, frequency: float) -> OperatingPoint:
     """Operating point of one line; the set point's frequency where the line belongs to it."""
-    nominal = run.point.excitation_hz
+    nominal = stated.excitation_hz
     if abs(frequency - nominal) <= 0.02 * max(nominal, 1e-9):
-        return run.point
+        return stated
     rounded = 2 * np.pi * round(frequency, 3)
-    return OperatingPoint(run.point.static_load, run.point.static_load_direction, run.point.shaft_speed, rounded)
+    return OperatingPoint(stated.static_load, stated.static_load_direction, stated.shaft_speed, rounded)
 
 
-def _point_data(members: list[tuple[RunPhasors, int, OperatingPoint]]) -> PointData:
-    runs = tuple(run for run, _, _ in members)
-    lines = tuple(i for _, i, _ in members)
+def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> PointData:
+    """Windows of a point's runs, each with the line that is meant."""
+    runs = tuple(run for run, _ in members)
+    lines = tuple(i for _, i in members)
     D = [run.displacement.phasors[:, i] for run, i in zip(runs, lines)]
     F = [run.oil_force(i) for run, i in zip(runs, lines)]
     A = [
@@ -92,4 +105,4 @@ def _point_data(members: list[tuple[RunPhasors, int, OperatingPoint]]) -> PointD
         for run, i, d in zip(runs, lines, D)
     ]
     index = np.repeat(np.arange(len(runs)), [len(d) for d in D])
-    return PointData(members[0][2], runs, lines, np.concatenate(D), np.concatenate(F), np.concatenate(A), index)
+    return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), np.concatenate(A), index)

@@ -14,10 +14,11 @@ import numpy as np
 
 from tpjb_ident.dynamic.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.dynamic.run_result import RunResult
+from tpjb_ident.dynamic.run_shelf import RunShelf
 from tpjb_ident.dynamic.run_store import RunStore, fingerprint
 from tpjb_ident.dynamic.stretches import kept_open
 from tpjb_ident.dynamic.windows import RecordTooShortError
-from tpjb_ident.executors import Here, Workers, in_order
+from tpjb_ident.executors import Here, Workers, each_finished
 
 Progress = Callable[[str, int, int], None]
 #: Samples from which a run's temperatures are taken.
@@ -30,8 +31,8 @@ def all_runs(
     progress: Progress,
     workers: Workers | None = None,
     store: RunStore | None = None,
-) -> list[RunResult]:
-    """Phasors and temperatures of every dynamic run, in the campaign's order.
+) -> RunShelf:
+    """Phasors and temperatures of every dynamic run, put away on a shelf that the caller closes.
 
     Parameters
     ----------
@@ -54,38 +55,37 @@ def all_runs(
     runs = campaign.of_kind("dynamic")
     mass = campaign.housing_mass
     progress(runs[0].id if runs else "", 0, len(runs))
-    if store is None:
-        jobs = [(_anywhere(run), mass, settings) for run in runs]
-        results: list[RunResult] = []
-        for result in in_order(workers or Here(), one_run, jobs):
-            results.append(result)
-            progress(result.phasors.run, len(results), len(runs))
-        return results
-    marked = [(_anywhere(run), mass, settings, store.known(run.id)) for run in runs]
+    shelf = RunShelf(runs, mass, lambda run: one_run(run, mass, settings), store)
     done = 0
 
     def finished(index: int, answer: tuple[str, RunResult | None]) -> None:
         nonlocal done
         mark, result = answer
-        if result is not None and mark:
+        if store is not None and result is not None and mark:
             store.keep(mark, result)
+        shelf.put(index, result, mark)
         done += 1
         progress(runs[index].id, done, len(runs))
 
-    answers = list(in_order(workers or Here(), unless_known, marked, finished=finished))
-    found = []
-    for run, (mark, result) in zip(runs, answers):
-        kept = result or store.load(run, mark, mass)
-        # what was kept may be gone by now: another run into the same folder has ended
-        found.append(kept or one_run(run, mass, settings))
-    return found
+    jobs = ((_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs)
+    try:
+        each_finished(workers or Here(), unless_known, list(jobs), finished)
+    except BaseException:
+        shelf.__exit__(None, None, None)
+        raise
+    return shelf
 
 
-def unless_known(run: Any, housing_mass: float, settings: PhasorSettings, known: str) -> tuple[str, RunResult | None]:
+def unless_known(
+    run: Any, housing_mass: float, settings: PhasorSettings, known: str | None
+) -> tuple[str, RunResult | None]:
     """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
 
-    The fingerprint is "" where the record changed while it was read: such a result must not be kept.
+    The fingerprint is "" where the record changed while it was read: such a result must not be kept. Where nothing
+    is kept anywhere (`known` is None) it is not asked for.
     """
+    if known is None:
+        return "", one_run(run, housing_mass, settings)
     mark = fingerprint(run, housing_mass, settings)
     if mark and mark == known:
         return mark, None

@@ -12,12 +12,14 @@ in the scatter between runs and so in the interval.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdata.operating_point import OperatingPoint
 from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.conditions import Condition
 from tpjb_ident.dynamic.point_data import PointData
@@ -52,7 +54,19 @@ class LoadMiss:
     uncertainty: float = 0.0
 
 
-def load_ratio(data: PointData) -> ComplexArray:
+class Loaded(Protocol):
+    """Where a point was run, and the mean cell force of its runs (n_runs, 2) [N]: `PointData`, `PointSource`."""
+
+    @property
+    def point(self) -> OperatingPoint:
+        """Set point."""
+
+    @property
+    def mean_loads(self) -> FloatArray:
+        """Mean cell force of every run, (n_runs, 2) [N]."""
+
+
+def load_ratio(data: Loaded) -> ComplexArray:
     """Measured mean load over set point for every run, as a complex number (size, direction)."""
     loads = data.mean_loads
     point = data.point
@@ -61,7 +75,7 @@ def load_ratio(data: PointData) -> ComplexArray:
     return np.asarray((loads[:, 0] + 1j * loads[:, 1]) / (point.static_load * np.exp(1j * point.static_load_direction)))
 
 
-def load_misses(points: list[PointData]) -> tuple[list[LoadMiss], complex]:
+def load_misses(points: Sequence[Loaded]) -> tuple[list[LoadMiss], complex]:
     """Misses of all runs relative to the campaign, and the campaign's own ratio (cell gain, rotation).
 
     The ratio is the mean over the runs without outliers; what it is uncertain by, all misses are.
@@ -86,7 +100,7 @@ def load_misses(points: list[PointData]) -> tuple[list[LoadMiss], complex]:
     return misses, common
 
 
-def load_slopes(points: list[PointData], first: list[DynamicStiffness]) -> list[ComplexArray | None]:
+def load_slopes(points: Sequence[Loaded], first: list[DynamicStiffness]) -> list[ComplexArray | None]:
     """Slope dH/d(ln W) at every point from the campaign's other loads; None where there are none.
 
     Stiffness and damping slopes are found at the excitation that was run at several loads and
@@ -106,7 +120,9 @@ def load_slopes(points: list[PointData], first: list[DynamicStiffness]) -> list[
     return [slope if slope is not None else _borrowed(i, points, slopes) for i, slope in enumerate(slopes)]
 
 
-def _slopes_over_load(members: list[int], points: list[PointData], first: list[DynamicStiffness]) -> list[ComplexArray]:
+def _slopes_over_load(
+    members: list[int], points: Sequence[Loaded], first: list[DynamicStiffness]
+) -> list[ComplexArray]:
     members.sort(key=lambda i: points[i].point.static_load)
     log_load = np.log([points[i].point.static_load for i in members])
     h = np.array([first[i].h for i in members])
@@ -129,7 +145,7 @@ def _log_gradient(values: NDArray[np.float64], log_load: NDArray[np.float64]) ->
     return np.where(one_sign, power, plain)
 
 
-def _borrowed(i: int, points: list[PointData], slopes: list[ComplexArray | None]) -> ComplexArray | None:
+def _borrowed(i: int, points: Sequence[Loaded], slopes: list[ComplexArray | None]) -> ComplexArray | None:
     """Slope of the nearest excitation at the same load; K and C each keep theirs."""
     p = points[i].point
     same = [
