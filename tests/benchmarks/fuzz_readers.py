@@ -1,12 +1,14 @@
 """Feed every reader spoilt files: only documented errors, bounded time and memory.
 
     python tests/benchmarks/fuzz_readers.py TARGET [--cases 100000] [--seconds 600] [--seed 1] [--keep DIR]
+    python tests/benchmarks/fuzz_readers.py TARGET --seed 1 --case 4711
     python tests/benchmarks/fuzz_readers.py TARGET --engine atheris --seconds 300
 
-Targets: manifest, bearing, pivots, effects, csv, hdf5, cli, mat, parquet, tdms, uff, all. Case i of a seed is always
-the same input as long as no case joined the corpus; what fails is kept as a file. One case in a hundred runs traced: an
-input that reaches a line no other has reached joins the corpus. The cases run in child processes, so that a crash of a
-C library is a finding and not the end. With ``--engine atheris`` (pip install atheris) libFuzzer steers.
+Targets: manifest, bearing, pivots, effects, csv, hdf5, cli, mat, mat73, parquet, tdms, uff, mf4, asc, all. The first
+cases of a seed run traced: an input that reaches a line no other has reached joins the corpus. It then stays as it is,
+so that case i of a seed is always the same input (``--case i`` feeds it alone); what fails is kept as a file. The cases
+run in child processes, so that a crash of a C library is a finding and not the end. ``--record FILE`` adds the figures
+to a list in JSON, with the SHA-256 of the reader's source: cases of an older source do not count for a newer one. With ``--engine atheris`` (pip install atheris) libFuzzer steers.
 """
 
 from __future__ import annotations
@@ -15,8 +17,10 @@ import argparse
 import importlib
 import json
 import logging
+import math
 import mmap
 import os
+import platform
 import random
 import resource
 import signal
@@ -28,12 +32,13 @@ import traceback
 import warnings
 from collections import Counter
 from dataclasses import dataclass, field
+from importlib import metadata
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from fuzz_mutations import mutated
-from fuzz_targets import ROOT, TARGETS, Target, make_target
+from fuzz_targets import ROOT, TARGETS, Target, make_target, source_hash
 
 #: CPU seconds and bytes of growth above which a case is a finding.
 SLOWEST, LARGEST = 5.0, 2**31
@@ -41,7 +46,8 @@ SLOWEST, LARGEST = 5.0, 2**31
 LONGEST = 65536
 #: Cases per child process.
 BLOCK = 20_000
-_TRACED = 100
+#: The first cases of a seed run traced and make the corpus, which then stays as it is: so a case is its number.
+GROWTH = 500
 
 
 class TooSlowError(BaseException):
@@ -114,13 +120,15 @@ def _child(target: Target, block: range, seed: int, corpus: Path, board: mmap.mm
     signal.signal(signal.SIGVTALRM, _expire)
     logging.disable(logging.CRITICAL)
     tally, reached = Tally(), Reached()
+    # destructors of other people's half-open files (asammdf): counted, as nothing can catch them
+    sys.unraisablehook = lambda told: tally.refused.update([f"in a destructor: {told.exc_type.__name__}"])
     seeds = [*target.seeds, *(p.read_bytes() for p in sorted(corpus.iterdir())[-400:])]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for number in block:
         data = mutated(seeds, random.Random(f"{seed}-{number}"), LONGEST)
         board[:8], board[16:24] = struct.pack("<q", number), struct.pack("<q", len(data))
         board[24 : 24 + len(data)] = data  # a crash of the process leaves the input behind
-        if number % _TRACED == 0:
+        if number < GROWTH:
             new, finding = reached.new(target, data, tally)
             if new:
                 seeds.append(data)
@@ -184,6 +192,8 @@ def fuzz(name: str, cases: int, seconds: float, seed: int, keep: Path) -> dict[s
         for module in target.preload:
             importlib.import_module(module)  # once, not in every child
         board = mmap.mmap(-1, 24 + LONGEST)
+        spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+        cpu = spent.ru_utime + spent.ru_stime
         began, until = time.time(), time.time() + seconds
         board[8:16] = struct.pack("<d", until)
         total: dict[str, Any] = {
@@ -199,15 +209,20 @@ def fuzz(name: str, cases: int, seconds: float, seed: int, keep: Path) -> dict[s
         }
         at = 0
         while at < cases and time.time() < until:
-            got = run_block(target, range(at, min(cases, at + BLOCK)), seed, corpus, board)
+            end = GROWTH if at < GROWTH else at + BLOCK
+            got = run_block(target, range(at, min(cases, end)), seed, corpus, board)
             at += got["cases"] or 1
             for key in ("cases", "accepted"):
                 total[key] += got[key]
+            if at % 100_000 < BLOCK:
+                print(f"{name} {at} cases, {time.time() - began:.0f} s", file=sys.stderr, flush=True)
             for key in ("slowest", "peak_MB", "lines"):
                 total[key] = max(total[key], got[key])
             total["refused"].update(got["refused"])
             _keep(keep, name, seed, got["findings"], total["findings"])
         total["corpus"] = len(list(corpus.iterdir()))
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    total["cpu_seconds"] = round(spent.ru_utime + spent.ru_stime - cpu, 1)
     total["seconds"] = round(time.time() - began, 1)
     total["cases_per_second"] = round(total["cases"] / max(total["seconds"], 1e-9), 1)
     return {**total, "refused": dict(total["refused"]), "findings": dict(total["findings"])}
@@ -224,6 +239,40 @@ def _keep(keep: Path, name: str, seed: int, findings: list[dict[str, str]], seen
             stem = keep / f"{name}-{seed}-{found['case']}"
             stem.with_suffix(".bin").write_bytes(bytes.fromhex(found["input"]))
             stem.with_suffix(".txt").write_text(found["what"], encoding="utf-8", errors="replace")
+
+
+def replay(name: str, seed: int, number: int) -> str | None:
+    """Feed one case of a seed alone; the finding's text, None where the answer is a documented one."""
+    with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as scratch:
+        corpus = Path(scratch) / "corpus"
+        corpus.mkdir()
+        target = make_target(name, Path(scratch))
+        board = mmap.mmap(-1, 24 + LONGEST)
+        board[8:16] = struct.pack("<d", math.inf)
+        if number >= GROWTH:
+            run_block(target, range(GROWTH), seed, corpus, board)
+        found = run_block(target, range(number, number + 1), seed, corpus, board)["findings"]
+    return found[0]["what"] if found else None
+
+
+def _add_to_record(path: Path, result: dict[str, Any]) -> None:
+    """Append one target's figures to the list in `path`, whole or not at all."""
+    libraries = ("numpy", "scipy", "h5py", "pyarrow", "npTDMS", "pyuff", "asammdf")
+    versions = {"python": platform.python_version(), **{n: metadata.version(n) for n in libraries if _installed(n)}}
+    kept = ("target", "seed", "cases", "accepted", "slowest", "peak_MB", "corpus", "cpu_seconds", "findings")
+    entry = {k: result[k] for k in kept} | {"source_sha256": source_hash(result["target"]), "versions": versions}
+    known = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else []
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps([*known, entry], indent=1) + "\n", encoding="utf-8")
+    part.replace(path)
+
+
+def _installed(name: str) -> bool:
+    try:
+        metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return False
+    return True
 
 
 def run_atheris(name: str, seconds: float, seed: int, keep: Path) -> None:
@@ -275,15 +324,23 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", type=Path, default=Path("fuzz-findings"))
     parser.add_argument("--engine", choices=("own", "atheris"), default="own")
+    parser.add_argument("--case", type=int, help="feed this case of the seed alone")
+    parser.add_argument("--record", type=Path, help="JSON file to add the figures to")
     given = parser.parse_args()
     names = TARGETS if "all" in given.target else given.target
     if given.engine == "atheris":
         run_atheris(names[0], given.seconds, given.seed, given.keep)
         return
+    if given.case is not None:
+        finding = replay(names[0], given.seed, given.case)
+        print(finding or "a documented answer")
+        sys.exit(finding is not None)
     failed = False
     for name in names:
         result = fuzz(name, given.cases, given.seconds, given.seed, given.keep)
         print(json.dumps(result, indent=1), flush=True)
+        if given.record is not None:
+            _add_to_record(given.record, result)
         failed = failed or bool(result["findings"])
     sys.exit(failed)
 

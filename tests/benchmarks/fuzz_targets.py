@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import io
 import math
 import shlex
@@ -71,8 +72,7 @@ def manifest_target(folder: Path) -> Target:
     from rigdata.manifest import parse_manifest
     from rigdata.problem import RigDataError
 
-    demo = _demo_manifest()
-    seeds = (CSV_MANIFEST.encode(), demo, demo[:4000] + demo[-1500:])
+    seeds = (CSV_MANIFEST.encode(), _shortened(_demo_manifest()))
     return Target("manifest", seeds, lambda data: _ignore(parse_manifest(_text(data))), (RigDataError,))
 
 
@@ -86,6 +86,13 @@ def _demo_manifest() -> bytes:
     with h5py.File(ROOT / "rigdata" / "samples" / "demo.h5") as file:
         value = file.attrs["manifest"]
     return value if isinstance(value, bytes) else str(value).encode()
+
+
+def _shortened(manifest: bytes) -> bytes:
+    """The demo's manifest with one run of each kind: parsing the other dozens would only cost time."""
+    head, *runs = manifest.split(b"[[runs]]\n")
+    by_kind = {line: run for run in runs for line in run.splitlines() if line.startswith(b"kind")}
+    return b"[[runs]]\n".join([head, *by_kind.values()])
 
 
 def bearing_target(folder: Path) -> Target:
@@ -161,7 +168,7 @@ def csv_target(folder: Path) -> Target:
 
 
 def _csv_seeds() -> tuple[bytes, ...]:
-    rows = [(0.5 * i, 1.5 + math.sin(i), -2.25 * i) for i in range(30)]
+    rows = [(0.5 * i, 1.5 + math.sin(i), -2.25 * i) for i in range(12)]
     out = []
     for delimiter, decimal, end, codec in (
         (";", ",", "\r\n", "cp1252"),
@@ -185,14 +192,14 @@ def hdf5_target(folder: Path) -> Target:
 
     path = folder / "seed.h5"
     seeds = []
-    for options in ({"compression": "gzip", "chunks": (64,)}, {}):
+    for options in ({"compression": "gzip", "chunks": (16,)}, {}):
         with h5py.File(path, "w", libver="earliest" if options else "latest") as file:
             file.attrs["manifest"] = CSV_MANIFEST.replace("[channels.Zeit]", "[channels.T]")
             file.attrs["bearing"] = 'name = "b"\n'
             group = file.create_group("runs/c-1")
             group.attrs["sample_rate_hz"] = 100.0
             for k, name in enumerate(("X1A", "X1B")):
-                group.create_dataset(name, data=np.sin(0.1 * np.arange(200) + k).astype("f4"), **options)
+                group.create_dataset(name, data=np.sin(0.1 * np.arange(40) + k).astype("f4"), **options)
         seeds.append(path.read_bytes())
     fuzzed = folder / "fuzzed.h5"
 
@@ -211,7 +218,8 @@ def foreign_target(folder: Path, suffix: str) -> Target:
     from rigdata.problem import RigDataError
     from rigdata.readers.foreign import read_foreign
 
-    path = folder / f"fuzzed{suffix}"
+    ending = ".mat" if suffix == ".mat73" else suffix
+    path = folder / f"fuzzed{ending}"
     seed = folder / f"seed{suffix}"
     _write_foreign(seed)
 
@@ -229,6 +237,23 @@ def _write_foreign(path: Path) -> None:
         from scipy.io import savemat
 
         savemat(path, {"time": time, "X1A": values, "X1B": 2 * values})
+    elif path.suffix == ".mat73":
+        import h5py
+
+        with h5py.File(path, "w", userblock_size=512) as file:  # MATLAB's own text stands in the first 512 bytes
+            for name, column in (("time", time), ("s/X1A", values)):
+                file.create_dataset(name, data=column[None, :])
+    elif path.suffix == ".mf4":
+        from asammdf import MDF, Signal
+
+        with MDF(version="4.10") as file:
+            file.append([Signal(samples=values[:20], timestamps=time[:20], name="X1A", unit="um")])
+            file.append([Signal(samples=values[:5], timestamps=time[:5], name="T1", unit="degC")])
+            file.save(path, overwrite=True)
+    elif path.suffix == ".asc":
+        rows = [f"{i / 10:.1f}\t{i * 0.5:.3f}\t" + (f"{i:.1f}\t{20.0 + i:.2f}" if i < 4 else "\t") for i in range(12)]
+        head = ["Time  1 - fast [s]\tX1A [um]\tTime  2 - slow [s]\tT1 [degC]"]
+        path.write_text("\n".join(["rig", *head, *rows, ""]), encoding="cp1252")
     elif path.suffix == ".parquet":
         import pandas as pd
 
@@ -347,6 +372,36 @@ def command_target(folder: Path) -> Target:
     return Target("command line", tuple(c.encode() for c in COMMAND_LINES), feed, (), _COMMAND_MODULES)
 
 
+#: Files and folders (below the root) that make up each reader, for the record of what was fuzzed.
+_READER_SOURCES = {
+    "manifest": ("rigdata/manifest*.py", "rigdata/toml_lines.py", "rigdata/units.py", "rigdata/calibration.py"),
+    "bearing": ("model/bearing*.py", "model/toml_text.py", "model/units.py"),
+    "pivots": ("model/pivots.py", "model/toml_text.py"),
+    "effects": ("model/effects/*.py", "model/toml_text.py", "model/bearing.py"),
+    "csv": ("rigdata/readers/csv*.py", "rigdata/readers/dialect.py", "rigdata/readers/byte_stream.py"),
+    "hdf5": ("rigdata/readers/hdf5*.py", "rigdata/campaign.py", "rigdata/run.py", "rigdata/manifest*.py"),
+    "cli": ("tpjb_ident/cli/*.py",),
+    "mat": ("rigdata/readers/mat*.py",),
+    "mat73": ("rigdata/readers/mat.py",),
+    "parquet": ("rigdata/readers/parquet.py",),
+    "tdms": ("rigdata/readers/tdms.py",),
+    "uff": ("rigdata/readers/uff58.py",),
+    "mf4": ("rigdata/readers/mdf4.py",),
+    "asc": ("rigdata/readers/catman.py", "rigdata/readers/text_head.py", "rigdata/readers/csv_table.py"),
+}
+
+
+def source_hash(name: str) -> str:
+    """SHA-256 of the source of a target's reader: cases count for as long as it stays the same."""
+    patterns = _READER_SOURCES[name]
+    if name in FOREIGN:
+        patterns = (*patterns, "rigdata/readers/foreign.py")
+    digest = hashlib.sha256()
+    for path in sorted(p for pattern in patterns for p in ROOT.glob(pattern)):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
 def make_target(name: str, folder: Path) -> Target:
     """Target by name, working in `folder`."""
     makers: dict[str, Callable[[Path], Target]] = {
@@ -365,5 +420,5 @@ def make_target(name: str, folder: Path) -> Target:
     sys.exit(f"no target {name!r}; there are {', '.join(TARGETS)}")
 
 
-FOREIGN = ("mat", "parquet", "tdms", "uff")
+FOREIGN = ("mat", "mat73", "parquet", "tdms", "uff", "mf4", "asc")
 TARGETS = ("manifest", "bearing", "pivots", "effects", "csv", "hdf5", "cli", *FOREIGN)

@@ -1,0 +1,189 @@
+"""The special cases of hostile input, one by one: endless lines, claims of billions, links, numbers, names, folders."""
+
+from __future__ import annotations
+
+import resource
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+import rigdata
+from model.bearing import BearingError
+from model.bearing_file import load_bearing, parse_bearing
+from model.effects import EffectError, load_effects
+from model.pivots import load_pivots
+from model.units import UnitError
+from rigdata.manifest import parse_manifest
+from rigdata.problem import RigDataError
+from rigdata.readers.foreign import FORMATS, read_foreign
+
+pytestmark = pytest.mark.slow
+HEAD = 'schema = "tpjb-rig/1"\nid = "t"\nbearing = "b.toml"\n[acquisition]\nsample_rate = "10 Hz"\n'
+CHANNEL = '[channels.X1A]\nquantity = "displacement"\naxis = "{axis}"\nunit = "{unit}"\nsensitivity = "{gain}"\n'
+RUN = '[[runs]]\nid = "c-1"\nfile = "c-1.csv"\nkind = "clearance"\n'
+GIGABYTES = 2**32
+
+
+def channel(axis="0 deg", unit="V", gain="7.78 mV/um"):
+    return CHANNEL.format(axis=axis, unit=unit, gain=gain)
+
+
+def folder_campaign(folder, record=None):
+    (folder / "campaign.toml").write_text(HEAD + channel(unit="um") + RUN, encoding="utf-8")
+    if record is not None:
+        (folder / "c-1.csv").write_bytes(record)
+    return rigdata.load_campaign(folder)
+
+
+def hdf5_campaign(path, fill):
+    with h5py.File(path, "w") as file:
+        file.attrs["manifest"] = HEAD + channel(unit="um") + RUN
+        group = file.create_group("runs/c-1")
+        group.attrs["sample_rate_hz"] = 100.0
+        fill(group)
+    return rigdata.load_campaign(path)
+
+
+@pytest.mark.parametrize("head", [b"", b"X1A\n", b"X1A\n1.5\n2.5\n3.5\n", b"X1A;X1B\n1.5;2\n2.5"])
+def test_a_line_of_four_gigabytes_is_refused_in_little_time_and_memory(tmp_path, head):
+    run = folder_campaign(tmp_path, head).run("c-1")
+    with (tmp_path / "c-1.csv").open("r+b") as stream:
+        stream.truncate(GIGABYTES)  # a hole: no disk is used
+    before, began = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
+    with pytest.raises(RigDataError, match=r"c-1\.csv"):
+        run.record("X1A")
+    assert time.process_time() - began < 5.0
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 2**18  # kB
+
+
+@pytest.mark.parametrize("name", ["campaign.toml", "b.toml", "p.toml", "e.effects.toml"])
+def test_a_toml_file_of_four_gigabytes_is_refused_unread(tmp_path, name):
+    path = tmp_path / name
+    with path.open("wb") as stream:
+        stream.truncate(GIGABYTES)
+    load = {"c": rigdata.load_campaign, "b": load_bearing, "p": load_pivots, "e": load_effects}[name[0]]
+    before, began = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
+    with pytest.raises((RigDataError, BearingError, EffectError)):
+        load(path)
+    assert time.process_time() - began < 2.0
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 2**17
+
+
+@pytest.mark.parametrize("rows", [10**9, 2**31 + 1, 2**62])
+def test_a_dataset_that_claims_billions_of_rows(tmp_path, rows):
+    campaign = hdf5_campaign(
+        tmp_path / "a.h5", lambda g: g.create_dataset("X1A", shape=(rows,), dtype="f4", chunks=(1024,))
+    )
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(RigDataError, match=r"claims|samples"):
+        campaign.run("c-1").record("X1A")
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 2**17
+
+
+def test_a_manifest_of_more_runs_than_any_campaign_has():
+    with pytest.raises(RigDataError, match=r"more than 100000 runs|larger than"):
+        parse_manifest(HEAD + channel() + "[[runs]]\n" * 100_001)
+
+
+@pytest.mark.parametrize("depth", [3, 63, 200])
+def test_chains_of_soft_links_end_in_data_or_a_named_refusal(tmp_path, depth):
+    def fill(group):
+        group.create_dataset("end", data=np.arange(20.0))
+        for k in range(depth):
+            group[f"l{k}"] = h5py.SoftLink("/runs/c-1/end" if k == 0 else f"/runs/c-1/l{k - 1}")
+        group["X1A"] = h5py.SoftLink(f"l{depth - 1}")
+
+    run = hdf5_campaign(tmp_path / "a.h5", fill).run("c-1")
+    if depth == 3:
+        assert run.record("X1A").values[-1] == pytest.approx(19e-6)
+    else:
+        with pytest.raises(RigDataError, match="circle of links, or too deep"):
+            run.record("X1A")
+
+
+def test_a_group_linked_into_itself_is_walked_once(tmp_path):
+    def fill(group):
+        group.create_dataset("X1A", data=np.arange(20.0))
+        group["again"] = group  # a hard link: /runs/c-1/again/again/...
+
+    run = hdf5_campaign(tmp_path / "a.h5", fill).run("c-1")
+    assert len(run.record("X1A").values) == 20
+    assert run.reader.problems()
+
+
+def test_nan_and_infinities_are_missing_values_not_numbers(tmp_path):
+    data = np.array([1.0, np.nan, np.inf, -np.inf, 1e31, -3e38, 2.0])
+    run = hdf5_campaign(tmp_path / "a.h5", lambda g: g.create_dataset("X1A", data=data)).run("c-1")
+    values = run.record("X1A").values
+    assert np.flatnonzero(np.isfinite(values)).tolist() == [0, 6]
+    text = b"X1A\n1.0\nNaN\ninf\n-inf\n1e31\n1e999\n2.0\n"
+    values = folder_campaign(tmp_path, text).run("c-1").record("X1A").values
+    assert np.flatnonzero(np.isfinite(values)).tolist() == [0, 6]
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf, 1e300])
+def test_an_impossible_sample_rate_is_named(tmp_path, rate):
+    def fill(group):
+        group.create_dataset("X1A", data=np.arange(20.0))
+        group.attrs["sample_rate_hz"] = rate
+
+    with pytest.raises(RigDataError, match="sample_rate_hz"):
+        hdf5_campaign(tmp_path / "a.h5", fill).run("c-1").record("X1A")
+
+
+@pytest.mark.parametrize("gain", ["0 mV/um", "-7.78 mV/um", "nan mV/um", "inf mV/um", "1e999 mV/um", "1e-400 mV/um"])
+def test_zero_negative_and_endless_sensitivities_are_named(gain):
+    with pytest.raises(RigDataError, match="sensitivity"):
+        parse_manifest(HEAD + channel(gain=gain) + RUN)
+
+
+@pytest.mark.parametrize("unit", ["0", "-um", "um^0", "um^99999", "1e5 um", "um/0", "V**V", "\u202emu", "µ" * 500])
+def test_units_that_are_none(unit):
+    with pytest.raises(RigDataError, match="unit"):
+        parse_manifest(HEAD + channel(unit=unit, gain="1 V/V") + RUN)
+
+
+@pytest.mark.parametrize("value", ['"1e999 mm"', '"nan mm"', '"-1e308 km"', '"0 mm"', "nan", "inf", "9" * 400])
+def test_impossible_diameters_of_a_bearing(rocker_file, value):
+    lines = rocker_file.read_text("utf-8").splitlines()
+    at = next(i for i, line in enumerate(lines) if "diameter" in line.partition("=")[0])
+    lines[at] = f"{lines[at].partition('=')[0]} = {value}"
+    with pytest.raises((BearingError, UnitError)):
+        parse_bearing("\n".join(lines), "b.toml")
+
+
+@pytest.mark.parametrize("name", ["Größe µ", "شبه", "\u202eA1X", "日本", "e\u0301", "\U0001f600", "a\u2066b"])
+def test_channel_names_of_any_writing_are_taken_or_told_in_print(tmp_path, name):
+    text = HEAD + channel(unit="um").replace("channels.X1A", f'channels."{name}"') + RUN
+    (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "c-1.csv").write_text(f"{name}\n" + "1.5\n" * 5, encoding="utf-8")
+    try:
+        assert len(rigdata.load_campaign(tmp_path).run("c-1").record(name).values) == 5
+    except RigDataError as error:
+        assert all(line.isprintable() for line in str(error).splitlines())
+
+
+@pytest.mark.parametrize("suffix", [*FORMATS, ".asc"])
+def test_a_folder_in_the_place_of_a_record(tmp_path, suffix):
+    (tmp_path / f"r{suffix}").mkdir()
+    with pytest.raises(RigDataError, match="not there|not an ordinary file"):
+        read_foreign(tmp_path / f"r{suffix}", f"r{suffix}")
+
+
+@pytest.mark.parametrize("load", [load_bearing, load_pivots, load_effects, rigdata.load_campaign])
+def test_a_folder_in_the_place_of_a_file(tmp_path, load):
+    folder = tmp_path / "x.toml"
+    folder.mkdir()
+    with pytest.raises((RigDataError, BearingError, EffectError), match=r"x\.toml"):
+        load(folder)
+
+
+def test_a_folder_in_the_place_of_a_run_and_of_the_bearing(tmp_path):
+    (tmp_path / "b.toml").mkdir()
+    (tmp_path / "c-1.csv").mkdir()
+    campaign = folder_campaign(tmp_path)
+    assert any("b.toml" in str(note) for note in campaign.notes)
+    with pytest.raises(RigDataError, match="not an ordinary file"):
+        campaign.run("c-1").record("X1A")
