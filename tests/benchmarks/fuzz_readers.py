@@ -8,7 +8,8 @@ Targets: manifest, bearing, pivots, effects, csv, hdf5, cli, mat, mat73, parquet
 cases of a seed run traced: an input that reaches a line no other has reached joins the corpus. It then stays as it is,
 so that case i of a seed is always the same input (``--case i`` feeds it alone); what fails is kept as a file. The cases
 run in child processes, so that a crash of a C library is a finding and not the end. ``--record FILE`` adds the figures
-to a list in JSON, with the SHA-256 of the reader's source: cases of an older source do not count for a newer one. With ``--engine atheris`` (pip install atheris) libFuzzer steers.
+to a list in JSON, with the SHA-256 of the reader's source: cases of an older source do not count for a newer one.
+With ``--engine atheris`` (pip install atheris) libFuzzer steers.
 """
 
 from __future__ import annotations
