@@ -12,7 +12,7 @@ from tpjb_ident.diagnose.decide import decide, strongest_rival
 from tpjb_ident.diagnose.forward import Forward, ForwardModel
 from tpjb_ident.diagnose.laws import frequency_laws, sensor_map_test
 from tpjb_ident.diagnose.memory import Memory
-from tpjb_ident.diagnose.next_test import designs, rank_designs, say
+from tpjb_ident.diagnose.next_test import options_for, rank_designs, say, suggested
 from tpjb_ident.diagnose.nuisance import nuisances
 from tpjb_ident.diagnose.observe import Observations
 from tpjb_ident.diagnose.problem import Problem, loosened
@@ -130,6 +130,6 @@ def _next_test(
     rival = strongest_rival(found, settings)
     if rival is None:
         return ""
-    options = designs(setup, observations.layout)
+    options = options_for(setup, observations.layout)
     ranked = rank_designs(setup, found.model.effects, rival.effects, options, settings.certificates)
-    return say(ranked[0], found.model.label, rival.label) if ranked else ""
+    return say(suggested(ranked), found.model.label, rival.label) if ranked else ""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from model.setup import Setup
 from tpjb_ident.diagnose.bench import Bench
 from tpjb_ident.diagnose.candidates import Candidate
-from tpjb_ident.diagnose.next_test import designs, rank_designs
+from tpjb_ident.diagnose.next_test import options_for, rank_designs, suggested, together
 from tpjb_ident.diagnose.settings import DiagnoseSettings
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def next_test_table(bench: Bench, setup: Setup, pairs: Sequence[tuple[Candidate,
     from scipy.stats import norm
 
     factor, settings = bench.factor(1.0), DiagnoseSettings()
-    options = designs(setup, bench.observations.layout)
+    options = options_for(setup, bench.observations.layout)
     rows = []
     for one, other in pairs:
         effect = bench.sized(one, SIZE, 1.0, factor) or bench.sized(one, SIZE, -1.0, factor)
@@ -66,12 +66,15 @@ def next_test_table(bench: Bench, setup: Setup, pairs: Sequence[tuple[Candidate,
             setup, (effect,), (other.effect(float(amplitudes[best])),), options, settings.certificates
         )
         d = np.hypot([r.expected for r in ranked], miss[best])
-        chance = norm.cdf((d**2 - 9.0) / (2.0 * d))
+        # nothing apart: the right explanation wins by 9 never
+        chance = norm.cdf((d**2 - 9.0) / (2.0 * np.maximum(d, 1e-9)))
+        chosen = suggested(ranked)
+        then = float(np.hypot(together(chosen), miss[best]))
         rows.append(
             {
                 "effect": one.label, "taken_for": other.label, "apart_now": miss[best],
-                "next_test": ranked[0].design.words, "apart_by_it": ranked[0].expected, "apart_then": float(d[0]),
-                "success": float(chance[0]),
+                "next_test": " and ".join(t.design.words for t in chosen), "apart_by_it": together(chosen),
+                "apart_then": then, "success": float(norm.cdf((then**2 - 9.0) / (2.0 * then))),
                 "success_of_a_random_test": float(np.mean(chance)),
             }
         )  # fmt: skip
