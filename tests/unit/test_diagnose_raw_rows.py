@@ -55,7 +55,7 @@ def test_rounds_hold_every_kind_and_share_campaigns():
         assert len({(t.truth, t.size, t.noise, t.number, t.plan) for t in group}) == 1
 
 
-@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_rows_do_not_depend_on_the_workers(monkeypatch, shared, count):
     monkeypatch.setattr(module, "run_raw_trials", drawn_rows)
     groups = raw_trials(LABELS, 12)
@@ -65,6 +65,7 @@ def test_rows_do_not_depend_on_the_workers(monkeypatch, shared, count):
     assert [tuple(r["truth"]) for r in here] == [t.truth for g in groups for t in g]
 
 
+@pytest.mark.slow
 def test_rows_on_a_dask_cluster_are_the_same(monkeypatch, shared):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(module, "run_raw_trials", drawn_rows)
