@@ -20,7 +20,7 @@ def run(*arguments):
 def test_plan_tells_floor_and_look_alikes_of_a_thin_campaign(tmp_path):
     result = run(
         "plan", ROCKER, "--load", "5 kN", "--excitation", "25 Hz", "--locus", 0, "--no-dry", "--push", 0,
-        "--no-temperatures", "--out", tmp_path / "out",
+        "--no-temperatures", "--data-sets", "--out", tmp_path / "out",
     )  # fmt: skip
     assert result.exit_code == 0, result.output
     data = json.loads((tmp_path / "out" / "plan.json").read_text(encoding="utf-8"))
@@ -30,6 +30,13 @@ def test_plan_tells_floor_and_look_alikes_of_a_thin_campaign(tmp_path):
     with (tmp_path / "out" / "isolability.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
     assert rows[0][1:] == [row[0] for row in rows[1:]]
+    with (tmp_path / "out" / "data_sets.csv").open(encoding="utf-8", newline="") as file:
+        sets = list(csv.DictReader(file))
+    assert [row["data_set"] for row in sets] == list("ABCDE")
+    numbers = [int(row["numbers"]) for row in sets]
+    assert numbers == [4, 8, 8, 8, 16]  # two direct coefficients of K and C; all of h; nothing static; a second speed
+    assert int(sets[4]["detectable_nuisances_free"]) >= int(sets[0]["detectable_nuisances_free"])
+    assert int(sets[0]["detectable_nuisances_free"]) <= int(sets[0]["detectable_nuisances_known"])
 
 
 def test_plan_without_dynamic_tests_is_refused(tmp_path):

@@ -36,17 +36,20 @@ def plan(
     dry: Annotated[bool, typer.Option(help="Dry load-deflection tests on all pads.")] = True,
     push: Annotated[float, typer.Option(min=0.0, help="Push load of the clearance sweep [N]; 0: none.")] = 200.0,
     temperatures: Annotated[bool, typer.Option(help="A temperature sensor in every pad.")] = True,
+    data_sets: Annotated[bool, typer.Option("--data-sets", help="Also: what parts of it could tell, A to E.")] = False,
     out: Out = None,
 ) -> None:
     """Tell which effects a planned campaign could see, from which size on, and which it would mix up.
 
     Writes plan.json, effects (detection floor and look-alikes) and isolability (the matrix of separations), each as
-    .csv and .parquet.
+    .csv and .parquet; with --data-sets also data_sets: what the direct coefficients alone (A), all of h (B), with locus
+    and polygon (C), everything planned (D) and a second speed beside it (E) could tell.
     """
     refuse_special(bearing)
     from model.bearing_file import load_bearing
     from model.pivots import pivot_laws
     from model.setup import Setup
+    from tpjb_ident.diagnose.data_sets import data_sets_table
     from tpjb_ident.diagnose.plan import plan as work_out
 
     drawn = load_bearing(bearing)
@@ -56,11 +59,16 @@ def plan(
     options: dict[str, Any] = {
         "bearing": bearing, "pivots": pivots, "load": load, "load_direction": load_direction, "speed": speed,
         "excitation": excitation, "locus": locus, "dry": dry, "push": push, "temperatures": temperatures,
+        "data_sets": data_sets,
     }  # fmt: skip
     with output_folder(target, "plan") as folder:
         with progress("planning") as show:
             show("every effect of the library", 0, 1)
-            found = work_out(Setup(drawn, pivot_laws(pivot_choice(pivots), drawn)), tests)
+            setup = Setup(drawn, pivot_laws(pivot_choice(pivots), drawn))
+            found = work_out(setup, tests)
+            if data_sets:
+                show("parts of the campaign", 1, 2)
+                write_table(folder, "data_sets", data_sets_table(setup, tests))
         frame = found.to_frame()
         write_table(folder, "effects", frame)
         write_table(folder, "isolability", found.matrix())

@@ -20,6 +20,7 @@ from tpjb_ident.diagnose.fit import slope
 from tpjb_ident.diagnose.forward import Forward
 from tpjb_ident.diagnose.layout import Layout
 from tpjb_ident.diagnose.nuisance import Certificates, nuisances, whitener
+from tpjb_ident.diagnose.observe import Observations
 from tpjb_ident.diagnose.planned import planned_observations
 
 if TYPE_CHECKING:
@@ -131,21 +132,60 @@ def plan(
     NoEquilibriumError
         The baseline has none at some point of the layout.
     """
-    known = known or Certificates()
+    chosen = tuple(pool if pool is not None else candidates(setup.bearing))
+    seen = signatures(setup, layout, chosen, known)
+    return separated(chosen, np.asarray(np.linalg.solve(seen.factor(), seen.columns)))
+
+
+@dataclass(frozen=True)
+class Signatures:
+    """What every candidate does to the observation vector of a layout, beside what hides it.
+
+    Attributes
+    ----------
+    observations : Observations
+        Planned.
+    nuisances : (n, m) ndarray
+        Columns per standard deviation.
+    columns : (n, k) ndarray
+        Change by a typical size of every candidate.
+    """
+
+    observations: Observations
+    nuisances: FloatArray = field(repr=False)
+    columns: FloatArray = field(repr=False)
+
+    def factor(self, free: bool = True) -> FloatArray:
+        """Cholesky factor of the covariance, with or without nuisances."""
+        return whitener(self.observations, self.nuisances if free else self.nuisances[:, :0])
+
+
+def signatures(
+    setup: Setup, layout: Layout, chosen: Sequence[Candidate], known: Certificates | None = None
+) -> Signatures:
+    """Work out the signature of every candidate on a layout.
+
+    Raises
+    ------
+    NoEquilibriumError
+        The baseline has none at some point of the layout.
+    """
     observations = planned_observations(setup, layout)
     forward = Forward(setup, layout, observations.elements)
     base = forward()
-    factor = whitener(observations, nuisances(forward, (), base, known).columns)
-    chosen = tuple(pool if pool is not None else candidates(setup.bearing))
-    columns = []
-    for c in chosen:
-        one = slope(forward.fresh(), [c], np.array([c.neutral]), base, 0, 0.5 * c.step)
-        columns.append(np.linalg.solve(factor, one * c.step))
-    table = np.column_stack(columns)
-    size = np.linalg.norm(table, axis=0)
+    free = nuisances(forward, (), base, known or Certificates()).columns
+    columns = [
+        slope(forward.fresh(), [c], np.array([c.neutral]), base, 0, 0.5 * c.step) * c.step for c in chosen
+    ]  # fmt: skip
+    return Signatures(observations, free, np.column_stack(columns))
+
+
+def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:
+    """Sizes and separations of whitened signatures (n, k)."""
+    size = np.linalg.norm(white, axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        unit = table / size
+        unit = white / size
     cosine = np.clip(unit.T @ unit, -1.0, 1.0)
     separation = SEEN * np.sqrt(1.0 - cosine**2)
     np.fill_diagonal(separation, np.nan)
-    return CampaignPlan(chosen, size, separation)
+    return CampaignPlan(tuple(chosen), size, separation)

@@ -1,0 +1,90 @@
+"""Data sets: what a campaign could tell if only a part of it were there.
+
+A  direct coefficients against load at one frequency (what papers show)
+B  all entries of h against load and frequency
+C  B with locus, load readings and clearance polygon
+D  C with dry tests and pad temperatures: everything that was planned
+E  D with a second shaft speed
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.setup import Setup
+from tpjb_ident.diagnose.candidates import candidates
+from tpjb_ident.diagnose.layout import Layout
+from tpjb_ident.diagnose.observe import Element
+from tpjb_ident.diagnose.plan import separated, signatures
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+BoolArray = NDArray[np.bool_]
+DIRECT = frozenset({"kxx", "kyy", "cxx", "cyy"})
+FAMILIES = {
+    "B": frozenset({"h"}),
+    "C": frozenset({"h", "locus", "load", "clearance"}),
+    "D": frozenset({"h", "locus", "load", "clearance", "dry", "temperature"}),
+}
+#: Second speed of data set E over the planned one.
+FASTER = 1.5
+
+
+def data_sets_table(setup: Setup, layout: Layout) -> pd.DataFrame:
+    """Count what every data set sees at typical sizes and mixes up at d' = 6, nuisances known and free.
+
+    Parameters
+    ----------
+    setup : Setup
+    layout : Layout
+        Everything that is planned.
+
+    Raises
+    ------
+    NoEquilibriumError
+        The baseline has none at some point of the layout, or at the second speed.
+    """
+    import pandas as pd
+
+    faster = tuple(replace(t, speed=FASTER * t.speed) for t in layout.dynamic)
+    chosen = candidates(setup.bearing)
+    seen = signatures(setup, replace(layout, dynamic=(*layout.dynamic, *faster)), chosen)
+    planned = {t.speed for t in layout.dynamic}
+    rows = []
+    for name, mine in _masks(seen.observations.elements, planned).items():
+        row: dict[str, object] = {"data_set": name, "numbers": int(mine.sum())}
+        for free, words in ((False, "known"), (True, "free")):
+            factor = seen.factor(free)
+            part = (factor @ factor.T)[np.ix_(mine, mine)]
+            scale = np.sqrt(np.diag(part))
+            whole = np.linalg.cholesky(part / np.outer(scale, scale))
+            told = separated(chosen, np.asarray(np.linalg.solve(whole, seen.columns[mine] / scale[:, None])))
+            row |= {
+                f"detectable_nuisances_{words}": len(chosen) - len(told.below_floor),
+                f"confusable_pairs_nuisances_{words}": len(told.confusable),
+                "pairs": len(chosen) * (len(chosen) - 1) // 2,
+            }
+        rows.append({**row, "mixed_up": "; ".join(" / ".join(pair) for pair in told.confusable)})
+    return pd.DataFrame(rows)
+
+
+def _masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArray]:
+    """Elements of every data set."""
+    families = np.array([e.family for e in elements])
+    first = np.array([not np.isfinite(e.place("speed")) or e.place("speed") in planned for e in elements])
+    line = np.array([e.place("excitation") for e in elements])
+    known = line[np.isfinite(line)]
+    # the frequency that is there at the most loads, the middle one among equals
+    lines, counts = np.unique(known, return_counts=True)
+    most = lines[counts == counts.max()]
+    one = line == most[len(most) // 2]
+    direct = np.array([e.observable in DIRECT for e in elements])
+    masks = {"A": direct & one & first}
+    masks |= {name: np.isin(families, sorted(kept)) & first for name, kept in FAMILIES.items()}
+    return {**masks, "E": np.ones(len(elements), dtype=bool)}
