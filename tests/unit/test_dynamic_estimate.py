@@ -104,6 +104,14 @@ def test_r_matrix_is_eq_14_row_by_row():
         r_matrix(D, F[:1])
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_two_windows_give_h_exactly_and_no_interval(method: str):
+    est = run(method, *sample(8, directions=2, windows=1, noise=0.0))
+    np.testing.assert_allclose(est.h, H, rtol=1e-9, atol=1e-9 * abs(H).max())
+    assert "no-residual" in est.status
+    assert np.isnan(est.covariance).all()
+
+
 def test_conditions_are_named():
     D, F, label, command = sample(6)
     one = run("mm-eiv", D[:10], F[:10], label[:10], command[:10])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
-from rigdata.virtual_rig import Noise, RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
+from rigdata.virtual_rig import Fault, Noise, RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
 from tests.benchmarks.bench_phasors import HeldRun
 from tpjb_ident.dynamic.conditions import Condition
 from tpjb_ident.dynamic.extraction import extract
@@ -335,3 +335,10 @@ def test_memory_does_not_grow_with_the_record():
     assert len(phasors.start) > 50
     assert peak < 0.25 * whole
     assert peak < 80e6
+
+
+def test_cells_ten_times_off_in_all_runs_make_every_point_doubtful(tmp_path):
+    wrong = replace(rig([(3500.0, 25.0)], seed=12), faults=(Fault("scaled", "*", "L1*", value=0.1),))
+    write_campaign(tmp_path / "c.h5", wrong)
+    [point] = identify(load_campaign(tmp_path / "c.h5"), IdentifySettings(methods=())).points
+    assert "cells-contradict-set-points" in point.quality

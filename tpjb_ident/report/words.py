@@ -59,6 +59,7 @@ MEANING = {
     "displacement noise pull them. See estimators.csv.",
     "no-repeats": "Too few repeats per direction to measure the noise: displacement noise is not corrected for. "
     "Record longer.",
+    "no-residual": "As many windows as unknowns: the numbers solve them exactly and have no interval. Record more.",
     "no-robust-start": "No robust start was found; outliers may have pulled the answer.",
     "zero-scale": "The residuals are zero: the records are no measurement, or repeat one another exactly.",
     "bad-steps": "Some load steps were left out because the record was disturbed there.",
@@ -89,6 +90,7 @@ SERIOUS = frozenset(
         "low-coherence",
         "many-windows-rejected",
         "negative-damping",
+        "no-residual",
         "no-robust-start",
         "zero-scale",
     }
