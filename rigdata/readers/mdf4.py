@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 
 import numpy as np
 
 from rigdata.readers.series import Series
+from rigdata.readers.walled import read_walled
 
 
 def read_series(path: Path) -> list[Series]:
@@ -16,7 +18,21 @@ def read_series(path: Path) -> list[Series]:
     ----------
     path : Path
         ``.mf4`` or ``.mdf``.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        asammdf is not installed.
+    RigDataError
+        The file is damaged.
     """
+    if importlib.util.find_spec("asammdf") is None:
+        raise ModuleNotFoundError("No module named 'asammdf'", name="asammdf")
+    return read_walled("mdf4", path)
+
+
+def read_walled_in(path: Path) -> list[Series]:
+    """As `read_series`, in this process: a damaged file can end it."""
     from asammdf import MDF
 
     found = []

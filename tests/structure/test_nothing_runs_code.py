@@ -22,6 +22,7 @@ ATTRIBUTES = {
 }  # fmt: skip
 #: file: what it may do, and why.
 ALLOWED = {
+    "rigdata/readers/walled.py": {"subprocess"},  # this interpreter, to read files that crash libraries
     "tpjb_ident/compare/warm_up.py": {"subprocess"},  # this interpreter, to load libraries
     "tpjb_ident/executors.py": {"pickle"},  # what its own processes send each other, never a file
 }

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-import pickle
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -73,7 +72,7 @@ class RawBench:
     memory : Memory
         The model's answers at the baseline, the same for every campaign.
     keep : Path or None
-        Folder in which identified campaigns are kept.
+        Folder in which the campaigns are kept.
     """
 
     bench: Bench = field(repr=False)
@@ -164,23 +163,21 @@ def _diagnosed(
 
 
 def _measured(rig: VirtualRig, bearing: Bearing, keep: Path | None, name: str) -> Measured:
-    """Identify a rig's campaign, or take what is kept of it."""
-    path = None if keep is None else keep / f"{hashlib.sha256(name.encode()).hexdigest()[:20]}.measured"
-    if path is not None and path.exists():
-        kept = pickle.loads(path.read_bytes())
-        if isinstance(kept, Measured):
-            return kept
-    with tempfile.TemporaryDirectory() as folder:
+    """Identify a rig's campaign, written now or kept from before."""
+    with tempfile.TemporaryDirectory(dir=_folder(keep)) as folder:
         file = Path(folder) / "campaign.h5"
-        write_campaign(file, rig)
+        kept = file if keep is None else keep / f"{hashlib.sha256(name.encode()).hexdigest()[:20]}.h5"
+        if not kept.exists():
+            write_campaign(file, rig)
+            file.replace(kept)
         # one estimator is enough: the others only tell where they disagree
-        measured = measure_campaign(load_campaign(file), bearing, estimator=IdentifySettings(methods=()))
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as part:
-            part.write(pickle.dumps(measured, protocol=5))
-        Path(part.name).replace(path)
-    return measured
+        return measure_campaign(load_campaign(kept), bearing, estimator=IdentifySettings(methods=()))
+
+
+def _folder(keep: Path | None) -> Path | None:
+    if keep is not None:
+        keep.mkdir(parents=True, exist_ok=True)
+    return keep
 
 
 def raw_bench(bench: Bench, bearing: Bearing, keep: Path | None = None) -> RawBench:

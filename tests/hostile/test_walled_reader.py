@@ -1,0 +1,54 @@
+"""A library that crashes, hangs or eats memory on a damaged file takes its own process along and no other."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigdata.problem import RigDataError
+from rigdata.readers import walled
+from rigdata.readers.foreign import read_foreign
+from rigdata.readers.series import Series
+
+DAMAGED = Path(__file__).parent / "damaged"
+
+
+def test_numbers_cross_the_wall_bit_for_bit(capsysbinary):
+    given = [
+        Series("X1A", "V", np.array([1.0, np.nan, -np.inf, 5e-324]), np.arange(4.0), "group 1"),
+        Series("Temperatür", "°C", np.array([]), None, "group 2"),
+    ]
+    walled._answer(given)
+    head, _, body = capsysbinary.readouterr().out.partition(b"\n")
+    for one, back in zip(given, walled._unpack(json.loads(head), body), strict=True):
+        assert (one.name, one.unit, one.group) == (back.name, back.unit, back.group)
+        assert one.values.tobytes() == back.values.tobytes()
+        assert (one.time is None) == (back.time is None)
+        assert one.time is None or one.time.tobytes() == back.time.tobytes()
+
+
+def test_a_child_that_dies_is_told(tmp_path):
+    path = tmp_path / "a.mf4"
+    path.write_bytes(b"x")
+    with pytest.raises(RigDataError, match="crash"):
+        walled.read_walled("no_such_reader", path)
+
+
+def test_a_child_that_does_not_end_is_ended(tmp_path, monkeypatch):
+    path = tmp_path / "a.mf4"
+    path.write_bytes(b"x")
+    monkeypatch.setattr(walled, "SECONDS", 0.01)
+    with pytest.raises(RigDataError, match="took longer than 0 s"):
+        walled.read_walled("mdf4", path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["crash", "circle", "gigabytes"])
+def test_what_fuzzing_found_is_refused(name, monkeypatch):
+    pytest.importorskip("asammdf", reason="asammdf is heavy; install the extra mdf to run this")
+    monkeypatch.setattr(walled, "SECONDS", 10.0)
+    with pytest.raises(RigDataError, match=rf"{name}\.mf4"):
+        read_foreign(DAMAGED / f"{name}.mf4", f"{name}.mf4")
