@@ -36,7 +36,7 @@ def evaluate(
     raw: Annotated[int, typer.Option(min=0, help="Trials with campaigns written as raw volts and identified.")] = 0,
     keep: Annotated[
         Path | None,
-        typer.Option(help="Folder for tables, identified campaigns and rows: a killed evaluation goes on from there."),
+        typer.Option(help="Folder for tables, campaigns and rows: a killed evaluation goes on from there."),
     ] = None,
     workers: WorkerCount = None,
     scheduler: Scheduler = None,
@@ -46,7 +46,7 @@ def evaluate(
 
     Writes trials, summary, confusion, figures and rules as .csv and .parquet, and evidence.md. The same seed gives
     the same campaigns, whatever the workers. With --keep, rows of raw trials are made anew where the code of the
-    diagnosis has changed since; delete the folder when the virtual rig or the identification has.
+    diagnosis has changed since; delete the folder when the virtual rig has.
     """
     if scheduler is not None and workers is not None:
         raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")

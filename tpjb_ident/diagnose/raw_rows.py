@@ -11,6 +11,8 @@ from typing import Any
 
 import model
 import tpjb_ident.diagnose as decisions
+import tpjb_ident.dynamic as dynamic
+import tpjb_ident.pivot as pivot
 from tpjb_ident.diagnose.raw_trials import RawBench, RawTrial, run_raw_trials
 from tpjb_ident.executors import Workers
 
@@ -71,9 +73,9 @@ def read_rows(file: Path, code: str | None = None) -> dict[str, Row]:
 
 
 def code_fingerprint() -> str:
-    """What decides: the source of the diagnosis and of the model."""
+    """What a row depends on: the source of identification, diagnosis and model."""
     digest = hashlib.sha256()
-    for package in (decisions, model):
+    for package in (dynamic, pivot, decisions, model):
         for source in sorted(Path(str(package.__file__)).parent.rglob("*.py")):
             digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
