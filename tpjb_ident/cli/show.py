@@ -101,6 +101,10 @@ def progress(what: str) -> Iterator[Progress]:
         yield show
 
 
+#: Share of a step from which its speed is known well enough to tell the time left.
+FORETELLS = 0.02
+
+
 class _Lines:
     """Progress for a log file: a line with the time left every half minute, none for what is quickly done."""
 
@@ -116,8 +120,10 @@ class _Lines:
         if now - self._told < LINE_EVERY or not 0 < done < total:
             return
         self._told = now
-        left = (now - self._began) * (total - done) / done
-        note_line("doing", f"{self._what}: {done} of {total}, about {_duration(left)} left ({text})")
+        left = ""
+        if done >= FORETELLS * total:
+            left = f", about {_duration((now - self._began) * (total - done) / done)} left"
+        note_line("doing", f"{self._what}: {done} of {total}{left} ({text})")
 
 
 def _duration(seconds: float) -> str:
