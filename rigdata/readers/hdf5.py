@@ -56,6 +56,9 @@ def _faults_told(file: str, run: str | None) -> Iterator[None]:
         raise
     except FileNotFoundError as error:
         raise _refuse(file, "", "the file is not there", "Check the path", run) from error
+    except BlockingIOError as error:  # HDF5's file lock
+        what = "the file is being written by another program"
+        raise _refuse(file, "", what, "Wait until the export has ended, or copy it first", run) from error
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError) as error:
         what = f"the file cannot be read as HDF5 ({_first_line(error)})"
         raise _refuse(file, "", what, "Copy it again from the rig, or check it with h5dump", run) from error

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -257,6 +259,15 @@ def test_files_that_are_no_hdf5(tmp_path, bad):
     (tmp_path / "c.h5").write_bytes(bad)
     with pytest.raises(RigDataError, match="HDF5"):
         rigdata.load_campaign(tmp_path / "c.h5")
+
+
+@pytest.mark.slow  # a lock is seen by other processes only
+def test_a_file_that_is_being_written(tmp_path):
+    make(tmp_path / "c.h5")
+    code = "import sys, rigdata\ntry:\n  rigdata.load_campaign(sys.argv[1])\nexcept rigdata.RigDataError as e: print(e)"
+    with change(tmp_path / "c.h5"):
+        told = subprocess.run([sys.executable, "-c", code, str(tmp_path / "c.h5")], capture_output=True, text=True)
+    assert "being written by another program" in told.stdout, told
 
 
 def test_truncated_and_scrambled_files(tmp_path):

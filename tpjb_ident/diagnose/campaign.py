@@ -142,7 +142,10 @@ def measure_campaign(
     tell("pivot curves, clearance and locus", 20, 100)
     curves, polygon, locus = measure_dry(campaign, bearing)
     housing = with_housing(Setup(bearing, pivot_laws("rigid", bearing)), campaign).instruments
-    return Measured(found, tuple(curves), polygon, locus, housing, certificates(campaign, known or Certificates()))
+    certain = certificates(campaign, known or Certificates())
+    if polygon is None and locus is not None:
+        certain = replace(certain, centre=unknown_centre(locus))
+    return Measured(found, tuple(curves), polygon, locus, housing, certain)
 
 
 def diagnose_measured(
@@ -179,6 +182,14 @@ def diagnose_measured(
         observations, setup, certain, lambda text, share: tell(f"diagnosing, {text}", 30 + int(70 * share), 100), memory
     )
     return CampaignDiagnosis(result, found, setup)
+
+
+def unknown_centre(locus: Locus) -> float:
+    """How far the bearing's centre may lie from where positions are counted when no clearance sweep tells it [m].
+
+    Positions then count from the probes' own zero, and only their differences say something about the bearing.
+    """
+    return max(1e-3, 3.0 * max(math.hypot(*p.position) for p in locus.points))
 
 
 def certificates(campaign: Campaign, known: Certificates) -> Certificates:

@@ -44,6 +44,7 @@ class Certificates:
         Zero of every pad's temperature sensor [K].
     centre : float
         How far the polygon's centre may lie from the bearing's [m]: it is a choice where pads stand unequal.
+        Without a polygon, that of the probes' zero.
     coherent_stiffness : float
         How far two programs may be apart in one coefficient at all points alike, relative.
     coherent_dry : float
