@@ -281,12 +281,6 @@ def predict_setup(
     else:
         h = np.full((len(lines), 2, 2), complex(math.nan, math.nan))
     instruments = setup.instruments
-    read = np.array(
-        [
-            instruments.force_map(w) @ one @ np.linalg.inv(instruments.displacement_map(w))
-            for w, one in zip(lines, h, strict=True)
-        ]
-    )
     outside = equilibrium.position + setup.series_compliance * force
     films = equilibrium.films
     shape = (2, 2) if omega.ndim == 0 else (len(lines), 2, 2)
@@ -295,11 +289,11 @@ def predict_setup(
         load_direction=load_direction,
         speed=speed,
         excitation=float(omega) if omega.ndim == 0 else omega,
-        h=read.reshape(shape),
+        h=instruments.shown_stiffness(h, lines).reshape(shape),
         bearing_h=h.reshape(shape),
-        position=(instruments.displacement_map(0.0) @ outside).real,
+        position=instruments.shown_position(outside),
         bearing_position=equilibrium.position,
-        load_reading=(instruments.force_map(0.0) @ force).real,
+        load_reading=instruments.shown_load(force),
         tilt=np.array([f.tilt for f in films]),
         deflection=np.array([f.deflection for f in films]),
         pad_load=np.array([f.forces.force[0] if f.forces is not None else 0.0 for f in films]),

@@ -49,6 +49,19 @@ class Instruments:
         """G(omega): read force = G @ true force."""
         return _product(self.force, omega)
 
+    def shown_stiffness(self, h: ComplexArray, lines: FloatArray) -> ComplexArray:
+        """G h S^-1 (n, 2, 2) [N/m]: what the records make of the bearing's `h` (n, 2, 2) at `lines` (n,) [rad/s]."""
+        at = zip(lines, h, strict=True)
+        return np.array([self.force_map(w) @ one @ np.linalg.inv(self.displacement_map(w)) for w, one in at])
+
+    def shown_position(self, position: FloatArray) -> FloatArray:
+        """S(0) position (2,) [m]: where static readings place a shaft that the housing's probes see at `position`."""
+        return np.asarray((self.displacement_map(0.0) @ position).real)
+
+    def shown_load(self, force: FloatArray) -> FloatArray:
+        """G(0) force (2,) [N]: the static load that the cells tell."""
+        return np.asarray((self.force_map(0.0) @ force).real)
+
     def read_displacement(self, one: SensorMap) -> Instruments:
         """Return a copy whose displacement readings pass through one more map."""
         return replace(self, displacement=(*self.displacement, one))
