@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -118,6 +119,51 @@ def test_the_command_line_works_on_a_cluster(cluster, small_campaign, tmp_path):
         assert result.exit_code == 0, result.output
         tables.append([(out / f"{name}.csv").read_bytes() for name in ("coefficients", "estimators", "windows")])
     assert tables[0] == tables[1]
+
+
+@pytest.mark.slow
+def test_a_client_killed_half_way_is_taken_up_where_it_stopped(cluster, campaign_file, tmp_path, monkeypatch):
+    from typer.testing import CliRunner
+
+    from tpjb_ident.cli.app import app
+    from tpjb_ident.cli.identify import KEPT
+    from tpjb_ident.dynamic.run_store import RunStore
+
+    wait_for(str(cluster.file), 1)
+    out = tmp_path / "out"
+    words = ["identify", str(campaign_file), "--scheduler", str(cluster.file), "--out", str(out)]
+    client = subprocess.Popen(
+        [sys.executable, "-m", "tpjb_ident", *words], cwd=ROOT, stdout=subprocess.DEVNULL, stderr=cluster.log
+    )
+    until = time.monotonic() + 120
+    whole = "[!.]*.npz"  # a file that is being written has a dot in front
+    while not list((out / KEPT).glob(whole)) and client.poll() is None and time.monotonic() < until:
+        time.sleep(0.001)
+    client.send_signal(signal.SIGSTOP)  # so that nothing is finished between the look and the kill
+    finished = {path.name for path in (out / KEPT).glob(whole)}
+    client.kill()
+    assert client.wait() == -signal.SIGKILL
+    assert 0 < len(finished) < 12
+    assert not list(out.glob("*.csv"))
+
+    kept: list[str] = []
+    plain = RunStore.keep
+
+    def keep(store, mark, result):
+        kept.append(store._file(result.phasors.run).name)
+        plain(store, mark, result)
+
+    monkeypatch.setattr(RunStore, "keep", keep)
+    again = CliRunner().invoke(app, words)
+    assert again.exit_code == 0, again.output
+    assert len(kept) == len(set(kept)) == 12 - len(finished)  # the others, and each of them once
+    assert not finished & set(kept)
+    assert not (out / KEPT).exists()
+
+    alone = tmp_path / "alone"
+    CliRunner().invoke(app, ["identify", str(campaign_file), "--workers", "1", "--out", str(alone)])
+    for name in ("coefficients", "estimators", "windows"):
+        assert (out / f"{name}.csv").read_bytes() == (alone / f"{name}.csv").read_bytes()
 
 
 def test_a_scheduler_that_is_not_there_is_named():
