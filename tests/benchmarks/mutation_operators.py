@@ -2,7 +2,8 @@
 
 Changed are operators, comparisons (their edge and their sense), numbers, truth values, conditions, results, statements,
 and the pairs that numerical code confuses (real and imaginary part, sine and cosine, smallest and largest, any and all,
-a conjugate or a transpose left out). Left alone: texts, docstrings, annotations, and what stands outside functions.
+a conjugate or a transpose left out). Left alone: texts, docstrings, annotations, what stands outside functions, and the
+`strict=True` of zip, which is an assertion.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ _NAMES = {a: b for pair in _PAIRS for a, b in (pair, pair[::-1])} | {"argmax": "
 
 @dataclass
 class Mutant:
-    """One change: where (first and last line of its statement), what, and how it is made and taken back."""
+    """One change: its number, where (first and last line of its statement), what, how it is made and undone."""
 
+    number: int
     line: int
     first: int
     last: int
@@ -43,11 +45,11 @@ def mutants(tree: ast.Module) -> list[Mutant]:
             first, last = statement.lineno, _last_line(statement)
             changes = [*_of_statement(statement), *(c for node in _own_nodes(statement) for c in _of_node(node))]
             for line, what, make, undo in changes:
-                found.append(Mutant(line, first, last, what, name, make, undo))
+                found.append(Mutant(len(found), line, first, last, what, name, make, undo))
         for node in [d for d in (*function.args.defaults, *function.args.kw_defaults) if d is not None]:
             for line, what, make, undo in _of_node(node):
-                found.append(Mutant(line, function.body[0].lineno, _last_line(function), f"default {what}", name, make,
-                                    undo))  # fmt: skip
+                found.append(Mutant(len(found), line, function.body[0].lineno, _last_line(function), f"default {what}",
+                                    name, make, undo))  # fmt: skip
     return found
 
 
@@ -87,6 +89,8 @@ def _own_nodes(statement: ast.AST) -> Iterator[Any]:
             continue
         for child in value if isinstance(value, list) else [value]:
             if isinstance(child, ast.JoinedStr) or not isinstance(child, ast.AST):
+                continue
+            if isinstance(child, ast.keyword) and child.arg == "strict":
                 continue
             if isinstance(child, (ast.stmt, ast.ExceptHandler)) or isinstance(statement, ast.Raise):
                 continue

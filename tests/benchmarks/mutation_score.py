@@ -1,10 +1,11 @@
 """Mutation score of the files that the numbers depend on: a small change in the source, do the tests notice?
 
-    python tests/benchmarks/mutation_score.py [--mutants 0] [--seed 1] [--out FILE.jsonl] [FILE ...]
+    python tests/benchmarks/mutation_score.py [--mutants 0] [--seed 1] [--out FILE] [--again FILE] [FILE ...]
 
 All mutants of `mutation_operators.py` (or a number of them, drawn by the seed) against the quick tests that reach them
 (`mutation_trial.py`). Survivors are listed with their line: a missing test, or an equal program. Equal programs are
-listed by hand with the reason in `mutation_equal.toml` and left out of the denominator.
+listed by hand with the reason in `mutation_equal.toml` and left out of the denominator. `--again` tries the survivors
+of an earlier record only, after new tests (`--tests`) or with a larger `--budget`, and keeps what was killed then.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ import pytest
 ROOT = mutation_trial.ROOT
 UNIT = "tests/unit/"
 _DYNAMIC = (UNIT + "test_dynamic_*.py", UNIT + "test_tables.py", UNIT + "test_run_store.py")
-_PIVOT = (UNIT + "test_pivot_*.py", UNIT + "test_virtual_rig_dry.py")
+_PIVOT = (UNIT + "test_pivot_*.py", UNIT + "test_virtual_rig_dry.py", "tests/recovery/test_pivot_recovery.py")
 _ESTIMATOR = (UNIT + "test_dynamic_estimate.py", UNIT + "test_dynamic_exact_limits.py")
 #: Folder or file: the tests that are asked; of several that fit, the longest name counts.
 TESTS = {
@@ -82,17 +83,35 @@ def figures(verdict: mutation_trial.Verdict) -> dict[str, Any]:
     }
 
 
+def earlier(record: Path) -> dict[str, dict[str, Any]]:
+    """File -> its last verdict in a record."""
+    rows = [json.loads(line) for line in record.read_text(encoding="utf-8").splitlines()]
+    return {row["file"]: row["all"] for row in rows}
+
+
+def number(told: str) -> int:
+    """Number of a mutant in its file, from what is told of it."""
+    return int(told[1:].split()[0])
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", nargs="*")
     parser.add_argument("--mutants", type=int, default=0, help="how many per file; 0: all")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--budget", type=float, default=mutation_trial.BUDGET, help="seconds of tests for a mutant")
+    parser.add_argument("--tests", nargs="+", help="other test files than those of `TESTS`")
+    parser.add_argument("--again", type=Path, help="record of which the survivors are tried once more")
     parser.add_argument("--out", type=Path, help="one line of JSON per file, added to")
     given = parser.parse_args()
     os.chdir(ROOT)
-    files = given.files or targets()
+    before = {} if given.again is None else earlier(given.again)
+    files = given.files or list(before) or targets()
 
     def chosen(file: str, every: list[mutation_operators.Mutant]) -> list[mutation_operators.Mutant]:
+        if file in before:
+            left = {number(told) for told in before[file]["survived"]}
+            return [m for m in every if m.number in left]
         return (
             random.Random(f"{given.seed}-{file}").sample(every, given.mutants)
             if 0 < given.mutants < len(every)
@@ -102,6 +121,11 @@ def main() -> None:
     terminal = os.fdopen(os.dup(1), "w")
 
     def say(verdict: mutation_trial.Verdict) -> None:
+        if verdict.file in before:
+            if before[verdict.file]["source"] != verdict.source:
+                raise pytest.UsageError(f"{verdict.file} has changed since {given.again}")
+            verdict.killed = before[verdict.file]["killed"] + verdict.killed
+            verdict.equal = before[verdict.file]["equal"] + verdict.equal
         told = figures(verdict)
         print(json.dumps(told, indent=1), file=terminal, flush=True)
         if given.out:
@@ -109,10 +133,10 @@ def main() -> None:
                 sink.write(json.dumps(told | {"all": dataclasses.asdict(verdict)}) + "\n")
 
     with tempfile.TemporaryDirectory(prefix="mutants-") as scratch:
-        trial = mutation_trial.Trial(files, equal_programs(), chosen, say)
+        trial = mutation_trial.Trial(files, equal_programs(), chosen, say, given.budget)
         options = ["-q", "--no-header", "-p", "no:xdist", "-p", "no:cacheprovider", "--tb=no", "--assert=plain",
                    f"--basetemp={scratch}/tests", "-m", "not slow and not samples"]  # fmt: skip
-        sys.exit(int(pytest.main([*options, *tests_of(files)], plugins=[trial])))
+        sys.exit(int(pytest.main([*options, *(given.tests or tests_of(files))], plugins=[trial])))
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import gc
+import hashlib
 import os
 import pickle
 import resource
@@ -38,6 +39,8 @@ class Verdict:
     """What became of the mutants of a file."""
 
     file: str
+    #: hash of the source: numbers of mutants mean nothing elsewhere
+    source: str
     killed: list[str] = field(default_factory=list)
     survived: list[str] = field(default_factory=list)
     #: of the survivors, those whose statement no quick test reaches
@@ -60,12 +63,15 @@ class Trial:
         From all mutants of a file to those that are tried.
     say : callable
         Where a finished file is reported.
+    budget : float
+        Seconds of tests that a mutant gets.
     """
 
     files: list[str]
     equal: dict[tuple[str, str, str], str]
     chosen: Callable[[str, list[mutation_operators.Mutant]], list[mutation_operators.Mutant]]
     say: Callable[[Verdict], None]
+    budget: float = BUDGET
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
@@ -86,13 +92,13 @@ class Trial:
     def _file(self, session: pytest.Session, file: str, survey: Survey) -> Verdict:
         source = (ROOT / file).read_text(encoding="utf-8")
         tree, lines = ast.parse(source), source.splitlines()
-        verdict, begun = Verdict(file), time.time()
+        verdict, begun = Verdict(file, hashlib.sha256(source.encode()).hexdigest()), time.time()
         for mutant in self.chosen(file, mutation_operators.mutants(tree)):
-            told = f"{mutant.line}: {mutant.what} | {lines[mutant.line - 1].strip()}"
+            told = f"#{mutant.number} {mutant.line}: {mutant.what} | {lines[mutant.line - 1].strip()}"
             if (file, lines[mutant.line - 1].strip(), mutant.what) in self.equal:
                 verdict.equal.append(told)
                 continue
-            tests = survey.reaching(file, mutant.first, mutant.last)
+            tests = survey.reaching(file, mutant.first, mutant.last, self.budget)
             mutant.make()
             try:
                 code = compile(ast.fix_missing_locations(tree), str(ROOT / file), "exec")
@@ -117,7 +123,7 @@ class Survey:
     seconds: list[float]
     failed: list[str]
 
-    def reaching(self, file: str, first: int, last: int) -> list[int]:
+    def reaching(self, file: str, first: int, last: int, budget: float) -> list[int]:
         """Tests that run a line in this range, as far as the budget goes: quick modules and quick tests first.
 
         Tests of one module stay together, since they share fixtures.
@@ -128,7 +134,7 @@ class Survey:
         kept, total = [], 0.0
         for i in hits:
             total += self.seconds[i]
-            if self.seconds[i] <= LONGEST_TEST and total <= BUDGET:
+            if self.seconds[i] <= LONGEST_TEST and total <= budget:
                 kept.append(i)
         rank = {module: place for place, module in enumerate(dict.fromkeys(self.modules[i] for i in kept))}
         return sorted(kept, key=lambda i: rank[self.modules[i]])
