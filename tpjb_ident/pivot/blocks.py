@@ -160,6 +160,8 @@ def _branches(number: IntArray, along: FloatArray, holds: tuple[Hold, ...]) -> I
 
 def _directions(load: FloatArray) -> IntArray:
     """Sense of the load's way (m,): it turns only when the load has come back by `TURN` of its range."""
+    if not len(load):  # a logger too slow for a single piece
+        return np.zeros(0, dtype=int)
     turn = TURN * float(np.ptp(load))
     off = load - load[0]
     now = 1 if off[int(np.argmax(np.abs(off) > turn))] >= 0.0 else -1
