@@ -18,7 +18,10 @@ import numpy as np
 import pandas as pd
 
 from rigdata.operating_point import OperatingPoint
+from tests.unit.evidence_cases import rows
 from tpjb_ident.clearance import ClearancePolygon
+from tpjb_ident.evidence.counts import SPECIAL, confusion_matrix
+from tpjb_ident.evidence.measures import closure_table, coverage_table, no_effect_p, power_table
 from tpjb_ident.locus import Locus, LocusPoint
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
 from tpjb_ident.pivot.fit import LAWS
@@ -212,6 +215,15 @@ CASES = {
     "gap": lambda: plots.gap(GAPS),
     "gap_controls": lambda: plots.gap_controls(
         11.9, 1.2, {"best wrong effect": (6.3, 5.1, 7.7), "no-effect campaign": 1.04}, noise_floor=0.9
+    ),
+    "confusion": lambda: plots.confusion(confusion_matrix(rows(), size=6.0), SPECIAL),
+    "power": lambda: plots.power(power_table(rows())),
+    "p_values": lambda: plots.p_values(no_effect_p(rows()), 0.01),
+    "interval_coverage": lambda: plots.interval_coverage(coverage_table(rows())),
+    "closures": lambda: plots.closures(closure_table([r for r in rows() if "rung" not in r])),
+    "outcomes": lambda: plots.outcomes(
+        {"hidden, d' = 6": {"named right": 7, "group right": 1, "consistent": 2, "named wrong": 1},
+         "left out": {"unexplained": 5, "group wrong": 1, "named wrong": 2}}, [11, 8]
     ),
 }  # fmt: skip
 

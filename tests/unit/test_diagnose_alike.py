@@ -14,13 +14,13 @@ from model.setup import Mesh, Setup
 from tpjb_ident.diagnose.candidates import candidates
 from tpjb_ident.diagnose.decide import strongest_rival
 from tpjb_ident.diagnose.diagnose import solve
-from tpjb_ident.diagnose.evidence import outcome
 from tpjb_ident.diagnose.layout import Layout
 from tpjb_ident.diagnose.nuisance import Nuisances
 from tpjb_ident.diagnose.planned import dynamic, planned_observations
 from tpjb_ident.diagnose.problem import Problem
 from tpjb_ident.diagnose.settings import DiagnoseSettings
 from tpjb_ident.diagnose.surrogate import EffectTable, Surrogate
+from tpjb_ident.evidence.outcome import outcome
 
 BEARINGS = Path(__file__).parents[2] / "model" / "bearings"
 SPEED = 2 * math.pi * 22

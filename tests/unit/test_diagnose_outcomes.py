@@ -2,7 +2,10 @@
 
 import pytest
 
-from tpjb_ident.diagnose.evidence import confusion_table, markdown, outcome, summary_table, upper_bound
+from tpjb_ident.evidence.counts import confusion_table, summary_table
+from tpjb_ident.evidence.outcome import outcome
+from tpjb_ident.evidence.shares import upper_bound
+from tpjb_ident.evidence.tables import markdown
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,54 @@
+"""Rows of trials made by hand, as an evaluation would write them."""
+
+from __future__ import annotations
+
+import itertools
+
+NAMES = ("soft_pivot", "oil_viscosity", "channel_delay")
+
+
+def row(kind="hidden", said="soft_pivot pad 5", **other):
+    """One trial of a soft pivot; `said` is a verdict, a label or a group of labels."""
+    full = {
+        "kind": kind, "truth": () if kind == "none" else ("soft_pivot pad 5",), "size": 0.0 if kind == "none" else 6.0,
+        "noise": 1.0, "number": 0, "names": () if kind == "none" else ("soft_pivot",), "groups": (),
+        "alternatives": (), "labels": (), "found": (), "p_before": 0.5 if kind == "none" else 1e-6,
+    }  # fmt: skip
+    if said in {"consistent", "unexplained", "unreachable"}:
+        full["verdict"] = said
+    elif isinstance(said, tuple):
+        names = tuple(label.split(" ")[0] for label in said)
+        full |= {"verdict": "ambiguous", "labels": said[:1], "found": names[:1], "groups": (names,),
+                 "alternatives": (said,)}  # fmt: skip
+    else:
+        full |= {"verdict": "named", "labels": (said,), "found": (said.split(" ")[0],)}
+    return {**full, **other}
+
+
+def rows():
+    """Some of everything: both rungs, three sizes, nothing hidden, left out, simple rules."""
+    numbers, out = itertools.count(), []
+
+    def add(count, *arguments, **other):
+        out.extend(row(*arguments, number=next(numbers), **other) for _ in range(count))
+
+    naive = {"largest score": "soft_pivot", "training chi-square": "soft_pivot", "BIC": "", "random": "oil_viscosity"}
+    known = {"true_value": 0.5, "value": 0.52, "lo": 0.4, "hi": 0.6}
+    closed = {"closed": 1.05, "closed_wrong": 0.3, "closed_ceiling": 0.9}
+    for size, right, shy in ((3.0, 1, 6), (6.0, 6, 2), (12.0, 8, 0)):
+        add(right, size=size, naive=naive, **known, **closed)
+        add(1, size=size, **{**known, "lo": 0.6, "hi": 0.7}, closed=0.8, closed_wrong=0.5, closed_ceiling=0.6)
+        add(shy, said="consistent", size=size)
+        add(1, said=("soft_pivot pad 5", "channel_delay"), size=size, noise=2.0)
+    add(1, said="soft_pivot pad 4", size=6.0)
+    add(3, said="oil_viscosity", size=12.0, truth=("oil_viscosity",), names=("oil_viscosity",), **known, **closed)
+    add(4, said="soft_pivot pad 5", size=12.0, rung="raw volts", plan="paper", **known, **closed)
+    add(2, said="unexplained", size=24.0, rung="raw volts, no locus", plan="no locus")
+    for k in range(20):
+        add(1, "none", "consistent", p_before=(k + 0.5) / 20, placebo_fall=0.02 * (k - 9), naive=naive)
+    add(1, "none", "oil_viscosity", p_before=0.001, placebo_fall=0.2, naive=naive)
+    add(3, "none", "consistent", p_before=0.4, rung="raw volts", plan="paper")
+    add(5, "left out", "unexplained", size=12.0, naive=naive)
+    add(2, "left out", "channel_delay", size=12.0, naive=naive)
+    add(1, "left out", ("channel_delay", "oil_viscosity"), size=12.0)
+    return out
