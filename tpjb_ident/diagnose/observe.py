@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from tpjb_ident.clearance import ClearancePolygon
 from tpjb_ident.diagnose.layout import DryTest, DynamicTest, Layout, LocusTest
+from tpjb_ident.diagnose.load_scatter import moved_by_miss
 from tpjb_ident.diagnose.tolerance import Tolerance
 from tpjb_ident.dynamic.identification import Identification
+from tpjb_ident.dynamic.mains import MAINS_CORRECTED, MAINS_ON_LINE
 from tpjb_ident.dynamic.point_result import PointResult
 from tpjb_ident.locus import Locus
 from tpjb_ident.pivot.curve import PivotCurve
@@ -150,7 +152,7 @@ def observe(
     tolerance = tolerance or Tolerance()
     builder = _Builder()
     dynamic = _add_dynamic(builder, identification, locus, tolerance)
-    locus_tests = _add_locus(builder, locus, tolerance) if locus is not None else ()
+    locus_tests = _add_locus(builder, locus, identification, tolerance) if locus is not None else ()
     dry = tuple(_add_dry(builder, c, tolerance) for c in curves if _usable(c))
     push = _add_clearance(builder, polygon, tolerance) if polygon is not None else None
     n = len(builder.value)
@@ -194,7 +196,7 @@ def _add_dynamic(
 
 def _struck_by_mains(result: PointResult) -> bool:
     """Whether mains hum lies on the excitation and could not be taken off: no interval covers that."""
-    return "mains on excitation line" in result.quality and "mains corrected" not in result.quality
+    return MAINS_ON_LINE in result.quality and MAINS_CORRECTED not in result.quality
 
 
 def _add_stiffness(builder: _Builder, result, base: tuple, tolerance: Tolerance) -> None:  # type: ignore[no-untyped-def, type-arg]
@@ -225,23 +227,26 @@ def _mean_temperatures(rows: Sequence[dict[int, float]]) -> dict[int, float]:
     return {pad: t - 273.15 for pad, t in mean.items()}
 
 
-def _add_locus(builder: _Builder, locus: Locus, tolerance: Tolerance) -> tuple[LocusTest, ...]:
+def _add_locus(
+    builder: _Builder, locus: Locus, identification: Identification, tolerance: Tolerance
+) -> tuple[LocusTest, ...]:
+    """Positions and load readings; a load that misses its set point moves both, so they share an error."""
     out = []
-    for i, p in enumerate(locus.points):
+    spread = np.diag([tolerance.load_miss**2, tolerance.direction_miss**2])
+    unit = (tolerance.fine_position, tolerance.fine_position, 0.001, 0.001)
+    stated = (tolerance.position, tolerance.position, 0.003, 0.003)
+    for i, (p, give) in enumerate(zip(locus.points, moved_by_miss(locus, identification), strict=True)):
         where = (
             ("load", p.point.static_load), ("direction", p.point.static_load_direction), ("speed", p.point.shaft_speed),
         )  # fmt: skip
-        block = f"locus {i % 5}"
+        names = (("locus", "locus_x"), ("locus", "locus_y"), ("load", "load_ratio"), ("load", "load_turn"))
+        turn = math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)
+        both = np.vstack([give, np.eye(2)])
+        covariance = both @ spread @ both.T
+        covariance[:2, :2] += p.covariance
         builder.add(
-            [Element("locus", "locus_x", block, where), Element("locus", "locus_y", block, where)],
-            p.position, p.covariance, (tolerance.position, tolerance.fine_position),
-        )  # fmt: skip
-        miss = p.load_direction - p.point.static_load_direction
-        turn = math.remainder(miss, 2 * math.pi)
-        spread = np.diag([tolerance.load_miss**2, tolerance.direction_miss**2])
-        builder.add(
-            [Element("load", "load_ratio", block, where), Element("load", "load_turn", block, where)],
-            np.array([p.load / p.point.static_load, turn]), spread, (0.003, 0.001),
+            [Element(family, name, f"locus {i % 5}", where) for family, name in names],
+            np.array([*p.position, p.load / p.point.static_load, turn]), covariance, (np.array(stated), np.array(unit)),
         )  # fmt: skip
         out.append(LocusTest(p.point.static_load, p.point.static_load_direction, p.point.shaft_speed))
     return tuple(out)

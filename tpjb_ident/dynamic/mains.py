@@ -23,6 +23,7 @@ from tpjb_ident.dynamic.run_phasors import RunPhasors
 from tpjb_ident.dynamic.stiffness import DynamicStiffness
 
 MAINS_ON_LINE = "mains on excitation line"
+MAINS_CORRECTED = "mains corrected"
 #: Runs that must show the pick-up apart from the excitation before its size counts as known.
 MIN_RUNS = 6
 #: How well the probes' phases must agree over the runs to count as one pattern.
@@ -195,7 +196,7 @@ def corrected_condition(pickup: Pickup, fit: MainsFit) -> Condition:
     """What was done about it."""
     size = ", ".join(f"{1e6 * s:.3g} um" for s in pickup.size)
     return Condition(
-        "mains corrected",
+        MAINS_CORRECTED,
         f"pick-up of {size} known from {pickup.runs} other runs, its phase fitted per run "
         f"(reduced chi-square {fit.chi_square:.2g}); intervals widened for it",
     )

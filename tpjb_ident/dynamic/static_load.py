@@ -6,8 +6,7 @@ run's forces are brought to the set point before the estimate: F - (dH/dlnW) * m
 
 What the cells say is taken relative to the campaign's own mean: a gain error of the cells would
 look like a miss of all runs alike, and the set point is met by the actuators' own transducers.
-Misses in direction are not corrected (their slope cannot be measured by such a campaign); they stay
-in the scatter between runs and so in the interval.
+Misses in direction have a slope of their own, which only the runs' own misses tell: `load_direction`.
 """
 
 from __future__ import annotations
@@ -83,13 +82,11 @@ def load_misses(points: Sequence[Loaded]) -> tuple[list[LoadMiss], complex]:
     ratios = [load_ratio(data) for data in points]
     known = np.concatenate(ratios)
     known = known[np.isfinite(known)]
-    if not len(known):
-        return [LoadMiss(np.zeros(len(r)), np.zeros(len(r)), 0.0) for r in ratios], complex(1.0)
-    if not 0.5 < abs(np.median(known.real)) < 2.0:
-        # Nothing to correct by such cells, but the ratio itself must be told.
-        middle = complex(np.median(known.real), np.median(known.imag))
+    middle = complex(np.median(known.real), np.median(known.imag)) if len(known) else complex(1.0)
+    if not len(known) or not 0.5 < abs(middle.real) < 2.0:
+        # nothing to correct by such cells, but the ratio itself must be told
         return [LoadMiss(np.zeros(len(r)), np.zeros(len(r)), 0.0) for r in ratios], middle
-    distance = np.abs(known - (np.median(known.real) + 1j * np.median(known.imag)))
+    distance = np.abs(known - middle)
     inner = known[distance <= 4 * np.median(distance) + 1e-12]
     common = complex(inner.mean())
     uncertainty = float(inner.real.std() / np.sqrt(len(inner)))
