@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import hypothesis
-import numpy as np
 import pytest
 
 # how long an example takes says how busy the machine is, nothing about the code
@@ -30,37 +28,19 @@ def rocker_file() -> Path:
 
 
 @pytest.fixture(scope="session")
-def small_campaign(tmp_path_factory, rocker_file) -> Path:
+def small_campaign(tmp_path_factory) -> Path:
     """HDF5 campaign of a linear bearing: two loads, three directions, three locus runs, one sweep, no dry tests."""
-    from rigdata.virtual_rig import (
-        ClearanceSweep,
-        Instruments,
-        Noise,
-        RigPlan,
-        RigTruth,
-        Timing,
-        VirtualRig,
-        locus_points,
-        operating_points,
-        write_campaign,
-    )
+    from dataclasses import replace
 
-    k, c = np.array([[1.0e8, 2e6], [1e6, 2.0e8]]), np.array([[5e5, 1e4], [1e4, 7e5]])
-    rig = VirtualRig(
-        truth=RigTruth.constant(k, c, bearing_name="rocker.toml", bearing_text=rocker_file.read_text("utf-8")),
-        plan=RigPlan(
-            dynamic=operating_points([(2500.0, 25.0), (5000.0, 25.0)]),
-            directions=tuple(math.radians(60.0 * i) for i in range(3)),
-            locus=locus_points(3, load=1000.0),
-            clearance=(ClearanceSweep(seconds=8.0),),
-            timing=Timing(dynamic_seconds=1.0),
-        ),
-        instruments=Instruments.like_paper(5, 3),
-        noise=Noise.like_samples(),
-        seed=3,
-        campaign="small <b>&",
-        description='=HYPERLINK("http://example.invalid")<script>alert(1)</script>',
+    from rigdata.virtual_rig import ClearanceSweep, operating_points
+    from tests.good_campaigns import SMALL_PLAN, rocker_rig, written
+
+    plan = replace(
+        SMALL_PLAN,
+        dynamic=operating_points([(2500.0, 25.0), (5000.0, 25.0)]),
+        dry=(),
+        clearance=(ClearanceSweep(seconds=8.0),),
     )
-    path = tmp_path_factory.mktemp("campaign") / "small.h5"
-    write_campaign(path, rig)
-    return path
+    text = '=HYPERLINK("http://example.invalid")<script>alert(1)</script>'
+    rig = rocker_rig(3, plan=plan, campaign="small <b>&", description=text)
+    return written(tmp_path_factory.mktemp("campaign") / "small.h5", rig)

@@ -342,9 +342,16 @@ class Hdf5Reader:
                 if dataset.shape[0] != length:
                     what = f"has {dataset.shape[0]} samples, the others {length}"
                     raise self._error(f"dataset {name}", what, "Store all channels of a run with one length")
-                with np.errstate(invalid="ignore"):  # a signalling NaN is a missing value as well
-                    columns.append(np.asarray(dataset[start:stop], dtype=np.float64))
+                columns.append(self._samples(dataset, name, start, stop))
             return columns
+
+    def _samples(self, dataset: Any, name: str, start: int, stop: int) -> FloatArray:
+        try:
+            with np.errstate(invalid="ignore"):  # a signalling NaN is a missing value as well
+                return np.asarray(dataset[start:stop], dtype=np.float64)
+        except (OSError, RuntimeError) as error:  # what a filter says of damaged bytes
+            what = f"the stored samples are damaged ({_first_line(error)})"
+            raise self._error(f"dataset {name}", what, "Copy the file again from the rig") from error
 
     def stored_hash(self) -> str:
         """SHA-256 of the run as it is stored: its datasets' packed bytes and its attributes."""

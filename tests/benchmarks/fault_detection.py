@@ -17,34 +17,10 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 import rigdata
-from rigdata.virtual_rig import (
-    ClearanceSweep,
-    DryTest,
-    Fault,
-    Noise,
-    RigPlan,
-    RigTruth,
-    Timing,
-    VirtualRig,
-    locus_points,
-    operating_points,
-    write_campaign,
-)
+from rigdata.virtual_rig import Fault
+from tests.good_campaigns import DAMPING, RUN, STIFFNESS, stiff_rig, written
 
-STIFFNESS = np.array([[3.0e8, 0.2e8], [-0.3e8, 4.5e8]])
-DAMPING = np.array([[5e5, 2e4], [1e4, 7e5]])
-RUN = "d-05000-25-03"
-PLAN = RigPlan(
-    dynamic=operating_points([(5000.0, 25.0)]),
-    directions=tuple(math.radians(30.0 * i) for i in range(6)),
-    locus=locus_points(6),
-    dry=tuple(DryTest(p, levels=(1000.0, 3000.0), hold=0.3) for p in range(1, 6)),
-    clearance=(ClearanceSweep(seconds=6.0),),
-    timing=Timing(locus_seconds=1.0),
-)
 #: The faults of the list, in one run unless the name says otherwise.
 FAULTS: dict[str, Fault] = {
     "dead probe": Fault("dead", RUN, "X1A"),
@@ -100,9 +76,7 @@ class Outcome:
 
 def write(path: Path, seed: int, fault: Fault | None, stiffness: float = 1.0) -> None:
     """Write a campaign."""
-    truth = RigTruth.constant(stiffness * STIFFNESS, DAMPING)
-    faults = () if fault is None else (fault,)
-    write_campaign(path, VirtualRig(truth, PLAN, noise=Noise.like_samples(), faults=faults, seed=seed))
+    written(path, stiff_rig(seed, *(() if fault is None else (fault,)), k=stiffness * STIFFNESS))
 
 
 def mix(path: Path, other: Path) -> None:

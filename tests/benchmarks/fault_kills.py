@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
-import math
 import os
 import random
 import shutil
@@ -26,8 +25,6 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = ("identify", "pivot", "locus")
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
@@ -36,38 +33,9 @@ _STEPS = ("os.rename", "os.remove", "os.rmdir", "os.mkdir", "shutil.rmtree")
 
 def write_small_campaign(path: Path, seed: int = 5) -> Path:
     """An HDF5 campaign with a little of everything, not writable."""
-    from rigdata.virtual_rig import (
-        ClearanceSweep,
-        DryTest,
-        Instruments,
-        Noise,
-        RigPlan,
-        RigTruth,
-        Timing,
-        VirtualRig,
-        locus_points,
-        operating_points,
-        write_campaign,
-    )
+    from tests.good_campaigns import rocker_rig, written
 
-    k, c = np.array([[1.0e8, 2e6], [1e6, 2.0e8]]), np.array([[5e5, 1e4], [1e4, 7e5]])
-    bearing = (ROOT / "model" / "bearings" / "rocker.toml").read_text("utf-8")
-    plan = RigPlan(
-        dynamic=operating_points([(5000.0, 25.0)]),
-        directions=tuple(math.radians(60.0 * i) for i in range(3)),
-        locus=locus_points(3, load=1000.0),
-        dry=tuple(DryTest(p, levels=(500.0, 1000.0, 2000.0, 3000.0), hold=0.3) for p in range(1, 6)),
-        clearance=(ClearanceSweep(seconds=6.0),),
-        timing=Timing(dynamic_seconds=1.0),
-    )
-    rig = VirtualRig(
-        RigTruth.constant(k, c, bearing_name="rocker.toml", bearing_text=bearing),
-        plan,
-        Instruments.like_paper(5, 3),
-        Noise.like_samples(),
-        seed=seed,
-    )
-    write_campaign(path, rig)
+    written(path, rocker_rig(seed))
     path.chmod(0o444)
     return path
 

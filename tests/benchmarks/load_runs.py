@@ -22,28 +22,27 @@ from typing import Any
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
 DIRECTIONS = 6
 FREQUENCIES = (10.0, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 55.0)
 
 
 def _rig(points: int) -> Any:
-    from rigdata.virtual_rig import Instruments, Noise, RigPlan, RigTruth, Timing, VirtualRig, operating_points
+    from rigdata.virtual_rig import RigPlan, Timing, operating_points
+    from tests.good_campaigns import directions, rocker_rig
 
     loads = np.linspace(2000.0, 9000.0, math.ceil(points / len(FREQUENCIES)))
     wanted = [(round(float(load), 0), f) for load in loads for f in FREQUENCIES][:points]
-    k, c = np.array([[1.0e8, 2e6], [1e6, 2.0e8]]), np.array([[5e5, 1e4], [1e4, 7e5]])
-    bearing = (ROOT / "model" / "bearings" / "rocker.toml").read_text("utf-8")
-    plan = RigPlan(
-        dynamic=operating_points(wanted),
-        directions=tuple(math.radians(180.0 / DIRECTIONS * i) for i in range(DIRECTIONS)),
-        locus=(),
-        dry=(),
-        clearance=(),
-        timing=Timing(dynamic_seconds=1.0),
+    return rocker_rig(
+        11,
+        plan=RigPlan(
+            dynamic=operating_points(wanted),
+            directions=directions(DIRECTIONS),
+            locus=(),
+            dry=(),
+            clearance=(),
+            timing=Timing(dynamic_seconds=1.0),
+        ),
     )
-    truth = RigTruth.constant(k, c, bearing_name="rocker.toml", bearing_text=bearing)
-    return VirtualRig(truth, plan, Instruments.like_paper(5, 3), Noise.like_samples(), seed=11)
 
 
 def make(path: Path, runs: int, gigabytes: float) -> int:

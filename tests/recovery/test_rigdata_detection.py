@@ -2,52 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
 import pytest
 
 import rigdata
 from rigdata.problem import Problem
-from rigdata.virtual_rig import (
-    ClearanceSweep,
-    DryTest,
-    Fault,
-    Noise,
-    RigPlan,
-    RigTruth,
-    Timing,
-    VirtualRig,
-    locus_points,
-    operating_points,
-    write_campaign,
-)
+from rigdata.virtual_rig import Fault, Noise
+from tests.good_campaigns import RUN, stiff_rig, written
 
 pytestmark = pytest.mark.slow
 
-STIFFNESS = np.array([[3.0e8, 0.2e8], [-0.3e8, 4.5e8]])
-DAMPING = np.array([[5e5, 2e4], [1e4, 7e5]])
-PLAN = RigPlan(
-    dynamic=operating_points([(5000.0, 25.0)]),
-    directions=tuple(math.radians(30.0 * i) for i in range(6)),
-    locus=locus_points(6),
-    dry=tuple(DryTest(p, levels=(1000.0, 3000.0), hold=0.3) for p in range(1, 6)),
-    clearance=(ClearanceSweep(seconds=6.0),),
-    timing=Timing(locus_seconds=1.0),
-)
-RUN = "d-05000-25-03"
-
 
 def check(folder, *faults: Fault, seed: int = 1, noise: Noise | None = None, layout: str = "hdf5") -> list[Problem]:
-    rig = VirtualRig(
-        RigTruth.constant(STIFFNESS, DAMPING),
-        PLAN,
-        noise=Noise.like_samples() if noise is None else noise,
-        faults=faults,
-        seed=seed,
-    )
-    path = folder / ("c.h5" if layout == "hdf5" else "c")
-    write_campaign(path, rig, layout)
+    path = written(folder / ("c.h5" if layout == "hdf5" else "c"), stiff_rig(seed, *faults, noise=noise), layout)
     return rigdata.check_campaign(path)
 
 

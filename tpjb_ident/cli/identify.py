@@ -235,7 +235,7 @@ def show_frequency_fits(result: Identification) -> None:
 
 
 def refuse_untrusted(result: Identification) -> None:
-    """End with exit code 3 if a point has no answer or one that is not to be trusted.
+    """End with exit code 3 if a point has no answer, or one that is not to be trusted, or no run any more.
 
     Raises
     ------
@@ -250,6 +250,9 @@ def refuse_untrusted(result: Identification) -> None:
         serious = [c.sentence() for c in p.quality if is_serious(c)]
         if serious or not np.isfinite(p.stiffness.h).all():
             bad.append(f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz: {'; '.join(serious)}")
+    lost = [c.sentence() for c in result.conditions if is_serious(c)]
+    if lost and not bad:
+        raise NotTrustedError("; ".join(lost))
     if bad:
         more = f"\n... and {len(bad) - 5} more" if len(bad) > 5 else ""
-        raise NotTrustedError(f"{len(bad)} of {len(result.points)} points:\n" + "\n".join(bad[:5]) + more)
+        raise NotTrustedError(f"{len(bad)} of {len(result.points)} points:\n" + "\n".join([*bad[:5], *lost]) + more)

@@ -15,6 +15,7 @@ from tpjb_ident.dynamic.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections import Correction, find_corrections
 from tpjb_ident.dynamic.estimate import REJECTED_WEIGHT, estimate_table
 from tpjb_ident.dynamic.identification import Identification
+from tpjb_ident.dynamic.left_out import lost_points, named_at_points, named_runs
 from tpjb_ident.dynamic.nominal_drive import nominal_drive
 from tpjb_ident.dynamic.phasor_table import phasor_table
 from tpjb_ident.dynamic.point_data import PointData
@@ -94,9 +95,9 @@ def identify(
     ValueError
         The campaign has no dynamic run, or an unknown method is asked for.
     rigdata.problem.RigDataError
-        A record that cannot be read.
+        None of the records can be read. Single ones are left out and named in the result's conditions.
     RecordTooShortError
-        A record that cannot tell its lines apart.
+        None of the records can tell its lines apart.
     """
     settings = settings or IdentifySettings()
     runs = campaign.of_kind("dynamic")
@@ -130,7 +131,10 @@ def assemble(campaign: Any, shelf: RunShelf, settings: IdentifySettings, tell: P
         points.append(_completed(point, by_method, np.cov(change.T, bias=True), settings.method, used))
         tell("estimating", len(points), len(sources))
     joint = np.concatenate(changes, axis=1)
-    return Identification(campaign.id, settings.method, tuple(points), joint, _campaign_conditions(draws))
+    left, several = shelf.left_out, bool(settings.phasors.excitation_lines)
+    told = named_runs(left, len(digests) + len(left)) + lost_points(points, left, several)
+    named = named_at_points(points, left, several)
+    return Identification(campaign.id, settings.method, named, joint, _campaign_conditions(draws) + told)
 
 
 def _first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffness:

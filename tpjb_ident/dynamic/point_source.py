@@ -46,8 +46,8 @@ class PointSource:
 
 def point_sources(shelf: RunShelf) -> list[PointSource]:
     """Operating points of all runs on a shelf."""
-    digests = shelf.digests
+    digests, places = shelf.digests, shelf.places
     return [
-        PointSource(point, tuple(members), tuple(digests[k] for k, _ in members), shelf)
+        PointSource(point, tuple((places[k], i) for k, i in members), tuple(digests[k] for k, _ in members), shelf)
         for point, members in group([(digest.point, digest.excitations) for digest in digests])
     ]

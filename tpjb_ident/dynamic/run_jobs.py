@@ -12,6 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.problem import RigDataError
+from tpjb_ident.dynamic.conditions import Condition, merged
+from tpjb_ident.dynamic.dead_channels import dead_accelerometers
+from tpjb_ident.dynamic.left_out import LeftOut
 from tpjb_ident.dynamic.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.dynamic.run_result import RunResult
 from tpjb_ident.dynamic.run_shelf import RunShelf
@@ -34,6 +38,8 @@ def all_runs(
 ) -> RunShelf:
     """Phasors and temperatures of every dynamic run, put away on a shelf that the caller closes.
 
+    A run that cannot be used is left out, and the shelf names it.
+
     Parameters
     ----------
     campaign : rigdata.campaign.Campaign
@@ -48,7 +54,7 @@ def all_runs(
     Raises
     ------
     RecordTooShortError, rigdata.problem.RigDataError
-        Of the first run, in order, that cannot be used.
+        Of the first run, in order, where none can be used.
     LostJobsError
         Workers were lost again and again.
     """
@@ -58,18 +64,24 @@ def all_runs(
     shelf = RunShelf(runs, mass, lambda run: one_run(run, mass, settings), store)
     done = 0
 
-    def finished(index: int, answer: tuple[str, RunResult | None]) -> None:
+    def finished(index: int, answer: tuple[str, RunResult | LeftOut | None]) -> None:
         nonlocal done
         mark, result = answer
-        if store is not None and result is not None and mark:
-            store.keep(mark, result)
-        shelf.put(index, result, mark)
+        if isinstance(result, LeftOut):
+            shelf.leave_out(index, result)
+        else:
+            if store is not None and result is not None and mark:
+                store.keep(mark, result)
+            shelf.put(index, result, mark)
         done += 1
         progress(runs[index].id, done, len(runs))
 
     jobs = ((_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs)
     try:
         each_finished(workers or Here(), unless_known, list(jobs), finished)
+        shelf.leave_out_the_odd_ones()
+        if runs and not shelf.places:
+            raise shelf.left_out[0].error
     except BaseException:
         shelf.__exit__(None, None, None)
         raise
@@ -78,12 +90,21 @@ def all_runs(
 
 def unless_known(
     run: Any, housing_mass: float, settings: PhasorSettings, known: str | None
-) -> tuple[str, RunResult | None]:
+) -> tuple[str, RunResult | LeftOut | None]:
     """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
 
     The fingerprint is "" where the record changed while it was read: such a result must not be kept. Where nothing
     is kept anywhere (`known` is None) it is not asked for.
     """
+    try:
+        return _unless_known(run, housing_mass, settings, known)
+    except (RigDataError, RecordTooShortError) as error:
+        return "", LeftOut(run.id, run.point, error)
+
+
+def _unless_known(
+    run: Any, housing_mass: float, settings: PhasorSettings, known: str | None
+) -> tuple[str, RunResult | None]:
     if known is None:
         return "", one_run(run, housing_mass, settings)
     mark = fingerprint(run, housing_mass, settings)
@@ -98,7 +119,10 @@ def _state(run: Any) -> tuple[int, int] | None:
     path = getattr(getattr(run, "reader", None), "path", None)
     if path is None:
         return None
-    state = path.stat()
+    try:
+        state = path.stat()
+    except OSError:  # it has vanished: reading says so, with a better message
+        return None
     return state.st_size, state.st_mtime_ns
 
 
@@ -117,7 +141,15 @@ def one_run(run: Any, housing_mass: float, settings: PhasorSettings) -> RunResul
             phasors = run_phasors(run, housing_mass, settings)
         except RecordTooShortError as error:
             raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
-        return RunResult(phasors, mean_temperatures(run))
+        conditions = merged(phasors.conditions, dead_accelerometers(run, phasors), _mended(run))
+        return RunResult(replace(phasors, conditions=conditions), mean_temperatures(run))
+
+
+def _mended(run: Any) -> tuple[Condition, ...]:
+    """What the reader had to mend in the record."""
+    problems = run.reader.problems() if hasattr(run, "reader") else ()
+    told = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
+    return (Condition("record-damaged", "; ".join(told)),) if told else ()
 
 
 def mean_temperatures(run: Any) -> dict[int, float]:

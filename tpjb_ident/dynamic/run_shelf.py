@@ -15,8 +15,10 @@ from types import TracebackType
 from typing import Any
 
 from rigdata.operating_point import OperatingPoint
+from rigdata.problem import Problem, RigDataError
 from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.conditions import Condition
+from tpjb_ident.dynamic.left_out import DEAD_ACCELEROMETER, LeftOut
 from tpjb_ident.dynamic.mains import mains_line
 from tpjb_ident.dynamic.phasors import PhasorBlock
 from tpjb_ident.dynamic.point_data import finite_mean
@@ -121,6 +123,7 @@ class RunShelf:
         self._runs, self._mass, self._again, self._store = runs, housing_mass, again, store
         self._room = ROOM if room is None else room
         self._digests: dict[int, RunDigest] = {}
+        self._left: dict[int, LeftOut] = {}
         self._memory: dict[int, RunPhasors] = {}
         self._marks: dict[int, str] = {}
         self._folder: tempfile.TemporaryDirectory[str] | None = None
@@ -137,9 +140,36 @@ class RunShelf:
             self._folder = None
 
     @property
+    def places(self) -> list[int]:
+        """Of the runs that can be used, in the campaign's order: what `take` takes."""
+        return sorted(self._digests)
+
+    @property
     def digests(self) -> list[RunDigest]:
-        """Of all runs, in the campaign's order."""
-        return [self._digests[i] for i in range(len(self._runs))]
+        """Of the runs that can be used, in the order of `places`."""
+        return [self._digests[i] for i in self.places]
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """Runs that take no part, in the campaign's order."""
+        return tuple(self._left[i] for i in sorted(self._left))
+
+    def leave_out(self, index: int, why: LeftOut) -> None:
+        """Note that a run takes no part."""
+        self._left[index] = why
+        self._digests.pop(index, None)
+        self._memory.pop(index, None)
+
+    def leave_out_the_odd_ones(self) -> None:
+        """Leave out runs with a dead accelerometer, where most of the others show that there is an acceleration."""
+        dead = [i for i, one in self._digests.items() if DEAD_ACCELEROMETER in one.conditions]
+        if 2 * len(dead) < len(self._digests):
+            for i in dead:
+                run = self._runs[i]
+                (told,) = (c for c in self._digests[i].conditions if c == DEAD_ACCELEROMETER)
+                cure = "Check sensor, cable and amplifier; repeat the run"
+                problem = Problem("error", run.file, "", told.detail, cure, run.id)
+                self.leave_out(i, LeftOut(run.id, run.point, RigDataError(problem)))
 
     def put(self, index: int, result: RunResult | None, mark: str = "") -> None:
         """Put a finished run away.

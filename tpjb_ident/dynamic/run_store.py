@@ -35,7 +35,7 @@ _PARTS = ("phasors", "mean", "noise", "lost")
 
 
 def fingerprint(run: Any, housing_mass: float, settings: PhasorSettings) -> str:
-    """SHA-256 of everything that a run's phasors depend on; "" where the run has no file of its own.
+    """SHA-256 of everything that a run's phasors depend on; "" where the run has no file of its own, or none any more.
 
     Parameters
     ----------
@@ -47,7 +47,10 @@ def fingerprint(run: Any, housing_mass: float, settings: PhasorSettings) -> str:
     reader = getattr(run, "reader", None)
     if reader is None:
         return ""
-    record = reader.stored_hash() if hasattr(reader, "stored_hash") else sha256(reader.path)
+    try:
+        record = reader.stored_hash() if hasattr(reader, "stored_hash") else sha256(reader.path)
+    except OSError:  # whoever reads it next says what is wrong with it
+        return ""
     entry = (run.id, run.kind, run.point, run.excitation_direction, dict(run.channels), reader)
     described = (dict(getattr(reader, "channels", {})), housing_mass, settings)
     text = "\n".join([record, repr(entry), repr(described), code_stamp()])

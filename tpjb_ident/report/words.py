@@ -41,6 +41,12 @@ MEANING = {
     "channels or a delay.",
     "no-spare-direction": "With two directions only, the interval holds how repeats differ, not how runs do. "
     "Excite in a third direction.",
+    "accelerometer-dead": "An accelerometer reads one value throughout: the housing's inertia along it stays in the "
+    "force. Check it, or set the channel to ignore.",
+    "point-lost": "None of the runs at an operating point can be used: it has no coefficients.",
+    "record-damaged": "A record had to be mended when it was read, and part of it is lost. Copy it again from the rig.",
+    "run-left-out": "A run at this point cannot be used and takes no part; the others stand.",
+    "runs-left-out": "Some runs cannot be used and take no part; the others stand.",
     "run-without-data": "A run gave no usable window and takes no part.",
     "windows-missing": "Parts of the records gave no phasors and take no part.",
     "iteration-limit": "The estimator stopped before it settled.",
@@ -84,6 +90,7 @@ SERIOUS = frozenset(
         "cells-contradict-set-points",
         "contact-never-complete",
         "outside-polygon",
+        "point-lost",
         "fewer-than-two-directions",
         "ill-conditioned",
         "iteration-limit",

@@ -1,0 +1,166 @@
+"""One damaged run costs itself and no other: commands name it and go on, as long as most of its kind are sound."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from rigdata.virtual_rig import operating_points
+from tests.good_campaigns import SMALL_PLAN, rocker_rig, written
+from tpjb_ident.cli.app import app
+
+RUN = "d-05000-25-02"
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    """The same campaign as HDF5 file and as CSV folder."""
+    folder = tmp_path_factory.mktemp("good")
+    rig = rocker_rig(5, plan=replace(SMALL_PLAN, dynamic=operating_points([(2500.0, 25.0), (5000.0, 25.0)])))
+    return written(folder / "c.h5", rig), written(folder / "csv", rig, "csv")
+
+
+def call(*words):
+    return CliRunner().invoke(app, [str(w) for w in words])
+
+
+def no_file(path, run):
+    (path / "runs" / f"{run}.csv").unlink()
+
+
+def empty_file(path, run):
+    (path / "runs" / f"{run}.csv").write_bytes(b"")
+
+
+def cut_off(path, run):
+    """Most of the record lost, in the middle of a line."""
+    file = path / "runs" / f"{run}.csv"
+    file.write_bytes(file.read_bytes()[:400])
+
+
+def garbage(path, run):
+    file = path / "runs" / f"{run}.csv"
+    data = file.read_bytes()
+    half = len(data) // 2
+    file.write_bytes(data[:half] + np.random.default_rng(1).bytes(3000) + data[half:])
+
+
+def torn_chunk(path, run):
+    with h5py.File(path) as file:
+        where = file[f"runs/{run}/X1A"].id.get_chunk_info(0)
+    with path.open("r+b") as file:
+        file.seek(where.byte_offset)
+        file.write(b"\xff" * where.size)
+
+
+def no_group(path, run):
+    with h5py.File(path, "r+") as file:
+        del file[f"runs/{run}"]
+
+
+def constant(channel, value):
+    def damage(path, run):
+        with h5py.File(path, "r+") as file:
+            group = file[f"runs/{run}"]
+            values = np.full(group[channel].shape, value, "f4")
+            del group[channel]
+            group[channel] = values
+
+    return damage
+
+
+CSV = {"missing file": no_file, "empty file": empty_file, "cut off": cut_off, "garbage": garbage}
+HDF5 = {
+    "torn chunk": torn_chunk,
+    "missing group": no_group,
+    "probe NaN": constant("X1A", np.nan),
+    "cell NaN": constant("L1H", np.nan),
+    "probe zero": constant("X1A", 0.0),
+    "cell zero": constant("L1V", 0.0),
+}
+DAMAGE = CSV | HDF5
+
+
+@pytest.fixture
+def spoilt(good, tmp_path):
+    """Copies of the good campaign, each with some runs damaged."""
+
+    def make(name, *runs):
+        source = good[1] if name in CSV else good[0]
+        path = tmp_path / source.name
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, path)
+        for run in runs:
+            (DAMAGE | {"accelerometer zero": constant("A1V", 0.0)})[name](path, run)
+        return path
+
+    return make
+
+
+def error_of(out, truth_row):
+    row = pd.read_csv(out / "coefficients.csv").set_index("static_load_N").loc[truth_row]
+    return max(abs(row["kxx_N_per_m"] / 1e8 - 1), abs(row["kyy_N_per_m"] / 2e8 - 1), abs(row["cxx_Ns_per_m"] / 5e5 - 1))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*DAMAGE, "accelerometer zero"])
+def test_identify_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path, name):
+    path = spoilt(name, RUN)
+    told = call("identify", path, "--workers", 1, "--out", tmp_path / "out")
+    assert told.exit_code == 0, told.output
+    assert RUN in told.output
+    table = pd.read_csv(tmp_path / "out" / "coefficients.csv").set_index("static_load_N")
+    assert list(table.index) == [2500.0, 5000.0]
+    assert "left-out" in table["quality"][5000.0] or "run-without-data" in table["quality"][5000.0]
+    assert "left-out" not in table["quality"][2500.0]
+    assert error_of(tmp_path / "out", 5000.0) < 0.02
+
+
+def test_a_check_names_every_damaged_run(spoilt):
+    for name in DAMAGE:
+        path = spoilt(name, RUN)
+        told = call("check", path)
+        assert told.exit_code == 2, (name, told.output)
+        assert RUN in told.output, name
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def test_a_record_that_lost_its_end_is_said_to_be_damaged(spoilt, tmp_path):
+    path = spoilt("missing file")
+    file = path / "runs" / f"{RUN}.csv"
+    file.write_bytes(file.read_bytes()[:-30])
+    told = call("identify", path, "--workers", 1, "--out", tmp_path / "out")
+    assert told.exit_code == 0
+    assert "record-damaged" in told.output
+    assert f"{RUN}.csv" in told.output
+
+
+def test_a_point_that_loses_all_its_runs_is_lost_and_the_answer_not_to_be_trusted(spoilt, tmp_path):
+    told = call(
+        "identify", spoilt("missing group", *(f"d-05000-25-0{i}" for i in (1, 2, 3))), "--out", tmp_path / "out"
+    )
+    assert told.exit_code == 3
+    assert "no usable run at 5 kN, 25 Hz" in told.output
+    assert pd.read_csv(tmp_path / "out" / "coefficients.csv")["static_load_N"].tolist() == [2500.0]
+
+
+def test_where_no_run_is_left_nothing_is_written(spoilt, tmp_path):
+    runs = [f"d-0{load}-25-0{i}" for load in (2500, 5000) for i in (1, 2, 3)]
+    told = call("identify", spoilt("probe zero", *runs), "--out", tmp_path / "out")
+    assert told.exit_code == 2
+    assert "X1A" in told.output
+    assert "is dead" in told.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_accelerometer_dead_in_all_runs_is_told_and_costs_no_run(spoilt, tmp_path):
+    runs = [f"d-0{load}-25-0{i}" for load in (2500, 5000) for i in (1, 2, 3)]
+    told = call("identify", spoilt("accelerometer zero", *runs), "--out", tmp_path / "out")
+    assert told.exit_code == 0
+    assert "accelerometer-dead" in told.output
+    assert pd.read_csv(tmp_path / "out" / "coefficients.csv")["n_records"].tolist() == [3, 3]
