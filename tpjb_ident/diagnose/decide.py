@@ -31,15 +31,15 @@ def decide(problem: Problem, found: Search, settings: DiagnoseSettings) -> Verdi
     """
     observations, held = problem.observations, problem.held
     scale = found.after.scale
-    groups = _groups(found, scale, settings)
-    name, reasons = _judge(problem, found, groups, settings)
+    groups, spelt = _groups(found, scale, settings), _alternatives(found, scale, settings)
+    name, reasons = _judge(problem, found, spelt, settings)
     model = found.model if name in {"named", "ambiguous"} else found.baseline
     shown = found.model if found.model.candidates else found.baseline
     return Verdict(
         verdict=name,
         effects=_effects(found, scale) if model.candidates else (),
         indistinguishable=groups if name == "ambiguous" else (),
-        alternatives=_alternatives(found, scale, settings) if name == "ambiguous" else (),
+        alternatives=spelt if name == "ambiguous" else (),
         below_floor=_below_floor(found, settings),
         next_test="",
         candidates=_ranked(found, observations, held, int(problem.misfit.train.sum())),
@@ -57,7 +57,7 @@ def decide(problem: Problem, found: Search, settings: DiagnoseSettings) -> Verdi
 
 
 def _judge(
-    problem: Problem, found: Search, groups: tuple[tuple[str, ...], ...], settings: DiagnoseSettings
+    problem: Problem, found: Search, alike: tuple[tuple[str, ...], ...], settings: DiagnoseSettings
 ) -> tuple[VerdictName, tuple[str, ...]]:
     model, before, after = found.model, found.before, found.after
     if not model.candidates:
@@ -78,9 +78,8 @@ def _judge(
             f"held-out gap {gaps[0]:.2f} -> {gaps[1]:.2f}; what is left is small but structured, most in "
             f"{after.structure.words}"
         )
-    if groups:
-        spelt = _alternatives(found, after.scale, settings)
-        return "ambiguous", (*(f"{' or '.join(group)}: these data cannot tell" for group in spelt), text)
+    if alike:
+        return "ambiguous", (*(f"{' or '.join(group)}: these data cannot tell" for group in alike), text)
     return "named", (text,)
 
 

@@ -51,14 +51,10 @@ class Solved:
     def read(self, setup: Setup, lines: tuple[float, ...]) -> Reading:
         """As the instruments of a set-up show it."""
         instruments = setup.instruments
-        h = [
-            instruments.force_map(w) @ one @ np.linalg.inv(instruments.displacement_map(w))
-            for w, one in zip(lines, self.h, strict=True)
-        ]
-        outside = self.position + setup.series_compliance * self.force
         return Reading(
-            np.array(h), (instruments.displacement_map(0.0) @ outside).real,
-            (instruments.force_map(0.0) @ self.force).real, self.temperature, self.pad_load,
+            instruments.shown_stiffness(self.h, np.array(lines)),
+            instruments.shown_position(self.position + setup.series_compliance * self.force),
+            instruments.shown_load(self.force), self.temperature, self.pad_load,
         )  # fmt: skip
 
 
