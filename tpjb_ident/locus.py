@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -122,29 +123,48 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     Raises
     ------
     RigDataError
-        When the campaign has no locus runs, or one of them holds no usable samples.
+        When the campaign has no locus runs, or half of them or more cannot be used. Fewer are left out, and the status
+        names them.
     """
     runs = campaign.of_kind("locus")
     if not runs:
         raise RigDataError(
             Problem("error", "campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
         )
-    read = [_read(run) for run in runs]
+    found, refused = _usable(runs)
+    orders, read = list(found), list(found.values())
     noise = _noise(read)
     centre = np.zeros(2) if polygon is None else polygon.centre
-    drift = _drift(read, noise, centre)
+    drift = _drift(found, noise, centre)
     known = np.isfinite(drift.rate).all()
     drifts, drift_variance = (drift.rate, drift.variance) if known else (np.zeros(2), 0.0)
     centre_covariance = np.zeros((2, 2)) if polygon is None else polygon.centre_covariance
     points = []
-    for order, (run, record) in enumerate(zip(runs, read, strict=True)):
+    for order, record in zip(orders, read, strict=True):
+        run = runs[order]
         position = record.position - drifts * order - centre
         variance = (noise.mean_variance(record.span) + order**2 * drift_variance) * np.eye(2)
         points.append(
             LocusPoint(run.id, run.point, record.load, record.direction, position, variance + centre_covariance)
         )
     points.sort(key=lambda p: (p.point.static_load, p.point.shaft_speed, _from_down(p.point.static_load_direction)))
-    return Locus(tuple(points), np.asarray(centre), drift.rate, _status(points, polygon, drift.rate))
+    status = (*_status(points, polygon, drift.rate), *refused)
+    return Locus(tuple(points), np.asarray(centre), drift.rate, status)
+
+
+def _usable(runs: Sequence[Run]) -> tuple[dict[int, _Read], tuple[str, ...]]:
+    """Runs that can be used, by their number in the order of testing, and a condition that names the others."""
+    found: dict[int, _Read] = {}
+    problems: list[Problem] = []
+    for order, run in enumerate(runs):
+        try:
+            found[order] = _read(run)
+        except RigDataError as error:
+            problems += error.problems
+    if 2 * len(found) <= len(runs):
+        raise RigDataError(problems)
+    reasons = {str(p.run): p.what for p in reversed(problems)}
+    return found, ("runs-refused: " + "; ".join(f"{run} ({reasons[run]})" for run in reasons),) if reasons else ()
 
 
 @dataclass(frozen=True)
@@ -225,7 +245,7 @@ class _Drift:
     variance: float
 
 
-def _drift(read: list[_Read], noise: NoiseModel, centre: FloatArray) -> _Drift:
+def _drift(found: dict[int, _Read], noise: NoiseModel, centre: FloatArray) -> _Drift:
     """Drift from repeats of one set point.
 
     Runs are evenly spaced in time as far as anyone knows: the drift is taken as proportional to the run's number. A
@@ -233,10 +253,9 @@ def _drift(read: list[_Read], noise: NoiseModel, centre: FloatArray) -> _Drift:
     may stand elsewhere without any drift.
     """
     pairs = []
-    for i, first in enumerate(read):
-        for j in range(i + 1, len(read)):
-            other = read[j]
-            if _same_set_point(first.point, other.point):
+    for i, first in found.items():
+        for j, other in found.items():
+            if i < j and _same_set_point(first.point, other.point):
                 miss = math.hypot(
                     other.load / max(first.load, 1e-300) - 1.0,
                     math.remainder(other.direction - first.direction, 2 * math.pi),

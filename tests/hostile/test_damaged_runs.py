@@ -164,3 +164,38 @@ def test_an_accelerometer_dead_in_all_runs_is_told_and_costs_no_run(spoilt, tmp_
     assert told.exit_code == 0
     assert "accelerometer-dead" in told.output
     assert pd.read_csv(tmp_path / "out" / "coefficients.csv")["n_records"].tolist() == [3, 3]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["torn chunk", "probe zero", "cut off"])
+def test_pivot_goes_on_without_a_damaged_run_and_says_which_pad_has_no_curve(spoilt, tmp_path, name):
+    told = call("pivot", spoilt(name, "p-2-up"), "--out", tmp_path / "out")
+    assert told.exit_code == 3, told.output
+    assert "pad 2: has no curve" in told.output
+    assert told.output.count("p-2-up") >= 1
+    assert sorted(set(pd.read_csv(tmp_path / "out" / "pivot_curves.csv")["pad"])) == [1, 3, 4, 5]
+
+
+def test_most_dry_runs_damaged_is_no_accident(spoilt, tmp_path):
+    told = call("pivot", spoilt("missing group", "p-1-up", "p-2-up", "p-3-up"), "--out", tmp_path / "out")
+    assert told.exit_code == 2
+    assert all(f"p-{pad}-up" in told.output for pad in (1, 2, 3))
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["missing file", "torn chunk", "probe NaN", "cell zero"])
+def test_locus_goes_on_without_a_damaged_direction(spoilt, tmp_path, name):
+    told = call("locus", spoilt(name, "l-01000-02"), "--out", tmp_path / "out")
+    assert told.exit_code == 0, told.output
+    assert "runs-refused: l-01000-02" in told.output
+    assert pd.read_csv(tmp_path / "out" / "locus.csv")["run"].tolist() == ["l-01000-01", "l-01000-03"]
+    assert len(pd.read_csv(tmp_path / "out" / "clearance.csv")) == 5
+
+
+def test_without_a_usable_sweep_positions_have_no_centre_and_the_command_says_so(spoilt, tmp_path):
+    told = call("locus", spoilt("missing group", "c-1"), "--out", tmp_path / "out")
+    assert told.exit_code == 3, told.output
+    assert "runs-refused: c-1" in told.output
+    assert "no-centre" in told.output
+    assert not (tmp_path / "out" / "clearance.csv").exists()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tpjb_ident.cli.errors import BadInputError, guarded
+from tpjb_ident.cli.errors import BadInputError, NotTrustedError, guarded
 from tpjb_ident.cli.inputs import open_bearing, open_campaign
 from tpjb_ident.cli.options import BearingOption, CampaignPath, Out, out_folder
 from tpjb_ident.cli.outdir import output_folder
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from model.bearing import Bearing
     from rigdata.campaign import Campaign
     from tpjb_ident.clearance import ClearancePolygon
-    from tpjb_ident.pivot import PivotCurve
+    from tpjb_ident.compare.static_tests import StaticTests
 
 
 @guarded
@@ -34,15 +34,18 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
     drawn, given = open_bearing(source, bearing)
     import numpy as np
 
-    from tpjb_ident.compare.comparison import measure_dry
+    from tpjb_ident.compare.static_tests import measure_static
     from tpjb_ident.report.figure import save_panels
     from tpjb_ident.report.position_panels import position_panels
 
     target = out_folder(out, "locus")
     with output_folder(target, "locus", (campaign,)) as folder:
         with progress("measuring positions"):
-            curves, polygon, found = measure_dry(source, drawn)
-            others = other_polygons(source, drawn, curves, polygon)
+            static = measure_static(source, drawn)
+            polygon, found = static.clearance, static.locus
+            others, refused = other_polygons(source, drawn, static)
+        if polygon is None and found is None:
+            raise BadInputError("; ".join(c.detail for c in static.left_out))
         if found is not None:
             write_table(folder, "locus", found.to_frame())
         if polygon is not None:
@@ -60,20 +63,36 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
     for part in (polygon, found):
         for condition in part.status if part is not None else ():
             note_line("note", condition)
+    for sentence in dict.fromkeys([*(c.sentence() for c in static.left_out), *refused]):
+        if found is None or sentence not in found.status:
+            note_line("note", sentence)
     for other in others:
         say(str(other))
     say(f"Results: {target}")
+    if polygon is None and source.of_kind("clearance"):
+        raise NotTrustedError(
+            "no clearance run can be used: positions count from the probes' zero, not from the centre."
+        )
 
 
 def other_polygons(
-    source: Campaign, drawn: Bearing, curves: Sequence[PivotCurve], polygon: ClearancePolygon | None
-) -> tuple[ClearancePolygon, ...]:
-    """Polygons of the sweeps beside the one that counts."""
+    source: Campaign, drawn: Bearing, static: StaticTests
+) -> tuple[tuple[ClearancePolygon, ...], tuple[str, ...]]:
+    """Polygons of the sweeps beside the one that counts, and what is wrong with those that cannot be used."""
+    from rigdata.problem import RigDataError
     from tpjb_ident.clearance import measure_run
 
     angles = [pad.pivot_angle for pad in drawn.pads]
-    runs = [run for run in source.of_kind("clearance") if polygon is not None and run.id != polygon.run]
-    return tuple(measure_run(run, angles, curves or None) for run in runs)
+    first = static.clearance
+    found, refused = [], []
+    for run in source.of_kind("clearance"):
+        if first is None or run.id == first.run:
+            continue
+        try:
+            found.append(measure_run(run, angles, static.curves or None))
+        except RigDataError as error:
+            refused.append(f"runs-refused: {run.id} ({error.problems[0]})")
+    return tuple(found), tuple(refused)
 
 
 def write_pairs(folder: Path, polygon: ClearancePolygon, others: Sequence[ClearancePolygon]) -> None:

@@ -12,6 +12,9 @@ from tpjb_ident.cli.record import write_record
 from tpjb_ident.cli.show import note_line, progress, say, table
 from tpjb_ident.tables import write_table
 
+#: Conditions of the campaign rather than of one pad.
+ABOUT_ALL = ("runs-refused",)
+
 
 @guarded
 def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None) -> None:
@@ -20,7 +23,7 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
     Writes pivot_curves and pivot_pads (.csv, .parquet), pivots.toml, which `tpjb predict --pivots` reads, and figures.
     """
     from tpjb_ident.compare.pivot_formula import printed_formula
-    from tpjb_ident.pivot import fit_pivots, pads_table, pivot_table, write_pivots
+    from tpjb_ident.pivot import PivotSettings, fit_pivots, pads_table, pivot_table, write_pivots
     from tpjb_ident.report.figure import save_panels
     from tpjb_ident.report.pivot_panels import pivot_panels
 
@@ -29,7 +32,7 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
     target = out_folder(out, "pivot")
     with output_folder(target, "pivot", (campaign,)) as folder:
         with progress("fitting pivot curves"):
-            curves = fit_pivots(source, [pad.pivot_angle for pad in drawn.pads])
+            curves = fit_pivots(source, [pad.pivot_angle for pad in drawn.pads], PivotSettings(on_refusal="few"))
         formula = printed_formula(drawn)
         write_table(folder, "pivot_curves", pivot_table(curves, formula=formula))
         write_table(folder, "pivot_pads", pads_table(curves))
@@ -42,10 +45,15 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
     say(f"Results: {target}")
     from tpjb_ident.report.words import is_serious
 
+    for condition in dict.fromkeys(c for curve in curves for c in curve.status if c.startswith(ABOUT_ALL)):
+        note_line("note", condition)
     for curve in curves:
         for condition in curve.status:
-            note_line("note", f"pad {curve.pad}: {condition}")
+            if not condition.startswith(ABOUT_ALL):
+                note_line("note", f"pad {curve.pad}: {condition}")
     bad = [f"pad {c.pad}: {condition}" for c in curves for condition in c.status if is_serious(condition)]
+    without = sorted({run.pad or 0 for run in source.of_kind("dry_pivot")} - {curve.pad for curve in curves})
+    bad += [f"pad {pad}: has no curve, its records were refused" for pad in without]
     if bad:
         raise NotTrustedError("; ".join(bad))
 

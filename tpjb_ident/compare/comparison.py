@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rigdata.campaign import Campaign
 from tpjb_ident.compare.measured_pivots import measured_laws
 from tpjb_ident.compare.predictions import ModelSettings, PointPrediction, Progress, predict_points
+from tpjb_ident.compare.static_tests import measure_static
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
 from tpjb_ident.model_guard import check_model
 
@@ -152,8 +153,10 @@ def compare_campaign(
     chosen = replace(settings.identify, clearance=settings.identify.clearance or least)
     identification = identify(campaign, chosen, _labelled(tell, "identifying"))
     tell("fitting pivot curves, clearance and locus", 0, 1)
-    curves, clearance, locus = measure_dry(campaign, bearing, "measured" in settings.variants)
+    static = measure_static(campaign, bearing, "measured" in settings.variants)
+    curves, clearance, locus = static.curves, static.clearance, static.locus
     names, remarks = _possible(settings, curves, bearing)
+    remarks += [condition.sentence() for condition in static.left_out]
     if before_predicting is not None:
         tell("compiling the film solver (once on a machine)", 0, 1)
         before_predicting()
@@ -176,29 +179,6 @@ def compare_campaign(
 
 def _labelled(progress: Progress, label: str) -> Progress:
     return lambda text, done, total: progress(f"{label}, {text}", done, total)
-
-
-def measure_dry(
-    campaign: Campaign, bearing: Bearing, with_pivots: bool = True
-) -> tuple[tuple[PivotCurve, ...], ClearancePolygon | None, Locus | None]:
-    """Measure what the campaign holds of pivot curves, clearance polygon and locus.
-
-    Returns
-    -------
-    curves : tuple of PivotCurve
-        Empty without dry tests, or if not asked for.
-    clearance : ClearancePolygon or None
-    locus : Locus or None
-    """
-    from tpjb_ident.clearance import measure_clearance
-    from tpjb_ident.locus import measure_locus
-    from tpjb_ident.pivot import fit_pivots
-
-    angles = [pad.pivot_angle for pad in bearing.pads]
-    curves = fit_pivots(campaign, angles) if with_pivots and campaign.of_kind("dry_pivot") else ()
-    clearance = measure_clearance(campaign, angles, curves or None) if campaign.of_kind("clearance") else None
-    locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
-    return curves, clearance, locus
 
 
 def _possible(

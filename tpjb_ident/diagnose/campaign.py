@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.compare.comparison import ComparisonError, measure_dry
+from tpjb_ident.compare.comparison import ComparisonError
 from tpjb_ident.compare.measured_pivots import measured_laws
+from tpjb_ident.compare.static_tests import measure_static
 from tpjb_ident.diagnose.diagnose import Diagnosis, diagnose
 from tpjb_ident.diagnose.housing import with_housing
 from tpjb_ident.diagnose.nuisance import Certificates
@@ -140,7 +141,9 @@ def measure_campaign(
     chosen = replace(estimator or IdentifySettings(), clearance=least)
     found = identify(campaign, chosen, lambda text, done, total: tell(f"identifying, {text}", 20 * done, 100 * total))
     tell("pivot curves, clearance and locus", 20, 100)
-    curves, polygon, locus = measure_dry(campaign, bearing)
+    static = measure_static(campaign, bearing)
+    curves, polygon, locus = static.curves, static.clearance, static.locus
+    found = replace(found, conditions=found.conditions + static.left_out)
     housing = with_housing(Setup(bearing, pivot_laws("rigid", bearing)), campaign).instruments
     certain = certificates(campaign, known or Certificates())
     if polygon is None and locus is not None:

@@ -68,7 +68,7 @@ def assemble_curve(choice: Choice, noise: NoiseModel, settings: PivotSettings, r
     settings : PivotSettings
         Contact tolerance, warning angle.
     refused : tuple of str
-        Runs of the campaign that were left out.
+        Runs of the campaign that were left out, each with the reason.
 
     Returns
     -------
@@ -205,5 +205,5 @@ def _status(
     if any(record.lost > MANY_LOST for record in choice.records):
         found.append("samples-lost")
     if refused:
-        found.append("runs-refused: " + ", ".join(refused))
+        found.append("runs-refused: " + "; ".join(refused))
     return tuple(found)

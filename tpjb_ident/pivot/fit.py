@@ -72,7 +72,7 @@ def fit_pivots(
     RigDataError
         When the campaign has no dry tests, or records are not what they claim to be (wrong pad, swapped
         channel, wrong angle); carries every refusal, not just the first. With ``settings.on_refusal =
-        "skip"`` refused records are left out as long as any are left, and the curves say so.
+        "few"`` or ``"skip"`` refused records are left out as long as most, or any, are left, and the curves say so.
     """
     chosen = settings or PivotSettings()
     angles = np.asarray(pivot_angles, dtype=float)
@@ -89,9 +89,11 @@ def fit_pivots(
             continue
         if record.run.id not in refused:
             pads.setdefault(record.pad, []).append((record, directions))
-    if problems and (chosen.on_refusal == "raise" or not pads):
+    reasons = {str(p.run): p.what for p in reversed(problems)}
+    many = 2 * len(reasons) >= len(campaign.of_kind("dry_pivot"))
+    if problems and (chosen.on_refusal == "raise" or not pads or (chosen.on_refusal == "few" and many)):
         raise RigDataError(problems)
-    return _curves(pads, noise, chosen, tuple(sorted({str(p.run) for p in problems})))
+    return _curves(pads, noise, chosen, tuple(f"{run} ({reasons[run]})" for run in sorted(reasons)))
 
 
 def _read(campaign: Campaign, angles: FloatArray, settings: PivotSettings) -> tuple[list[DryRecord], list[Problem]]:

@@ -43,8 +43,9 @@ class PivotSettings:
         A hold is left out when it misses the curve by more than this many standard errors.
     extrapolate_to : float
         Tables reach this many times the largest measured load.
-    on_refusal : {"raise", "skip"}
-        Whether one refused record stops everything, or is left out.
+    on_refusal : {"raise", "few", "skip"}
+        Whether one refused record stops everything, is left out as long as fewer than half of the records are refused
+        (more are no accident of single records), or is left out in any case.
     """
 
     laws: tuple[str, ...] = LAW_NAMES
@@ -60,7 +61,7 @@ class PivotSettings:
     drift_rate: float = 1.0e-8
     bad_hold_limit: float = 5.0
     extrapolate_to: float = 2.0
-    on_refusal: Literal["raise", "skip"] = "raise"
+    on_refusal: Literal["raise", "few", "skip"] = "raise"
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.laws if name not in LAW_NAMES]

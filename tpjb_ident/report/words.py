@@ -81,7 +81,7 @@ MEANING = {
     "the sweep itself corrects it.",
     "no-holds": "The load never stood still, so drift cannot be told from deflection.",
     "no-physical-law": "No contact law describes the points; a smooth monotone curve stands in.",
-    "runs-refused": "Some dry runs were refused as not what they claim to be.",
+    "runs-refused": "Some static tests cannot be used, or are not what they claim to be; they take no part.",
     "samples-lost": "Many samples of the record were missing or disturbed.",
 }
 #: With one of these the number is not to be trusted.

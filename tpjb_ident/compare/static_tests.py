@@ -1,0 +1,90 @@
+"""What a campaign holds of pivot curves, clearance polygon and locus; single bad records are left out and named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from rigdata.problem import RigDataError
+from tpjb_ident.dynamic.conditions import Condition
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from model.bearing import Bearing
+    from rigdata.campaign import Campaign
+    from tpjb_ident.clearance import ClearancePolygon
+    from tpjb_ident.locus import Locus
+    from tpjb_ident.pivot import PivotCurve
+
+
+@dataclass(frozen=True)
+class StaticTests:
+    """Results of the static tests.
+
+    Attributes
+    ----------
+    curves : tuple of PivotCurve
+        Empty without dry tests, or if not asked for.
+    clearance : ClearancePolygon or None
+    locus : Locus or None
+    left_out : tuple of Condition
+        Name the records that take no part, and say why.
+    """
+
+    curves: tuple[PivotCurve, ...] = field(repr=False)
+    clearance: ClearancePolygon | None = field(repr=False)
+    locus: Locus | None = field(repr=False)
+    left_out: tuple[Condition, ...] = ()
+
+
+def measure_static(campaign: Campaign, bearing: Bearing, with_pivots: bool = True) -> StaticTests:
+    """Measure what the campaign holds of pivot curves, clearance polygon and locus.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    bearing : Bearing
+        Gives the directions of the pads.
+    with_pivots : bool
+        Whether pivot curves are wanted.
+
+    Raises
+    ------
+    RigDataError
+        Half of the dry runs or of the locus runs, or more, cannot be used: that is no accident of single records.
+    """
+    from tpjb_ident.locus import measure_locus
+    from tpjb_ident.pivot import PivotSettings, fit_pivots
+
+    angles = [pad.pivot_angle for pad in bearing.pads]
+    curves: tuple[PivotCurve, ...] = ()
+    if with_pivots and campaign.of_kind("dry_pivot"):
+        curves = fit_pivots(campaign, angles, PivotSettings(on_refusal="few"))
+    clearance, left = _clearance(campaign, angles, curves)
+    locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
+    left += [told for part in (*curves[:1], locus) if part is not None for told in _refused(part.status)]
+    return StaticTests(curves, clearance, locus, tuple(left))
+
+
+def _clearance(
+    campaign: Campaign, angles: Sequence[float], curves: tuple[PivotCurve, ...]
+) -> tuple[ClearancePolygon | None, list[Condition]]:
+    """Polygon of the coldest sweep that can be used; what is wrong with those before it."""
+    from tpjb_ident.clearance import coldest_run, measure_run
+
+    runs = list(campaign.of_kind("clearance"))
+    left: list[Condition] = []
+    while runs:
+        try:
+            return measure_run(coldest_run(runs), angles, curves or None), left
+        except RigDataError as error:  # a damaged sweep may not even tell how warm it was
+            bad = next((run for run in runs if run.id == error.problems[0].run), runs[0])
+            left.append(Condition("runs-refused", f"{bad.id} ({error.problems[0]})"))
+            runs.remove(bad)
+    return None, left
+
+
+def _refused(status: tuple[str, ...]) -> list[Condition]:
+    parts = (condition.partition(": ") for condition in status)
+    return [Condition(name, detail) for name, _, detail in parts if name == "runs-refused"]
