@@ -113,9 +113,7 @@ def read_plainly(path: Path) -> int:
 def to_phasors(path: Path, count: int = 1) -> None:
     """Turn all runs to phasors."""
     with local_workers(count, preload=("tpjb_ident.dynamic.run_jobs", "h5py")) as workers:
-        shelf = all_runs(load_campaign(path), PhasorSettings(), lambda text, done, total: None, workers)
-        with shelf:
-            pass
+        all_runs(load_campaign(path), PhasorSettings(), lambda text, done, total: None, workers).close()
 
 
 def hdf5_rates(folder: Path, seconds: float, count: int) -> None:

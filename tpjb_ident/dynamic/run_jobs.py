@@ -83,7 +83,7 @@ def all_runs(
         if runs and not shelf.places:
             raise shelf.left_out[0].error
     except BaseException:
-        shelf.__exit__(None, None, None)
+        shelf.close()
         raise
     return shelf
 

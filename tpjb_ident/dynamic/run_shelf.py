@@ -134,6 +134,10 @@ class RunShelf:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Forget the runs, and take the temporary folder away."""
         self._memory.clear()
         if self._folder is not None:
             self._folder.cleanup()
