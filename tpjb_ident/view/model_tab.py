@@ -22,76 +22,110 @@ _NEAR = 0.02
 
 def model_tab(session: Session) -> Any:
     """Build the tab; the session has a predictor and identified points."""
-    from bokeh.io import curdoc
     from bokeh.layouts import column, row
-    from bokeh.models import ColumnDataSource, Div, RadioButtonGroup, Slider
+    from bokeh.models import Div
 
-    found = session.identification
-    assert found is not None
-    assert session.predict is not None
-    points = found.points
+    load, line, pivots = _controls(session)
+    said = Div(name="model-said", sizing_mode="stretch_width")
+    plots, sources = _curve_plots()
+    rest, residual = _residual_plot()
+    follower = _Follower(session, (load, line, pivots), sources, residual, said)
+    for slider in (load, line):
+        slider.on_change("value", lambda attr, old, new: follower.later(follower.update))
+    pivots.on_change("active", lambda attr, old, new: follower.later(follower.update, follower.residuals))
+    follower.update()
+    follower.residuals()
+    return column(row(load, line, pivots), said, row(plots["k"], plots["c"], sizing_mode="stretch_width"), rest,
+                  sizing_mode="stretch_width")  # fmt: skip
+
+
+def _controls(session: Session) -> tuple[Any, Any, Any]:
+    """Sliders of load [kN] and excitation [Hz], and the choice of pivots."""
+    from bokeh.models import RadioButtonGroup, Slider
+
+    assert session.identification is not None
+    points = session.identification.points
     loads = sorted({p.point.static_load for p in points})
-    first = points[0].point
     low, high = 0.8 * loads[0] / 1e3, 1.15 * loads[-1] / 1e3
     load = Slider(title="static load, kN", start=round(low, 2), end=round(high, 2), step=0.05, value=loads[0] / 1e3,
                   name="load", width=320)  # fmt: skip
-    line = Slider(
-        title="excitation, Hz", start=5.0, end=80.0, step=0.5, value=first.excitation_hz, name="line", width=320
-    )
+    first = points[0].point.excitation_hz
+    line = Slider(title="excitation, Hz", start=5.0, end=80.0, step=0.5, value=first, name="line", width=320)
     pivots = RadioButtonGroup(labels=list(session.pivots), active=len(session.pivots) - 1, name="pivots")
-    said = Div(name="model-said", sizing_mode="stretch_width")
-    waiting: dict[Callable[[], None], None] = {}
+    return load, line, pivots
+
+
+def _curve_plots() -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """Plots of stiffness and damping over excitation, and what fills them."""
+    from bokeh.models import ColumnDataSource
+
     plots, sources = {}, {}
     for part, (unit, _) in PARTS.items():
-        plot = new_plot(f"{part} over excitation", "excitation, Hz", unit, name=f"model-{part}")
+        plots[part] = new_plot(f"{part} over excitation", "excitation, Hz", unit, name=f"model-{part}")
         sources[part] = {n: ColumnDataSource({"x": [], "xx": [], "yy": []}) for n in ("curve", "here", "measured")}
-        _draw(plot, sources[part])
-        plots[part] = plot
+        _draw(plots[part], sources[part])
+    return plots, sources
+
+
+def _residual_plot() -> tuple[Any, Any]:
+    """Plot of predicted over measured at all points, and what fills it."""
+    from bokeh.models import ColumnDataSource
+
     residual = ColumnDataSource({"point": [], "xx": [], "yy": [], "cxx": [], "cyy": []})
     rest = new_plot("predicted / measured - 1, all points", "static load, kN", "per cent", name="residuals", height=240)
     looks = (("xx", BLUE, "circle"), ("yy", ORANGE, "square"), ("cxx", INK, "x"), ("cyy", GREY, "cross"))
     for name, colour, marker in looks:
         shown = {"xx": "kxx", "yy": "kyy"}.get(name, name)
         rest.scatter("point", name, source=residual, color=colour, marker=marker, size=8, legend_label=shown)
-
     rest.add_layout(rest.legend[0], "right")
+    return rest, residual
 
-    @functools.lru_cache(maxsize=512)
-    def curve(newtons: float, name: str) -> Curve:
-        assert session.predict is not None
-        return session.predict(newtons, first.static_load_direction, first.shaft_speed, LINES, name)
 
-    def update() -> None:
-        name = session.pivots[pivots.active]
-        got = curve(round(1e3 * load.value, 3), name)
-        near = [p for p in points if abs(p.point.static_load / (1e3 * load.value) - 1.0) < _NEAR]
+class _Follower:
+    """Lets curves, sentence and residuals follow the controls (load, line, pivots)."""
+
+    def __init__(
+        self, session: Session, controls: tuple[Any, Any, Any], sources: dict[str, Any], residual: Any, said: Any
+    ) -> None:
+        assert session.identification is not None
+        self.session, self.sources, self.residual, self.said = session, sources, residual, said
+        self.load, self.line, self.pivots = controls
+        self.points = session.identification.points
+        self.curve = functools.lru_cache(maxsize=512)(self._predict)
+        self.waiting: dict[Callable[[], None], None] = {}
+
+    def _predict(self, newtons: float, name: str) -> Curve:
+        assert self.session.predict is not None
+        first = self.points[0].point
+        return self.session.predict(newtons, first.static_load_direction, first.shaft_speed, LINES, name)
+
+    def update(self) -> None:
+        """Show the model at the sliders' load beside the points measured near it."""
+        name, load, line = self.session.pivots[self.pivots.active], self.load.value, self.line.value
+        got = self.curve(round(1e3 * load, 3), name)
+        near = [p for p in self.points if abs(p.point.static_load / (1e3 * load) - 1.0) < _NEAR]
         for part, (_, scale) in PARTS.items():
-            _fill(sources[part], scale * getattr(got, part), got.frequency, line.value)
-            sources[part]["measured"].data = measured_columns(near, part, scale)
-        said.text = describe(got, line.value, load.value, name, len(near))
+            _fill(self.sources[part], scale * getattr(got, part), got.frequency, line)
+            self.sources[part]["measured"].data = measured_columns(near, part, scale)
+        self.said.text = describe(got, line, load, name, len(near))
 
-    def later(*tasks: Callable[[], None]) -> None:
+    def residuals(self) -> None:
+        """Show all points against the chosen pivots."""
+        self.residual.data = residual_columns(self.session, self.session.pivots[self.pivots.active])
+
+    def later(self, *tasks: Callable[[], None]) -> None:
         """Let a moving slider outrun the model: only its last place counts."""
-        waiting.update(dict.fromkeys(tasks))
-        if len(waiting) == len(set(tasks)):
-            curdoc().add_timeout_callback(run_waiting, 60)
+        from bokeh.io import curdoc
 
-    def run_waiting() -> None:
-        tasks = list(waiting)
-        waiting.clear()
+        self.waiting.update(dict.fromkeys(tasks))
+        if len(self.waiting) == len(set(tasks)):
+            curdoc().add_timeout_callback(self._run_waiting, 60)
+
+    def _run_waiting(self) -> None:
+        tasks = list(self.waiting)
+        self.waiting.clear()
         for task in tasks:
             task()
-
-    def residuals() -> None:
-        residual.data = residual_columns(session, session.pivots[pivots.active])
-
-    for slider in (load, line):
-        slider.on_change("value", lambda attr, old, new: later(update))
-    pivots.on_change("active", lambda attr, old, new: later(update, residuals))
-    update()
-    residuals()
-    return column(row(load, line, pivots), said, row(plots["k"], plots["c"], sizing_mode="stretch_width"), rest,
-                  sizing_mode="stretch_width")  # fmt: skip
 
 
 def _draw(plot: Any, sources: dict[str, Any]) -> None:
