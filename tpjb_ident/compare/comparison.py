@@ -143,11 +143,7 @@ def compare_campaign(
         Records that are not what they claim to be.
     """
     settings = settings or CompareSettings()
-    unknown = [name for name in settings.variants if name not in VARIANTS]
-    if unknown or not settings.variants:
-        raise ComparisonError(f"pivot model {unknown[:1]} is not known; use some of {', '.join(VARIANTS)}")
-    if not campaign.of_kind("dynamic"):
-        raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to compare")
+    _check(campaign, settings)
     tell = progress or (lambda text, done, total: None)
     least = min(pad.assembled_clearance for pad in bearing.pads)
     chosen = replace(settings.identify, clearance=settings.identify.clearance or least)
@@ -175,6 +171,14 @@ def compare_campaign(
     return Comparison(
         campaign, bearing, settings, identification, curves, clearance, locus, tuple(variants), tuple(remarks)
     )
+
+
+def _check(campaign: Campaign, settings: CompareSettings) -> None:
+    unknown = [name for name in settings.variants if name not in VARIANTS]
+    if unknown or not settings.variants:
+        raise ComparisonError(f"pivot model {unknown[:1]} is not known; use some of {', '.join(VARIANTS)}")
+    if not campaign.of_kind("dynamic"):
+        raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to compare")
 
 
 def _labelled(progress: Progress, label: str) -> Progress:
