@@ -10,11 +10,11 @@ from model.effects import Effect, kind_of
 from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
 from tpjb_ident.diagnose.checks import CHECKS, Check
+from tpjb_ident.diagnose.designs import Design, designs
 from tpjb_ident.diagnose.layout import Layout
 from tpjb_ident.diagnose.next_test import (
-    Design,
     Separation,
-    designs,
+    chance,
     options_for,
     rank_designs,
     say,
@@ -59,8 +59,8 @@ def test_a_check_tells_pads_apart():
 
 def test_probes_on_the_housing_do_not_see_its_spring(setup):
     spring = [Effect("housing_flexibility", stiffness=3e9)]
-    (blind,) = (d for d in designs(setup, Layout(dynamic([5000.0], [SPEED], SPEED, -math.pi / 2, 0))) if d.blind)
     point = Layout(dynamic([5000.0], [SPEED], SPEED, -math.pi / 2, 0))
+    (blind,) = (d for d in designs(setup, point) if "housing_flexibility" in d.blind)
     seeing, not_seeing = Design("from the frame", point), Design("from the housing", point, blind.blind)
     ranked = rank_designs(setup, spring, [], [seeing, not_seeing], Certificates())
     assert [s.design.words for s in ranked] == ["from the frame", "from the housing"]
@@ -87,3 +87,8 @@ def test_a_second_test_is_suggested_where_one_is_not_enough(expected, count, apa
     words = say(chosen, "a", "b")
     assert ("nothing on the list" in words) == (apart < 3.0)
     assert all(s.design.words in words for s in chosen)
+
+
+@pytest.mark.parametrize(("apart", "wanted"), [(0.0, 0.0), (3.0, 0.5), (5.0, 0.9452), (-1.0, 0.0)])
+def test_chance_is_that_of_a_normal_difference_of_chi_squares(apart, wanted):
+    assert chance(apart) == pytest.approx(wanted, abs=1e-4)

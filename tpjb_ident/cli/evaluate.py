@@ -18,7 +18,7 @@ from tpjb_ident.provenance import sha256
 from tpjb_ident.tables import write_table, write_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import pandas as pd
 
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from tpjb_ident.executors import Workers
 
 PRELOAD = ("tpjb_ident.diagnose.trials", "tpjb_ident.diagnose.raw_trials")
+#: Parts of the paper's campaign after which next tests are tried.
+DATA_SETS = ("D", "C", "B", "A")
 
 
 @guarded
@@ -41,6 +43,9 @@ def evaluate(
     left_out: Annotated[int, typer.Option(min=0, help="Campaigns per effect that the library lacks.")] = 4,
     two: Annotated[int, typer.Option(min=0, help="Campaigns with two effects.")] = 60,
     raw: Annotated[int, typer.Option(min=0, help="Trials with campaigns written as raw volts and identified.")] = 0,
+    follow: Annotated[
+        int, typer.Option(min=0, help="Campaigns per effect, size and data set for next tests; 0: none.")
+    ] = 1,
     keep: Annotated[
         Path | None,
         typer.Option(help="Folder for tables, campaigns and rows: a killed evaluation goes on from there."),
@@ -56,23 +61,24 @@ def evaluate(
     """Draw campaigns with hidden effects, diagnose them, and count: the evidence behind `tpjb diagnose`.
 
     Writes rows.jsonl (one trial a line), trials, summary, power, p_values, coverage, closure, abstention, impostors,
-    plans, rules, confusion matrices and next_tests as .csv and .parquet, evidence.md, and report.html with its
-    figures as .svg and .png. The same seed gives the same campaigns, whatever the workers. With --keep, rows of raw
-    trials are made anew where the code of the diagnosis has changed since; delete the folder when the virtual rig
-    has. With --rows only tables, figures and page are made, of rows of any age.
+    plans, rules, next_tests and confusion matrices as .csv and .parquet, evidence.md, and report.html with its
+    figures as .svg and .png. The same seed gives the same campaigns, whatever the workers. Where campaigns of the data
+    sets A to D (see `tpjb plan --data-sets`) come out ambiguous, the suggested next test is drawn too. With --keep,
+    rows are made anew where the code of the diagnosis has changed since; delete the folder when the virtual rig has.
+    With --rows only tables, figures and page are made, of rows of any age.
     """
     if scheduler is not None and workers is not None:
         raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")
     target = out_folder(out, "evaluate")
     options = {"bearing": bearing, "sizes": sizes, "noises": noises, "seeds": seeds, "none": none,
-               "left_out": left_out, "two": two, "raw": raw, "keep": keep, "rows": rows}  # fmt: skip
-    todo = _Todo(bearing, _plan(options), keep, workers, scheduler)
+               "left_out": left_out, "two": two, "raw": raw, "follow": follow, "keep": keep, "rows": rows}  # fmt: skip
+    todo = _Todo(bearing, _plan(options), follow, keep, (workers, scheduler))
     before = _made_before(rows) if rows else None
     with output_folder(target, "evaluate") as folder:
         with progress("evaluating") as show:
-            made, tests = (before, None) if before is not None else todo.make(show)
+            made = before if before is not None else todo.make(show)
             show("tables and figures", 99, 100)
-            summary = _write(folder, made, tests, (bearing, options))
+            summary = _write(folder, made, (bearing, options))
         inputs = {file.name: sha256(file) for file in (bearing, *(rows or ()))}
         write_record(folder, target, "evaluate", options, inputs)
     _show(summary)
@@ -107,34 +113,47 @@ def _made_before(files: Sequence[Path]) -> list[Row]:
 
 @dataclass(frozen=True)
 class _Todo:
-    """What is to be drawn and where it runs."""
+    """What is to be drawn, where it is kept and where it runs (processes, cluster)."""
 
     bearing: Path
     plan: Plan
+    follow: int
     keep: Path | None
-    workers: int | None
-    scheduler: str | None
+    where: tuple[int | None, str | None]
 
-    def make(self, show: Progress) -> tuple[list[Row], pd.DataFrame]:
-        """Rows of all trials, and what next tests are expected to tell."""
+    def make(self, show: Progress) -> list[Row]:
+        """Rows of all trials."""
         from model.bearing_file import load_bearing
         from tpjb_ident.diagnose.bench import paper_layout, prepare
         from tpjb_ident.executors import open_workers
 
         drawn = load_bearing(self.bearing)
         show("tabling the model", 0, 100)
-        bench = prepare(drawn, paper_layout(len(drawn.pads)), self._store())
-        with open_workers(self.workers, self.scheduler, PRELOAD) as team:
-            rows = [*_run(team, bench, self.plan, show), *self._raw(team, bench, drawn, show)]
-        show("next tests", 99, 100)
-        return rows, _next_tests(bench, drawn)
+        bench = prepare(drawn, paper_layout(len(drawn.pads)), self._store(".npz"))
+        with open_workers(*self.where, PRELOAD) as team:
+            return [
+                *self._surrogate(team, bench, show),
+                *self._raw(team, bench, drawn, show),
+                *self._followed(team, bench, drawn, show),
+            ]
 
-    def _store(self) -> Path | None:
-        """Where the tables of this very bearing are kept."""
+    def _store(self, name: str) -> Path | None:
+        """Where something about this very bearing is kept."""
         if self.keep is None:
             return None
         self.keep.mkdir(parents=True, exist_ok=True)
-        return self.keep / f"{sha256(self.bearing)[:16]}.npz"
+        return self.keep / f"{sha256(self.bearing)[:16]}{name}"
+
+    def _surrogate(self, team: Workers, bench: Bench, show: Progress) -> list[Row]:
+        from tpjb_ident.diagnose.kept_trials import kept_trials
+        from tpjb_ident.diagnose.trials import run_trial, trials
+
+        todo, done = list(trials([c.label for c in bench.pool], self.plan)), itertools.count(1)
+
+        def told(row: Row) -> None:
+            show(f"{row['kind']} {' + '.join(row['truth'])}", next(done), len(todo))
+
+        return [*kept_trials(team, run_trial, todo, bench, self._store("-rows.jsonl"), told)]
 
     def _raw(self, team: Workers, bench: Bench, drawn: Bearing, show: Progress) -> list[Row]:
         if not self.plan.raw:
@@ -147,30 +166,30 @@ class _Todo:
         total, done = sum(map(len, groups)), itertools.count(1)
         return [*raw_rows(team, shared, groups, lambda row: show(f"raw volts, {row['kind']}", next(done), total))]
 
+    def _followed(self, team: Workers, bench: Bench, drawn: Bearing, show: Progress) -> list[Row]:
+        """Next tests, for every data set."""
+        from model.pivots import pivot_laws
+        from model.setup import Setup
+        from tpjb_ident.diagnose.kept_trials import kept_trials
+        from tpjb_ident.diagnose.next_test_bench import followed_by_all, of_data_set
+        from tpjb_ident.diagnose.next_test_trials import next_trials, run_next_trial
 
-def _run(team: Workers, bench: Bench, plan: Plan, show: Progress) -> list[Row]:
-    from tpjb_ident.diagnose.trials import run_trial, trials
-    from tpjb_ident.executors import in_order
+        setup, rows = Setup(drawn, pivot_laws("kirk", drawn)), []
+        for name in DATA_SETS if self.follow else ():
+            show(f"tests that could follow data set {name}", 0, 100)
+            alone = of_data_set(bench, name)
+            whole = followed_by_all(setup, alone, lambda design: self._store(f"-{design}.npz"))
+            todo, done = list(next_trials([c.label for c in bench.pool], name, self.follow)), itertools.count(1)
 
-    drawn_trials = list(trials([c.label for c in bench.pool], plan))
-    rows: list[Row] = []
-    for row in in_order(team, run_trial, [(trial,) for trial in drawn_trials], bench):
-        rows.append(row)
-        show(f"{row['kind']} {' + '.join(row['truth'])}", len(rows), len(drawn_trials))
-    return rows
+            def told(row: Row, done: Iterator[int] = done, total: int = len(todo)) -> None:
+                show(f"next tests after {row['data_set']}", next(done), total)
 
-
-def _next_tests(bench: Bench, drawn: Bearing) -> pd.DataFrame:
-    from model.pivots import pivot_laws
-    from model.setup import Setup
-    from tpjb_ident.diagnose.next_test_trials import alike_pairs, next_test_table
-
-    return next_test_table(bench, Setup(drawn, pivot_laws("kirk", drawn)), alike_pairs(bench))
+            file = self._store("-next-tests.jsonl")
+            rows += kept_trials(team, run_next_trial, todo, (whole, alone), file, told)
+        return [*rows]
 
 
-def _write(
-    folder: Path, rows: list[Row], tests: pd.DataFrame | None, made: tuple[Path, Mapping[str, Any]]
-) -> pd.DataFrame:
+def _write(folder: Path, rows: list[Row], made: tuple[Path, Mapping[str, Any]]) -> pd.DataFrame:
     from tpjb_ident.evidence.rows import write_rows
     from tpjb_ident.evidence.tables import evidence_tables, markdown, trials_table
     from tpjb_ident.report.evidence_page import write_evidence_report
@@ -178,7 +197,7 @@ def _write(
     bearing, options = made
     write_rows(folder / "rows.jsonl", rows)
     write_table(folder, "trials", trials_table(rows))
-    tables = evidence_tables(rows) | ({"next_tests_expected": tests} if tests is not None and len(tests) else {})
+    tables = evidence_tables(rows)
     for name, frame in tables.items():
         write_table(folder, name, frame)
     texts = [f"## {name}\n\n{markdown(frame)}" for name, frame in tables.items()]

@@ -49,7 +49,6 @@ def plan(
     from model.bearing_file import load_bearing
     from model.pivots import pivot_laws
     from model.setup import Setup
-    from tpjb_ident.diagnose.data_sets import data_sets_table
     from tpjb_ident.diagnose.plan import plan as work_out
 
     drawn = load_bearing(bearing)
@@ -67,6 +66,8 @@ def plan(
             setup = Setup(drawn, pivot_laws(pivot_choice(pivots), drawn))
             found = work_out(setup, tests)
             if data_sets:
+                from tpjb_ident.diagnose.data_sets import data_sets_table
+
                 show("parts of the campaign", 1, 2)
                 write_table(folder, "data_sets", data_sets_table(setup, tests))
         frame = found.to_frame()

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Seconds between two lines about progress where there is no terminal.
 LINE_EVERY = 30.0
+#: Share of a step from which its speed is known well enough to tell the time left.
+FORETELLS = 0.02
 #: Called with what is being done, how many are done, of how many.
 Progress = Callable[[str, int, int], None]
 
@@ -99,10 +101,6 @@ def progress(what: str) -> Iterator[Progress]:
             bar.update(task, total=known, completed=share, description=f"{what}: {printable(text)}")
 
         yield show
-
-
-#: Share of a step from which its speed is known well enough to tell the time left.
-FORETELLS = 0.02
 
 
 class _Lines:

@@ -57,7 +57,7 @@ def data_sets_table(setup: Setup, layout: Layout) -> pd.DataFrame:
     seen = signatures(setup, replace(layout, dynamic=(*layout.dynamic, *faster)), chosen)
     planned = {t.speed for t in layout.dynamic}
     rows = []
-    for name, mine in _masks(seen.observations.elements, planned).items():
+    for name, mine in masks(seen.observations.elements, planned).items():
         row: dict[str, object] = {"data_set": name, "numbers": int(mine.sum())}
         for free, words in ((False, "known"), (True, "free")):
             factor = seen.factor(free)
@@ -74,17 +74,40 @@ def data_sets_table(setup: Setup, layout: Layout) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArray]:
-    """Elements of every data set."""
+def masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArray]:
+    """Elements of every data set.
+
+    Parameters
+    ----------
+    elements : sequence of Element
+    planned : set of float
+        Shaft speeds of data sets A to D [rad/s].
+    """
     families = np.array([e.family for e in elements])
     first = np.array([not np.isfinite(e.place("speed")) or e.place("speed") in planned for e in elements])
     line = np.array([e.place("excitation") for e in elements])
-    known = line[np.isfinite(line)]
-    # the frequency that is there at the most loads, the middle one among equals
-    lines, counts = np.unique(known, return_counts=True)
-    most = lines[counts == counts.max()]
-    one = line == most[len(most) // 2]
+    one = line == _usual(line[np.isfinite(line)])
     direct = np.array([e.observable in DIRECT for e in elements])
     masks = {"A": direct & one & first}
     masks |= {name: np.isin(families, sorted(kept)) & first for name, kept in FAMILIES.items()}
     return {**masks, "E": np.ones(len(elements), dtype=bool)}
+
+
+def part_of(layout: Layout, name: str) -> Layout:
+    """Tests of a layout that belong to a data set, ``"A"`` to ``"D"``."""
+    line = _usual(np.array([w for t in layout.dynamic for w in t.excitation]))
+    plain = tuple(replace(t, pads=()) for t in layout.dynamic)
+    if name == "A":
+        return Layout(tuple(replace(t, excitation=(line,)) for t in plain if line in t.excitation))
+    return {
+        "B": Layout(plain),
+        "C": replace(layout, dynamic=plain, dry=()),
+        "D": layout,
+    }[name]
+
+
+def _usual(lines: NDArray[np.float64]) -> float:
+    """The frequency that is there at the most loads, the middle one among equals."""
+    found, counts = np.unique(lines, return_counts=True)
+    most = found[counts == counts.max()]
+    return float(most[len(most) // 2])

@@ -1,81 +1,171 @@
-"""How often the suggested next test would settle what a campaign cannot tell, beside a test picked blindly."""
+"""Trials of next tests: campaigns that cannot tell, the test that is suggested, and a diagnosis of both together.
+
+A campaign with a hidden effect is drawn with all tests that could follow. Where its diagnosis is ambiguous the test
+that `tpjb diagnose` would suggest is added, and the two are diagnosed as one; as a control, as many tests picked
+blindly. Settled means: the truth alone is named.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from model.setup import Setup
-from tpjb_ident.diagnose.bench import Bench
+from tpjb_ident.diagnose.bench import Bench, seed
 from tpjb_ident.diagnose.candidates import Candidate
-from tpjb_ident.diagnose.next_test import options_for, rank_designs, suggested, together
+from tpjb_ident.diagnose.checks import Check
+from tpjb_ident.diagnose.decide import strongest_rival
+from tpjb_ident.diagnose.diagnose import solve
+from tpjb_ident.diagnose.fit import Fit, Misfit
+from tpjb_ident.diagnose.next_test import Separation, apart, chance, suggested, together
+from tpjb_ident.diagnose.next_test_bench import NextBench, Part, restricted, restricted_surrogate
+from tpjb_ident.diagnose.problem import Problem
 from tpjb_ident.diagnose.settings import DiagnoseSettings
-
-if TYPE_CHECKING:
-    import pandas as pd
+from tpjb_ident.diagnose.surrogate import Surrogate
+from tpjb_ident.diagnose.trials import Trial, sized, summary
+from tpjb_ident.diagnose.verdict import Verdict
 
 FloatArray = NDArray[np.float64]
-#: d' of the true effect in the campaign that could not tell.
-SIZE = 9.0
+BoolArray = NDArray[np.bool_]
+#: Sizes at which campaigns are drawn.
+SIZES = (6.0, 9.0, 12.0)
 
 
-def alike_pairs(bench: Bench, below: float = 3.0) -> list[tuple[Candidate, Candidate]]:
-    """Pairs of different effects that a bench's campaign could not tell apart at d' = 6, most alike first."""
-    factor = bench.factor(1.0)
-    columns = np.column_stack([_unit(bench, c, factor) for c in bench.pool])
-    apart = 6.0 * np.sqrt(1.0 - np.clip(columns.T @ columns, -1.0, 1.0) ** 2)
-    n = len(bench.pool)
-    found = [(apart[i, j], i, j) for i in range(n) for j in range(i + 1, n) if apart[i, j] < below]
-    return [(bench.pool[i], bench.pool[j]) for _, i, j in sorted(found) if bench.pool[i].name != bench.pool[j].name]
+@dataclass(frozen=True)
+class NextTrial(Trial):
+    """A trial with a test to follow.
 
-
-def _unit(bench: Bench, candidate: Candidate, factor: FloatArray) -> FloatArray:
-    table = bench.surrogate.tables[bench.pool.index(candidate)]
-    small = 0.02 * max(table.amplitudes - candidate.neutral, key=abs)
-    white = np.linalg.solve(factor, table.at(candidate.neutral + small))
-    return np.asarray(white / max(float(np.linalg.norm(white)), 1e-300))
-
-
-def next_test_table(bench: Bench, setup: Setup, pairs: Sequence[tuple[Candidate, Candidate]]) -> pd.DataFrame:
-    """Expected separation and chance of success of the best test and of a random one, per pair.
-
-    A test succeeds when chi-square of the wrong effect, over the campaign and the new test, exceeds that of the right
-    one by 9; with a separation d of both together that has the probability Phi((d^2 - 9) / 2 d).
+    Attributes
+    ----------
+    data_set : str
+        Which part of the paper's campaign there was, see `data_sets`.
     """
-    import pandas as pd
-    from scipy.stats import norm
 
-    factor, settings = bench.factor(1.0), DiagnoseSettings()
-    options = options_for(setup, bench.observations.layout)
-    rows = []
-    for one, other in pairs:
-        effect = bench.sized(one, SIZE, 1.0, factor) or bench.sized(one, SIZE, -1.0, factor)
-        if effect is None:
+    data_set: str = "D"
+
+
+def next_trials(labels: Sequence[str], data_set: str, seeds: int) -> Iterator[NextTrial]:
+    """List trials: every candidate at every size, `seeds` times."""
+    for label in labels:
+        for size in SIZES:
+            for number in range(seeds):
+                yield NextTrial("hidden", (label,), size, 1.0, number, data_set)
+
+
+def run_next_trial(shared: tuple[NextBench, Bench], trial: NextTrial) -> dict[str, Any]:
+    """Draw a campaign; if its diagnosis is ambiguous add tests and diagnose again.
+
+    Parameters
+    ----------
+    shared : (NextBench, Bench)
+        Of one data set, and its own campaign alone.
+    trial : NextTrial
+
+    Returns
+    -------
+    dict
+        Flat row of kind ``"next test"``; without ``tests`` where the campaign alone came to another verdict.
+    """
+    nb, alone = shared
+    rng = seed("next", *asdict(trial).values())
+    chosen = [next(c for c in alone.pool if c.label == label) for label in trial.truth]
+    effects = sized(alone, chosen, trial, rng)
+    row: dict[str, Any] = {**asdict(trial), "kind": "next test", "names": tuple(c.name for c in chosen)}
+    if effects is None:
+        return {**row, "verdict": "unreachable"}
+    drawn = nb.whole.problem(effects, rng, trial.noise)
+    settings = DiagnoseSettings()
+    campaign = restricted(drawn, nb.campaign)
+    verdict, found = solve(campaign, alone.surrogate, settings)
+    rival = strongest_rival(found, settings) if verdict.verdict == "ambiguous" else None
+    row |= {"verdict": verdict.verdict, "labels": summary(verdict, ())["labels"]}
+    if rival is None:
+        return row
+    ranked = ranked_parts(nb, found.model, rival)
+    best = [_part(nb, s.design) for s in suggested([s for s, _ in ranked])]
+    row |= {
+        "alternatives": verdict.alternatives, "model": found.model.label, "rival": rival.label,
+        "held_it": any(trial.truth[0] in group for group in verdict.alternatives),
+        "apart_now": _apart(campaign, found.model.prediction - rival.prediction),
+    }  # fmt: skip
+    row |= _followed(nb, drawn, best, (found.model, rival, chosen[0]), "then_")
+    blind = rng.choice(len(ranked), size=len(best), replace=False)
+    picked = [_part(nb, ranked[int(i)][0].design) for i in blind]
+    row |= _followed(nb, drawn, picked, (found.model, rival, chosen[0]), "random_")
+    expected = {_part(nb, s.design): s for s, _ in ranked}
+    for prefix, tests in (("then_", best), ("random_", picked)):
+        by_tests = together([expected[i] for i in tests])
+        row[f"{prefix}expected"] = float(np.hypot(by_tests, row["apart_now"]))
+        row[f"{prefix}chance"] = chance(row[f"{prefix}expected"])
+    return row
+
+
+def ranked_parts(nb: NextBench, one: Fit, other: Fit) -> list[tuple[Separation, Part]]:
+    """Expected separation of two fits by every part, best first; as `next_test.rank_designs`, from tables."""
+    out = []
+    for part in nb.parts:
+        option = part.option
+        if isinstance(option, Check):
+            out.append((Separation(option, option.separation(one.effects, other.effects)), part))
             continue
-        change = np.linalg.solve(factor, bench.surrogate((effect,)) - bench.surrogate.base)
-        table = bench.surrogate.tables[bench.pool.index(other)]
-        amplitudes = np.linspace(table.amplitudes[0], table.amplitudes[-1], 801)
-        miss = [float(np.linalg.norm(change - np.linalg.solve(factor, table.at(a)))) for a in amplitudes]
-        best = int(np.argmin(miss))
-        if miss[best] > 4.0:  # not alike in this direction: the campaign tells them
-            continue
-        ranked = rank_designs(
-            setup, (effect,), (other.effect(float(amplitudes[best])),), options, settings.certificates
-        )
-        d = np.hypot([r.expected for r in ranked], miss[best])
-        # nothing apart: the right explanation wins by 9 never
-        chance = norm.cdf((d**2 - 9.0) / (2.0 * np.maximum(d, 1e-9)))
-        chosen = suggested(ranked)
-        then = float(np.hypot(together(chosen), miss[best]))
-        rows.append(
-            {
-                "effect": one.label, "taken_for": other.label, "apart_now": miss[best],
-                "next_test": " and ".join(t.design.words for t in chosen), "apart_by_it": together(chosen),
-                "apart_then": then, "success": float(norm.cdf((then**2 - 9.0) / (2.0 * then))),
-                "success_of_a_random_test": float(np.mean(chance)),
-            }
-        )  # fmt: skip
-    return pd.DataFrame(rows)
+        if option.fits(one.effects, other.effects):
+            difference = part.surrogate(one.effects) - part.surrogate(other.effects)
+            out.append((Separation(option, apart(part.seen, part.nuisances.columns, difference)), part))
+    return sorted(out, key=lambda pair: -pair[0].expected)
+
+
+def _part(nb: NextBench, option: object) -> int:
+    return next(i for i, part in enumerate(nb.parts) if part.option is option)
+
+
+def _apart(problem: Problem, difference: FloatArray) -> float:
+    return apart(problem.observations, problem.nuisances.columns, difference)
+
+
+def _followed(
+    nb: NextBench, drawn: Problem, tests: Sequence[int], fits: tuple[Fit, Fit, Candidate], prefix: str
+) -> dict[str, Any]:
+    """What comes of a campaign with some tests after it."""
+    mask = nb.campaign | np.logical_or.reduce([nb.masks[i] for i in tests])
+    problem, surrogate = restricted(drawn, mask), restricted_surrogate(nb.whole.surrogate, mask)
+    verdict, _ = solve(problem, surrogate, DiagnoseSettings())
+    said = summary(verdict, ())
+    one, other, truth = fits
+    rivals = {f.candidates[0] for f in (one, other) if len(f.candidates) == 1} - {truth}
+    return {
+        f"{prefix}tests": tuple(nb.parts[i].option.words for i in tests),
+        f"{prefix}verdict": said["verdict"], f"{prefix}labels": said["labels"],
+        f"{prefix}alternatives": said["alternatives"], f"{prefix}settled": _settled(verdict, truth),
+        f"{prefix}achieved": _achieved(problem, surrogate, truth, rivals),
+    }  # fmt: skip
+
+
+def _settled(verdict: Verdict, truth: Candidate) -> bool:
+    return verdict.verdict == "named" and tuple(e.label for e in verdict.effects) == (truth.label,)
+
+
+def _achieved(problem: Problem, surrogate: Surrogate, truth: Candidate, rivals: set[Candidate]) -> float:
+    """Root of the chi-square by which the truth fits better than its nearest rival, negative if it fits worse."""
+    everything = np.ones(len(problem.base), dtype=bool)
+    misfit = Misfit(problem.observations.value, problem.covariance, everything)
+    if not rivals:
+        return float("nan")
+    gain = min(_least(misfit, surrogate, c) for c in sorted(rivals, key=lambda c: c.label))
+    gain -= _least(misfit, surrogate, truth)
+    return float(np.sign(gain) * np.sqrt(abs(gain)))
+
+
+def _least(misfit: Misfit, surrogate: Surrogate, candidate: Candidate) -> float:
+    """Smallest chi-square along one effect's table."""
+    table = surrogate.tables[surrogate.candidates.index(candidate)]
+    best, width = candidate.neutral, float(np.ptp(table.amplitudes))
+    for count in (161, 41, 41):
+        low, high = max(best - width, table.amplitudes[0]), min(best + width, table.amplitudes[-1])
+        tried = np.linspace(low, high, count)
+        left = np.column_stack([misfit.value - surrogate.base - table.at(float(a)) for a in tried])
+        cost = np.sum(misfit.whiten(left) ** 2, axis=0)
+        best, width = float(tried[int(np.argmin(cost))]), 2.0 * float(tried[1] - tried[0])
+    return float(cost.min())

@@ -12,7 +12,7 @@ from tpjb_ident.tables import write_text
 
 #: What a line must say to be a trial.
 NEEDED = frozenset({"kind", "truth", "size", "noise", "verdict"})
-_KEY = ("rung", "kind", "truth", "size", "noise", "number", "plan", "test")
+_KEY = ("rung", "kind", "truth", "size", "noise", "number", "plan", "data_set")
 
 
 class RowsError(ValueError):

@@ -17,6 +17,7 @@ from tpjb_ident.evidence.counts import (
     summary_table,
 )
 from tpjb_ident.evidence.measures import closure_table, coverage_table, p_value_table, power_table, rules_table
+from tpjb_ident.evidence.next_tests import next_test_pairs, next_test_table
 from tpjb_ident.evidence.outcome import Row, outcome, run, rung
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ def evidence_tables(rows: Sequence[Row]) -> dict[str, pd.DataFrame]:
         "impostors": impostors_table(rows),
         "plans": plans_table(rows),
         "rules": rules_table(rows),
+        "next_tests": next_test_table(rows),
+        "next_test_pairs": next_test_pairs(rows),
         **matrices(rows),
         "confusion": confusion_table(rows),
     }

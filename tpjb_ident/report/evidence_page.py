@@ -37,8 +37,9 @@ SECTIONS: tuple[tuple[str, tuple[str, ...], tuple[str, ...], str], ...] = (
     ("Intervals", ("coverage",), ("coverage",), "Of parameters whose effect was rightly named."),
     ("The gap, on points that no fit has seen", ("closure",), ("closure",),
      "1 is what noise and tolerance leave. The Gaussian process closes what can be closed and names nothing."),
-    ("Next tests", ("next_tests", "next_tests_expected"), ("next-test",),
-     "What the suggested test settles, by simulation: the test is drawn, and both are diagnosed together."),
+    ("Next tests", ("next_tests", "next_test_pairs"), ("next-test",),
+     "What the suggested test settles, by simulation: campaigns that came out ambiguous and the test after "
+     "them are drawn with the same calibration errors and diagnosed together. Settled: the truth alone is named."),
     ("Plans", ("plans",), (), "Campaigns written as raw volts, by what was measured."),
     ("Simple rules on the same campaigns", ("rules",), ("rules",),
      "By names alone; a wrong pad of a right name counts as right here."),

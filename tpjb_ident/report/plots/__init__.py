@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from tpjb_ident.report.plots.gap_bars import gap
     from tpjb_ident.report.plots.gap_beside_controls import gap_controls
     from tpjb_ident.report.plots.isolability_map import isolability
+    from tpjb_ident.report.plots.next_test_dots import next_tests
     from tpjb_ident.report.plots.outcome_bars import outcomes
     from tpjb_ident.report.plots.p_values_line import p_values
     from tpjb_ident.report.plots.power_curves import power
@@ -48,6 +49,7 @@ _FILES = {
     "interval_coverage": "coverage_dots",
     "isolability": "isolability_map",
     "load_deflection": "fig11_load_deflection",
+    "next_tests": "next_test_dots",
     "outcomes": "outcome_bars",
     "p_values": "p_values_line",
     "pad_deformation": "fig02_pad_deformation",
@@ -73,6 +75,7 @@ __all__ = [
     "interval_coverage",
     "isolability",
     "load_deflection",
+    "next_tests",
     "outcomes",
     "p_values",
     "pad_deformation",
