@@ -8,116 +8,40 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigdata.calibration import Channel
+from rigdata.checking.agreement import check_agreement
+from rigdata.checking.answers import Answer, answer_of, misfit_of, robust_stiffness
 from rigdata.checking.observation import Observation
-from rigdata.checking.set_points import excited, oil_force, to_plane
-from rigdata.checking.wiring import name_fault, repairs
+from rigdata.checking.set_points import excited, to_plane
+from rigdata.checking.wiring import name_fault
 from rigdata.problem import Severity
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-#: A run whose force differs by this share from what the others foretell stands apart.
-_OUTLIER = 0.08
-#: Only where the others agree this well among themselves.
-_AGREE = 0.03
+#: Where half of the runs differ by more than this share there is no one answer to judge.
+_NO_ANSWER = 0.08
 _DEFINITE = 0.05
 _MAX_ANISOTROPY = 6.0
 
 
-@dataclass(frozen=True)
-class _Answer:
-    """One dynamic run: force and displacement phasors.
-
-    Attributes
-    ----------
-    seen : Observation
-    force : (2,) complex ndarray
-        X, Y [N].
-    readings : (2,) complex ndarray
-        Of the two displacement channels, SI.
-    channels : tuple of Channel
-        These two.
-    """
-
-    seen: Observation
-    force: ComplexArray
-    readings: ComplexArray
-    channels: tuple[Channel, ...]
-
-    @property
-    def displacement(self) -> ComplexArray:
-        """X, Y [m]."""
-        return to_plane(self.channels, self.readings)
-
-
 def check_responses(runs: Sequence[Observation], mass: float) -> None:
     """Compare the dynamic runs of every operating point with each other and with what a film can do."""
-    groups: dict[object, list[_Answer]] = {}
+    groups: dict[object, list[Answer]] = {}
     for seen in runs:
-        answer = _answer(seen, mass)
+        answer = answer_of(seen, mass)
         if answer is not None:
             names = tuple(c.name for c in answer.channels)
             groups.setdefault((seen.run.point, names), []).append(answer)
     for group in groups.values():
-        stiffness = _robust_stiffness(group)
+        stiffness = robust_stiffness(group)
         if stiffness is None:
             continue
         _check_signs(group, stiffness)
-        _check_agreement(group, stiffness)
-
-
-def _answer(seen: Observation, mass: float) -> _Answer | None:
-    where = seen.pick("displacement")
-    force = oil_force(seen, mass)
-    if len(where) != 2 or force is None or seen.lines is None or "force" in seen.report.doubts or not excited(seen):
-        return None
-    readings = seen.lines.phasor[where]
-    if not np.all(np.isfinite(readings)) or not np.any(np.abs(readings) > 8 * seen.lines.floor[where]):
-        return None
-    return _Answer(seen, force, readings, tuple(seen.channels[i] for i in where))
-
-
-def _solve(answers: Sequence[_Answer]) -> ComplexArray | None:
-    """H of ``F = H D``, least squares; None where the runs excite one direction only."""
-    displacement = np.stack([a.displacement for a in answers], axis=1)
-    force = np.stack([a.force for a in answers], axis=1)
-    scale = np.linalg.norm(displacement, axis=0)
-    if np.any(scale == 0) or not np.all(np.isfinite(displacement)):
-        return None
-    sizes = np.linalg.svd(displacement / scale, compute_uv=False)
-    if sizes[-1] < 0.2 * sizes[0]:
-        return None
-    weights = 1.0 / scale
-    return np.linalg.lstsq((displacement * weights).T, (force * weights).T, rcond=None)[0].T
-
-
-def _misfit(answer: _Answer, stiffness: ComplexArray, repair: FloatArray | None = None) -> float:
-    readings = answer.readings if repair is None else repair @ answer.readings
-    predicted = stiffness @ to_plane(answer.channels, readings)
-    return float(np.linalg.norm(answer.force - predicted) / np.linalg.norm(answer.force))
-
-
-def _robust_stiffness(group: Sequence[_Answer]) -> ComplexArray | None:
-    """H with the least median misfit among all pairs of runs, so that a faulty run cannot pull it."""
-    best: tuple[float, ComplexArray] | None = None
-    for pair in combinations(group[:24], 2):
-        stiffness = _solve(pair)
-        if stiffness is None:
-            continue
-        misfit = float(np.median([_misfit(a, stiffness) for a in group]))
-        if best is None or misfit < best[0]:
-            best = (misfit, stiffness)
-    if best is None:
-        return None
-    close = [a for a in group if _misfit(a, best[1]) <= max(3 * best[0], 1e-9)]
-    refined = _solve(close)
-    return best[1] if refined is None else refined
+        check_agreement(group, stiffness)
 
 
 def definiteness(matrix: NDArray) -> float:
@@ -136,9 +60,9 @@ def mirrored(channels: Sequence[Channel], repair: FloatArray) -> FloatArray:
     return np.asarray(inverse @ repair @ np.linalg.inv(inverse))
 
 
-def _check_signs(group: Sequence[_Answer], stiffness: ComplexArray) -> None:
+def _check_signs(group: Sequence[Answer], stiffness: ComplexArray) -> None:
     """Positive stiffness and damping; most of the runs must agree, else there is no one answer to judge."""
-    if np.median([_misfit(a, stiffness) for a in group]) > _OUTLIER:
+    if np.median([misfit_of(a, stiffness) for a in group]) > _NO_ANSWER:
         return
     channels = group[0].channels
     names = " and ".join(c.name for c in channels)
@@ -155,7 +79,7 @@ def _check_signs(group: Sequence[_Answer], stiffness: ComplexArray) -> None:
         answer.seen.report.say(f"signs {names}{hint}", severity, f"channels {names}", what, cure)
 
 
-def _check_scales(group: Sequence[_Answer], stiffness: ComplexArray, names: str) -> None:
+def _check_scales(group: Sequence[Answer], stiffness: ComplexArray, names: str) -> None:
     """A film is not many times stiffer along one probe than along the other."""
     channels = group[0].channels
     along = np.stack([to_plane(channels, e) for e in np.eye(2)], axis=1)
@@ -170,39 +94,6 @@ def _check_scales(group: Sequence[_Answer], stiffness: ComplexArray, names: str)
     for answer in group:
         cure = "Check the sensitivities of the two probes"
         answer.seen.report.say(f"scales {names}", "warning", f"channels {names}", what, cure)
-
-
-def _check_agreement(group: Sequence[_Answer], stiffness: ComplexArray) -> None:
-    """A run that answers otherwise than the others at its operating point."""
-    if len(group) < 4:
-        return
-    misfits = np.array([_misfit(a, stiffness) for a in group])
-    if np.median(misfits) > _AGREE:
-        return
-    for answer, misfit in zip(group, misfits):
-        if misfit <= max(_OUTLIER, 6 * float(np.median(misfits))):
-            continue
-        hint = _name_misfit(answer, stiffness, float(misfit))
-        severity: Severity = "error" if misfit > 0.5 or (hint and misfit > 0.2) else "warning"
-        what = f"differs by {misfit:.0%} from the other runs at this operating point{hint}"
-        cure = "Check this run's channels and set points; leave it out or repeat it"
-        answer.seen.report.say("disagrees", severity, "displacement and force", what, cure)
-
-
-def _name_misfit(answer: _Answer, stiffness: ComplexArray, misfit: float) -> str:
-    """Name the one fault of probes or cells that explains a run apart from the others."""
-    tried = [(_misfit(answer, stiffness, m), w) for w, m in repairs(answer.channels, scales=True)]
-    seen, where = answer.seen, answer.seen.pick("force")
-    cells = [seen.channels[i] for i in where]
-    if len(cells) == 2 and seen.lines is not None:
-        phasors = seen.lines.phasor[where]
-        for words, matrix in repairs(cells, scales=True):
-            # The inertia part of the force stays: only the cells are supposed to be at fault.
-            force = answer.force + to_plane(cells, matrix @ phasors - phasors)
-            tried.append((_misfit(replace(answer, force=force), stiffness), words))
-    tried.sort()
-    clear = tried[0][0] < misfit / 4 and tried[0][0] < tried[1][0] / 2
-    return f"; as if {tried[0][1]}" if clear else ""
 
 
 def check_accelerometers(runs: Sequence[Observation]) -> None:

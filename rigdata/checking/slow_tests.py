@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdata.checking.observation import Observation
+from rigdata.checking.pad_labels import check_labels
 from rigdata.checking.response import definiteness, mirrored
 from rigdata.checking.set_points import angle_between, to_plane
 from rigdata.checking.wiring import guess_wiring, name_fault
@@ -16,7 +17,6 @@ from rigdata.problem import Severity
 
 FloatArray = NDArray[np.float64]
 _ANGLE_WARNING, _ANGLE_ERROR = 10.0, 30.0
-_SAME_PAD = 25.0
 #: Cosine of the angle between load and motion; rigs move sideways by up to a quarter of the way.
 _FOLLOWS = math.cos(math.radians(40.0))
 #: A shaft that moves less than this [m] in a dry test may as well be a probe that drifts.
@@ -57,7 +57,7 @@ def check_dry(runs: Sequence[Observation]) -> None:
         directions.append((seen, shows))
         if "static_load_direction" in seen.run.stated:
             _check_push(seen, shows, push)
-    _check_pads(directions)
+    check_labels(directions)
 
 
 def check_shaft_follows(runs: Sequence[Observation]) -> None:
@@ -118,22 +118,6 @@ def _check_follows(seen: Observation, planes: tuple[FloatArray, FloatArray], pus
     cure = "Check axis, polarity and cables of the probes"
     names = " and ".join(c.name for c in channels)
     seen.report.say(f"signs {names}{guess}", "error", f"channels {names}", what, cure)
-
-
-def _check_pads(directions: Sequence[tuple[Observation, float]]) -> None:
-    """One pad number, one direction: two runs that differ cannot both be labelled rightly."""
-    for index, (seen, shows) in enumerate(directions):
-        for other, other_shows in directions[:index]:
-            apart = angle_between(shows, other_shows)
-            same_pad = seen.run.pad == other.run.pad
-            if same_pad and apart > _SAME_PAD:
-                what = f"pad {seen.run.pad} is loaded toward {shows:.0f} deg here, toward {other_shows:.0f} deg"
-            elif not same_pad and apart < _SAME_PAD:
-                what = f"pad {seen.run.pad} is loaded toward {shows:.0f} deg, as is pad {other.run.pad}"
-            else:
-                continue
-            cure = "One of the two runs names the wrong pad: correct it"
-            seen.report.say("pad", "error", "pad", f"{what} in run {other.run.id}", cure)
 
 
 def check_sweeps(runs: Sequence[Observation]) -> None:

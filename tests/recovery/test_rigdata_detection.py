@@ -59,6 +59,8 @@ ONE_RUN = {
         "channel X1A",
         "200 of 2000",
     ),
+    "probe a tenth too much": (Fault("scaled", RUN, "X1A", value=1.1), "warning", "displacement and force", "X1A read"),
+    "cell a tenth too much": (Fault("scaled", RUN, "L1H", value=1.1), "warning", "displacement and force", "L1H read"),
     "one probe late": (Fault("delayed", RUN, "X1A", value=3e-3), "warning", "displacement", "differs by"),
     "crosstalk": (Fault("crosstalk", RUN, "L1H", value=0.3), "warning", "mean force", "points to"),
     "no excitation": (Fault("missing_excitation", RUN), "error", "force", "no line at the excitation frequency"),
@@ -106,10 +108,11 @@ def test_fault_in_one_run(tmp_path, name):
     assert {p.run for p in found} == {fault.run}
 
 
-def test_wrong_pad_number_is_named_in_one_of_the_two_runs(tmp_path):
-    found = check(tmp_path, Fault("wrong_pad", "p-2-up", value=3.0))
-    assert any(p.severity == "error" and p.place == "pad" for p in found)
-    assert {p.run for p in found} <= {"p-2-up", "p-3-up"}
+@pytest.mark.parametrize(("run", "named"), [("p-2-up", 3), ("p-4-up", 1), ("p-1-up", 5)])
+def test_a_wrong_pad_number_is_named_at_its_run(tmp_path, run, named):
+    found = check(tmp_path, Fault("wrong_pad", run, value=float(named)))
+    assert [(p.run, p.severity, p.place) for p in found] == [(run, "error", "pad")], [str(p) for p in found]
+    assert f"it is pad {run[2]}" in found[0].what
 
 
 ALL_RUNS = {

@@ -1,0 +1,151 @@
+"""Runs of one operating point against each other: a run whose gains, signs or channels are others' stands apart.
+
+All runs of a point share one matrix H. Each run is held against the matrix of the others, in units of what these
+scatter about it themselves, so that a quiet rig shows a gain that is some per cent off and a noisy one does not cry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.checking.answers import Answer, misfit_of, solve_stiffness
+from rigdata.checking.set_points import to_plane
+from rigdata.checking.wiring import repairs
+from rigdata.problem import Severity
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+#: A run that differs by this share stands apart in any case, where the others agree to the second share.
+_OUTLIER, _AGREE = 0.08, 0.03
+#: Differences below this share are no fault: loads and temperatures differ from run to run.
+_LEAST = 0.03
+#: Probability at which chance is no explanation any more.
+_CHANCE = 1e-4
+#: Runs needed before one can be told apart from the others, and share of them that can be.
+_MIN_RUNS, _MOST = 4, 1 / 3
+#: A wrong gain explains a run if this share of its misfit, or less, is left.
+_EXPLAINED = 0.4
+
+
+def check_agreement(group: Sequence[Answer], stiffness: ComplexArray) -> None:
+    """Name runs that answer otherwise than the others at their operating point.
+
+    Parameters
+    ----------
+    group : sequence of Answer
+        Runs of one operating point.
+    stiffness : (2, 2) complex ndarray
+        H that most of them agree on.
+    """
+    if len(group) < _MIN_RUNS:
+        return
+    misfits = np.array([misfit_of(a, stiffness) for a in group])
+    told = set()
+    if np.median(misfits) <= _AGREE:
+        allowed = max(_OUTLIER, 6 * float(np.median(misfits)))
+        told = {i for i, misfit in enumerate(misfits) if misfit > allowed}
+    told |= _apart(group, told)
+    others = [a for i, a in enumerate(group) if i not in told]
+    common = solve_stiffness(others) if told and len(others) > 1 else None
+    for i in sorted(told):
+        _tell(group[i], stiffness if common is None else common)
+
+
+def _apart(group: Sequence[Answer], known: set[int]) -> set[int]:
+    """Runs beyond chance of the others' matrix, the worst first, until none is left or too many are."""
+    apart: set[int] = set(known)
+    while len(apart) + 1 <= _MOST * len(group):
+        left = [i for i in range(len(group)) if i not in apart]
+        if len(left) < _MIN_RUNS:
+            break
+        tried = [(_distance(group[i], [group[j] for j in left if j != i]), i) for i in left]
+        (ratio, misfit), worst = max(tried)
+        if ratio < 1.0 or misfit < _LEAST:
+            break
+        apart.add(worst)
+    return apart
+
+
+def _distance(one: Answer, others: Sequence[Answer]) -> tuple[float, float]:
+    """How far a run is from the others' matrix: over what chance allows, and as a share of its force.
+
+    With s^2 the others' variance per equation and d the run's displacement, its residual r has the variance
+    s^2 (1 + d* (sum of d d*)^-1 d); |r|^2 over it follows an F distribution.
+    """
+    stiffness = solve_stiffness(others)
+    spare = 2 * (2 * len(others) - 4)
+    if stiffness is None or spare < 4:
+        return 0.0, 0.0
+    from scipy.special import fdtri
+
+    scales = np.array([np.linalg.norm(a.displacement) for a in others])
+    unit = np.stack([a.displacement for a in others]) / scales[:, None]
+    rest = np.stack([a.force - stiffness @ a.displacement for a in others]) / scales[:, None]
+    variance = float(np.sum(np.abs(rest) ** 2)) / spare
+    size = float(np.linalg.norm(one.displacement))
+    own = one.displacement / size
+    leverage = float(np.real(own.conj() @ np.linalg.solve(unit.T @ unit.conj(), own)))
+    residual = float(np.linalg.norm(one.force - stiffness @ one.displacement)) / size
+    ratio = residual**2 / 4 / (max(variance, 1e-300) * (1 + leverage))
+    return ratio / float(fdtri(4, spare, 1 - _CHANCE)), misfit_of(one, stiffness)
+
+
+def _tell(answer: Answer, stiffness: ComplexArray) -> None:
+    misfit = misfit_of(answer, stiffness)
+    hint = _name_misfit(answer, stiffness, misfit) or _name_gain(answer, stiffness, misfit)
+    severity: Severity = "error" if misfit > 0.5 or (hint and misfit > 0.2) else "warning"
+    share = f"{misfit:.0%}" if misfit > 0.1 else f"{misfit:.1%}"
+    what = f"differs by {share} from the other runs at this operating point{hint}"
+    cure = "Check this run's channels and set points; leave it out or repeat it"
+    answer.seen.report.say("disagrees", severity, "displacement and force", what, cure)
+
+
+def _name_misfit(answer: Answer, stiffness: ComplexArray, misfit: float) -> str:
+    """Name the one wiring fault of probes or cells that explains a run apart from the others."""
+    tried = [(misfit_of(answer, stiffness, m), w) for w, m in repairs(answer.channels, scales=True)]
+    seen, where = answer.seen, answer.seen.pick("force")
+    cells = [seen.channels[i] for i in where]
+    if len(cells) == 2 and seen.lines is not None:
+        phasors = seen.lines.phasor[where]
+        for words, matrix in repairs(cells, scales=True):
+            # The inertia part of the force stays: only the cells are supposed to be at fault.
+            force = answer.force + to_plane(cells, matrix @ phasors - phasors)
+            tried.append((misfit_of(replace(answer, force=force), stiffness), words))
+    tried.sort()
+    clear = tried[0][0] < misfit / 4 and tried[0][0] < tried[1][0] / 2
+    return f"; as if {tried[0][1]}" if clear else ""
+
+
+def _name_gain(answer: Answer, stiffness: ComplexArray, misfit: float) -> str:
+    """Name the one channel whose gain, some per cent off, explains a run apart from the others."""
+    rest = answer.force - stiffness @ answer.displacement
+    tried = []
+    for name, share in _shares(answer, stiffness):
+        # rest = (1 - 1/g) share, with g the gain that the readings have beyond the truth
+        part = float(np.real(np.vdot(share, rest)) / max(float(np.real(np.vdot(share, share))), 1e-300))
+        left = float(np.linalg.norm(rest - part * share) / np.linalg.norm(answer.force))
+        tried.append((left, part, name))
+    tried.sort()
+    if len(tried) < 2 or tried[0][0] > _EXPLAINED * misfit or tried[0][0] > 0.6 * tried[1][0] or tried[0][1] >= 1:
+        return ""
+    gain = 1 / (1 - tried[0][1])
+    return f"; as if {tried[0][2]} read {abs(gain - 1):.0%} too {'much' if gain > 1 else 'little'}"
+
+
+def _shares(answer: Answer, stiffness: ComplexArray) -> Iterator[tuple[str, ComplexArray]]:
+    """What every probe and cell contributes to force minus H times displacement, with the sign of its own reading."""
+    for i, channel in enumerate(answer.channels):
+        own = np.zeros(2, dtype=complex)
+        own[i] = answer.readings[i]
+        yield channel.name, np.asarray(-stiffness @ to_plane(answer.channels, own))
+    seen, where = answer.seen, answer.seen.pick("force")
+    if len(where) == 2 and seen.lines is not None:
+        cells = [seen.channels[i] for i in where]
+        for i, channel in enumerate(cells):
+            own = np.zeros(2, dtype=complex)
+            own[i] = seen.lines.phasor[where[i]]
+            yield channel.name, np.asarray(to_plane(cells, own))
