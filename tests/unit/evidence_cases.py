@@ -25,6 +25,21 @@ def row(kind="hidden", said="soft_pivot pad 5", **other):
     return {**full, **other}
 
 
+def followed():
+    """Ambiguous campaigns of two data sets with the tests after them, and one that needed none."""
+    pair, out = ("soft_pivot pad 5", "channel_delay"), []
+    for k, (data_set, settled, blind) in enumerate((("A", True, False), ("A", True, True), ("D", False, False))):
+        then = {
+            "then_tests": ("a locus", "a dry test"), "then_verdict": "named" if settled else "ambiguous",
+            "then_settled": settled, "then_expected": 8.0 + k, "then_achieved": 7.5 + k, "then_chance": 0.97,
+            "random_tests": ("a polygon", "a balance"), "random_verdict": "ambiguous", "random_settled": blind,
+            "random_expected": 2.0, "random_achieved": -1.0 + k, "random_chance": 0.01,
+            "model": pair[0], "rival": pair[1], "apart_now": 1.5,
+        }  # fmt: skip
+        out.append(row("next test", pair, number=k, data_set=data_set, **then))
+    return [*out, row("next test", "consistent", number=9, data_set="D")]
+
+
 def rows():
     """Some of everything: both rungs, three sizes, nothing hidden, left out, simple rules."""
     numbers, out = itertools.count(), []
@@ -48,6 +63,7 @@ def rows():
         add(1, "none", "consistent", p_before=(k + 0.5) / 20, placebo_fall=0.02 * (k - 9), naive=naive)
     add(1, "none", "oil_viscosity", p_before=0.001, placebo_fall=0.2, naive=naive)
     add(3, "none", "consistent", p_before=0.4, rung="raw volts", plan="paper")
+    out.extend(followed())
     add(5, "left out", "unexplained", size=12.0, naive=naive)
     add(2, "left out", "channel_delay", size=12.0, naive=naive)
     add(1, "left out", ("channel_delay", "oil_viscosity"), size=12.0)

@@ -22,6 +22,7 @@ from tests.unit.evidence_cases import rows
 from tpjb_ident.clearance import ClearancePolygon
 from tpjb_ident.evidence.counts import SPECIAL, confusion_matrix
 from tpjb_ident.evidence.measures import closure_table, coverage_table, no_effect_p, power_table
+from tpjb_ident.evidence.next_tests import next_test_table, separations
 from tpjb_ident.locus import Locus, LocusPoint
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
 from tpjb_ident.pivot.fit import LAWS
@@ -221,6 +222,7 @@ CASES = {
     "p_values": lambda: plots.p_values(no_effect_p(rows()), 0.01),
     "interval_coverage": lambda: plots.interval_coverage(coverage_table(rows())),
     "closures": lambda: plots.closures(closure_table([r for r in rows() if "rung" not in r])),
+    "next_tests": lambda: plots.next_tests(next_test_table(rows()), separations(rows())),
     "outcomes": lambda: plots.outcomes(
         {"hidden, d' = 6": {"named right": 7, "group right": 1, "consistent": 2, "named wrong": 1},
          "left out": {"unexplained": 5, "group wrong": 1, "named wrong": 2}}, [11, 8]

@@ -11,12 +11,13 @@ from model.effects import Effect, known_effects, load_effects
 from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
 from tpjb_ident.diagnose.candidates import candidates
+from tpjb_ident.diagnose.designs import Design
 from tpjb_ident.diagnose.diagnose import diagnose
 from tpjb_ident.diagnose.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnose.gap import gap, residuals
 from tpjb_ident.diagnose.layout import Layout
 from tpjb_ident.diagnose.localise import localise
-from tpjb_ident.diagnose.next_test import Design, rank_designs, say
+from tpjb_ident.diagnose.next_test import rank_designs, say
 from tpjb_ident.diagnose.nuisance import Certificates
 from tpjb_ident.diagnose.plan import plan
 from tpjb_ident.diagnose.planned import around, dry, dynamic, planned_observations
@@ -148,7 +149,7 @@ def test_next_test_ranks_the_test_that_separates(setup):
         Design("with sensors", Layout(point)),
         Design("without", Layout((replace(point[0], pads=()),))),
     )
-    ranked = rank_designs(setup, thin, warm, [without, with_sensors], Certificates())
+    ranked = rank_designs(setup, thin, [warm], [without, with_sensors], Certificates())
     assert ranked[0].design is with_sensors
     assert ranked[0].expected > 3 * ranked[1].expected
     assert "with sensors" in say(ranked[:1], "a", "b")

@@ -12,7 +12,7 @@ from model.effects import Effect
 from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
 from tpjb_ident.diagnose.candidates import candidates
-from tpjb_ident.diagnose.decide import strongest_rival
+from tpjb_ident.diagnose.decide import close_rivals
 from tpjb_ident.diagnose.diagnose import solve
 from tpjb_ident.diagnose.layout import Layout
 from tpjb_ident.diagnose.nuisance import Nuisances
@@ -65,7 +65,7 @@ def test_another_pad_that_would_do_makes_the_verdict_ambiguous(posed):
     assert verdict.indistinguishable == (("soft_pivot", "soft_pivot pad 2"),)
     assert verdict.alternatives == (("soft_pivot pad 1", "soft_pivot pad 2"),)
     assert "soft_pivot pad 1 or soft_pivot pad 2" in verdict.reasons[0]
-    assert strongest_rival(found, DiagnoseSettings()).label == "soft_pivot pad 2"
+    assert [r.label for r in close_rivals(found, DiagnoseSettings())] == ["soft_pivot pad 2"]
     assert verdict.to_dict()["alternatives"] == [["soft_pivot pad 1", "soft_pivot pad 2"]]
 
 
@@ -74,7 +74,7 @@ def test_a_pad_that_differs_enough_is_named(posed):
     assert verdict.verdict == "named"
     assert [e.label for e in verdict.effects] == ["soft_pivot pad 1"]
     assert not verdict.alternatives
-    assert strongest_rival(found, DiagnoseSettings()) is None
+    assert close_rivals(found, DiagnoseSettings()) == ()
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ def test_probes_on_the_housing_do_not_see_its_spring(setup):
     point = Layout(dynamic([5000.0], [SPEED], SPEED, -math.pi / 2, 0))
     (blind,) = (d for d in designs(setup, point) if "housing_flexibility" in d.blind)
     seeing, not_seeing = Design("from the frame", point), Design("from the housing", point, blind.blind)
-    ranked = rank_designs(setup, spring, [], [seeing, not_seeing], Certificates())
+    ranked = rank_designs(setup, spring, [[]], [seeing, not_seeing], Certificates())
     assert [s.design.words for s in ranked] == ["from the frame", "from the housing"]
     assert ranked[0].expected > 3.0
     assert ranked[1].expected == 0.0
@@ -72,7 +72,7 @@ def test_checks_are_ranked_beside_tests_on_the_rig(setup):
     slow, heavy = [Effect("channel_delay", delay=2e-5)], [Effect("fluid_inertia", added_mass=40.0)]
     options = [o for o in options_for(setup, Layout(())) if isinstance(o, Check)]
     assert len(options) == len(CHECKS)
-    ranked = rank_designs(setup, slow, heavy, options, Certificates())
+    ranked = rank_designs(setup, slow, [heavy], options, Certificates())
     assert ranked[0].design is by_effect("channel_delay")
 
 
@@ -80,7 +80,7 @@ def test_checks_are_ranked_beside_tests_on_the_rig(setup):
     ("expected", "count", "apart"), [((6.0, 5.0), 1, 6.0), ((4.0, 3.0), 2, 5.0), ((1.0, 0.5), 2, math.hypot(1.0, 0.5))]
 )
 def test_a_second_test_is_suggested_where_one_is_not_enough(expected, count, apart):
-    ranked = [Separation(CHECKS[i], d) for i, d in enumerate(expected)]
+    ranked = [Separation(CHECKS[i], (d,)) for i, d in enumerate(expected)]
     chosen = suggested(ranked)
     assert len(chosen) == count
     assert together(chosen) == pytest.approx(apart)
@@ -92,3 +92,13 @@ def test_a_second_test_is_suggested_where_one_is_not_enough(expected, count, apa
 @pytest.mark.parametrize(("apart", "wanted"), [(0.0, 0.0), (3.0, 0.5), (5.0, 0.9452), (-1.0, 0.0)])
 def test_chance_is_that_of_a_normal_difference_of_chi_squares(apart, wanted):
     assert chance(apart) == pytest.approx(wanted, abs=1e-4)
+
+
+def test_the_nearest_rival_counts_and_two_tests_may_be_chosen_for_what_each_tells():
+    # the best two alone see the first rival only; the third sees the second
+    tests = [Separation(CHECKS[i], each) for i, each in enumerate([(9.0, 1.0), (8.0, 1.0), (0.5, 7.0)])]
+    chosen = suggested(tests)
+    assert {s.design for s in chosen} == {CHECKS[0], CHECKS[2]}
+    assert together(chosen) == pytest.approx(math.hypot(1.0, 7.0))
+    assert together(chosen, now=(0.0, 2.0)) == pytest.approx(math.sqrt(1.0 + 49.0 + 4.0))
+    assert "from b and c by at least 7 standard deviations" in say(chosen, "a", "b", "c")

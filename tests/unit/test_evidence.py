@@ -11,6 +11,7 @@ from tests.unit.evidence_cases import row, rows
 from tpjb_ident.cli.app import app
 from tpjb_ident.evidence.counts import abstention_table, confusion_matrix, impostors_table, plans_table
 from tpjb_ident.evidence.measures import closure_table, coverage_table, p_value_table, power_table, rules_table
+from tpjb_ident.evidence.next_tests import next_test_pairs, next_test_table, separations
 from tpjb_ident.evidence.rows import RowsError, read_rows, write_rows
 from tpjb_ident.evidence.shares import share_interval
 from tpjb_ident.evidence.tables import evidence_tables
@@ -103,6 +104,18 @@ def test_p_values_of_no_effect_and_simple_rules():
     rule = only(rules_table(rows()), kind="hidden", size_sigma=6.0, rule="largest score")
     assert (rule["right_share"], rule["trials"]) == (1.0, 6)
     assert only(rules_table(rows()), kind="none", rule="BIC")["none_share"] == 1.0
+
+
+def test_next_tests_are_counted_where_a_test_followed():
+    table = next_test_table(rows())
+    a = only(table, data_set="A", size_sigma="all")
+    assert (a["ambiguous_campaigns"], a["settled"], a["settled_by_random"]) == (2, 1.0, 0.5)
+    assert (a["expected"], a["achieved"]) == (8.5, 8.0)
+    d = only(table, data_set="D", size_sigma="6")
+    assert (d["ambiguous_campaigns"], d["settled"], d["named_wrong"]) == (1, 0.0, 0.0)
+    pair = only(next_test_pairs(rows()), data_set="A")
+    assert (pair["confused_with"], pair["next_test"], pair["settled"]) == ("channel_delay", "a locus and a dry test", 2)
+    assert separations(rows())["random"][0] == (2.0, -1.0)
 
 
 def test_plans_are_told_apart():

@@ -150,8 +150,8 @@ def _alternatives(found: Search, scale: float, settings: DiagnoseSettings) -> tu
     return tuple((one.label, *(c.label for c in others)) for one, others in rows if others)
 
 
-def strongest_rival(found: Search, settings: DiagnoseSettings) -> Fit | None:
-    """Return the explanation that comes closest to the model without being told from it; None if none does.
+def close_rivals(found: Search, settings: DiagnoseSettings) -> tuple[Fit, ...]:
+    """Return the explanations that the data cannot tell from the model, the closest first.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def strongest_rival(found: Search, settings: DiagnoseSettings) -> Fit | None:
     settings : DiagnoseSettings
     """
     alike = [r for row in found.rivals for r in row if _alike(found, r, found.after.scale, settings)]
-    return min(alike, key=lambda f: f.chi_square, default=None)
+    return tuple(sorted(alike, key=lambda f: f.chi_square))
 
 
 def _effects(found: Search, scale: float) -> tuple[FoundEffect, ...]:

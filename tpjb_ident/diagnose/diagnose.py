@@ -8,7 +8,7 @@ from typing import Any
 from model.setup import Setup
 from tpjb_ident.diagnose.candidates import candidates
 from tpjb_ident.diagnose.closure import closure
-from tpjb_ident.diagnose.decide import decide, strongest_rival
+from tpjb_ident.diagnose.decide import close_rivals, decide
 from tpjb_ident.diagnose.forward import Forward, ForwardModel
 from tpjb_ident.diagnose.laws import frequency_laws, sensor_map_test
 from tpjb_ident.diagnose.memory import Memory
@@ -127,9 +127,10 @@ def _next_test(
         return f"repeat {worst.observable} at {worst.where}, where the unknown shows most, with another sensor set"
     if verdict.verdict == "named":
         return "none needed to tell these effects from the others in the library"
-    rival = strongest_rival(found, settings)
-    if rival is None:
+    rivals = close_rivals(found, settings)
+    if not rivals:
         return ""
     options = options_for(setup, observations.layout)
-    ranked = rank_designs(setup, found.model.effects, rival.effects, options, settings.certificates)
-    return say(suggested(ranked), found.model.label, rival.label) if ranked else ""
+    others = [rival.effects for rival in rivals]
+    ranked = rank_designs(setup, found.model.effects, others, options, settings.certificates)
+    return say(suggested(ranked), found.model.label, *(r.label for r in rivals)) if ranked else ""

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from tpjb_ident.diagnose.bench import Bench, seed
 from tpjb_ident.diagnose.candidates import Candidate
 from tpjb_ident.diagnose.checks import Check
-from tpjb_ident.diagnose.decide import strongest_rival
+from tpjb_ident.diagnose.decide import close_rivals
 from tpjb_ident.diagnose.diagnose import solve
 from tpjb_ident.diagnose.fit import Fit, Misfit
-from tpjb_ident.diagnose.next_test import Separation, apart, chance, suggested, together
-from tpjb_ident.diagnose.next_test_bench import NextBench, Part, restricted, restricted_surrogate
+from tpjb_ident.diagnose.next_test import Separation, apart, chance, ranked, suggested, together
+from tpjb_ident.diagnose.next_test_bench import NextBench, restricted, restricted_surrogate
 from tpjb_ident.diagnose.problem import Problem
 from tpjb_ident.diagnose.settings import DiagnoseSettings
 from tpjb_ident.diagnose.surrogate import Surrogate
@@ -80,45 +80,36 @@ def run_next_trial(shared: tuple[NextBench, Bench], trial: NextTrial) -> dict[st
     settings = DiagnoseSettings()
     campaign = restricted(drawn, nb.campaign)
     verdict, found = solve(campaign, alone.surrogate, settings)
-    rival = strongest_rival(found, settings) if verdict.verdict == "ambiguous" else None
+    rivals = close_rivals(found, settings) if verdict.verdict == "ambiguous" else ()
     row |= {"verdict": verdict.verdict, "labels": summary(verdict, ())["labels"]}
-    if rival is None:
+    if not rivals:
         return row
-    ranked = ranked_parts(nb, found.model, rival)
-    best = [_part(nb, s.design) for s in suggested([s for s, _ in ranked])]
-    row |= {
-        "alternatives": verdict.alternatives, "model": found.model.label, "rival": rival.label,
-        "held_it": any(trial.truth[0] in group for group in verdict.alternatives),
-        "apart_now": _apart(campaign, found.model.prediction - rival.prediction),
+    now = tuple(_apart(campaign, found.model.prediction - rival.prediction) for rival in rivals)
+    tests = ranked_parts(nb, found.model, rivals)
+    best = suggested(tests)
+    blind = tuple(tests[int(i)] for i in rng.choice(len(tests), size=len(best), replace=False))
+    truths = (chosen[0], (found.model, *rivals))
+    return {
+        **row, "alternatives": verdict.alternatives, "model": found.model.label, "rival": rivals[0].label,
+        "apart_now": min(now), **_followed(nb, drawn, (best, now), truths, "then_"),
+        **_followed(nb, drawn, (blind, now), truths, "random_"),
     }  # fmt: skip
-    row |= _followed(nb, drawn, best, (found.model, rival, chosen[0]), "then_")
-    blind = rng.choice(len(ranked), size=len(best), replace=False)
-    picked = [_part(nb, ranked[int(i)][0].design) for i in blind]
-    row |= _followed(nb, drawn, picked, (found.model, rival, chosen[0]), "random_")
-    expected = {_part(nb, s.design): s for s, _ in ranked}
-    for prefix, tests in (("then_", best), ("random_", picked)):
-        by_tests = together([expected[i] for i in tests])
-        row[f"{prefix}expected"] = float(np.hypot(by_tests, row["apart_now"]))
-        row[f"{prefix}chance"] = chance(row[f"{prefix}expected"])
-    return row
 
 
-def ranked_parts(nb: NextBench, one: Fit, other: Fit) -> list[tuple[Separation, Part]]:
-    """Expected separation of two fits by every part, best first; as `next_test.rank_designs`, from tables."""
+def ranked_parts(nb: NextBench, one: Fit, rivals: Sequence[Fit]) -> tuple[Separation, ...]:
+    """Expected separation of a fit from its rivals by every part; as `next_test.rank_designs`, from tables."""
     out = []
     for part in nb.parts:
         option = part.option
         if isinstance(option, Check):
-            out.append((Separation(option, option.separation(one.effects, other.effects)), part))
+            each = tuple(option.separation(one.effects, other.effects) for other in rivals)
+        elif option.fits(one.effects, *(other.effects for other in rivals)):
+            mine, columns = part.surrogate(one.effects), part.nuisances.columns
+            each = tuple(apart(part.seen, columns, mine - part.surrogate(other.effects)) for other in rivals)
+        else:
             continue
-        if option.fits(one.effects, other.effects):
-            difference = part.surrogate(one.effects) - part.surrogate(other.effects)
-            out.append((Separation(option, apart(part.seen, part.nuisances.columns, difference)), part))
-    return sorted(out, key=lambda pair: -pair[0].expected)
-
-
-def _part(nb: NextBench, option: object) -> int:
-    return next(i for i, part in enumerate(nb.parts) if part.option is option)
+        out.append(Separation(option, each))
+    return ranked(out)
 
 
 def _apart(problem: Problem, difference: FloatArray) -> float:
@@ -126,21 +117,28 @@ def _apart(problem: Problem, difference: FloatArray) -> float:
 
 
 def _followed(
-    nb: NextBench, drawn: Problem, tests: Sequence[int], fits: tuple[Fit, Fit, Candidate], prefix: str
+    nb: NextBench,
+    drawn: Problem,
+    tests: tuple[Sequence[Separation], Sequence[float]],
+    truths: tuple[Candidate, Sequence[Fit]],
+    prefix: str,
 ) -> dict[str, Any]:
-    """What comes of a campaign with some tests after it."""
-    mask = nb.campaign | np.logical_or.reduce([nb.masks[i] for i in tests])
+    """What comes of a campaign with some tests after it, beside what was foretold."""
+    (chosen, now), (truth, fits) = tests, truths
+    options = [t.design for t in chosen]
+    masks = [m for m, part in zip(nb.masks, nb.parts, strict=True) if part.option in options]
+    mask = np.logical_or.reduce([nb.campaign, *masks])
     problem, surrogate = restricted(drawn, mask), restricted_surrogate(nb.whole.surrogate, mask)
     verdict, _ = solve(problem, surrogate, DiagnoseSettings())
     said = summary(verdict, ())
-    one, other, truth = fits
-    rivals = {f.candidates[0] for f in (one, other) if len(f.candidates) == 1} - {truth}
-    return {
-        f"{prefix}tests": tuple(nb.parts[i].option.words for i in tests),
-        f"{prefix}verdict": said["verdict"], f"{prefix}labels": said["labels"],
-        f"{prefix}alternatives": said["alternatives"], f"{prefix}settled": _settled(verdict, truth),
-        f"{prefix}achieved": _achieved(problem, surrogate, truth, rivals),
+    others = {f.candidates[0] for f in fits if len(f.candidates) == 1} - {truth}
+    expected = together(chosen, now)
+    found = {
+        "tests": tuple(option.words for option in options), "verdict": said["verdict"], "labels": said["labels"],
+        "alternatives": said["alternatives"], "settled": _settled(verdict, truth), "expected": expected,
+        "chance": chance(expected), "achieved": _achieved(problem, surrogate, truth, others),
     }  # fmt: skip
+    return {prefix + name: value for name, value in found.items()}
 
 
 def _settled(verdict: Verdict, truth: Candidate) -> bool:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
+from tpjb_ident.report.numbers import MINUS
 from tpjb_ident.report.plots.look import LIGHT, add_legend, label, new_pictures
 
 if TYPE_CHECKING:
@@ -68,25 +70,20 @@ def _shares(axes: Axes, whole: pd.DataFrame) -> None:
 
 def _scatter(axes: Axes, separations: Mapping[str, Sequence[tuple[float, float]]]) -> None:
     label(axes, "expected separation, standard deviations", "achieved separation, standard deviations")
-    top = 1.0
+    top, bottom = 1.0, 0.0
     for name, pairs in separations.items():
         colour, marker, fill = STYLE[name]
         points = np.array(pairs)
         axes.plot(points[:, 0], points[:, 1], marker, color=LIGHT[colour], fillstyle=fill, markersize=4.5,
                   label=f"{name} ({len(points)})")  # fmt: skip
-        top = max(top, 1.1 * float(points.max()))
+        top, bottom = max(top, 1.1 * float(points.max())), min(bottom, 1.1 * float(points.min()))
     axes.plot([0.0, top], [0.0, top], color=LIGHT["ink"], linestyle=(0, (2, 2)), linewidth=0.9, label="as expected")
     axes.axhline(3.0, color=LIGHT["red"], linewidth=0.9, label="told apart above")
     axes.set_xscale("symlog", linthresh=3.0)
     axes.set_yscale("symlog", linthresh=3.0)
-    ticks = [t for t in (0, 1, 2, 3, 6, 10, 20, 50, 100, 200, 500) if t <= top]
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_ticks(ticks, [f"{t:g}" for t in ticks])
-        axis.set_minor_locator(_no_ticks())
+    both = sorted({sign * t for t in (0, 1, 2, 3, 6, 10, 20, 50, 100, 200, 500) for sign in (-1, 1)})
+    for axis, low in ((axes.xaxis, 0.0), (axes.yaxis, bottom)):
+        ticks = [t for t in both if low <= t <= top]
+        axis.set_ticks(ticks, [f"{t:g}".replace("-", MINUS) for t in ticks])
+        axis.set_minor_locator(NullLocator())
     add_legend(axes)
-
-
-def _no_ticks():  # type: ignore[no-untyped-def]
-    from matplotlib.ticker import NullLocator
-
-    return NullLocator()
