@@ -13,6 +13,7 @@ from rigdata.problem import Problem, RigDataError
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.noise import NoiseModel
 from tpjb_ident.polygon import Centre, CentreRule, corners, find_centre, normals
+from tpjb_ident.probe_gains import gain_ratio
 from tpjb_ident.side_fit import SideFit, fit_sides
 from tpjb_ident.sweep import Touch, read_sweep
 
@@ -27,6 +28,8 @@ FloatArray = NDArray[np.float64]
 FEWEST_BLOCKS = 4  # per pad
 SAME_WARMTH = 4.0  # [K]
 IRREGULAR = 3.0  # standard errors
+UNEQUAL = 0.02  # gains of two probes: twice what a usual certificate leaves open
+GAIN_ERRORS = 4.0  # standard errors, of few sides
 DISAGREES = 0.1  # share: a shaft that slides into its corner slowly makes up for some per cent
 
 
@@ -187,7 +190,7 @@ def measure_run(
     pads = np.flatnonzero(reached)
     centre = find_centre(angles[pads], fit.distance[pads], fit.covariance[np.ix_(pads, pads)], rule)
     found = _polygon(run, touch, angles, fit, centre, rule)
-    return replace(found, status=(*found.status, *_extrapolated(touch.push, curves)))
+    return replace(found, status=(*found.status, *_gains_differ(run, found), *_extrapolated(touch.push, curves)))
 
 
 def _polygon(
@@ -231,6 +234,21 @@ def _polygon(
         centre_rule=rule,
         status=_status(fit, clearance, se, len(pads)),
     )
+
+
+def _gains_differ(run: Run, found: ClearancePolygon) -> tuple[str, ...]:
+    """One probe reads more than the other: sizes do not tell, the angles between the sides do."""
+    probes = [c for c in run.channels.values() if c.quantity == "displacement" and c.axis is not None]
+    if len(probes) != 2:
+        return ()
+    first, second = probes
+    axes = (float(first.axis or 0.0), float(second.axis or 0.0))
+    ratio = gain_ratio(found.angles, found.fitted_angle - found.angles, found.fitted_angle_se, axes)
+    if not abs(ratio.value) > max(UNEQUAL, GAIN_ERRORS * ratio.se):
+        return ()
+    share = f"{100 * abs(ratio.value):.1f} % (se {100 * ratio.se:.1f} %)"
+    more = "more" if ratio.value > 0 else "less"
+    return (f"probe-gains-differ: the sides stand as if {first.name} read {share} {more} than {second.name}",)
 
 
 def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tpjb_ident.cli.bearing_checks import bearing_problems
 from tpjb_ident.cli.errors import BadInputError, guarded
 from tpjb_ident.cli.inputs import campaign_place
 from tpjb_ident.cli.options import CampaignPath, Out, out_folder
@@ -17,6 +18,8 @@ from tpjb_ident.tables import write_text
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from rigdata.problem import Problem
+
+SEVERITIES = ("error", "warning", "note")
 
 
 @guarded
@@ -32,8 +35,12 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
     campaign = campaign_place(campaign)
     with progress(f"reading {campaign.name}"):
         problems = check_campaign(campaign)
+        opened = _opened(campaign)
+        if opened is not None:
+            more = bearing_problems(opened, problems)
+            problems = sorted([*problems, *more], key=lambda p: SEVERITIES.index(p.severity))
     errors = [p for p in problems if p.severity == "error"]
-    summary = check_summary(campaign, problems, _opened(campaign))
+    summary = check_summary(campaign, problems, opened)
     target = out_folder(out, "check")
     with output_folder(target, "check", (campaign,)) as folder:
         write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")
@@ -65,13 +72,12 @@ def check_summary(path: Path, problems: list[Problem], campaign: Campaign | None
     if campaign is not None:
         kinds = {kind: len(campaign.of_kind(kind)) for kind in ("dynamic", "dry_pivot", "locus", "clearance")}
         files = campaign.fingerprint()
-    severities = ("error", "warning", "note")
     return {
         "schema": "tpjb-check/1",
         "campaign": path.name if campaign is None else campaign.id,
         "ok": not any(p.severity == "error" for p in problems),
         "runs": kinds,
-        "counts": {s: sum(p.severity == s for p in problems) for s in severities},
+        "counts": {s: sum(p.severity == s for p in problems) for s in SEVERITIES},
         "problems": [
             {"severity": p.severity, "file": p.file, "place": p.place, "run": p.run, "what": p.what, "cure": p.cure}
             for p in problems

@@ -21,6 +21,7 @@ from tpjb_ident.dynamic.phasor_table import phasor_table
 from tpjb_ident.dynamic.point_data import PointData
 from tpjb_ident.dynamic.point_result import PointResult
 from tpjb_ident.dynamic.point_source import point_sources
+from tpjb_ident.dynamic.probe_scale import with_probe_doubts
 from tpjb_ident.dynamic.quality import amplitude, coherence, directional_pattern, flags, rejected_windows
 from tpjb_ident.dynamic.rlm import RlmSettings
 from tpjb_ident.dynamic.run_jobs import Progress, all_runs
@@ -133,7 +134,7 @@ def assemble(campaign: Any, shelf: RunShelf, settings: IdentifySettings, tell: P
     joint = np.concatenate(changes, axis=1)
     left, several = shelf.left_out, bool(settings.phasors.excitation_lines)
     told = named_runs(left, len(digests) + len(left)) + lost_points(points, left, several)
-    named = named_at_points(points, left, several)
+    named = with_probe_doubts(campaign, named_at_points(points, left, several), settings.clearance)
     return Identification(campaign.id, settings.method, named, joint, _campaign_conditions(draws) + told)
 
 

@@ -44,6 +44,10 @@ MEANING = {
     "accelerometer-dead": "An accelerometer reads one value throughout: the housing's inertia along it stays in the "
     "force. Check it, or set the channel to ignore.",
     "point-lost": "None of the runs at an operating point can be used: it has no coefficients.",
+    "probe-gains-differ": "The sides of the clearance polygon stand at other angles to each other than the pads do, as "
+    "where one probe reads more than the other. Check both sensitivities.",
+    "probes-contradict-clearance": "The probes' readings cannot be lengths in this bearing: a sensitivity is several "
+    "times off, and the coefficients with it. Check the sensitivities of the probes, and the bearing file.",
     "record-damaged": "A record had to be mended when it was read, and part of it is lost. Copy it again from the rig.",
     "run-left-out": "A run at this point cannot be used and takes no part; the others stand.",
     "runs-left-out": "Some runs cannot be used and take no part; the others stand.",
@@ -91,6 +95,7 @@ SERIOUS = frozenset(
         "contact-never-complete",
         "outside-polygon",
         "point-lost",
+        "probes-contradict-clearance",
         "fewer-than-two-directions",
         "ill-conditioned",
         "iteration-limit",

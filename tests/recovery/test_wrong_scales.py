@@ -1,0 +1,101 @@
+"""Probes whose scale is wrong in all runs: ten times off shows beside the clearance, unequal gains in its angles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from rigdata.campaign import load_campaign
+from rigdata.virtual_rig import Fault
+from tests.good_campaigns import SMALL_PLAN, rocker_rig, written
+from tpjb_ident.clearance import measure_run
+from tpjb_ident.cli.app import app
+from tpjb_ident.dynamic.identify import IdentifySettings, identify
+from tpjb_ident.probe_gains import gain_ratio
+
+CLEARANCE = 80e-6
+ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
+SWEEP = replace(SMALL_PLAN, dynamic=(), locus=(), dry=())
+
+
+def gain(channel, value):
+    return Fault("scaled", "*", channel, value=value)
+
+
+def campaign(tmp_path, *faults, plan=SMALL_PLAN, seed=3):
+    return load_campaign(written(tmp_path / "c.h5", rocker_rig(seed, *faults, plan=plan)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("faults", "sweep", "says"),
+    [
+        ((gain("X1*", 10.0),), True, "X1A travels"),
+        ((gain("X1*", 0.1),), True, "X1A travels"),
+        ((gain("X1B", 10.0),), True, "X1B travels"),
+        ((gain("X1*", 10.0),), False, "would move the shaft by more than"),
+    ],
+)
+def test_probes_ten_times_off_make_every_point_doubtful(tmp_path, faults, sweep, says):
+    plan = SMALL_PLAN if sweep else replace(SMALL_PLAN, clearance=())
+    source = campaign(tmp_path, *faults, plan=replace(plan, dry=(), locus=()))
+    found = identify(source, IdentifySettings(methods=(), method="ols", clearance=CLEARANCE))
+    (told,) = (c for c in found.points[0].quality if c == "probes-contradict-clearance")
+    assert says in told.detail
+
+
+def test_good_probes_are_not_doubted(tmp_path):
+    source = campaign(tmp_path)
+    found = identify(source, IdentifySettings(methods=(), method="ols", clearance=CLEARANCE))
+    assert "probes-contradict-clearance" not in found.points[0].quality
+    polygon = measure_run(source.of_kind("clearance")[0], ANGLES)
+    assert not [s for s in polygon.status if s.startswith("probe-gains-differ")]
+    assert CliRunner().invoke(app, ["check", str(source.path), "--out", str(tmp_path / "o")]).exit_code == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("channel", "value", "says"),
+    [("X1A", 1.1, "X1A read 9"), ("X1B", 1.03, "X1A read 2.9 % (se 0."), ("X1A", 0.95, "less")],
+)
+def test_unequal_gains_show_in_the_angles_of_the_polygon(tmp_path, channel, value, says):
+    source = campaign(tmp_path, gain(channel, value), plan=SWEEP)
+    polygon = measure_run(source.of_kind("clearance")[0], ANGLES)
+    (told,) = (s for s in polygon.status if s.startswith("probe-gains-differ"))
+    assert says in told
+    out = CliRunner().invoke(app, ["check", str(source.path), "--out", str(tmp_path / "o")])
+    assert out.exit_code == 0
+    assert "warning" in out.output
+    assert "X1A read" in out.output.replace("\n", " ")
+
+
+@pytest.mark.slow
+def test_a_clearance_of_a_tenth_of_the_drawing_s_is_an_error_of_the_check(tmp_path):
+    source = campaign(tmp_path, gain("X1*", 0.1), plan=SWEEP)
+    out = CliRunner().invoke(app, ["check", str(source.path), "--out", str(tmp_path / "o")])
+    assert out.exit_code == 2
+    assert "the bearing file says 80 um" in out.output.replace("\n", " ")
+
+
+@pytest.mark.parametrize("axes", [(np.pi / 4, 3 * np.pi / 4), (0.3, 1.2)])
+def test_gains_are_found_from_turned_normals(axes):
+    rows = np.array([[np.cos(a), np.sin(a)] for a in axes])
+    stretch = np.linalg.inv(rows) @ np.diag([1.002, 1.0]) @ rows
+    normal = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)]) @ np.linalg.inv(stretch)
+    tilt = np.arctan2(normal[:, 1], normal[:, 0]) - ANGLES
+    tilt = np.remainder(tilt + np.pi, 2 * np.pi) - np.pi
+    found = gain_ratio(ANGLES, tilt + 0.01, np.full(5, 1e-4), axes)
+    assert found.value == pytest.approx(0.002, rel=0.01)
+    assert found.turn == pytest.approx(0.01, abs=1e-5)
+    assert np.isnan(gain_ratio(ANGLES[:3], tilt[:3], np.full(3, 1e-4), axes).value)
+
+
+def test_the_condition_reaches_the_table(tmp_path):
+    path = written(tmp_path / "c.h5", rocker_rig(3, gain("X1*", 10.0), plan=replace(SMALL_PLAN, dry=(), locus=())))
+    out = CliRunner().invoke(app, ["identify", str(path), "--out", str(tmp_path / "out")])
+    assert out.exit_code == 3
+    assert pd.read_csv(tmp_path / "out" / "coefficients.csv")["quality"].str.contains("probes-contradict").all()
