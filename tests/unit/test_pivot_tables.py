@@ -259,3 +259,11 @@ def test_a_pivot_that_gives_nothing_has_no_loss_factor():
     load, branch = np.array([200.0, 1000.0, 1000.0, 200.0]), np.array([1, 1, -1, -1])
     assert measure_loop(load, np.zeros(4), np.zeros((4, 4)), branch) is None
     assert replace(curve(), pad=3).pad == 3
+
+
+def test_covariance_between_loads_holds_the_standard_errors_and_a_scale_moves_all_loads_alike():
+    one, far = curve((law(errors=(0.0, 0.0, 0.03)),)), np.array([1000.0, 2500.0, 4000.0, 15000.0])
+    joint = one.relative_stiffness_covariance(far)
+    np.testing.assert_allclose(np.sqrt(np.diag(joint)), one.relative_stiffness_se(far), rtol=1e-12)
+    inside = one.relative_stiffness_covariance(INSIDE)
+    np.testing.assert_allclose(inside, 0.03**2, rtol=1e-9)

@@ -259,9 +259,8 @@ def _usable(curve: PivotCurve) -> bool:
 def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryTest:
     load = np.array([curve.valid_from + s * (curve.valid_to - curve.valid_from) for s in DRY_SHARES])
     value = -np.log(np.asarray(curve.stiffness(load), float))
-    se = np.asarray(curve.relative_stiffness_se(load), float)
     elements = [Element("dry", "dry_compliance", "dry", (("pad", float(curve.pad)), ("load", float(w)))) for w in load]
-    builder.add(elements, value, np.diag(se**2), (tolerance.dry, tolerance.fine_dry))
+    builder.add(elements, value, curve.relative_stiffness_covariance(load), (tolerance.dry, tolerance.fine_dry))
     kept = load[builder.kept]
     return DryTest(curve.pad, tuple(float(w) for w in kept))
 

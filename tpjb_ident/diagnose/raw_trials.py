@@ -23,7 +23,7 @@ from model.effects import Effect, EffectKind, register
 from model.pivots import pivot_laws
 from model.setup import Setup
 from rigdata.campaign import load_campaign
-from rigdata.virtual_rig import Instruments, Noise, VirtualRig, write_campaign
+from rigdata.virtual_rig import Instruments, Noise, VirtualRig, VirtualRigError, write_campaign
 from tpjb_ident.compare.predictions import ModelSettings
 from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 from tpjb_ident.diagnose.bench import FINER, Bench, seed
@@ -130,9 +130,12 @@ def run_raw_trials(shared: RawBench, group: tuple[RawTrial, ...]) -> list[dict[s
     absent = any(c.fixed.get("pad", 0) > len(test.bearing.pads) for c in chosen)
     effects = None if absent else sized(shared.bench, chosen, replace(first, kind="hidden"), rng)
     blank = [{**asdict(trial), "rung": _rung(trial), "names": tuple(c.name for c in chosen)} for trial in group]
-    if effects is None:
+    try:
+        rig = None if effects is None else _rig(test, effects, rng, first.noise)
+    except VirtualRigError:  # no housing weighs less than nothing
+        rig = None
+    if effects is None or rig is None:
         return [{**row, "verdict": "unreachable"} for row in blank]
-    rig = _rig(test, effects, rng, first.noise)
     measured = _measured(rig, test.bearing, shared.keep, "-".join(map(str, asdict(first).values())))
     memory = shared.memory if test.bearing == shared.bearing else None
     return [row | _diagnosed(measured, test.bearing, effects, trial, memory)

@@ -179,6 +179,17 @@ class PivotCurve:
         """Standard error of ln(tangent stiffness) at pad loads [N]."""
         return self._spread(_loads(load), secant=False)
 
+    def relative_stiffness_covariance(self, load: ArrayLike) -> FloatArray:
+        """Covariance of ln(tangent stiffness) between pad loads (n,) [N], (n, n).
+
+        A curve that is off is off as a whole: contact and friction bend it, noise hardly scatters it.
+        """
+        values = np.maximum(_loads(load).ravel(), 1e-6 * self.valid_to)
+        beyond = EXTRAPOLATION_SPREAD * self._beyond(values)
+        return self._joint([np.log(fit.compliance(values)) for fit in self.fits], [
+            fit.log_compliance_gradient(values) for fit in self.fits
+        ]) + np.diag(beyond**2)  # fmt: skip
+
     def reading_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Deflection that the steps should show while loading, and its interval.
 
@@ -218,14 +229,26 @@ class PivotCurve:
     def _spread(self, load: FloatArray, secant: bool) -> FloatArray:
         """Standard deviation of ln(stiffness): each law's own, and the laws' about the leading one."""
         flat = np.maximum(load.ravel(), 1e-6 * self.valid_to)
-        total = np.zeros(len(flat))
         value = [np.log(fit.deflection(flat) if secant else fit.compliance(flat)) for fit in self.fits]
-        for fit, weight, logs in zip(self.fits, self.weights, value, strict=True):
-            gradient = fit.log_deflection_gradient(flat) if secant else fit.log_compliance_gradient(flat)
-            own = np.einsum("ij,jk,ik->i", gradient, fit.covariance, gradient)
-            total += weight * (own + (logs - value[0]) ** 2)
-        beyond = np.log(np.maximum(np.maximum(flat / self.valid_to, float(np.min(self.steps.load)) / flat), 1.0))
-        return np.asarray(np.sqrt(total + (EXTRAPOLATION_SPREAD * beyond) ** 2)).reshape(load.shape)
+        gradient = [
+            fit.log_deflection_gradient(flat) if secant else fit.log_compliance_gradient(flat) for fit in self.fits
+        ]
+        total = np.diag(self._joint(value, gradient)) + (EXTRAPOLATION_SPREAD * self._beyond(flat)) ** 2
+        return np.asarray(np.sqrt(total)).reshape(load.shape)
+
+    def _joint(self, value: list[FloatArray], gradient: list[FloatArray]) -> FloatArray:
+        """Covariance (n, n) of logarithms: each law's own, and the laws' about the leading one."""
+        total = np.zeros((len(value[0]), len(value[0])))
+        for fit, weight, logs, slopes in zip(self.fits, self.weights, value, gradient, strict=True):
+            aside = logs - value[0]
+            total += weight * (slopes @ fit.covariance @ slopes.T + np.outer(aside, aside))
+        return total
+
+    def _beyond(self, load: FloatArray) -> FloatArray:
+        """By how many e-folds loads (n,) lie outside the points."""
+        return np.asarray(
+            np.log(np.maximum(np.maximum(load / self.valid_to, float(np.min(self.steps.load)) / load), 1.0))
+        )
 
     def _quantile(self, level: float) -> float:
         if not 0.0 < level < 1.0:
