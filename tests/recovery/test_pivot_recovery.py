@@ -122,6 +122,7 @@ def equal_gaps():
     return Instruments.like_paper()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fault", [Fault("swapped", "p-1-up", "X1A", other="X1B"), Fault("inverted", "p-1-up", "L1H")], ids=lambda f: f.kind
 )
@@ -166,6 +167,7 @@ def test_any_load_programme(tmp_path, name):
     assert (curve.hysteresis is not None) is (name == "cycle")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["rocker", "sphere on housing"])
 def test_ramps_of_all_pads_are_not_taken_for_drift(tmp_path, kind):
     """Load and time grow together on a ramp: a drift learnt from it would eat the pivots' compliance."""
@@ -228,6 +230,7 @@ def test_a_long_false_load_is_left_out(tmp_path):
     assert np.all(np.abs(error) < 4 * curve.relative_stiffness_se(LOADS))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["rocker", "sphere", "sphere on housing"])
 def test_clearance_has_no_bias_of_its_own(tmp_path, kind):
     """Without noise what is left is the method's own: slides, slow approaches to corners, the give's extrapolation."""
@@ -248,6 +251,7 @@ class Play:
         return np.where(np.asarray(load) < 1500.0, 3e-9, 1.5e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("odd", "law"), [(Play(), "bilinear"), (Sphere(0.6, 3e-9), "point-in-series")])
 def test_a_pad_of_its_own_kind_keeps_its_own_law(tmp_path, odd, law):
     laws = bearing("sphere on housing", 1)

@@ -33,6 +33,12 @@ def path(tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="module")
+def whole(path):
+    """What comes of all runs, done once and kept nowhere."""
+    return all_runs(load_campaign(path), PhasorSettings(), silent)
+
+
 @pytest.fixture
 def counted(monkeypatch):
     """Ids of the runs that are read, one after the other."""
@@ -81,10 +87,8 @@ def same(first, second) -> bool:
     return True
 
 
-def test_finished_runs_are_not_repeated_and_come_back_bit_for_bit(path, tmp_path, counted):
+def test_finished_runs_are_not_repeated_and_come_back_bit_for_bit(path, whole, tmp_path, counted):
     campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
-    whole = all_runs(campaign, settings, silent)
-    counted.clear()
     with pytest.raises(KeyboardInterrupt):
         all_runs(campaign, settings, stop_after(7), store=store)
     assert len(counted) == 7
@@ -99,9 +103,8 @@ def test_finished_runs_are_not_repeated_and_come_back_bit_for_bit(path, tmp_path
     assert not (tmp_path / "kept").exists()
 
 
-def test_what_waits_on_disk_comes_back_bit_for_bit(path, tmp_path, monkeypatch, counted):
+def test_what_waits_on_disk_comes_back_bit_for_bit(path, whole, tmp_path, monkeypatch, counted):
     campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
-    whole = all_runs(campaign, settings, silent)
     monkeypatch.setattr(run_shelf, "ROOM", 0)  # as if the campaign were large
     counted.clear()
     assert same(all_runs(campaign, settings, silent), whole)  # in a temporary folder
