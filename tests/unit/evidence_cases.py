@@ -40,6 +40,20 @@ def followed():
     return [*out, row("next test", "consistent", number=9, data_set="D")]
 
 
+def case():
+    """One case with its gaps and residuals."""
+    gaps = {
+        name: {"baseline": before, "named": 1.1, "gaussian process": 1.5, "wrong effect": 0.7 * before,
+               "placebo before": 0.9, "placebo after": 0.92}
+        for name, before in (("kxx", 4.0), ("kyy", 9.0), ("locus_x", 3.0))
+    }  # fmt: skip
+    residuals = tuple(
+        (model, entry, load, 25.0, z * load / 5000.0)
+        for model, z in (("before", 6.0), ("after", 0.8)) for entry in ("kxx", "kyy") for load in (2500.0, 5000.0)
+    )  # fmt: skip
+    return row("case", gaps=gaps, residuals=residuals, wrong_name="oil_viscosity")
+
+
 def rows():
     """Some of everything: both rungs, three sizes, nothing hidden, left out, simple rules."""
     numbers, out = itertools.count(), []
@@ -64,6 +78,7 @@ def rows():
     add(1, "none", "oil_viscosity", p_before=0.001, placebo_fall=0.2, naive=naive)
     add(3, "none", "consistent", p_before=0.4, rung="raw volts", plan="paper")
     out.extend(followed())
+    out.append(case())
     add(5, "left out", "unexplained", size=12.0, naive=naive)
     add(2, "left out", "channel_delay", size=12.0, naive=naive)
     add(1, "left out", ("channel_delay", "oil_viscosity"), size=12.0)

@@ -20,6 +20,7 @@ import pandas as pd
 from rigdata.operating_point import OperatingPoint
 from tests.unit.evidence_cases import rows
 from tpjb_ident.clearance import ClearancePolygon
+from tpjb_ident.evidence.case import case_table
 from tpjb_ident.evidence.counts import SPECIAL, confusion_matrix
 from tpjb_ident.evidence.measures import closure_table, coverage_table, no_effect_p, power_table
 from tpjb_ident.evidence.next_tests import next_test_table, separations
@@ -222,6 +223,7 @@ CASES = {
     "p_values": lambda: plots.p_values(no_effect_p(rows()), 0.01),
     "interval_coverage": lambda: plots.interval_coverage(coverage_table(rows())),
     "closures": lambda: plots.closures(closure_table([r for r in rows() if "rung" not in r])),
+    "case_gaps": lambda: plots.case_gaps(case_table(rows())),
     "next_tests": lambda: plots.next_tests(next_test_table(rows()), separations(rows())),
     "outcomes": lambda: plots.outcomes(
         {"hidden, d' = 6": {"named right": 7, "group right": 1, "consistent": 2, "named wrong": 1},

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from tests.unit.evidence_cases import row, rows
 from tpjb_ident.cli.app import app
+from tpjb_ident.evidence.case import case_residuals, case_table
 from tpjb_ident.evidence.counts import abstention_table, confusion_matrix, impostors_table, plans_table
 from tpjb_ident.evidence.measures import closure_table, coverage_table, p_value_table, power_table, rules_table
 from tpjb_ident.evidence.next_tests import next_test_pairs, next_test_table, separations
@@ -116,6 +117,13 @@ def test_next_tests_are_counted_where_a_test_followed():
     pair = only(next_test_pairs(rows()), data_set="A")
     assert (pair["confused_with"], pair["next_test"], pair["settled"]) == ("channel_delay", "a locus and a dry test", 2)
     assert separations(rows())["random"][0] == (2.0, -1.0)
+
+
+def test_a_case_is_told_entry_by_entry():
+    table = case_table(rows())
+    assert only(table, observable="kyy")["baseline"] == 9.0
+    assert len(case_residuals(rows())) == 8
+    assert not len(case_table([row()]))
 
 
 def test_plans_are_told_apart():

@@ -135,6 +135,7 @@ class _Todo:
                 *self._surrogate(team, bench, show),
                 *self._raw(team, bench, drawn, show),
                 *self._followed(team, bench, drawn, show),
+                *self._case(bench, show),
             ]
 
     def _store(self, name: str) -> Path | None:
@@ -154,6 +155,12 @@ class _Todo:
             show(f"{row['kind']} {' + '.join(row['truth'])}", next(done), len(todo))
 
         return [*kept_trials(team, run_trial, todo, bench, self._store("-rows.jsonl"), told)]
+
+    def _case(self, bench: Bench, show: Progress) -> list[Row]:
+        from tpjb_ident.diagnose.case import run_case
+
+        show("one case", 0, 1)
+        return [run_case(bench)]
 
     def _raw(self, team: Workers, bench: Bench, drawn: Bearing, show: Progress) -> list[Row]:
         if not self.plan.raw:

@@ -81,7 +81,7 @@ def closure(problem: Problem, found: Search) -> Closure | None:
         hi=hi,
         wrong_name=wrong.label if wrong is not None else "",
         wrong=_closed(before, seen.blocks(wrong.prediction)) if wrong is not None else float("nan"),
-        ceiling=_closed(before, seen.blocks(_gaussian_process(problem))),
+        ceiling=_closed(before, seen.blocks(gaussian_process(problem))),
         placebo=_placebo(problem, columns),
     )
 
@@ -134,7 +134,7 @@ def _interval(before: FloatArray, after: FloatArray) -> tuple[float, float]:
     return (float(np.quantile(good, 0.025)), float(np.quantile(good, 0.975))) if len(good) > 100 else (np.nan, np.nan)
 
 
-def _gaussian_process(problem: Problem) -> FloatArray:
+def gaussian_process(problem: Problem) -> FloatArray:
     """Baseline plus the mean of a smooth discrepancy learnt from the training points, (n,)."""
     train = ~problem.held
     sigma = problem.observations.sigma

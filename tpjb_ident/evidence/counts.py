@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.evidence.outcome import NOT_RUN, OUTCOMES, RIGHT, SMALL, Row, outcome, run, rung
+from tpjb_ident.evidence.outcome import KINDS, NOT_RUN, OUTCOMES, RIGHT, SMALL, Row, outcome, run, rung
 from tpjb_ident.evidence.shares import share_interval, upper_bound
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def summary_table(rows: Sequence[Row]) -> pd.DataFrame:
 
     groups: dict[tuple[Any, ...], Counter[str]] = {}
     for row in rows:
-        if row["kind"] == "next test":
+        if row["kind"] not in KINDS:
             continue
         groups.setdefault((rung(row), row["kind"], row["size"], row["noise"]), Counter())[outcome(row)] += 1
     out = []
@@ -51,7 +51,7 @@ def summary_table(rows: Sequence[Row]) -> pd.DataFrame:
 
 def _order(where: str, kind: str, size: float, noise: float) -> tuple[Any, ...]:
     """Surrogates first, then raw volts; hidden effects by size, then what else was tried."""
-    return (where != "surrogate", where, ("hidden", "two", "none", "left out").index(kind), size, noise)
+    return (where != "surrogate", where, KINDS.index(kind), size, noise)
 
 
 def confusion_table(rows: Sequence[Row], kind: str = "hidden") -> pd.DataFrame:

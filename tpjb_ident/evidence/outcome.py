@@ -17,6 +17,8 @@ OUTCOMES = (
     "named right", "group right", "large group", "part of it", "consistent", "unexplained", "named wrong",
     "group wrong",
 )  # fmt: skip
+#: Kinds of trials that are judged; other rows tell of next tests, and of one case.
+KINDS = ("hidden", "two", "none", "left out")
 RIGHT = frozenset({"named right", "group right"})
 #: Verdicts of trials that never came to a diagnosis: no such size within bounds, no equilibrium.
 NOT_RUN = frozenset({"unreachable", "no baseline"})

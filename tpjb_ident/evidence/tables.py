@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tpjb_ident.evidence.case import case_table
 from tpjb_ident.evidence.counts import (
     abstention_table,
     confusion_matrix,
@@ -18,7 +19,7 @@ from tpjb_ident.evidence.counts import (
 )
 from tpjb_ident.evidence.measures import closure_table, coverage_table, p_value_table, power_table, rules_table
 from tpjb_ident.evidence.next_tests import next_test_pairs, next_test_table
-from tpjb_ident.evidence.outcome import Row, outcome, run, rung
+from tpjb_ident.evidence.outcome import KINDS, Row, outcome, run, rung
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,6 +44,7 @@ def evidence_tables(rows: Sequence[Row]) -> dict[str, pd.DataFrame]:
         "impostors": impostors_table(rows),
         "plans": plans_table(rows),
         "rules": rules_table(rows),
+        "case": case_table(rows),
         "next_tests": next_test_table(rows),
         "next_test_pairs": next_test_pairs(rows),
         **matrices(rows),
@@ -68,7 +70,7 @@ def trials_table(rows: Sequence[Row]) -> pd.DataFrame:
 
     flat: list[Mapping[str, Any]] = []
     for row in rows:
-        if row["kind"] != "next test":
+        if row["kind"] in KINDS:
             cells = {k: _flat(v) for k, v in row.items() if k != "naive"}
             flat.append({**cells, "outcome": outcome(row)})
     return pd.DataFrame(flat)

@@ -37,6 +37,9 @@ SECTIONS: tuple[tuple[str, tuple[str, ...], tuple[str, ...], str], ...] = (
     ("Intervals", ("coverage",), ("coverage",), "Of parameters whose effect was rightly named."),
     ("The gap, on points that no fit has seen", ("closure",), ("closure",),
      "1 is what noise and tolerance leave. The Gaussian process closes what can be closed and names nothing."),
+    ("One case, entry by entry", ("case",), ("case",),
+     "A campaign of the surrogate whose pivots are softer than the formula says; points that no fit has seen, "
+     "less the calibration errors that the fitted points show. The placebo is a campaign that hides nothing."),
     ("Next tests", ("next_tests", "next_test_pairs"), ("next-test",),
      "What the suggested test settles, by simulation: campaigns that came out ambiguous and the test after "
      "them are drawn with the same calibration errors and diagnosed together. Settled: the truth alone is named."),

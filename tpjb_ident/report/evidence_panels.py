@@ -7,11 +7,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from tpjb_ident.evidence.case import case_residuals
 from tpjb_ident.evidence.counts import SPECIAL
 from tpjb_ident.evidence.measures import no_effect_p
 from tpjb_ident.evidence.next_tests import separations
 from tpjb_ident.evidence.outcome import OUTCOMES, Row
 from tpjb_ident.report.figure import Panel, panel
+from tpjb_ident.report.plots.case_dots import case_gaps
 from tpjb_ident.report.plots.closure_boxes import closures
 from tpjb_ident.report.plots.confusion_map import confusion
 from tpjb_ident.report.plots.coverage_dots import interval_coverage
@@ -19,6 +21,7 @@ from tpjb_ident.report.plots.next_test_dots import next_tests
 from tpjb_ident.report.plots.outcome_bars import outcomes
 from tpjb_ident.report.plots.p_values_line import p_values
 from tpjb_ident.report.plots.power_curves import power
+from tpjb_ident.report.plots.residual_heat import residual_map
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,6 +52,11 @@ def evidence_panels(rows: Sequence[Row], tables: Mapping[str, pd.DataFrame]) -> 
         out.append(panel("coverage", "Intervals that hold the truth, of rightly named effects; right: how many",
                          interval_coverage(tables["coverage"]), GROUP))  # fmt: skip
     out += _closures(tables)
+    if "case" in tables:
+        out.append(panel("case-gaps", "One case: residual by observable, held-out points, before and after and by "
+                         "three controls", case_gaps(tables["case"]), GROUP))  # fmt: skip
+        out.append(panel("case-residuals", "One case: residuals of every coefficient and point, before and after",
+                         residual_map(case_residuals(rows)), GROUP))  # fmt: skip
     if "next_tests" in tables:
         title = "What the suggested test settles, beside a random one; separations foretold and found"
         out.append(panel("next-tests", title, next_tests(tables["next_tests"], separations(rows)), GROUP))

@@ -11,6 +11,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tpjb_ident.report.plots.case_dots import case_gaps
     from tpjb_ident.report.plots.closure_boxes import closures
     from tpjb_ident.report.plots.coherence_lines import coherence_spectrum
     from tpjb_ident.report.plots.coherence_points import coherence
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 #: In which file each picture is drawn. Files and functions have different names: a submodule would hide its function.
 _FILES = {
+    "case_gaps": "case_dots",
     "clearance_and_locus": "fig14_clearance_and_locus",
     "closures": "closure_boxes",
     "coefficient": "fig17_coefficient",
@@ -63,6 +65,7 @@ _FILES = {
 }
 
 __all__ = [
+    "case_gaps",
     "clearance_and_locus",
     "closures",
     "coefficient",
