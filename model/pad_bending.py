@@ -23,8 +23,6 @@ from model.pad_solid import solid_of
 
 FloatArray = NDArray[np.float64]
 
-#: A film may lose or gain this share of its least thickness by one step of its pad's deformation.
-LARGEST_STEP = 0.3
 #: Stations on the dry arc ahead of a film that starts late.
 DRY_STATIONS = 8
 #: Shapes that take part in the Newton step.

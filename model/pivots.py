@@ -305,9 +305,6 @@ def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> PivotLaw:
     return RigidPivot()
 
 
-PivotChoice = str | float | PivotLaw | Sequence[PivotLaw] | Path
-
-
 def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
     """One law per pad from what a user may say.
 
