@@ -14,9 +14,9 @@ import pytest
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 CASES = {
     "manifest": 100, "bearing": 100, "pivots": 150, "effects": 150, "csv": 40, "hdf5": 40, "mat": 150, "parquet": 60,
-    "tdms": 60, "uff": 60,
+    "tdms": 60, "uff": 60, "mat73": 60, "asc": 60, "mf4": 5,
 }  # fmt: skip
-LIBRARIES = {"tdms": "nptdms", "uff": "pyuff"}
+LIBRARIES = {"tdms": "nptdms", "uff": "pyuff", "mf4": "asammdf"}
 
 
 def load(name):
@@ -35,8 +35,9 @@ def quiet_libraries():
     logging.disable(logging.NOTSET)
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_spoilt_files_end_in_data_or_documented_errors(name, tmp_path, quiet_libraries):
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == "mf4" else n for n in CASES])
+def test_spoilt_files_end_in_data_or_documented_errors(name, tmp_path, quiet_libraries, monkeypatch):
+    monkeypatch.setattr("rigdata.readers.walled.SECONDS", 10.0)  # for a file of 2 kB
     if name in LIBRARIES:
         pytest.importorskip(LIBRARIES[name])
     mutated = load("fuzz_mutations").mutated
