@@ -33,6 +33,9 @@ def test_plan_tells_floor_and_look_alikes_of_a_thin_campaign(tmp_path):
     with (tmp_path / "out" / "data_sets.csv").open(encoding="utf-8", newline="") as file:
         sets = list(csv.DictReader(file))
     assert [row["data_set"] for row in sets] == list("ABCDE")
+    for name in ("isolability", *(f"isolability_{x}" for x in "ABCDE")):
+        assert (tmp_path / "out" / f"{name}.parquet").exists()
+        assert (tmp_path / "out" / "figures" / f"{name.replace('_', '-')}.svg").exists()
     numbers = [int(row["numbers"]) for row in sets]
     assert numbers == [4, 8, 8, 8, 16]  # two direct coefficients of K and C; all of h; nothing static; a second speed
     assert int(sets[4]["detectable_nuisances_free"]) >= int(sets[0]["detectable_nuisances_free"])

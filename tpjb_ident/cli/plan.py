@@ -19,7 +19,10 @@ from tpjb_ident.provenance import sha256
 from tpjb_ident.tables import write_table, write_text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from model.bearing import Bearing
+    from model.setup import Setup
     from tpjb_ident.diagnose.layout import DynamicTest, Layout
     from tpjb_ident.diagnose.plan import CampaignPlan
 
@@ -42,14 +45,16 @@ def plan(
     """Tell which effects a planned campaign could see, from which size on, and which it would mix up.
 
     Writes plan.json, effects (detection floor and look-alikes) and isolability (the matrix of separations), each as
-    .csv and .parquet; with --data-sets also data_sets: what the direct coefficients alone (A), all of h (B), with locus
-    and polygon (C), everything planned (D) and a second speed beside it (E) could tell.
+    .csv and .parquet, and the matrix as a picture; with --data-sets also data_sets: what the direct coefficients alone
+    (A), all of h (B), with locus and polygon (C), everything planned (D) and a second speed beside it (E) could tell,
+    and a matrix and a picture of each.
     """
     refuse_special(bearing)
     from model.bearing_file import load_bearing
     from model.pivots import pivot_laws
     from model.setup import Setup
     from tpjb_ident.diagnose.plan import plan as work_out
+    from tpjb_ident.report.plan_page import save_isolability
 
     drawn = load_bearing(bearing)
     points = operating_points(load, load_direction, speed, excitation)
@@ -65,18 +70,30 @@ def plan(
             show("every effect of the library", 0, 1)
             setup = Setup(drawn, pivot_laws(pivot_choice(pivots), drawn))
             found = work_out(setup, tests)
+            plans = {"isolability": found}
             if data_sets:
-                from tpjb_ident.diagnose.data_sets import data_sets_table
-
                 show("parts of the campaign", 1, 2)
-                write_table(folder, "data_sets", data_sets_table(setup, tests))
+                plans |= _parts(folder, setup, tests)
         frame = found.to_frame()
         write_table(folder, "effects", frame)
-        write_table(folder, "isolability", found.matrix())
+        for name, told in plans.items():
+            write_table(folder, name, told.matrix())
+        save_isolability(folder, plans)
         write_text(folder / "plan.json", json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n")
         write_record(folder, target, "plan", options, {bearing.name: sha256(bearing)})
     _show(found)
     say(f"Results: {target}")
+
+
+def _parts(folder: Path, setup: Setup, tests: Layout) -> dict[str, CampaignPlan]:
+    """Write the table of data sets; what each could tell with calibration errors free, by file name."""
+    import pandas as pd
+
+    from tpjb_ident.diagnose.data_sets import data_sets
+
+    found = data_sets(setup, tests)
+    write_table(folder, "data_sets", pd.DataFrame([one.to_row() for one in found]))
+    return {f"isolability_{one.name}": one.free for one in found}
 
 
 def _layout(bearing: Bearing, points: Any, static: tuple[int, bool, float, bool]) -> Layout:

@@ -10,20 +10,16 @@ E  D with a second shaft speed
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from model.setup import Setup
-from tpjb_ident.diagnose.candidates import candidates
+from tpjb_ident.diagnose.candidates import Candidate, candidates
 from tpjb_ident.diagnose.layout import Layout
 from tpjb_ident.diagnose.observe import Element
-from tpjb_ident.diagnose.plan import separated, signatures
-
-if TYPE_CHECKING:
-    import pandas as pd
+from tpjb_ident.diagnose.plan import CampaignPlan, Signatures, separated, signatures
 
 BoolArray = NDArray[np.bool_]
 DIRECT = frozenset({"kxx", "kyy", "cxx", "cyy"})
@@ -36,8 +32,39 @@ FAMILIES = {
 FASTER = 1.5
 
 
-def data_sets_table(setup: Setup, layout: Layout) -> pd.DataFrame:
-    """Count what every data set sees at typical sizes and mixes up at d' = 6, nuisances known and free.
+@dataclass(frozen=True)
+class DataSet:
+    """What one part of a campaign could tell.
+
+    Attributes
+    ----------
+    name : str
+        ``"A"`` to ``"E"``.
+    numbers : int
+        Length of its observation vector.
+    known, free : CampaignPlan
+        With calibration errors known, and free within their certificates.
+    """
+
+    name: str
+    numbers: int
+    known: CampaignPlan = field(repr=False)
+    free: CampaignPlan = field(repr=False)
+
+    def to_row(self) -> dict[str, object]:
+        """Counts, flat."""
+        row: dict[str, object] = {"data_set": self.name, "numbers": self.numbers}
+        k = len(self.known.candidates)
+        for words, told in (("known", self.known), ("free", self.free)):
+            row |= {
+                f"detectable_nuisances_{words}": k - len(told.below_floor),
+                f"confusable_pairs_nuisances_{words}": len(told.confusable), "pairs": k * (k - 1) // 2,
+            }  # fmt: skip
+        return {**row, "mixed_up": "; ".join(" / ".join(pair) for pair in self.free.confusable)}
+
+
+def data_sets(setup: Setup, layout: Layout) -> tuple[DataSet, ...]:
+    """Work out what every data set sees at typical sizes and mixes up at d' = 6, nuisances known and free.
 
     Parameters
     ----------
@@ -50,28 +77,23 @@ def data_sets_table(setup: Setup, layout: Layout) -> pd.DataFrame:
     NoEquilibriumError
         The baseline has none at some point of the layout, or at the second speed.
     """
-    import pandas as pd
-
     faster = tuple(replace(t, speed=FASTER * t.speed) for t in layout.dynamic)
     chosen = candidates(setup.bearing)
     seen = signatures(setup, replace(layout, dynamic=(*layout.dynamic, *faster)), chosen)
     planned = {t.speed for t in layout.dynamic}
-    rows = []
-    for name, mine in masks(seen.observations.elements, planned).items():
-        row: dict[str, object] = {"data_set": name, "numbers": int(mine.sum())}
-        for free, words in ((False, "known"), (True, "free")):
-            factor = seen.factor(free)
-            part = (factor @ factor.T)[np.ix_(mine, mine)]
-            scale = np.sqrt(np.diag(part))
-            whole = np.linalg.cholesky(part / np.outer(scale, scale))
-            told = separated(chosen, np.asarray(np.linalg.solve(whole, seen.columns[mine] / scale[:, None])))
-            row |= {
-                f"detectable_nuisances_{words}": len(chosen) - len(told.below_floor),
-                f"confusable_pairs_nuisances_{words}": len(told.confusable),
-                "pairs": len(chosen) * (len(chosen) - 1) // 2,
-            }
-        rows.append({**row, "mixed_up": "; ".join(" / ".join(pair) for pair in told.confusable)})
-    return pd.DataFrame(rows)
+    return tuple(
+        DataSet(name, int(mine.sum()), *(_told(seen, mine, chosen, free) for free in (False, True)))
+        for name, mine in masks(seen.observations.elements, planned).items()
+    )
+
+
+def _told(seen: Signatures, mine: BoolArray, chosen: Sequence[Candidate], free: bool) -> CampaignPlan:
+    """Sizes and separations by a part of the elements."""
+    factor = seen.factor(free)
+    part = (factor @ factor.T)[np.ix_(mine, mine)]
+    scale = np.sqrt(np.diag(part))
+    whole = np.linalg.cholesky(part / np.outer(scale, scale))
+    return separated(chosen, np.asarray(np.linalg.solve(whole, seen.columns[mine] / scale[:, None])))
 
 
 def masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArray]:
