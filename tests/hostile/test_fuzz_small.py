@@ -36,8 +36,7 @@ def quiet_libraries():
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == "mf4" else n for n in CASES])
-def test_spoilt_files_end_in_data_or_documented_errors(name, tmp_path, quiet_libraries, monkeypatch):
-    monkeypatch.setattr("rigdata.readers.walled.SECONDS", 10.0)  # for a file of 2 kB
+def test_spoilt_files_end_in_data_or_documented_errors(name, tmp_path, quiet_libraries):
     if name in LIBRARIES:
         pytest.importorskip(LIBRARIES[name])
     mutated = load("fuzz_mutations").mutated
