@@ -56,6 +56,7 @@ def test_intervals_hold_with_one_window_per_direction(directions: int):
     assert 89.5 <= result.coverage <= 98.5  # target 92-98; 150 replicates of 8 correlated entries leave 1 %
 
 
+@pytest.mark.slow
 def test_rlm_fails_where_the_paper_used_it():
     """The figure to beat: a tenth of the windows with probe glitches ruin every M-estimator on stacked rows."""
     case = Case("lev", 0.1)

@@ -141,6 +141,7 @@ def test_mistakes_on_the_mirror_line_show_in_the_pickup_alone(tmp_path, fault):
     assert spoilt[0].stiffness(LOADS) == pytest.approx(clean[0].stiffness(LOADS), rel=4e-3)
 
 
+@pytest.mark.slow
 def test_a_refused_run_can_be_left_out(tmp_path):
     fault = Fault("wrong_pad", "p-2-up", value=4)
     source, _ = campaign(tmp_path / "c.h5", bearing("sphere", 3), 3, faults=(fault,))
@@ -208,6 +209,7 @@ def test_up_and_down_in_two_runs_make_one_curve(tmp_path):
     assert curve.hysteresis is not None
 
 
+@pytest.mark.slow
 def test_bad_steps_are_left_out(tmp_path):
     law = Line(0.4)
     start = 0.3 + 4 * 1.3

@@ -132,6 +132,7 @@ def second_order(errors: list[list[float]]) -> None:
     assert (table[-1] < table[0] / 9.0).all(), table
 
 
+@pytest.mark.slow
 def test_rupture_and_reformation_are_olssons():
     exact = exact_wavy(0.35)
     errors = []
