@@ -22,6 +22,10 @@ if __name__ == "__main__":
     # two workers, each with one thread: what the reference machine has
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # both workers, and every command they start, import the same thousand modules: who wants no bytecode beside the
+    # sources gets it kept in .venv
+    if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
+        os.environ.setdefault("PYTHONPYCACHEPREFIX", os.path.join(root, ".venv", "bytecode"))
     arguments = sys.argv[1:]
     if "--quick" in arguments:
         arguments = ["-m", "not slow"] + [a for a in arguments if a != "--quick"]
