@@ -381,7 +381,9 @@ def test_without_accelerometers_the_cells_gain_is_that_of_h():
     expected = (draws.force @ H - H).reshape(4, 4)
     np.testing.assert_allclose(found[:, :4], expected.real, atol=1e-3)
     lost = replace(stiff(), h=np.full((2, 2), np.nan))
-    assert np.isnan(apparent_change(measured(), lost, draws)).all()
+    nothing = apparent_change(measured(), lost, draws)
+    assert nothing.shape == found.shape == (4, 8)
+    assert np.isnan(nothing).all()
     # windows without weight say nothing of the inertia
     data, weights = measured(2e7), np.ones((12, 2))
     data.A[3] += 1.0

@@ -520,3 +520,28 @@ def test_how_far_off_a_direction_may_lie(discord, factor, heard):
     placed = dataclasses.replace(table, F=F + np.outer(mine, exact + factor * reach * aim))
     found = readmitted(placed, weights)
     assert bool(found[mine].sum() > 8) is heard
+
+
+def test_chi_square_of_directions_is_against_the_noise_within_them():
+    table = exact_repeats(25)
+    h = H / table.h_scale
+    off = 0.02 * complex_normal(np.random.default_rng(26), 6, 2)
+    moved_table = dataclasses.replace(table, F=table.F + off[table.direction])
+    within = table.F - table.D @ h.T
+    noise = within.T @ within.conj() / 54
+    by_hand = 10 * np.einsum("ga,ab,gb->", off.conj(), np.linalg.inv(noise), off).real / (2 * 4)
+    assert with_repeats(moved_table, h, np.ones(60))[2] == pytest.approx(by_hand, rel=1e-9)
+
+
+def test_where_directions_agree_the_interval_is_that_of_generalised_least_squares():
+    """Little noise of any shape: covariance (sum V^-1 (x) D* D)^-1, V of F - H D."""
+    noise = 1e-6 * hermitian(np.random.default_rng(27), 4)
+    count = np.array([5.0, 9.0, 20.0, 40.0, 7.0, 30.0, 12.0, 25.0])
+    given = next(m for m in (noisy_means(s, noise, count=count) for s in range(40)) if eiv_fit(m).chi_square < 0.9)
+    fit, means = eiv_fit(given), given.means
+    A = np.concatenate([-fit.h, np.eye(2)], axis=1)
+    V = (A @ noise @ A.conj().T)[None] / count[:, None, None]
+    expected = complex_to_real_covariance(np.linalg.inv(information(means.D, means.D, np.linalg.inv(V))))
+    size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    np.testing.assert_allclose(fit.covariance / size, expected / size, atol=5e-3)
+    np.testing.assert_array_equal(fit.dof, 2 * given.spare)
