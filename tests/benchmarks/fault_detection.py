@@ -1,6 +1,6 @@
 """Put each named fault into good virtual campaigns: what does `tpjb check` say, and does identification go on?
 
-    python tests/benchmarks/fault_detection.py [--seeds 3] [--good 30] [--faults dead "wrong pad" ..] [--identify]
+    python tests/benchmarks/fault_detection.py [--seeds 3] [--first 1] [--good 30] [--faults dead ..] [--identify]
 
 Per fault: the share of campaigns in which the struck run is named with an error or a warning, the share in which
 another run is blamed, and with ``--identify`` what became of the coefficients: the largest error of the direct terms
@@ -162,6 +162,7 @@ def row(name: str, outcomes: list[Outcome]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--first", type=int, default=1, help="first seed")
     parser.add_argument("--good", type=int, default=12, help="good campaigns")
     parser.add_argument("--faults", nargs="*", help="parts of names")
     parser.add_argument("--identify", action="store_true")
@@ -178,7 +179,7 @@ def main() -> None:
             outcomes = []
             fault = FAULTS.get(name)
             good = fault is None and name != MIXED
-            for seed in range(1, (given.good if good else given.seeds) + 1):
+            for seed in range(given.first, given.first + (given.good if good else given.seeds)):
                 path = folder / "c.h5"
                 if good:
                     write_various(path, seed)

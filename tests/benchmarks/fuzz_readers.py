@@ -308,7 +308,7 @@ def run_atheris(name: str, seconds: float, seed: int, keep: Path) -> None:
         f"-max_total_time={int(seconds)}",
         f"-seed={seed}",
         "-max_len=65536",
-        "-timeout=10",
+        "-timeout=60",  # of wall time: a busy machine is no finding
         "-rss_limit_mb=4096",
         f"-artifact_prefix={keep}/{name}-",
         "-print_final_stats=1",

@@ -1,17 +1,20 @@
 """Long use and large campaigns: does memory grow, do files stay open?
 
-    python tests/benchmarks/soak_runs.py --repeat 200
+    python tests/benchmarks/soak_runs.py --repeat 40
     python tests/benchmarks/soak_runs.py --gigabytes 0.25 0.5 1 2 [--workers 1]
 
-`--repeat` identifies, checks and locates the same small campaign again and again in one process. `--gigabytes` makes
-campaigns of that size on the fly, uncompressed, and identifies each in a process of its own: resident memory should be
-that of the longest run, not of the campaign.
+`--repeat` checks and identifies the same small campaign, measures its pivots, clearance and locus and predicts its
+bearing, again and again in one process: the same bits each time, and how memory, open files and threads go.
+`--gigabytes` makes campaigns of that size on the fly, uncompressed, and identifies each in a process of its own:
+resident memory should be that of the longest run, not of the campaign.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
+import math
 import os
 import resource
 import tempfile
@@ -33,32 +36,51 @@ def open_files() -> int:
     return len(os.listdir("/proc/self/fd"))
 
 
-def soak(repeat: int) -> None:
-    """Print memory and open files as the runs go by."""
+def threads() -> int:
+    """Count the threads of this process."""
+    return len(os.listdir("/proc/self/task"))
+
+
+def one_round(path: Path) -> str:
+    """Check, identify, measure all static tests and predict; a fingerprint of every number that came out."""
+    from model.bearing_file import parse_bearing
+    from model.predict import predict
     from rigdata import check_campaign, load_campaign
+    from tpjb_ident.compare.static_tests import measure_static
     from tpjb_ident.dynamic.identify import IdentifySettings, identify
 
+    campaign = load_campaign(path)
+    bearing = parse_bearing(campaign.bearing_text, "bearing")
+    point = identify(campaign, IdentifySettings()).points[0]
+    static = measure_static(campaign, bearing)
+    assert static.clearance is not None
+    assert static.locus is not None
+    h = predict(bearing, load=5000.0, load_direction=-np.pi / 2, speed=138.0, excitation=157.0, thermal="isothermal").h
+    numbers = [point.stiffness.h, h, static.clearance.clearance, *(p.position for p in static.locus.points)]
+    numbers += [curve.deflection(np.array([1000.0, 3000.0])) for curve in static.curves]
+    text = "\n".join(map(str, check_campaign(path)))
+    return hashlib.sha256(b"".join(np.ascontiguousarray(n).tobytes() for n in numbers) + text.encode()).hexdigest()
+
+
+def soak(repeat: int) -> None:
+    """Print memory, open files and threads as the rounds go by, and how fast memory grows over the second half."""
     with tempfile.TemporaryDirectory() as scratch:
         path = write_small_campaign(Path(scratch) / "c.h5")
-        seen: list[tuple[int, float, int]] = []
-        first = None
+        seen: list[tuple[int, float, int, int]] = []
+        first = ""
         for number in range(1, repeat + 1):
-            result = identify(load_campaign(path), IdentifySettings())
-            h = result.points[0].stiffness.h
-            first = h if first is None else first
-            if not np.array_equal(h, first):
-                raise SystemExit(f"run {number} gives other bits than run 1")
-            if number % 10 == 0:
-                check_campaign(path)
-            if number in (1, 20, 50) or number % 50 == 0:
-                seen.append((number, resident(), open_files()))
-                print(
-                    json.dumps({"run": number, "resident_MB": round(seen[-1][1], 1), "open_files": seen[-1][2]}),
-                    flush=True,
-                )
-    late = [s for s in seen if s[0] >= 20] or seen
-    growth = (late[-1][1] - late[0][1]) / max(1, late[-1][0] - late[0][0])
-    print(json.dumps({"growth_kB_per_run": round(1024 * growth, 2), "files": late[-1][2] - late[0][2]}))
+            marks = one_round(path)
+            first = first or marks
+            if marks != first:
+                raise SystemExit(f"round {number} gives other bits than round 1")
+            seen.append((number, resident(), open_files(), threads()))
+            if number in (1, 2, 5, 10) or number % 10 == 0:
+                told = {"round": number, "resident_MB": round(seen[-1][1], 1), "open_files": seen[-1][2]}
+                print(json.dumps({**told, "threads": seen[-1][3]}), flush=True)
+    late = np.array(seen[len(seen) // 2 :], dtype=float)
+    slope = np.polyfit(late[:, 0], late[:, 1], 1)[0] if len(late) > 2 else math.nan
+    grown = {"files": seen[-1][2] - seen[0][2], "threads": seen[-1][3] - seen[0][3]}
+    print(json.dumps({"growth_kB_per_round": round(1024 * float(slope), 2), **grown}))
 
 
 def write_large(path: Path, gigabytes: float, seconds: float = 60.0) -> int:

@@ -199,3 +199,20 @@ def test_without_a_usable_sweep_positions_have_no_centre_and_the_command_says_so
     assert "runs-refused: c-1" in told.output
     assert "no-centre" in told.output
     assert not (tmp_path / "out" / "clearance.csv").exists()
+
+
+@pytest.mark.slow
+def test_what_a_diagnosis_measures_goes_on_without_damaged_runs_and_names_them(spoilt):
+    from model.bearing_file import parse_bearing
+    from rigdata.campaign import load_campaign
+    from tpjb_ident.diagnose.campaign import measure_campaign
+
+    bad = [RUN, "p-4-up", "l-01000-02", "c-1"]
+    source = load_campaign(spoilt("probe zero", *bad))
+    found = measure_campaign(source, parse_bearing(source.bearing_text, "b.toml"))
+    told = " ".join(c.sentence() for c in found.identification.conditions)
+    assert all(run in told for run in bad), told
+    assert [curve.pad for curve in found.curves] == [1, 2, 3, 5]
+    assert [p.n_records for p in found.identification.points] == [3, 2]
+    assert len(found.locus.points) == 2
+    assert found.polygon is None
