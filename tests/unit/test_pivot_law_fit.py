@@ -317,3 +317,25 @@ def test_at_the_reference_load_every_law_but_the_bend_has_unit_compliance(name):
     law = LAWS[name]
     value = law.psi(np.ones(1), law.prior_mean)[0]
     assert value == pytest.approx(1.0, abs=1e-12)
+
+
+def test_what_the_data_do_not_tell_is_as_wide_as_its_prior():
+    """A straight line in a hundred micrometres of noise says nothing of a contact gap, nor of the load it closes at."""
+    fit = fit_law(LAWS["power"], True, data(4e-9 * LOAD, sigma=1e-4, friction=(0.01, 0.02)))
+    assert math.sqrt(fit.covariance[1, 1]) == pytest.approx(0.02, rel=0.01)
+    assert math.sqrt(fit.covariance[3, 3]) == pytest.approx(0.15, rel=0.05)
+    assert math.sqrt(fit.covariance[-2, -2]) == pytest.approx(CONTACT_GAP, rel=0.01)
+    assert math.sqrt(fit.covariance[-1, -1]) == pytest.approx(CONTACT_LOAD_SPREAD, rel=0.01)
+    assert math.exp(fit.theta[-1]) == pytest.approx(500.0, rel=0.01)
+
+
+@pytest.mark.parametrize("load", [0.2, 0.9, 1.7])
+def test_the_smallest_loads_are_taken_as_they_are(load):
+    fit = fit_law(LAWS["power"], False, noisy(8))
+    u, p, scale = load / REFERENCE, fit.shape[0], math.exp(fit.theta[2])
+    at = np.array([load])
+    assert fit.compliance(at)[0] == pytest.approx(scale * u ** (p - 1.0), rel=1e-9)
+    assert fit.deflection(at)[0] == pytest.approx(scale * REFERENCE * u**p / p, rel=1e-9)
+    assert fit.log_compliance_gradient(at)[0, 3] == pytest.approx(math.log(u), rel=1e-9)
+    assert fit.log_deflection_gradient(at)[0, 3] == pytest.approx(math.log(u) - 1.0 / p, rel=1e-9)
+    assert fit.reading(at, np.zeros(1))[0] == pytest.approx(fit.theta[0] + fit.deflection(at)[0], rel=1e-12)
