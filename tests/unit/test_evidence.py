@@ -39,6 +39,12 @@ def test_a_torn_last_line_is_no_row_and_the_last_of_two_counts(tmp_path):
     assert [r["verdict"] for r in read_rows([file])] == ["named", "named"]
 
 
+def test_rows_of_an_evaluation_that_still_runs_are_read(tmp_path):
+    file = tmp_path / "kept.jsonl"
+    file.write_text(json.dumps({"code": "0", "key": "1", "row": row()}) + "\n", encoding="utf-8")
+    assert read_rows([file]) == [row()]
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [("", "holds no trials"), ('{"a": 1}\n', "line 1: no trial"), ("no\n{}\n", "line 1: no JSON"), ("[]\n", "lacks")],

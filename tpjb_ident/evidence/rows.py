@@ -63,6 +63,8 @@ def _lines(file: Path) -> list[dict[str, Any]]:
             if number == len(lines):  # the writer was killed
                 continue
             raise RowsError(f"{file}, line {number}: no JSON ({error.msg}). Give a rows.jsonl.") from error
+        if isinstance(row, dict) and isinstance(row.get("row"), dict):
+            row = row["row"]  # as an evaluation keeps them while it runs
         if not isinstance(row, dict) or NEEDED - row.keys():
             raise RowsError(f"{file}, line {number}: no trial; it lacks {', '.join(sorted(NEEDED - set(row)))}.")
         rows.append({key: _tuples(value) for key, value in row.items() if key != "code"})
