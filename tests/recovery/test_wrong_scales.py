@@ -74,6 +74,14 @@ def test_unequal_gains_show_in_the_angles_of_the_polygon(tmp_path, channel, valu
 
 
 @pytest.mark.slow
+def test_the_pivot_command_says_that_its_probes_disagree(tmp_path):
+    source = campaign(tmp_path, gain("X1A", 1.1), plan=replace(SMALL_PLAN, dynamic=(), locus=()))
+    out = CliRunner().invoke(app, ["pivot", str(source.path), "--out", str(tmp_path / "o")])
+    assert out.exit_code == 0, out.output
+    assert "the sides stand as if X1A read 9" in out.output.replace("\n", " ")
+
+
+@pytest.mark.slow
 def test_a_clearance_of_a_tenth_of_the_drawing_s_is_an_error_of_the_check(tmp_path):
     source = campaign(tmp_path, gain("X1*", 0.1), plan=SWEEP)
     out = CliRunner().invoke(app, ["check", str(source.path), "--out", str(tmp_path / "o")])

@@ -17,14 +17,18 @@ if TYPE_CHECKING:
 SCALE = (0.5, 2.0)
 
 
-def bearing_problems(campaign: Campaign, known: Sequence[Problem]) -> list[Problem]:
-    """Problems that show in the clearance sweeps of a campaign that carries its bearing.
+def bearing_problems(
+    campaign: Campaign, known: Sequence[Problem] = (), bearing: Bearing | None = None
+) -> list[Problem]:
+    """Problems that show in the clearance sweeps of a campaign whose bearing is known.
 
     Parameters
     ----------
     campaign : Campaign
     known : sequence of Problem
         Found already; sweeps with an error are not looked at.
+    bearing : Bearing, optional
+        Default the one that the campaign carries.
     """
     from model.bearing import BearingError
 
@@ -33,14 +37,14 @@ def bearing_problems(campaign: Campaign, known: Sequence[Problem]) -> list[Probl
         for run in campaign.of_kind("clearance")
         if not any(p.run == run.id and p.severity == "error" for p in known)
     ]
-    if not sound or not campaign.bearing_text:
+    if not sound or (bearing is None and not campaign.bearing_text):
         return []
     try:
-        bearing, _ = open_bearing(campaign, None)
+        drawn = bearing or open_bearing(campaign, None)[0]
     except BearingError as error:
         what = str(error).partition("\n")[0]
         return [Problem("warning", campaign.bearing_name, "", what, "Mend it, or give --bearing where one is needed")]
-    return [problem for run in sound for problem in _of_sweep(run, bearing)]
+    return [problem for run in sound for problem in _of_sweep(run, drawn)]
 
 
 def _of_sweep(run: Run, bearing: Bearing) -> list[Problem]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from tpjb_ident.cli.bearing_checks import bearing_problems
 from tpjb_ident.cli.errors import NotTrustedError, guarded
 from tpjb_ident.cli.inputs import open_bearing, open_campaign
 from tpjb_ident.cli.options import BearingOption, CampaignPath, Out, out_folder
@@ -45,6 +46,8 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
     say(f"Results: {target}")
     from tpjb_ident.report.words import is_serious
 
+    for problem in bearing_problems(source, bearing=drawn):  # what is wrong with the probes is wrong with the curves
+        note_line("warning", str(problem))
     for condition in dict.fromkeys(c for curve in curves for c in curve.status if c.startswith(ABOUT_ALL)):
         note_line("note", condition)
     for curve in curves:
