@@ -121,6 +121,7 @@ def test_identify_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path, n
     assert error_of(tmp_path / "out", 5000.0) < 0.02
 
 
+@pytest.mark.slow
 def test_a_check_names_every_damaged_run(spoilt):
     for name in DAMAGE:
         path = spoilt(name, RUN)

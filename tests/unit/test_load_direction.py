@@ -85,6 +85,7 @@ def test_the_slope_is_found_and_takes_the_scatter_off():
         assert after.half_width(systematic=False)[1] < 0.5 * before.half_width(systematic=False)[1]
 
 
+@pytest.mark.slow
 def test_what_its_own_uncertainty_leaves_covers_what_is_left():
     """Over many campaigns the error of H that a wrong slope makes is as large as `left` says."""
     z = []
