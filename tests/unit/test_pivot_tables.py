@@ -160,7 +160,7 @@ def test_ratios_stand_beside_what_they_compare():
 def test_tables_of_nothing_are_refused():
     with pytest.raises(ValueError, match="at least one PivotCurve"):
         pivot_table([])
-    for loads in ([0.0], [-1.0], [math.nan]):
+    for loads in ([0.0], [-1.0], [math.nan], [100.0, 0.0]):
         with pytest.raises(ValueError, match="loads must be positive"):
             pivot_table([curve()], np.array(loads))
 
