@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from tests.unit.evidence_cases import row, rows
+from tests.unit.evidence_cases import followed, row, rows
 from tpjb_ident.cli.app import app
 from tpjb_ident.evidence.case import case_residuals, case_table
 from tpjb_ident.evidence.counts import abstention_table, confusion_matrix, impostors_table, plans_table
@@ -160,6 +160,18 @@ def test_old_rows_become_tables_figures_and_a_page(tmp_path):
     assert len(read_rows([out / "rows.jsonl"])) == len(rows())
     assert json.loads((out / "run.json").read_text(encoding="utf-8"))
     assert "## impostors" in (out / "evidence.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_next_tests_alone_are_evidence_too(tmp_path):
+    bearing = tmp_path / "rocker.toml"
+    bearing.write_text("", encoding="utf-8")
+    write_rows(tmp_path / "rows.jsonl", followed())
+    arguments = ["evaluate", str(bearing), "--rows", str(tmp_path / "rows.jsonl"), "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    assert "What the suggested next test settles" in result.output
+    assert (tmp_path / "out" / "figures" / "next-tests.png").exists()
 
 
 def test_rows_that_are_none_are_refused(tmp_path):

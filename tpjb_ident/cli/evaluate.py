@@ -78,10 +78,10 @@ def evaluate(
         with progress("evaluating") as show:
             made = before if before is not None else todo.make(show)
             show("tables and figures", 99, 100)
-            summary = _write(folder, made, (bearing, options))
+            tables = _write(folder, made, (bearing, options))
         inputs = {file.name: sha256(file) for file in (bearing, *(rows or ()))}
         write_record(folder, target, "evaluate", options, inputs)
-    _show(summary)
+    _show(tables)
     say(f"Results: {target}")
 
 
@@ -196,7 +196,7 @@ class _Todo:
         return [*rows]
 
 
-def _write(folder: Path, rows: list[Row], made: tuple[Path, Mapping[str, Any]]) -> pd.DataFrame:
+def _write(folder: Path, rows: list[Row], made: tuple[Path, Mapping[str, Any]]) -> dict[str, pd.DataFrame]:
     from tpjb_ident.evidence.rows import write_rows
     from tpjb_ident.evidence.tables import evidence_tables, markdown, trials_table
     from tpjb_ident.report.evidence_page import write_evidence_report
@@ -210,13 +210,26 @@ def _write(folder: Path, rows: list[Row], made: tuple[Path, Mapping[str, Any]]) 
     texts = [f"## {name}\n\n{markdown(frame)}" for name, frame in tables.items()]
     write_text(folder / "evidence.md", "\n".join(texts))
     write_evidence_report(folder, rows, tables, (bearing.stem, options, {bearing.name: sha256(bearing)}))
-    return tables["summary"]
+    return tables
 
 
-def _show(summary: pd.DataFrame) -> None:
-    columns = ["rung", "kind", "size_sigma", "noise_factor", "trials", "right_share", "abstained_share", "errors"]
-    rows = [
-        [f"{v:.3g}" if isinstance(v, float) else str(v) for v in row]
-        for row in summary[columns].itertuples(index=False)
-    ]
-    table("Outcomes", columns, rows, (0, 1))
+#: Tables that are shown at the terminal: title, columns, how many of them are words.
+SHOWN = {
+    "summary": (
+        "Outcomes",
+        ["rung", "kind", "size_sigma", "noise_factor", "trials", "right_share", "abstained_share", "errors"], 2,
+    ),
+    "next_tests": (
+        "What the suggested next test settles",
+        ["data_set", "size_sigma", "ambiguous_campaigns", "settled", "settled_by_random", "expected", "achieved"], 2,
+    ),
+}  # fmt: skip
+
+
+def _show(tables: Mapping[str, pd.DataFrame]) -> None:
+    for name, (title, columns, words) in SHOWN.items():
+        if name not in tables:
+            continue
+        lines = tables[name][columns].itertuples(index=False)
+        rows = [[f"{v:.3g}" if isinstance(v, float) else str(v) for v in line] for line in lines]
+        table(title, columns, rows, range(words))

@@ -39,6 +39,9 @@ def kept_trials(
     """
     code = code_fingerprint()
     known = {} if file is None else _read(file, code)
+    if file is not None and file.exists() and not file.read_text(encoding="utf-8").endswith("\n"):
+        with file.open("a", encoding="utf-8") as out:
+            out.write("\n")  # a torn line must not swallow the next one
     due = [trial for trial in trials if _key(trial) not in known]
     for trial, row in zip(due, in_order(team, task, [(trial,) for trial in due], shared), strict=True):
         line = json.dumps({"code": code, "key": _key(trial), "row": row}, default=float)

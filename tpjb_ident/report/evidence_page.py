@@ -124,6 +124,13 @@ def _more(rows: Sequence[Row], tables: Mapping[str, pd.DataFrame]) -> list[str]:
         f"{line['trials']} abstain."
         for line in _lines(tables, "abstention")
     ]
+    out += [
+        f"Ambiguous campaigns with data set {line['data_set']} that the suggested next test settles: "
+        f"{100 * line['settled']:.0f} % of {line['ambiguous_campaigns']}; a random test: "
+        f"{100 * line['settled_by_random']:.0f} %."
+        for line in _lines(tables, "next_tests")
+        if line["size_sigma"] == "all"
+    ]
     return out + [
         f"95 % intervals of right names hold the truth in {line['hold_truth']} of {line['intervals']}."
         for line in _lines(tables, "coverage")

@@ -86,4 +86,6 @@ def _scatter(axes: Axes, separations: Mapping[str, Sequence[tuple[float, float]]
         ticks = [t for t in both if low <= t <= top]
         axis.set_ticks(ticks, [f"{t:g}".replace("-", MINUS) for t in ticks])
         axis.set_minor_locator(NullLocator())
+    axes.set_xlim(-0.3, top)
+    axes.set_ylim(bottom - 0.3, top)
     add_legend(axes)
