@@ -545,3 +545,37 @@ def test_where_directions_agree_the_interval_is_that_of_generalised_least_square
     size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     np.testing.assert_allclose(fit.covariance / size, expected / size, atol=5e-3)
     np.testing.assert_array_equal(fit.dof, 2 * given.spare)
+
+
+def test_a_tight_core_in_every_direction_is_heard_against_a_scattered_majority():
+    rng = np.random.default_rng(28)
+    label = np.repeat(np.arange(6), 20)
+    X = complex_normal(rng, 6, 2)[label] + 0.02 * complex_normal(rng, 120, 2)
+    Y = X @ H.T + 0.01 * complex_normal(rng, 120, 2)
+    bad = np.arange(120) % 20 >= 9  # eleven of twenty in every direction
+    Y[bad] += 5.0 * complex_normal(rng, bad.sum(), 2)
+    start = robust_start(Regression(X, Y), label, 1)
+    np.testing.assert_allclose(start.coefficients, H, atol=0.03)
+    assert np.trace(start.scatter).real < 10 * 2 * 0.01**2
+
+
+def test_one_step_is_counted_as_one():
+    rng = np.random.default_rng(22)
+    X = complex_normal(rng, 40, 2)
+    Y = X @ H.T + 0.1 * complex_normal(rng, 40, 2)
+    assert mm_fit(X, Y, np.arange(40) % 5, tolerance=1e9).iterations == 1
+
+
+def test_who_is_looked_at_once_more_and_who_can_judge():
+    """A fifth of the windows accepted is not rejected; six of ten that agree suffice; four others can tell."""
+    table = windows(19, g=7, n=10)
+    fifth = rejected(table, [3])
+    fifth[np.flatnonzero(table.direction == 3)[:2]] = 1.0
+    assert readmitted(table, fifth) is fifth
+    faint = np.where(table.direction == 3, 0.3, 1.0)
+    assert readmitted(table, faint) is faint
+    F = table.F.copy()
+    F[np.flatnonzero(table.direction == 3)[:4]] += 4.0 * np.exp(0.5j * np.pi * np.arange(4))[:, None]
+    assert readmitted(dataclasses.replace(table, F=F), rejected(table, [3]))[table.direction == 3].sum() == 6
+    five = moved(windows(19, g=5, n=12), 3, 2.0)
+    np.testing.assert_array_equal(readmitted(five, rejected(five, [3])), rejected(five, [3]))
