@@ -421,3 +421,76 @@ def test_a_computed_record_may_stand_still():
     run.displacement = np.round(run.displacement / 2e-6) * 2e-6
     run.displacement[1000:1700] = run.displacement[1000]
     refuse_flat_channels(run)
+
+
+def repeating(share, stuck, n=4000):
+    """A run whose probes repeat a share of their readings, and stand still for a while."""
+    run = Run(n)
+    same = np.arange(n) % 20 < 20 * share
+    last = np.maximum.accumulate(np.where(same, 0, np.arange(n)))
+    run.displacement = run.displacement[last]
+    run.displacement[1000 : 1000 + stuck] = run.displacement[1000]
+    return run
+
+
+@pytest.mark.parametrize(
+    ("share", "stuck", "named"), [(0.4, 700, True), (0.6, 700, False), (0.4, 80, False), (0.4, 140, True)]
+)
+def test_repeated_readings_make_longer_stretches_plausible(share, stuck, named):
+    """With two of five readings repeated a stretch of nine is to be expected; ten times that is none of chance.
+
+    Where more than half repeat, the converter's step hides the noise, and standing still says nothing.
+    """
+    run = repeating(share, stuck)
+    if named:
+        with pytest.raises(RigDataError) as caught:
+            refuse_flat_channels(run)
+        assert {p.place for p in caught.value.problems} == {"channel X1A", "channel X1B"}
+    else:
+        refuse_flat_channels(run)
+
+
+def test_what_probes_cannot_tell_cells_still_can():
+    run = repeating(0.6, 700)
+    run.force[2000:2400] = run.force[2000]
+    with pytest.raises(RigDataError) as caught:
+        refuse_flat_channels(run)
+    assert [p.place for p in caught.value.problems] == ["channel L1H", "channel L1V"]
+
+
+def test_the_shorter_vector_ends_the_record():
+    run = Run()
+    plain = read(run)
+    run.force = run.force[:-300]
+    short = read(run)
+    assert short.blocks.time[-1] == pytest.approx(plain.blocks.time[-1] - 0.6, abs=0.15)
+    run.displacement, run.force = run.displacement[:-500], Run().force
+    assert read(run).blocks.time[-1] == pytest.approx(plain.blocks.time[-1] - 1.0, abs=0.15)
+
+
+@pytest.mark.parametrize("top", [1000.0, 4000.0])
+def test_after_a_reversal_the_pivot_sticks_for_eight_per_cent(top):
+    from tpjb_ident.pivot.bad_holds import sticking
+
+    load = top * np.array([0.5, 0.8, 1.0, 0.97, 0.93, 0.91, 0.8, 0.95, 0.5, 0.53, 0.55, 0.9])
+    branch = np.array([1, 1, 1, -1, -1, -1, -1, -1, -1, 1, 1, 1])
+    stuck = np.flatnonzero(sticking(load, branch))
+    # within 0.08 of the top, and on the way up again within 0.04 of where it turned at half of it
+    np.testing.assert_array_equal(stuck, [3, 4, 9])
+
+
+def test_a_hold_that_slipped_takes_the_ramps_beside_it_along():
+    """Six blocks on every hold, two on every ramp between them."""
+    one = record()
+    n = 10 * 8
+    hold = np.where(np.arange(n) % 8 < 2, -1, np.arange(n) // 8)
+    into = np.interp(np.arange(n) % 8, [0, 2], [0.25, 1.0])
+    load = np.where(hold < 0, LEVELS[np.arange(n) // 8] - 500.0 * (1.0 - into), LEVELS[np.arange(n) // 8])
+    place = vectors(ANGLES[0], REACH + SCALE * load)
+    zeros = np.zeros(n)
+    blocks = Blocks(0.1 * np.arange(n), np.full(n, 0.1), vectors(ANGLES[0], load), place, zeros, zeros, hold,
+                    np.ones(n, dtype=int))  # fmt: skip
+    made = replace(one, blocks=blocks, projection=project(blocks, ANGLES[0]))
+    off = 8e-7 * (hold == 4)
+    found = np.flatnonzero(bad_blocks(noisy(made, 6, off), NOISE, LAWS, _fit_data, PivotSettings()))
+    np.testing.assert_array_equal(found, np.arange(4 * 8, 5 * 8 + 2))
