@@ -44,6 +44,14 @@ def shared(tmp_path):
     return RawBench(bench=None, bearing=None, keep=tmp_path / "kept")
 
 
+def test_a_torn_line_swallows_none_that_follow(tmp_path):
+    file = tmp_path / "new" / "rows.jsonl"
+    module.append_lines(file, ["1", "2"])
+    file.write_bytes(file.read_bytes() + b'{"to')
+    module.append_lines(file, ["3"])
+    assert file.read_text() == '1\n2\n{"to\n3\n'
+
+
 def test_rounds_hold_every_kind_and_share_campaigns():
     groups = raw_trials(LABELS, 120)
     trials = [trial for group in groups for trial in group]

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tpjb_ident.diagnose.raw_rows import code_fingerprint
+from tpjb_ident.diagnose.raw_rows import append_lines, code_fingerprint
 from tpjb_ident.diagnose.trials import Trial
 from tpjb_ident.executors import Task, Workers, in_order
 
@@ -39,15 +39,11 @@ def kept_trials(
     """
     code = code_fingerprint()
     known = {} if file is None else _read(file, code)
-    if file is not None and file.exists() and not file.read_text(encoding="utf-8").endswith("\n"):
-        with file.open("a", encoding="utf-8") as out:
-            out.write("\n")  # a torn line must not swallow the next one
     due = [trial for trial in trials if _key(trial) not in known]
     for trial, row in zip(due, in_order(team, task, [(trial,) for trial in due], shared), strict=True):
         line = json.dumps({"code": code, "key": _key(trial), "row": row}, default=float)
         if file is not None:
-            with file.open("a", encoding="utf-8") as out:
-                out.write(line + "\n")
+            append_lines(file, [line])
         known[_key(trial)] = _tuples(json.loads(line)["row"])
         if told is not None:
             told(row)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -43,9 +44,7 @@ def raw_rows(
 
     def keep(rows: list[Row]) -> None:
         if file is not None:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            with file.open("a", encoding="utf-8") as out:
-                out.writelines(json.dumps({"code": code, **row}) + "\n" for row in rows)
+            append_lines(file, [json.dumps({"code": code, **row}) for row in rows])
         for row in rows:
             known[_key(row)] = _plain(json.loads(json.dumps(row)))
             if told is not None:
@@ -54,6 +53,18 @@ def raw_rows(
     for _, outcome in workers.outcomes(run_raw_trials, [(group,) for group in due], shared):
         keep(outcome.get())
     return [known[_key(asdict(trial))] for group in groups for trial in group]
+
+
+def append_lines(file: Path, lines: Sequence[str]) -> None:
+    """Add whole lines to a file; one that a kill has torn there is ended first, so that it swallows none of them."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("ab+") as out:
+        if out.tell():
+            out.seek(-1, os.SEEK_END)
+            torn = out.read(1) != b"\n"
+        else:
+            torn = False
+        out.write(("\n" * torn + "".join(line + "\n" for line in lines)).encode())
 
 
 def read_rows(file: Path, code: str | None = None) -> dict[str, Row]:
