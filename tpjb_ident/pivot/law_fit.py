@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 OFFSET, FRICTION, SCALE = 0, 1, 2  # places of the parameters that every law has; the shape follows
 CONTACT_GAP = 3.0e-6  # [m], plausible size of the missing contact (prior standard deviation)
 CONTACT_LOAD_SPREAD = 0.6  # of ln F0 about a tenth of the largest load
-ITERATIONS = 18
+ITERATIONS = 60  # a law far from its prior, such as an exponent of 0.4, takes 40
 LONGEST_STEP = 1.0  # in any shape parameter or logarithm
 CONVERGED = 3e-3  # change of the misfit (chi-square) that no longer matters
 

@@ -22,7 +22,7 @@ from scipy import optimize
 FloatArray = NDArray[np.float64]
 
 DRIFT_OVER_FLICKER = 0.7  # [1/sqrt(s)], drift rate to be expected over the square root of the 1/f power density
-BEND = 0.5  # of a drift: its rate at either end differs from that in the middle by half of it, standard deviation
+BEND = 0.5  # of a drift: half of what its rate at either end differs by from that in the middle, standard deviation
 PINNED = 0.01  # of ln(drift rate): as good as given
 # time constants [s] of the exponentially correlated processes whose sum has a 1/f spectrum from some 5 mHz
 # to 5 Hz
