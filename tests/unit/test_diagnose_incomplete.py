@@ -9,6 +9,7 @@ import pytest
 
 from tpjb_ident.diagnose.campaign import unknown_centre
 from tpjb_ident.diagnose.observe import UNSEEN_DIFFERENCE, _struck_by_mains, observe
+from tpjb_ident.dynamic.stiffness import DynamicStiffness
 
 
 def point(*quality: str, load: float = 5000.0):
@@ -21,7 +22,7 @@ def point(*quality: str, load: float = 5000.0):
             excitation=157.0,
             excitation_hz=25.0,
         ),
-        stiffness=SimpleNamespace(h=h, covariance=np.eye(8) * 1e10),
+        stiffness=DynamicStiffness(h, 157.0, np.eye(8) * 1e10, np.full(8, 20.0), "mm-eiv", np.ones((6, 2))),
         temperatures={},
         quality=quality,
     )

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from tests.unit.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.errors_in_variables import Repeats, eiv_fit, repeats
 from tpjb_ident.dynamic.mm import mm_fit
 from tpjb_ident.dynamic.phasor_table import phasor_table
@@ -28,13 +29,6 @@ from tpjb_ident.dynamic.uncertainty import (
     information,
     mixed_dof,
 )
-
-H = np.array([[2.0 + 0.7j, 0.3 - 0.2j], [-0.4 + 0.1j, 1.5 + 0.9j]])
-
-
-def complex_normal(rng, *shape):
-    """Circular, unit power per component."""
-    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
 
 
 def test_bisquare_constant_is_the_published_one():

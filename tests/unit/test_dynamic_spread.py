@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from tests.unit.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.drive_phase import LOCKED, aligned
 from tpjb_ident.dynamic.errors_in_variables import Repeats, eiv_fit, repeats
 from tpjb_ident.dynamic.mm import mm_fit
@@ -23,13 +24,6 @@ from tpjb_ident.dynamic.uncertainty import (
     with_repeats,
 )
 from tpjb_ident.dynamic.whole_directions import readmitted
-
-H = np.array([[2.0 + 0.7j, 0.3 - 0.2j], [-0.4 + 0.1j, 1.5 + 0.9j]])
-
-
-def complex_normal(rng, *shape):
-    """Circular, unit power per component."""
-    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
 
 
 def hermitian(rng, n):

@@ -8,11 +8,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tpjb_ident.diagnose.raw_rows import append_lines, code_fingerprint
+from tpjb_ident.diagnose.kept_rows import Row, append_lines, code_fingerprint, entries, with_tuples
 from tpjb_ident.diagnose.trials import Trial
 from tpjb_ident.executors import Task, Workers, in_order
-
-Row = dict[str, Any]
 
 
 def kept_trials(
@@ -38,36 +36,17 @@ def kept_trials(
         Called with every row that has been made now.
     """
     code = code_fingerprint()
-    known = {} if file is None else _read(file, code)
+    known = {} if file is None else {e["key"]: e["row"] for e in entries(file, code)}
     due = [trial for trial in trials if _key(trial) not in known]
     for trial, row in zip(due, in_order(team, task, [(trial,) for trial in due], shared), strict=True):
         line = json.dumps({"code": code, "key": _key(trial), "row": row}, default=float)
         if file is not None:
             append_lines(file, [line])
-        known[_key(trial)] = _tuples(json.loads(line)["row"])
+        known[_key(trial)] = with_tuples(json.loads(line)["row"])
         if told is not None:
             told(row)
     return [known[_key(trial)] for trial in trials]
 
 
-def _read(file: Path, code: str) -> dict[str, Row]:
-    """Rows of one version of the code by trial; a torn line is no row."""
-    found: dict[str, Row] = {}
-    for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else ():
-        try:
-            entry = json.loads(line)
-        except json.JSONDecodeError:
-            continue
-        if entry["code"] == code:
-            found[entry["key"]] = _tuples(entry["row"])
-    return found
-
-
 def _key(trial: Trial) -> str:
     return json.dumps([type(trial).__name__, *asdict(trial).values()])
-
-
-def _tuples(value: Any) -> Any:
-    if isinstance(value, list):
-        return tuple(_tuples(v) for v in value)
-    return {k: _tuples(v) for k, v in value.items()} if isinstance(value, dict) else value

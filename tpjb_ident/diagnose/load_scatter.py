@@ -47,7 +47,7 @@ def _stiffness(identification: Identification, load: float) -> float:
     if not known:
         return math.inf
     nearest = min(known, key=lambda p: (abs(p.point.static_load - load), p.point.excitation))
-    return float(np.mean(np.abs(np.diag(nearest.stiffness.h.real))))
+    return nearest.stiffness.direct[0]
 
 
 def _turned(point: LocusPoint, locus: Locus) -> FloatArray:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from model.effects import Effect, kind_of
 from model.setup import Setup
@@ -112,12 +113,7 @@ def _aligned(found: Nuisances, names: Sequence[str]) -> FloatArray:
 
 
 def _joined(seen: Sequence[Observations], layout: Layout) -> Observations:
-    n = sum(map(len, seen))
-    covariance = np.zeros((n, n))
-    at = 0
-    for one in seen:
-        covariance[at : at + len(one), at : at + len(one)] = one.covariance
-        at += len(one)
+    covariance = block_diag(*(one.covariance for one in seen))
     return Observations(
         layout, np.concatenate([s.value for s in seen]), covariance, np.concatenate([s.sigma for s in seen]),
         np.concatenate([s.fine for s in seen]), tuple(e for s in seen for e in s.elements),

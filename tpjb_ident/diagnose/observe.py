@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from tpjb_ident.clearance import ClearancePolygon
 from tpjb_ident.diagnose.layout import DryTest, DynamicTest, Layout, LocusTest
@@ -158,16 +159,10 @@ def observe(
     locus_tests = _add_locus(builder, locus, identification, tolerance) if locus is not None else ()
     dry = tuple(_add_dry(builder, c, tolerance) for c in curves if _usable(c))
     push = _add_clearance(builder, polygon, tolerance) if polygon is not None else None
-    n = len(builder.value)
-    covariance = np.zeros((n, n))
-    at = 0
-    for part in builder.covariance:
-        covariance[at : at + len(part), at : at + len(part)] = part
-        at += len(part)
     layout = Layout(dynamic, locus_tests, tuple(d for d in dry), push)
     return Observations(
-        layout, np.array(builder.value), covariance, np.array(builder.sigma), np.array(builder.fine),
-        tuple(builder.elements),
+        layout, np.array(builder.value), block_diag(*builder.covariance), np.array(builder.sigma),
+        np.array(builder.fine), tuple(builder.elements),
     )  # fmt: skip
 
 
@@ -205,13 +200,11 @@ def _struck_by_mains(result: PointResult) -> bool:
 def _add_stiffness(builder: _Builder, result, base: tuple, tolerance: Tolerance) -> None:  # type: ignore[no-untyped-def, type-arg]
     omega = result.point.excitation
     h = result.stiffness.h
-    direct_k = float(np.mean(np.abs(np.diag(h.real))))
-    direct_c = float(np.mean(np.abs(np.diag(h.imag))))
     block = f"load {result.point.static_load:.0f} N, {result.point.excitation_hz:g} Hz"
     where = (*base, ("excitation", omega))
     elements = [Element("h", f"k{e}", block, where) for e in ENTRY_NAMES]
     elements += [Element("h", f"c{e}", block, where) for e in ENTRY_NAMES]
-    scale = np.repeat([direct_k, direct_c], 4)
+    scale = np.repeat(result.stiffness.direct, 4)
     value = np.concatenate([h.real.ravel(), h.imag.ravel()])
     covariance = np.asarray(result.stiffness.covariance)
     if "no-spare-direction" in result.quality:  # the interval knows repeats only, not what runs differ by

@@ -89,8 +89,7 @@ def run_ratios(data: PointData, miss: LoadMiss, first: DynamicStiffness, trusted
         A first estimate, for the size of the direct coefficients.
     trusted : bool
     """
-    direct = np.abs(np.diag(first.h))
-    if len(data.runs) < 3 or data.point.static_load <= 0 or not np.isfinite(direct).all():
+    if len(data.runs) < 3 or data.point.static_load <= 0 or not np.isfinite(first.direct).all():
         return None
     if np.abs(miss.sideways).max() > MAX_SIDEWAYS:
         return None
@@ -99,8 +98,7 @@ def run_ratios(data: PointData, miss: LoadMiss, first: DynamicStiffness, trusted
     if len(good) < 3:
         return None
     shape, force = (np.array([rows[r][part] for r in good]) for part in (0, 1))  # type: ignore[index]
-    parts = float(np.mean(np.abs(np.diag(first.h.real)))), float(np.mean(np.abs(np.diag(first.h.imag))))
-    return RunRatios(shape, force, miss.sideways[good], data.point.static_load, parts, trusted)
+    return RunRatios(shape, force, miss.sideways[good], data.point.static_load, first.direct, trusted)
 
 
 def _ratio(displacement: ComplexArray, force: ComplexArray) -> tuple[ComplexArray, ComplexArray] | None:

@@ -71,6 +71,11 @@ class DynamicStiffness:
     systematic: FloatArray | None = field(default=None, repr=False)
 
     @property
+    def direct(self) -> tuple[float, float]:
+        """Mean size of the direct entries of Re h and of Im h [N/m]."""
+        return float(np.mean(np.abs(np.diag(self.h.real)))), float(np.mean(np.abs(np.diag(self.h.imag))))
+
+    @property
     def k(self) -> FloatArray:
         """Stiffness matrix Re h [N/m], shape (2, 2)."""
         return self.h.real
