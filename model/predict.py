@@ -30,6 +30,10 @@ ComplexArray = NDArray[np.complex128]
 FASTEST = 1e9
 
 
+class OperatingPointError(ValueError):
+    """A load, direction, speed or excitation that no bearing can have."""
+
+
 @dataclass(frozen=True)
 class Prediction:
     """What the model says about one operating point, as the records would show it.
@@ -224,8 +228,10 @@ def predict(
 
     Raises
     ------
+    OperatingPointError
+        A load, direction, speed or excitation that no bearing can have; a ValueError too.
     ValueError
-        An argument with a wrong dimension, sign or name (the message says which).
+        Another argument with a wrong dimension, sign or name (the message says which).
     """
     if thermal not in {"isothermal", "adiabatic", "tehd"}:
         raise ValueError(f"thermal must be isothermal, adiabatic or tehd, got {thermal!r}")
@@ -334,10 +340,15 @@ MAX_GROWTH_STEPS = 20
 
 def _check_point(load: float, direction: float, speed: float, omega: FloatArray) -> None:
     if not (math.isfinite(load) and load >= 0):
-        raise ValueError(f"load must be zero or positive [N], got {load!r}; give its direction as load_direction")
+        raise OperatingPointError(
+            f"load must be zero or positive [N], got {load!r}; give its direction as load_direction"
+        )
     if not math.isfinite(direction):
-        raise ValueError(f"load_direction must be finite [rad], got {direction!r}")
+        raise OperatingPointError(f"load_direction must be finite [rad], got {direction!r}")
     if not (math.isfinite(speed) and speed > 0):
-        raise ValueError(f"speed must be positive [rad/s] (the shaft turns counter-clockwise), got {speed!r}")
+        raise OperatingPointError(f"speed must be positive [rad/s] (the shaft turns counter-clockwise), got {speed!r}")
     if omega.ndim > 1 or omega.size == 0 or not np.all((omega > 0) & (omega < FASTEST)):
-        raise ValueError(f"excitation must be a positive number below {FASTEST:g} rad/s or a 1-D array of them")
+        raise OperatingPointError(
+            f"excitation must be a positive number below {FASTEST:g} rad/s or a 1-D array of them, "
+            f"got {np.array2string(omega, threshold=4, precision=3)}"
+        )

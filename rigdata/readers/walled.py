@@ -12,6 +12,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -47,10 +48,13 @@ def read_walled(module: str, path: Path) -> list[Series]:
     around = {**os.environ, "PYTHONPATH": os.pathsep.join([home, os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)}
     command = [sys.executable, "-m", "rigdata.readers.walled", module, str(path)]
     try:
-        # What a library prints about a broken file is no message for people; its exception comes with the answer.
-        done = subprocess.run(
-            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=seconds, env=around, check=False
-        )
+        # asammdf mends a copy of a measurement that was cut short, and a child that dies cannot clear it away.
+        with tempfile.TemporaryDirectory(prefix="tpjb-", ignore_cleanup_errors=True) as scratch:
+            around |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), scratch)
+            # What a library prints about a broken file is no message for people; its exception comes with the answer.
+            done = subprocess.run(
+                command, stdin=subprocess.DEVNULL, capture_output=True, timeout=seconds, env=around, check=False
+            )
     except subprocess.TimeoutExpired as error:
         raise _refuse(f"took longer than {seconds:.0f} s to read, far beyond its size", _AGAIN) from error
     head, _, body = done.stdout.partition(b"\n")

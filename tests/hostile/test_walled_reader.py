@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +46,21 @@ def test_a_child_that_does_not_end_is_ended(tmp_path, monkeypatch):
     monkeypatch.setattr(walled, "SECONDS", 0.01)
     with pytest.raises(RigDataError, match="took longer than 0 s"):
         walled.read_walled("mdf4", path)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell script stands for the child")
+def test_what_a_dying_child_leaves_in_the_temporary_folder_is_cleared_away(tmp_path, monkeypatch):
+    path, shelf, told, dying = (tmp_path / name for name in ("a.mf4", "shelf", "told", "dies"))
+    path.write_bytes(b"x")
+    shelf.mkdir()
+    dying.write_text(f'#!/bin/sh\necho "$TMPDIR" > {told}\ntouch "$TMPDIR/copy.mf4"\nexit 9\n')
+    dying.chmod(0o700)
+    monkeypatch.setattr(tempfile, "tempdir", str(shelf))
+    monkeypatch.setattr(sys, "executable", str(dying))
+    with pytest.raises(RigDataError, match="exit status 9"):
+        walled.read_walled("mdf4", path)
+    assert Path(told.read_text().strip()).parent == shelf
+    assert list(shelf.iterdir()) == []
 
 
 @pytest.mark.slow

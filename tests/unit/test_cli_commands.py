@@ -223,6 +223,8 @@ BAD = [
     (("predict", "{bearing}", "--thermal", "adiabatc"), "Did you mean 'adiabatic'"),
     (("predict", "{bearing}", "--load", "-5 kN"), "must be positive"),
     (("predict", "{bearing}", "--speed", "0 Hz"), "must be positive"),
+    (("predict", "{bearing}", "--excitation", "1e9 Hz"), "excitation must be"),
+    (("predict", "{bearing}", "--speed", "1e300 Hz"), "excitation must be"),
     (("predict", "{bearing}", "--load", "1..9:0.001 kN", "--speed", "1..90:0.1 Hz"), "operating points"),
     (("predict", "{bearing}", "--effects", "nowhere.toml"), "no such file"),
     (("compare", "{campaign}", "--pivots", "kirck"), "Did you mean 'kirk'"),
