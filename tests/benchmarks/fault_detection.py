@@ -1,16 +1,19 @@
 """Put each named fault into good virtual campaigns: what does `tpjb check` say, and does identification go on?
 
     python tests/benchmarks/fault_detection.py [--seeds 3] [--first 1] [--good 30] [--faults dead ..] [--identify]
+        [--rows FILE]
 
 Per fault: the share of campaigns in which the struck run is named with an error or a warning, the share in which
 another run is blamed, and with ``--identify`` what became of the coefficients: the largest error of the direct terms
 against the truth, what identification itself says of them, and in how many campaigns it says so. Good campaigns of
-various make (number of directions, noise, points) give the rate of false alarms.
+various make (number of directions, noise, points, bearings that wander from run to run) give the rate of false alarms.
+``--rows FILE`` keeps a JSON line per campaign; the same call again does what is missing there and prints the table.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import sys
 import tempfile
@@ -49,8 +52,13 @@ FAULTS: dict[str, Fault] = {
     "probe reads 10 % too much": Fault("scaled", RUN, "X1A", value=1.1),
     "probe reads 5 % too much": Fault("scaled", RUN, "X1A", value=1.05),
     "probe reads 3 % too much": Fault("scaled", RUN, "X1A", value=1.03),
+    "probe reads 3 % too little": Fault("scaled", RUN, "X1B", value=0.97),
+    "probe reads 5 % too little": Fault("scaled", RUN, "X1B", value=0.95),
     "cell reads 10 % too much": Fault("scaled", RUN, "L1H", value=1.1),
     "cell reads 5 % too much": Fault("scaled", RUN, "L1H", value=1.05),
+    "cell reads 3 % too much": Fault("scaled", RUN, "L1H", value=1.03),
+    "loaded cell reads 5 % too little": Fault("scaled", RUN, "L1V", value=0.95),
+    "loaded cell reads 3 % too much": Fault("scaled", RUN, "L1V", value=1.03),
     "probe sensitivity ten times off": Fault("scaled", RUN, "X1A", value=10.0),
     "cell sensitivity ten times off": Fault("scaled", RUN, "L1H", value=0.1),
     "cells ten times off, all runs": Fault("scaled", "*", "L1*", value=0.1),
@@ -72,6 +80,10 @@ FAULTS: dict[str, Fault] = {
     "crosstalk of 30 %": Fault("crosstalk", RUN, "L1H", value=0.3),
     "missing file": Fault("missing_file", RUN),
 }
+#: Good campaigns.
+GOOD = "none (false alarms)"
+#: One channel of `RUN` with all that it reads, gap voltage included, times a factor, as from a wrong amplifier.
+AMPLIFIED = {"probe amplified 3 % too much": ("X1A", 1.03), "probe amplified 5 % too little": ("X1B", 0.95)}
 #: In place of a fault: some runs from a bearing half as stiff, as when two bearings' runs got into one campaign.
 MIXED = "mixed bearings: every third run of another"
 
@@ -82,13 +94,13 @@ USUAL = {"calibration-uncertainty-unstated", "cells-against-set-points"}
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one campaign with one fault led to."""
+    """What one campaign with one fault led to; the last two are those of identification."""
 
     named: bool
     blamed_others: bool
     severity: str
-    error: float
-    said: frozenset[str]
+    error: float = math.nan
+    said: frozenset[str] = frozenset()
 
 
 def write(path: Path, seed: int, fault: Fault | None, stiffness: float = 1.0) -> None:
@@ -119,18 +131,24 @@ def mix(path: Path, other: Path) -> None:
                 source.copy(f"runs/{name}", file["runs"])
 
 
-def judge(path: Path, struck: str | None, identify: bool) -> Outcome:
-    """Check, and identify if asked."""
+def amplify(path: Path, channel: str, factor: float) -> None:
+    """Multiply one channel's readings in `RUN`."""
+    import h5py
+
+    with h5py.File(path, "r+") as file:
+        file[f"runs/{RUN}/{channel}"][...] *= factor
+
+
+def judge(path: Path, struck: str | None) -> Outcome:
+    """What the check says."""
     known = rigdata.check_campaign(path)
     found = [p for p in [*known, *bearing_problems(rigdata.load_campaign(path), known)] if p.severity != "note"]
     mine = [p for p in found if struck is None or p.run == struck or struck == "*"]
     worst = "error" if any(p.severity == "error" for p in mine) else "warning" if mine else "-"
-    others = [p for p in found if p not in mine]
-    error, said = _identified(path) if identify else (math.nan, frozenset())
-    return Outcome(bool(mine), bool(others), worst, error, said)
+    return Outcome(bool(mine), any(p not in mine for p in found), worst)
 
 
-def _identified(path: Path) -> tuple[float, frozenset[str]]:
+def identified(path: Path) -> tuple[float, frozenset[str]]:
     """Largest error of the direct terms at the struck point; names of what identification says."""
     from tpjb_ident.dynamic.identify import IdentifySettings, identify
 
@@ -159,6 +177,72 @@ def row(name: str, outcomes: list[Outcome]) -> str:
     return f"| {name} | {named} of {n} | {severity} | {others} of {n} | {worst} | {said} |"
 
 
+class Rows:
+    """Outcomes by fault and seed, kept in a file as they come."""
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+        lines = path.read_text("utf-8").splitlines() if path is not None and path.exists() else []
+        self.known = {(row["what"], row["fault"], row["seed"]): row for row in map(json.loads, lines)}
+
+    def take(self, what: str, fault: str, seed: int, values: dict[str, object]) -> None:
+        """Keep one result."""
+        row = {"what": what, "fault": fault, "seed": seed, **values}
+        self.known[what, fault, seed] = row
+        if self.path is not None:
+            with self.path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+
+    def outcome(self, fault: str, seed: int) -> Outcome:
+        """What is known of one campaign."""
+        checked = self.known["check", fault, seed]
+        found = self.known.get(("identify", fault, seed))
+        named, others, severity = (checked[k] for k in ("named", "others", "severity"))
+        if found is None:
+            return Outcome(named, others, severity)
+        error = math.nan if found["error"] is None else found["error"]
+        return Outcome(named, others, severity, error, frozenset(found["said"]))
+
+
+def make(path: Path, name: str, seed: int) -> str | None:
+    """Write the campaign of a row; the run that its fault strikes, None where it strikes several or none."""
+    fault = FAULTS.get(name)
+    if name == GOOD:
+        write_various(path, seed)
+        return None
+    write(path, seed, fault)
+    if name in AMPLIFIED:
+        amplify(path, *AMPLIFIED[name])
+        return RUN
+    if name == MIXED:
+        other = path.with_name("other.h5")
+        write(other, seed + 100, None, 0.5)
+        mix(path, other)
+        other.unlink()
+    return None if fault is None else fault.run
+
+
+def work(name: str, seed: int, rows: Rows, folder: Path, wanted: tuple[str, ...]) -> None:
+    """Do what is missing of one campaign."""
+    missing = [w for w in wanted if (w, name, seed) not in rows.known]
+    if not missing:
+        return
+    path = folder / "c.h5"
+    struck = make(path, name, seed)
+    if "check" in missing:
+        found = judge(path, struck)
+        rows.take(
+            "check",
+            name,
+            seed,
+            {"named": found.named, "others": found.blamed_others, "severity": found.severity},
+        )
+    if "identify" in missing:
+        error, said = identified(path)
+        rows.take("identify", name, seed, {"error": None if math.isnan(error) else error, "said": sorted(said)})
+    path.unlink()
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=3)
@@ -166,32 +250,22 @@ def main() -> None:
     parser.add_argument("--good", type=int, default=12, help="good campaigns")
     parser.add_argument("--faults", nargs="*", help="parts of names")
     parser.add_argument("--identify", action="store_true")
+    parser.add_argument("--no-check", action="store_true", help="identify only, for a file of rows that has the rest")
+    parser.add_argument("--rows", type=Path, help="file of results, one JSON line each; what it has is not done again")
     given = parser.parse_args()
-    began = time.time()
+    began, rows = time.time(), Rows(given.rows)
+    wanted = (*(() if given.no_check else ("check",)), *(("identify",) if given.identify else ()))
     print("| fault | named | as | others blamed | worst error of direct terms | identify says |")
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        names = ["none (false alarms)", *FAULTS, MIXED]
-        for name in names:
+        for name in (GOOD, *FAULTS, *AMPLIFIED, MIXED):
             if given.faults and not any(part in name for part in given.faults):
                 continue
-            outcomes = []
-            fault = FAULTS.get(name)
-            good = fault is None and name != MIXED
-            for seed in range(given.first, given.first + (given.good if good else given.seeds)):
-                path = folder / "c.h5"
-                if good:
-                    write_various(path, seed)
-                else:
-                    write(path, seed, fault)
-                if name == MIXED:
-                    write(folder / "other.h5", seed + 100, None, 0.5)
-                    mix(path, folder / "other.h5")
-                    (folder / "other.h5").unlink()
-                outcomes.append(judge(path, None if fault is None else fault.run, given.identify))
-                path.unlink()
-            print(row(name, outcomes), flush=True)
+            seeds = range(given.first, given.first + (given.good if name == GOOD else given.seeds))
+            for seed in seeds:
+                work(name, seed, rows, Path(scratch), wanted)
+            if not given.no_check:
+                print(row(name, [rows.outcome(name, seed) for seed in seeds]), flush=True)
     print(f"\n{given.seeds} campaigns per row, {time.time() - began:.0f} s", file=sys.stderr)
 
 
