@@ -32,6 +32,8 @@ MAX_MISS = 0.05
 MAX_SIDEWAYS = 0.05
 #: Beyond these ratios of the cells to the set points in all runs, a sensitivity or a set point is wrong, not a gain.
 CONTRADICTS = (0.7, 1.4)
+#: Turned by more than this in all runs [rad], cells are inverted or exchanged, or the load acts elsewhere.
+CONTRADICTS_TURN = 0.5
 
 
 @dataclass(frozen=True)
@@ -197,19 +199,31 @@ def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
                 f"a run's measured static load points {np.degrees(sideways):.1f} deg away from its set direction",
             )
         )
-    if not CONTRADICTS[0] <= abs(common) <= CONTRADICTS[1]:
-        found.append(
+    return (*found, *_common_conditions(common))
+
+
+def _common_conditions(common: complex) -> tuple[Condition, ...]:
+    """What all runs share: a gain of the cells, or what no gain explains."""
+    size, turn = abs(common), float(np.angle(common))
+    if not CONTRADICTS[0] <= size <= CONTRADICTS[1]:
+        return (
             Condition(
                 "cells-contradict-set-points",
-                f"the cells read {abs(common):.3g} times the static load of the set points in all runs: every "
+                f"the cells read {size:.3g} times the static load of the set points in all runs: every "
                 "coefficient is off by about as much if their sensitivity is wrong",
-            )
+            ),
         )
-    elif abs(abs(common) - 1) > 0.01:
+    aside = f"the static load by the cells points {np.degrees(turn):+.1f} deg away from its set direction in all runs"
+    if abs(turn) > CONTRADICTS_TURN:
+        return (Condition("cells-contradict-set-points", f"{aside}: a cell is inverted, or the cells are exchanged"),)
+    found = []
+    if abs(turn) > MAX_SIDEWAYS:
+        found.append(Condition("static-load-turned", aside))
+    if abs(size - 1) > 0.01:
         found.append(
             Condition(
                 "cells-against-set-points",
-                f"the cells read {100 * (abs(common) - 1):+.2f} % against the set points in all runs alike "
+                f"the cells read {100 * (size - 1):+.2f} % against the set points in all runs alike "
                 "(gain of the cells or of the actuators' transducers)",
             )
         )

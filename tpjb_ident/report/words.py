@@ -6,9 +6,9 @@ from __future__ import annotations
 MEANING = {
     "cells-against-set-points": "The load cells and the set points disagree alike in all runs: the "
     "gain of one or of the other is off.",
-    "cells-contradict-set-points": "The load cells read many times more or less than the set points in all runs, as if "
-    "their sensitivity were wrong; the coefficients are then off by as much. Check sensitivity, full_scale and "
-    "excitation of the cells.",
+    "cells-contradict-set-points": "In all runs the load cells read many times more or less than the set points, or a "
+    "load in quite another direction; the coefficients are then off by as much. Check sensitivity, full_scale, "
+    "excitation, polarity and axes of the cells.",
     "drive-not-locked": "The excitation's phase wandered between windows; they were turned to one phase first.",
     "drift-unknown": "No load direction was repeated, so a drift of the probes cannot be told from a position. "
     "Repeat the first direction at the end.",
@@ -24,7 +24,7 @@ MEANING = {
     "pivots-disagree": "In the sweep the pivots give another amount than the dry tests say.",
     "speed-drifts": "The shaft speed moved during the record; its lines were followed window by window.",
     "no-reference": "The runs do not state two excitation directions, so they cannot serve as instruments.",
-    "static-load-turned": "The measured static load of a run points elsewhere than its set point says.",
+    "static-load-turned": "The measured static load of a run, or of all, points elsewhere than its set point says.",
     "static-load-off": "The measured static load of a run misses its set point.",
     "unexpected-lines": "The records hold lines that the manifest does not explain; they were fitted along.",
     "calibration-uncertainty-unstated": "The manifest states no calibration uncertainty for some channels; the "
