@@ -143,6 +143,8 @@ def test_a_slope_is_borrowed_from_the_nearest_excitation_at_the_same_load():
     found = load_slopes(everyone, [*first, *(stiff(H) for _ in range(4))])
     assert found[5:] == [None] * 3
     np.testing.assert_allclose(found[4], found[1].real + 1j * found[1].imag * 35.0 / 20.0, rtol=1e-12)
+    at_45 = load_slopes([*points, SimpleNamespace(point=place(8000.0, excitation=45.0))], [*first, stiff(H)])[4]
+    np.testing.assert_allclose(at_45, found[3].real + 1j * found[3].imag * 45.0 / 60.0, rtol=1e-12)
     # an estimate without an answer gives no slope, and may borrow one
     lost = [first[0], stiff(np.full((2, 2), np.nan)), *first[2:]]
     found = load_slopes(points, lost)

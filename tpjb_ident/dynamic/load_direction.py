@@ -166,8 +166,7 @@ def _basis(ratio: RunRatios, log_load: float) -> ComplexArray:
 
 def _projected(ratio: RunRatios, basis: ComplexArray) -> tuple[FloatArray, FloatArray]:
     """Design (m, 8) and answers (m, 2) with H itself projected off, relative to the direct coefficients, real."""
-    u, s, _ = np.linalg.svd(ratio.shape, full_matrices=True)
-    rest = u[:, int(np.sum(s > 1e-6 * s[0])) :].conj().T
+    rest = np.linalg.svd(ratio.shape, full_matrices=True)[0][:, 2:].conj().T
     size = float(np.hypot(*ratio.direct))
     design = rest @ (ratio.sideways[:, None] * (ratio.shape @ basis)) / size
     answer = rest @ ratio.force / size

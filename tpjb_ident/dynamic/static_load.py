@@ -138,7 +138,7 @@ def _log_gradient(values: NDArray[np.float64], log_load: NDArray[np.float64]) ->
     """
     order: Literal[1, 2] = 2 if len(log_load) > 2 else 1
     plain = np.asarray(np.gradient(values, log_load, axis=0, edge_order=order))
-    one_sign = (np.abs(np.sign(values).sum(axis=0)) == len(values)) & (np.abs(values).min(axis=0) > 0)
+    one_sign = np.abs(np.sign(values).sum(axis=0)) == len(values)
     logarithm = np.log(np.where(one_sign, np.abs(values), 1.0))
     power = values * np.gradient(logarithm, log_load, axis=0, edge_order=order)
     return np.where(one_sign, power, plain)
