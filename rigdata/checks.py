@@ -60,7 +60,7 @@ def _judge(campaign: Campaign, seen: Sequence[Observation]) -> list[Problem]:
     check_excitation(of_kind["dynamic"], campaign.housing_mass)
     check_dry(of_kind["dry_pivot"])
     _spread_doubts(seen)
-    check_responses(of_kind["dynamic"], campaign.housing_mass)
+    check_responses(of_kind["dynamic"], campaign.housing_mass, of_kind["clearance"])
     check_accelerometers(of_kind["dynamic"])
     check_housing(of_kind["dynamic"])
     check_shaft_follows(of_kind["dry_pivot"])

@@ -31,8 +31,8 @@ _MIN_RUNS, _MOST = 4, 1 / 3
 _EXPLAINED = 0.4
 
 
-def check_agreement(group: Sequence[Answer], stiffness: ComplexArray) -> None:
-    """Name runs that answer otherwise than the others at their operating point.
+def check_agreement(group: Sequence[Answer], stiffness: ComplexArray) -> set[int]:
+    """Name runs that answer otherwise than the others at their operating point; their places in the group.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def check_agreement(group: Sequence[Answer], stiffness: ComplexArray) -> None:
         H that most of them agree on.
     """
     if len(group) < _MIN_RUNS:
-        return
+        return set()
     misfits = np.array([misfit_of(a, stiffness) for a in group])
     told = set()
     if np.median(misfits) <= _AGREE:
@@ -53,6 +53,7 @@ def check_agreement(group: Sequence[Answer], stiffness: ComplexArray) -> None:
     common = solve_stiffness(others) if told and len(others) > 1 else None
     for i in sorted(told):
         _tell(group[i], stiffness if common is None else common)
+    return told
 
 
 def _apart(group: Sequence[Answer], known: set[int]) -> set[int]:

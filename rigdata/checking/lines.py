@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 _GLITCH = 6.0
+#: A line whose amplitude may change needs this distance from all others [1 / record length].
+_PARTED = 2.5
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,9 @@ class Lines:
     scatter: FloatArray
 
 
-def fit_lines(time: FloatArray, values: FloatArray, frequencies: Sequence[float]) -> Lines:
+def fit_lines(
+    time: FloatArray, values: FloatArray, frequencies: Sequence[float], inexact: Sequence[float] = ()
+) -> Lines:
     """Fit mean, drift and lines to every column.
 
     Parameters
@@ -49,6 +53,9 @@ def fit_lines(time: FloatArray, values: FloatArray, frequencies: Sequence[float]
         NaN where missing.
     frequencies : sequence of float
         [Hz]; the first is the one wanted, others nearer to it than the record can part are dropped.
+    inexact : sequence of float
+        Those of them known to a fraction of 1 / record length only [Hz]: their amplitude may change along the record,
+        which is the first order of a wrong frequency, and no part of it leaks into the line wanted.
 
     Returns
     -------
@@ -60,7 +67,8 @@ def fit_lines(time: FloatArray, values: FloatArray, frequencies: Sequence[float]
     for frequency in frequencies:
         if frequency > 0 and all(abs(frequency - f) * span > 0.8 for f in kept):
             kept.append(frequency)
-    design = _design(time, kept)
+    growing = [f for f in inexact if f in kept[1:] and all(abs(f - k) * span > _PARTED for k in kept if k != f)]
+    design = _design(time, kept, growing)
     good = np.isfinite(values)
     coefficients, rest, used = _robust(design, np.where(good, values, 0.0), good)
     counts = np.count_nonzero(used, axis=0)
@@ -72,12 +80,16 @@ def fit_lines(time: FloatArray, values: FloatArray, frequencies: Sequence[float]
     return Lines(coefficients[0] * fit, phasor, floor, np.count_nonzero(good, axis=0) - counts, scatter)
 
 
-def _design(time: FloatArray, frequencies: Sequence[float]) -> FloatArray:
+def _design(time: FloatArray, frequencies: Sequence[float], growing: Sequence[float]) -> FloatArray:
     middle, half = (time[0] + time[-1]) / 2, max((time[-1] - time[0]) / 2, 1e-300)
-    columns = [np.ones_like(time), (time - middle) / half]
+    place = (time - middle) / half
+    columns = [np.ones_like(time), place]
     for frequency in frequencies:
         angle = 2 * math.pi * frequency * time
         columns += [np.cos(angle), np.sin(angle)]
+    for frequency in growing:
+        angle = 2 * math.pi * frequency * time
+        columns += [place * np.cos(angle), place * np.sin(angle)]
     return np.stack(columns, axis=1)
 
 

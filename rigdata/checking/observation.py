@@ -15,6 +15,7 @@ from rigdata.checking.channel_statistics import ChannelStatistics
 from rigdata.checking.clock import check_clock
 from rigdata.checking.findings import Reporter
 from rigdata.checking.lines import Lines, fit_lines, strongest_line
+from rigdata.checking.rotation import turning_frequency
 from rigdata.checking.signals import check_signal, needed
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
@@ -82,7 +83,7 @@ def observe(run: Run) -> Observation:
         return _blind(run, report)
     live = tuple(c for n, c in readable.items() if c.quantity in VECTOR_QUANTITIES and not _is_dead(statistics[n]))
     used = np.stack([first[c.name] for c in live], axis=1) if live else np.empty((length, 0))
-    lines = _lines(run, time[:_FITTED], used[:_FITTED]) if time is not None and live else None
+    lines = _lines(run, live, time[:_FITTED], used[:_FITTED]) if time is not None and live else None
     noise_free = _is_noise_free(run, live, used, lines)
     if noise_free:
         report.say("no noise", "note", "", "the readings show no noise", "Nothing, if the data are computed")
@@ -186,10 +187,12 @@ def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: L
     return True
 
 
-def _lines(run: Run, time: FloatArray, values: FloatArray) -> Lines:
+def _lines(run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray) -> Lines:
     excitation = run.point.excitation_hz if run.kind == "dynamic" else 0.0
-    speed = run.point.shaft_speed_hz
-    return fit_lines(time, values, [excitation, speed, 2 * speed, 50.0, 2 * excitation])
+    probes = values[:, [i for i, c in enumerate(channels) if c.quantity == "displacement"]]
+    others = [excitation, 50.0, 2 * excitation]
+    speed = turning_frequency(time, probes, run.point.shaft_speed_hz, [f for f in others if f > 0])
+    return fit_lines(time, values, [excitation, speed, 2 * speed, *others[1:]], [speed, 2 * speed])
 
 
 def _spread(values: FloatArray) -> FloatArray:

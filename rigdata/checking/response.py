@@ -16,6 +16,7 @@ from rigdata.calibration import Channel
 from rigdata.checking.agreement import check_agreement
 from rigdata.checking.answers import Answer, answer_of, misfit_of, robust_stiffness
 from rigdata.checking.observation import Observation
+from rigdata.checking.run_gains import check_gains, probe_centres
 from rigdata.checking.set_points import excited, to_plane
 from rigdata.checking.wiring import name_fault
 from rigdata.problem import Severity
@@ -28,20 +29,31 @@ _DEFINITE = 0.05
 _MAX_ANISOTROPY = 6.0
 
 
-def check_responses(runs: Sequence[Observation], mass: float) -> None:
-    """Compare the dynamic runs of every operating point with each other and with what a film can do."""
+def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[Observation] = ()) -> None:
+    """Compare the dynamic runs of every operating point with each other and with what a film can do.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+        All dynamic ones.
+    mass : float
+        Of the housing [kg]; NaN where not stated.
+    sweeps : sequence of Observation
+        Clearance runs, for what the probes read at the bearing's centre.
+    """
     groups: dict[object, list[Answer]] = {}
     for seen in runs:
         answer = answer_of(seen, mass)
         if answer is not None:
             names = tuple(c.name for c in answer.channels)
             groups.setdefault((seen.run.point, names), []).append(answer)
+    centres = probe_centres(sweeps)
     for group in groups.values():
         stiffness = robust_stiffness(group)
         if stiffness is None:
             continue
         _check_signs(group, stiffness)
-        check_agreement(group, stiffness)
+        check_gains(group, check_agreement(group, stiffness), centres)
 
 
 def definiteness(matrix: NDArray) -> float:

@@ -22,11 +22,19 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 import rigdata
+from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Fault, Noise, operating_points
+from rigdata.virtual_rig.truth import load_vector
 from tests.good_campaigns import BEARINGS, DAMPING, PLAN, RUN, STIFFNESS, directions, stiff_rig, written
 from tpjb_ident.cli.bearing_checks import bearing_problems
 
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+MISS = Noise.like_samples().set_point
 BEARING = BEARINGS / "rocker.toml"
 TEXT = BEARING.read_text("utf-8")
 #: Of that bearing, and of the virtual rig's polygon [m].
@@ -80,8 +88,8 @@ FAULTS: dict[str, Fault] = {
     "crosstalk of 30 %": Fault("crosstalk", RUN, "L1H", value=0.3),
     "missing file": Fault("missing_file", RUN),
 }
-#: Good campaigns.
-GOOD = "none (false alarms)"
+#: Good campaigns; those of the second kind wander from run to run.
+GOOD, WANDERING = "none (false alarms)", "none, wandering (false alarms)"
 #: One channel of `RUN` with all that it reads, gap voltage included, times a factor, as from a wrong amplifier.
 AMPLIFIED = {"probe amplified 3 % too much": ("X1A", 1.03), "probe amplified 5 % too little": ("X1B", 0.95)}
 #: In place of a fault: some runs from a bearing half as stiff, as when two bearings' runs got into one campaign.
@@ -118,6 +126,34 @@ def write_various(path: Path, seed: int) -> None:
     )
     noise = Noise.like_samples().scaled((0.5, 1.0, 2.0)[seed // 3 % 3])
     written(path, stiff_rig(1000 + seed, plan=plan, noise=noise, bearing_name=BEARING.name, bearing_text=TEXT))
+
+
+def write_wandering(path: Path, seed: int) -> None:
+    """Write a good campaign in which every run has a temperature of its own, in some seeds with outliers among them.
+
+    Stiffness scatters by 0.5 to 2 % from run to run, damping by twice as much, the mean position by 0.2 to 1 um besides
+    what the load does. What a run is like hangs on by how much it misses its set points, which is drawn for every run.
+    """
+    size, heavy = (0.5, 1.0, 2.0)[seed % 3], bool(seed // 3 % 2)
+
+    def chance(point: OperatingPoint) -> tuple[float, float]:
+        warm = (point.shaft_speed_hz / 22.0 - 1) / MISS.speed
+        turned = (point.static_load_direction + math.pi / 2) / MISS.direction
+        return (warm * abs(warm), turned * abs(turned)) if heavy else (warm, turned)
+
+    def stiffness(point: OperatingPoint) -> ComplexArray:
+        warm = 0.01 * size * chance(point)[0]
+        softer = (point.static_load / 5000.0) ** 0.6 * (1 - warm)
+        return np.asarray(softer * STIFFNESS + 1j * point.excitation * (1 - 2 * warm) * DAMPING)
+
+    def position(point: OperatingPoint) -> FloatArray:
+        warm, turned = chance(point) if point.static_load > 0 and point.shaft_speed > 0 else (0.0, 0.0)
+        moved = 0.5e-6 * size * np.array([0.6 * warm + 0.8 * turned, 0.8 * warm - 0.6 * turned])
+        return np.asarray(np.linalg.solve(STIFFNESS, load_vector(point)) + moved)
+
+    plan = replace(PLAN, directions=directions((6, 4, 8)[seed // 2 % 3]), locus=())
+    texts = {"bearing_name": BEARING.name, "bearing_text": TEXT}
+    written(path, stiff_rig(2000 + seed, plan=plan, stiffness=stiffness, position=position, **texts))
 
 
 def mix(path: Path, other: Path) -> None:
@@ -207,8 +243,8 @@ class Rows:
 def make(path: Path, name: str, seed: int) -> str | None:
     """Write the campaign of a row; the run that its fault strikes, None where it strikes several or none."""
     fault = FAULTS.get(name)
-    if name == GOOD:
-        write_various(path, seed)
+    if name in (GOOD, WANDERING):
+        (write_various if name == GOOD else write_wandering)(path, seed)
         return None
     write(path, seed, fault)
     if name in AMPLIFIED:
@@ -258,10 +294,10 @@ def main() -> None:
     print("| fault | named | as | others blamed | worst error of direct terms | identify says |")
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as scratch:
-        for name in (GOOD, *FAULTS, *AMPLIFIED, MIXED):
+        for name in (GOOD, WANDERING, *FAULTS, *AMPLIFIED, MIXED):
             if given.faults and not any(part in name for part in given.faults):
                 continue
-            seeds = range(given.first, given.first + (given.good if name == GOOD else given.seeds))
+            seeds = range(given.first, given.first + (given.good if name in (GOOD, WANDERING) else given.seeds))
             for seed in seeds:
                 work(name, seed, rows, Path(scratch), wanted)
             if not given.no_check:

@@ -1,0 +1,227 @@
+"""What one operating point's runs say of a single gain in one of them, by their phasors and by their means.
+
+Two probes and two cells serve all runs of a point. If one of them reads g times the truth in one run, the part
+1 - 1/g of its own reading is too much there, at the excitation line and in the mean alike. Both parts are estimated
+from the run against the others, by generalised least squares: noise is what the others scatter by, and beside it stands
+what honest runs differ by (`HONEST`): a bearing that answers a little softer or less damped in one run, a load that
+misses its set point and moves the shaft as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+#: Stiffness, damping and static load of one run may differ from the others' by this share, one standard deviation:
+#: oil gets warmer, loads are set by hand.
+HONEST = 0.01
+#: Least scatter that runs are credited with: phasors and mean loads as a share, mean positions [m].
+_LEAST_PHASOR, _LEAST_LOAD, _LEAST_POSITION = 1e-4, 1e-3, 10e-9
+#: How well the zero of a probe, and so its distance from there, is known from a clearance run.
+_LEVER_KNOWN = 0.25
+
+
+@dataclass(frozen=True)
+class PointReadings:
+    """Readings of the n runs of one operating point, SI.
+
+    Attributes
+    ----------
+    probes, cells : (n, 2) complex ndarray
+        Phasors at the excitation [m], [N], one column per channel.
+    inertia : (n, 2) complex ndarray
+        Housing mass times acceleration, X and Y [N].
+    probe_means, cell_means : (n, 2) ndarray
+        Mean readings [m], [N].
+    probe_plane, cell_plane : (2, 2) ndarray
+        From the two readings to X and Y.
+    """
+
+    probes: ComplexArray
+    cells: ComplexArray
+    inertia: ComplexArray
+    probe_means: FloatArray
+    cell_means: FloatArray
+    probe_plane: FloatArray
+    cell_plane: FloatArray
+
+    @property
+    def displacement(self) -> ComplexArray:
+        """X, Y of every run, (n, 2) [m]."""
+        return np.asarray(self.probes @ self.probe_plane.T)
+
+    @property
+    def force(self) -> ComplexArray:
+        """Of the film, X, Y of every run, (n, 2) [N]."""
+        return np.asarray(self.cells @ self.cell_plane.T + self.inertia)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How one run differs from what the others foretell, with its covariance.
+
+    Attributes
+    ----------
+    rest : (m,) ndarray
+    noise : (m, m) ndarray
+        Covariance that the others' scatter tells.
+    honest : (m, m) ndarray
+        Covariance of what honest runs differ by beyond it.
+    spare : int
+        Degrees of freedom of `noise`.
+    """
+
+    rest: FloatArray
+    noise: FloatArray
+    honest: FloatArray
+    spare: int
+
+    def evidence(self, pattern: FloatArray) -> Evidence:
+        """Estimate the factor of `pattern` (m,) in the rest; of nothing where the pattern does not show."""
+        weights = np.linalg.solve(self.noise + self.honest, pattern)
+        information = float(pattern @ weights)
+        if not information > 0:
+            return Evidence(0.0, 0.0, 0.0)
+        share = float(weights @ self.noise @ weights) / information**2
+        return Evidence(float(weights @ self.rest) / information, information, share**2 / self.spare)
+
+    def misfit(self, pattern: FloatArray, part: float) -> float:
+        """Squared distance of the rest from `part` times the pattern, per equation, in units of its covariance."""
+        left = self.rest - part * pattern
+        return float(left @ np.linalg.solve(self.noise + self.honest, left)) / len(left)
+
+    def widened(self, place: int, deviation: float) -> Difference:
+        """The same with one equation less certain."""
+        honest = self.honest.copy()
+        honest[place, place] += deviation**2
+        return Difference(self.rest, self.noise, honest, self.spare)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """An estimate of 1 - 1/g.
+
+    Attributes
+    ----------
+    part : float
+    information : float
+        One over its variance; 0 where there is no evidence.
+    doubt : float
+        Sum of (share of the variance that is estimated)^2 over its degrees of freedom.
+    """
+
+    part: float
+    information: float
+    doubt: float
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of its variance (Welch, Satterthwaite)."""
+        return float(np.inf) if self.doubt <= 0 else self.information**-2 / self.doubt
+
+    def chance(self) -> float:
+        """Probability of so large a part where there is none, two-sided."""
+        if self.information <= 0:
+            return 1.0
+        from scipy.special import stdtr
+
+        # the t distribution of infinite freedom is the normal one, which stdtr takes as a large number
+        return float(2 * stdtr(min(self.freedom, 1e9), -abs(self.part) * np.sqrt(self.information)))
+
+    def joined(self, other: Evidence) -> Evidence:
+        """Weighted mean of two independent estimates."""
+        information = self.information + other.information
+        if information <= 0:
+            return self
+        mine, its = self.information / information, other.information / information
+        return Evidence(mine * self.part + its * other.part, information, mine**4 * self.doubt + its**4 * other.doubt)
+
+
+def dynamic_difference(readings: PointReadings, one: int, others: Sequence[int]) -> Difference | None:
+    """Force of run `one` minus H of the `others` times its displacement: Re X, Re Y, Im X, Im Y [N].
+
+    H is their weighted least-squares matrix; None where they do not determine it, or leave no scatter.
+    """
+    stiffness = common_stiffness(readings, others)
+    spare = 2 * (2 * len(others) - 4)
+    if stiffness is None or spare < 4:
+        return None
+    displacement, force = readings.displacement, readings.force
+    sizes = np.linalg.norm(displacement[list(others)], axis=1)[:, None]
+    unit = displacement[list(others)] / sizes
+    scatter = (force[list(others)] - displacement[list(others)] @ stiffness.T) / sizes
+    own, size = displacement[one], float(np.linalg.norm(displacement[one]))
+    leverage = float(np.real(own.conj() @ np.linalg.solve(unit.T @ unit.conj(), own))) / size**2
+    variance = float(np.sum(np.abs(scatter) ** 2)) / spare * size**2 * (1 + leverage)
+    variance += (_LEAST_PHASOR * float(np.linalg.norm(force[one]))) ** 2
+    softer, looser = stacked(stiffness.real @ own), stacked(1j * stiffness.imag @ own)
+    honest = HONEST**2 * (np.outer(softer, softer) + np.outer(looser, looser))
+    return Difference(stacked(force[one] - stiffness @ own), variance * np.eye(4), honest, spare)
+
+
+def common_stiffness(readings: PointReadings, runs: Sequence[int]) -> ComplexArray | None:
+    """H (2, 2) of F = H D over some runs, weighted by one over their displacements; None where not determined."""
+    displacement, force = readings.displacement[list(runs)], readings.force[list(runs)]
+    sizes = np.linalg.norm(displacement, axis=1)
+    if len(sizes) < 2 or not np.all(sizes > 0) or not np.all(np.isfinite(sizes)):
+        return None
+    unit = displacement / sizes[:, None]
+    singular = np.linalg.svd(unit, compute_uv=False)
+    if singular[-1] < 0.2 * singular[0]:
+        return None
+    return np.asarray(np.linalg.lstsq(unit, force / sizes[:, None], rcond=None)[0].T)
+
+
+def static_difference(readings: PointReadings, one: int, others: Sequence[int]) -> Difference | None:
+    """Mean readings of run `one` minus those of the `others`: probe, probe [m], cell, cell [N].
+
+    A load that misses its set point shows in the cells and, over the stiffness, in the probes; what positions wander by
+    besides is their scatter. None where the stiffness cannot carry a load.
+    """
+    stiffness = common_stiffness(readings, others)
+    if stiffness is None or len(others) < 2 or np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
+        return None
+    compliance = np.linalg.inv(stiffness.real)
+    rows = list(others)
+    loads, places = readings.cell_means @ readings.cell_plane.T, readings.probe_means @ readings.probe_plane.T
+    misses = loads[rows] - loads[rows].mean(axis=0)
+    wander = places[rows] - places[rows].mean(axis=0) - misses @ compliance.T
+    spare = 2 * (len(others) - 1)
+    size = float(np.linalg.norm(loads[rows].mean(axis=0)))
+    to_probes, to_cells = np.linalg.inv(readings.probe_plane), np.linalg.inv(readings.cell_plane)
+    by_load = np.vstack([to_probes @ compliance, to_cells])
+    by_place = np.vstack([to_probes, np.zeros((2, 2))])
+    more = 1 + 1 / len(others)
+    load_variance, place_variance = (float(np.sum(x**2)) / spare for x in (misses, wander))
+    noise = more * (load_variance * by_load @ by_load.T + place_variance * by_place @ by_place.T)
+    least = np.diag([_LEAST_POSITION**2] * 2 + [max((_LEAST_LOAD * size) ** 2, 1e-12)] * 2)
+    honest = (HONEST * size) ** 2 * by_load @ by_load.T + least
+    rest = np.concatenate(
+        [
+            readings.probe_means[one] - readings.probe_means[rows].mean(axis=0),
+            readings.cell_means[one] - readings.cell_means[rows].mean(axis=0),
+        ]
+    )
+    return Difference(rest, noise, honest, spare)
+
+
+def dynamic_pattern(readings: PointReadings, one: int, channel: int, stiffness: ComplexArray) -> FloatArray:
+    """What a channel (probes 0 and 1, cells 2 and 3) contributes to force minus H times displacement, as `stacked`."""
+    if channel < 2:
+        return stacked(-stiffness @ readings.probe_plane[:, channel] * readings.probes[one, channel])
+    return stacked(readings.cell_plane[:, channel - 2] * readings.cells[one, channel - 2])
+
+
+def lever_slack(lever: float, part: float) -> float:
+    """How uncertain a shift of the mean is, because the zero from which a probe's gain counts is [m]."""
+    return abs(_LEVER_KNOWN * lever * part)
+
+
+def stacked(vector: ComplexArray) -> FloatArray:
+    """Real parts, then imaginary ones."""
+    return np.concatenate([vector.real, vector.imag])
