@@ -28,6 +28,8 @@ MAINS_CORRECTED = "mains corrected"
 MIN_RUNS = 6
 #: How well the probes' phases must agree over the runs to count as one pattern.
 LOCKED = 0.95
+#: Along a pattern every run leaves one real equation, and H has four numbers there.
+MIN_DIRECTIONS = 4
 #: Degrees of freedom with which the scatter seen at the other points is believed.
 _PRIOR_DOF = 8.0
 
@@ -140,7 +142,7 @@ def fit_mains(data: PointData, pickup: Pickup, scatter: float) -> MainsFit | Non
         return None
     D, F = means
     spare = 4 * len(D) - 8 - len(pickup.patterns) * len(D)
-    if spare < 1:
+    if spare < 1 or len(D) < MIN_DIRECTIONS:
         return None
     problem = Problem(D, F, pickup.patterns, scatter * np.linalg.norm(F, axis=1))
     minima = problem.solve()
@@ -149,7 +151,8 @@ def fit_mains(data: PointData, pickup: Pickup, scatter: float) -> MainsFit | Non
     cost = minima[0].cost
     inflation = (_PRIOR_DOF + cost) / (_PRIOR_DOF + spare)
     # Other minima that are nearly as good are other answers: the mean of all, each by its probability.
-    share = np.array([np.exp(-0.5 * (m.cost - cost) / inflation) * m.volume for m in minima])
+    log_share = np.array([m.log_volume - 0.5 * (m.cost - cost) / inflation for m in minima])
+    share = np.exp(log_share - log_share.max())
     share /= share.sum()
     entries = np.array([problem.entries(m.x) for m in minima])
     mean = share @ entries

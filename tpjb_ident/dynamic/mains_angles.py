@@ -27,14 +27,14 @@ class Minimum:
         Unknowns.
     covariance : (8, 8) ndarray
         Of the entries of H [N^2/m^2].
-    volume : float
-        Root of the determinant of all unknowns' covariance: how broad the minimum is.
+    log_volume : float
+        Logarithm of the root of the determinant of all unknowns' covariance: how broad the minimum is.
     """
 
     cost: float
     x: FloatArray
     covariance: FloatArray
-    volume: float
+    log_volume: float
 
 
 @dataclass(frozen=True)
@@ -120,9 +120,11 @@ class Problem:
             if fit.status <= 0 or any(np.abs(fit.x[:8] - m.x[:8]).max() < 1e-5 for m in found):
                 continue
             normal = fit.jac.T @ fit.jac
+            log_volume = -0.5 * float(np.linalg.slogdet(normal)[1])
+            if not np.isfinite(log_volume):
+                continue  # a valley without a floor: these runs leave H open there
             covariance = np.linalg.pinv(normal)[:8, :8] * self.scale**2
-            volume = float(np.exp(-0.5 * np.linalg.slogdet(normal)[1]))
-            found.append(Minimum(2.0 * float(fit.cost), fit.x, np.asarray(covariance), volume))
+            found.append(Minimum(2.0 * float(fit.cost), fit.x, np.asarray(covariance), log_volume))
         return sorted(found, key=lambda minimum: minimum.cost)
 
     def _candidates(self) -> ComplexArray:
