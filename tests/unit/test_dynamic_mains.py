@@ -1,4 +1,4 @@
-"""Mains on the excitation line and what else is put right between phasors and estimate: exact disturbances, taken off."""
+"""Mains on the excitation line, and what else is put right between phasors and estimate, taken off exactly."""
 
 from __future__ import annotations
 
@@ -297,12 +297,9 @@ def source(data, ratios):
     found = data.runs[0].conditions
     return SimpleNamespace(
         point=data.point,
-        point=data.point,
         load=lambda: data,
         found=lambda c: c in found,
         mean_loads=np.stack([force.real, force.imag], axis=1),
-        found=lambda c: c in found,
-        mean_loads=np.stack([force.real, force.imag], 1),
     )
 
 
