@@ -66,6 +66,23 @@ def test_a_glitch_in_one_channel_does_no_harm(samples: int, size: float):
     assert block.lost[[0, 2, 3, 4, 5, 6, 7]].max() == 0
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_leaving_out_few_samples_gives_what_the_long_robust_way_gives(seed: int, monkeypatch: pytest.MonkeyPatch):
+    rng = np.random.default_rng(seed)
+    values = record(8000, 0.02, seed)
+    for at in rng.integers(0, 7800, 4):  # bursts and needles, up to 9 % of a window
+        values[at : at + rng.integers(1, 90), rng.integers(2)] += rng.choice((-1, 1)) * 10 ** rng.uniform(-0.7, 3)
+    quick = fit(values, 4000)
+    monkeypatch.setattr(LineFitter, "_without_few", lambda *_: None)
+    robust = fit(values, 4000)
+    assert (quick.lost < 0.1).all()
+    assert np.abs(quick.phasors - robust.phasors).max() < 2e-4  # the noise of a phasor is 4e-4
+    assert np.abs(quick.lost - robust.lost).max() < 3e-3
+    monkeypatch.undo()
+    clean = fit(record(8000, 0.02, seed), 4000)
+    assert np.abs(quick.phasors - clean.phasors).max() < 2e-3
+
+
 def test_missing_samples_are_left_out_and_too_many_give_no_phasor():
     values = record(1000)
     values[10:60, 0] = np.nan

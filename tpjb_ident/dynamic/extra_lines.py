@@ -42,13 +42,16 @@ def unexpected_lines(run: Any, result: RunPhasors) -> tuple[tuple[float, ...], t
     n = min(run.length, LOOK)
     known = result.lines.frequencies
     found: list[float] = []
+    lines = None
     for quantity, block in (("force", result.cell_force), ("displacement", result.displacement)):
         record = run.vector(quantity, 0, n)
         sizes = np.linalg.norm(block.phasors[:, : len(result.lines.excitation)], axis=2)
         if not np.isfinite(record.values).all() or not np.isfinite(sizes).any():
             continue
         smallest = MIN_SHARE * float(np.nanmedian(sizes))
-        found += _peaks(record.values, run.sample_rate, np.append(known, found), smallest)
+        if lines is None or found:
+            lines = _Lines(n, run.sample_rate, np.append(known, found))
+        found += lines.beside(record.values, smallest)
     top = REACH * max(line.frequency for line in result.lines.excitation)
     extra = tuple(sorted(f for f in found if f < top))[:MAX_LINES]
     if not extra:
@@ -66,31 +69,46 @@ def unexpected_lines(run: Any, result: RunPhasors) -> tuple[tuple[float, ...], t
     return extra, tuple(conditions)
 
 
-def _peaks(values: FloatArray, rate: float, known: FloatArray, smallest: float) -> list[float]:
-    """Peaks of the residual's amplitude spectrum."""
-    n = len(values)
-    time = np.arange(n) / rate
-    design = line_design(time, known, 3)
-    residual = values - values.mean(axis=0)
-    # normal equations: a peak's place and size need no more digits
-    gram = np.linalg.pinv(design.T @ design, rcond=1e-12, hermitian=True)
-    residual = residual - design @ (gram @ (design.T @ residual))
-    # Glitches are broad-band and would drown every line: what is far out is cut to the noise's edge.
-    edge = 5 * 1.4826 * np.median(np.abs(residual), axis=0)
-    residual = np.clip(residual, -edge, edge)
-    window = np.hanning(n)
-    spectrum = np.abs(np.fft.rfft(residual * window[:, None], axis=0)) * 2 / window.sum()
-    amplitude = np.linalg.norm(spectrum, axis=1)
-    frequency = np.fft.rfftfreq(n, 1 / rate)
-    floor = median_filter(amplitude, size=min(61, max(n // 20, 3)), mode="nearest")
-    step = rate / n
-    candidate = amplitude > np.maximum(PROMINENCE * floor, smallest)
-    candidate[frequency < LOBE * step] = False
-    for f in known:
-        candidate[np.abs(frequency - f) < LOBE * step] = False
-    candidate[1:-1] &= (amplitude[1:-1] >= amplitude[:-2]) & (amplitude[1:-1] > amplitude[2:])
-    candidate[[0, -1]] = False
-    return [float(frequency[i] + step * _vertex(amplitude[i - 1 : i + 2])) for i in np.flatnonzero(candidate)]
+class _Lines:
+    """Known lines on an even grid, and the peaks that they leave.
+
+    Parameters
+    ----------
+    length : int
+        Samples.
+    rate : float
+        [Hz].
+    frequencies : (m,) ndarray
+        [Hz].
+    """
+
+    def __init__(self, length: int, rate: float, frequencies: FloatArray) -> None:
+        self.rate, self.frequencies = rate, frequencies
+        self._design = line_design(np.arange(length) / rate, frequencies, 3)
+        # normal equations: a peak's place and size need no more digits
+        self._inverse = np.linalg.pinv(self._design.T @ self._design, rcond=1e-12, hermitian=True)
+
+    def beside(self, values: FloatArray, smallest: float) -> list[float]:
+        """Frequencies [Hz] of the peaks above `smallest` in the residual's amplitude spectrum."""
+        n = len(values)
+        residual = values - values.mean(axis=0)
+        residual = residual - self._design @ (self._inverse @ (self._design.T @ residual))
+        # Glitches are broad-band and would drown every line: what is far out is cut to the noise's edge.
+        edge = 5 * 1.4826 * np.median(np.abs(residual), axis=0)
+        residual = np.clip(residual, -edge, edge)
+        window = np.hanning(n)
+        spectrum = np.abs(np.fft.rfft(residual * window[:, None], axis=0)) * 2 / window.sum()
+        amplitude = np.linalg.norm(spectrum, axis=1)
+        frequency = np.fft.rfftfreq(n, 1 / self.rate)
+        floor = median_filter(amplitude, size=min(61, max(n // 20, 3)), mode="nearest")
+        step = self.rate / n
+        candidate = amplitude > np.maximum(PROMINENCE * floor, smallest)
+        candidate[frequency < LOBE * step] = False
+        for f in self.frequencies:
+            candidate[np.abs(frequency - f) < LOBE * step] = False
+        candidate[1:-1] &= (amplitude[1:-1] >= amplitude[:-2]) & (amplitude[1:-1] > amplitude[2:])
+        candidate[[0, -1]] = False
+        return [float(frequency[i] + step * _vertex(amplitude[i - 1 : i + 2])) for i in np.flatnonzero(candidate)]
 
 
 def _vertex(three: FloatArray) -> float:

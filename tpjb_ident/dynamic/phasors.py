@@ -9,8 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.wave_blocks import BLOCK, WaveBlocks
 from tpjb_ident.dynamic.windows import line_design
 
@@ -18,7 +19,7 @@ from tpjb_ident.dynamic.windows import line_design
 GLITCH_LIMIT = 5.5
 #: A window this many times noisier than its run's median is looked at again.
 SCALE_LIMIT = 1.5
-#: Samples left out on either side of a glitch: its flanks lie below the limit.
+#: Samples left out on either side of a glitch.
 GLITCH_MARGIN = 3
 #: A window that has lost more than this share of its samples gives no phasor.
 MAX_LOST = 0.5
@@ -26,8 +27,9 @@ MAX_LOST = 0.5
 SETTLED = 0.02
 _LAD_ROUNDS = 15
 _ROUNDS = 12
-#: Outlying samples may bend a fit by this share of the residual's scale and still be told by it.
-MAX_PULL = 0.02
+#: Outlying samples up to this share are told by leaving them out, again and again, until fit and verdict agree.
+FEW = 0.1
+_FEW_ROUNDS = 8
 
 
 @dataclass(frozen=True)
@@ -109,11 +111,8 @@ class LineFitter:
         offset = _by_window(offset[:, 0])
         for i in np.flatnonzero(~clean):
             pair = rows[:, i].T - offset[i]
-            quick = self._without_few(pair, residual.reshape(2, n, -1)[:, i], coefficients[i], scale[i], usual)
-            if quick is not None:
-                coefficients[i], lost[i] = quick
-            else:
-                coefficients[i], scale[i], lost[i] = _refit(self.design, pair, usual)
+            quick = self._without_few(residual.reshape(2, n, -1)[:, i], coefficients[i], scale[i], usual)
+            coefficients[i], scale[i], lost[i] = _refit(self.design, pair, usual) if quick is None else quick
         mean = coefficients[:, :, 2 * len(self.frequencies)] + offset
         return PhasorBlock(self._phasors(coefficients, start), mean, scale, lost)
 
@@ -128,37 +127,52 @@ class LineFitter:
         return coefficients
 
     def _without_few(
-        self, pair: FloatArray, residual: FloatArray, coefficients: FloatArray, scale: FloatArray, usual: FloatArray
-    ) -> tuple[FloatArray, float] | None:
-        """Leave out the few outlying samples of a long window, too few to have bent its fit; None where they are many.
+        self, residual: FloatArray, coefficients: FloatArray, scale: FloatArray, usual: FloatArray
+    ) -> tuple[FloatArray, FloatArray, float] | None:
+        """Leave the few outlying samples out of a long window's fit until no verdict changes; None where it cannot.
 
         Their rows are taken off the normal equations: no need to go through all samples again.
 
         Parameters
         ----------
-        pair : (length, 2) ndarray
-            Samples, X and Y.
         residual : (2, length) ndarray
+            Of the fit to all samples.
         coefficients : (2, n_columns) ndarray
         scale, usual : (2,) ndarray
             Residual scale of this window, and of the run's.
+
+        Returns
+        -------
+        (2, n_columns) ndarray, (2,) ndarray, float
+            As of `_refit`.
         """
-        limit = GLITCH_LIMIT * scale[:, None]
-        size = np.abs(residual)
-        pulled = 2 * np.where(size > limit, size, 0.0).sum(axis=1) / self.length
-        if self._blocks is None or not (pulled <= MAX_PULL * scale).all() or not (scale <= SCALE_LIMIT * usual).all():
+        if self._blocks is None or not (scale <= SCALE_LIMIT * usual).all():
             return None
-        bad = (size > limit).any(axis=0)
-        wide = np.flatnonzero(np.convolve(bad, np.ones(2 * GLITCH_MARGIN + 1), mode="same") > 0)
-        rows = self.design[wide]
-        gram = np.linalg.inv(np.linalg.inv(self._gram_inverse) - rows.T @ rows)
-        # the residual of the left-out samples is what they contributed beyond the fit
-        return coefficients - residual[:, wide] @ rows @ gram, len(wide) / self.length
+        gram = np.linalg.inv(self._gram_inverse)
+        size, found, left_out = np.abs(residual), coefficients, None
+        for _ in range(_FEW_ROUNDS):
+            previous, left_out = left_out, _beside(size > GLITCH_LIMIT * scale[:, None])
+            if previous is not None and np.array_equal(previous, left_out):
+                return found, scale, len(left_out) / self.length
+            if len(left_out) > FEW * self.length:
+                return None
+            rows = self.design[left_out]
+            # the residual of the left-out samples is what they contributed beyond the fit
+            change = residual[:, left_out] @ rows @ np.linalg.inv(gram - rows.T @ rows)
+            found = coefficients - change
+            size = np.abs(residual + change @ self.design.T)
+            scale = 1.4826 * np.median(size, axis=1)
+        return None
 
     def _phasors(self, coefficients: FloatArray, start: FloatArray) -> ComplexArray:
         n = 2 * len(self.frequencies)
         local = coefficients[:, :, 0:n:2] + 1j * coefficients[:, :, 1:n:2]
         return to_run_origin(local.transpose(0, 2, 1), self.frequencies, start)
+
+
+def _beside(outlying: NDArray[np.bool_]) -> IntArray:
+    """Columns of (2, n) that are outlying in X or Y, or next to such a one: a glitch's flanks lie below the limit."""
+    return np.flatnonzero(np.convolve(outlying.any(axis=0), np.ones(2 * GLITCH_MARGIN + 1), mode="same") > 0)
 
 
 def _largest(rows: FloatArray) -> FloatArray:
@@ -258,11 +272,10 @@ def _refit(design: FloatArray, values: FloatArray, usual: FloatArray) -> tuple[F
             break
     if weights.mean() < 1 - MAX_LOST:
         return *nothing, 1.0
-    bad = u > 1
-    wide = np.zeros(len(values), dtype=bool)
-    wide[present] = bad
-    wide = np.convolve(wide, np.ones(2 * GLITCH_MARGIN + 1), mode="same") > 0
-    keep = present & ~wide
+    bad = np.zeros((1, len(values)), dtype=bool)
+    bad[0, present] = u > 1
+    keep = np.array(present)
+    keep[_beside(bad)] = False
     lost = float(1 - keep.mean())
     if lost > MAX_LOST:
         return *nothing, lost
