@@ -37,3 +37,9 @@ def test_time_left_is_told_from_the_speed_of_this_step(lines):
 def test_the_first_of_many_foretells_nothing(lines):
     lines(0.0, 0, 334)
     assert lines(100.0, 1, 334) == ["identifying: 1 of 334 (d-1)"]
+
+
+def test_what_the_first_one_had_to_compile_is_not_foretold_of_the_rest(lines):
+    lines(0.0, 0, 14)
+    assert lines(60.0, 1, 14) == ["identifying: 1 of 14 (d-1)"]
+    assert lines(92.0, 5, 14)[-1] == "identifying: 5 of 14, about 1 min left (d-1)"

@@ -107,20 +107,22 @@ class _Lines:
     """Progress for a log file: a line with the time left every half minute, none for what is quickly done."""
 
     def __init__(self, what: str) -> None:
-        self._what, self._step = what, 0
+        self._what, self._step, self._first = what, 0, 0
         self._began = self._told = time.monotonic()
 
     def __call__(self, text: str, done: int, total: int) -> None:
         now = time.monotonic()
-        if done <= self._step:  # another step has begun to count
-            self._began = now
+        # Another step has begun to count, or its first one is done, which also compiled, loaded and started workers.
+        if done <= self._step or done == 1:
+            self._began, self._first = now, done
         self._step = done
         if now - self._told < LINE_EVERY or not 0 < done < total:
             return
         self._told = now
         left = ""
-        if done >= FORETELLS * total:
-            left = f", about {_duration((now - self._began) * (total - done) / done)} left"
+        counted = done - self._first
+        if counted > 0 and done >= FORETELLS * total:
+            left = f", about {_duration((now - self._began) * (total - done) / counted)} left"
         note_line("doing", f"{self._what}: {done} of {total}{left} ({text})")
 
 
