@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from tpjb_ident.diagnose.campaign import CampaignDiagnosis
     from tpjb_ident.diagnose.verdict import Verdict
 
-PLACE_COLUMNS = ("observable", "where", "size, sigma", "share")
-
 
 def write_diagnosis_report(
     folder: Path,
