@@ -128,8 +128,9 @@ def _pooled(
         return None
     deviation = z - mean[table.direction]
     noise = (weights[:, None] * deviation).T @ deviation.conj() / (spare * shrinkage)
-    # Exact data leave no noise at all; a floor far below any instrument keeps the algebra alive.
-    noise = noise + 1e-24 * np.eye(4)
+    # Exact data leave no noise at all, or none but what F = H D lets through; a floor far below any instrument
+    # keeps the algebra alive.
+    noise = noise + (1e-24 + 1e-12 * float(np.trace(noise).real)) * np.eye(4)
     return mean, noise, spare
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from tpjb_ident.dynamic.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.conditions import Condition
 from tpjb_ident.dynamic.mm import mm_fit
+from tpjb_ident.dynamic.ols import ols_fit
 from tpjb_ident.dynamic.phasor_table import PhasorTable
 
 
@@ -50,10 +51,13 @@ def instrumental_fit(table: PhasorTable) -> InstrumentalFit:
     """
     if table.reference is None:
         raise ValueError('method "iv" needs reference phasors (n, 2), for instance the actuators\' command')
-    z = np.concatenate([table.D, table.F], axis=1)
+    # The fit follows any change of components; what plain least squares leaves of F has little in common with D, and
+    # where it is nothing at all the scatter is badly scaled instead of singular.
+    plain = ols_fit(table.D, table.F)
+    z = np.concatenate([table.D, table.F - table.D @ plain.T], axis=1)
     fit = mm_fit(table.reference, z, table.direction)
-    B_D, B_F = fit.coefficients[:2], fit.coefficients[2:]
-    h = np.linalg.solve(B_D.T, B_F.T).T
+    B_D, B_left = fit.coefficients[:2], fit.coefficients[2:]
+    h = plain + np.linalg.solve(B_D.T, B_left.T).T
     # F - h D does not change when D is replaced by its explained part and F by F - h (D - explained).
     explained_D = table.reference @ B_D.T
     explained_F = table.F - (table.D - explained_D) @ h.T

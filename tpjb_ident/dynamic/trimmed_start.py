@@ -18,6 +18,8 @@ from tpjb_ident.dynamic.robust_constants import half_shrinkage, trimming_limits,
 STARTS = 60
 _KEPT = 4
 _STEPS = 12
+#: Share of the mean power of all components that each has at least in the metric.
+METRIC_FLOOR = 0.01
 #: Share of the windows in the smaller core that is looked for besides the half.
 _SMALL_CORE = 0.38
 
@@ -38,9 +40,11 @@ class Regression:
         cross = X[:, 0].conj() * X[:, 1]
         power = X.real**2 + X.imag**2
         self._terms = np.concatenate([power, cross.real[:, None], cross.imag[:, None], right.real, right.imag], axis=1)
-        #: Scatter of the forces themselves: any equivariant metric does for a first ordering, this one is at hand.
         self._x, self._y = np.ascontiguousarray(X.T), np.ascontiguousarray(Y.T)
+        #: Scatter of the forces themselves: any equivariant metric does for a first ordering, this one is at hand.
+        #: A little of every component keeps it regular where some follow from the others exactly.
         self.metric = scatter(products(self._y), np.ones(self.n), self.q)
+        self.metric += METRIC_FLOOR * float(np.trace(self.metric).real) / self.q * np.eye(self.q)
 
     def fit(self, weights: FloatArray) -> ComplexArray:
         """Weighted least squares, (..., n) -> (..., q, 2), by Cramer's rule; a singular system gives large numbers."""
@@ -104,7 +108,8 @@ def distance2(terms: FloatArray, inner: ComplexArray) -> FloatArray:
     first, second = _pairs(q)
     pairs = inverse[..., first, second]
     factors = np.concatenate([2 * np.einsum("...ii->...i", inverse).real, 4 * pairs.real, -4 * pairs.imag], axis=-1)
-    return np.asarray((factors[..., None, :] @ terms)[..., 0, :])
+    # a scatter that is all but singular makes rounding large, of either sign
+    return np.maximum((factors[..., None, :] @ terms)[..., 0, :], 0.0)
 
 
 @dataclass(frozen=True)
