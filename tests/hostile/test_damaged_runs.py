@@ -9,11 +9,10 @@ import h5py
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
 from rigdata.virtual_rig import operating_points
+from tests.command_line import tpjb
 from tests.good_campaigns import SMALL_PLAN, rocker_rig, written
-from tpjb_ident.cli.app import app
 
 RUN = "d-05000-25-02"
 
@@ -24,10 +23,6 @@ def good(tmp_path_factory):
     folder = tmp_path_factory.mktemp("good")
     rig = rocker_rig(5, plan=replace(SMALL_PLAN, dynamic=operating_points([(2500.0, 25.0), (5000.0, 25.0)])))
     return written(folder / "c.h5", rig), written(folder / "csv", rig, "csv")
-
-
-def call(*words):
-    return CliRunner().invoke(app, [str(w) for w in words])
 
 
 def no_file(path, run):
@@ -111,7 +106,7 @@ def error_of(out, truth_row):
 @pytest.mark.parametrize("name", [*DAMAGE, "accelerometer zero"])
 def test_identify_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path, name):
     path = spoilt(name, RUN)
-    told = call("identify", path, "--workers", 1, "--out", tmp_path / "out")
+    told = tpjb("identify", path, "--workers", 1, "--out", tmp_path / "out")
     assert told.exit_code == 0, told.output
     assert RUN in told.output
     table = pd.read_csv(tmp_path / "out" / "coefficients.csv").set_index("static_load_N")
@@ -125,7 +120,7 @@ def test_identify_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path, n
 def test_a_check_names_every_damaged_run(spoilt):
     for name in DAMAGE:
         path = spoilt(name, RUN)
-        told = call("check", path)
+        told = tpjb("check", path)
         assert told.exit_code == 2, (name, told.output)
         assert RUN in told.output, name
         shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -135,14 +130,14 @@ def test_a_record_that_lost_its_end_is_said_to_be_damaged(spoilt, tmp_path):
     path = spoilt("missing file")
     file = path / "runs" / f"{RUN}.csv"
     file.write_bytes(file.read_bytes()[:-30])
-    told = call("identify", path, "--workers", 1, "--out", tmp_path / "out")
+    told = tpjb("identify", path, "--workers", 1, "--out", tmp_path / "out")
     assert told.exit_code == 0
     assert "record-damaged" in told.output
     assert f"{RUN}.csv" in told.output
 
 
 def test_a_point_that_loses_all_its_runs_is_lost_and_the_answer_not_to_be_trusted(spoilt, tmp_path):
-    told = call(
+    told = tpjb(
         "identify", spoilt("missing group", *(f"d-05000-25-0{i}" for i in (1, 2, 3))), "--out", tmp_path / "out"
     )
     assert told.exit_code == 3
@@ -152,7 +147,7 @@ def test_a_point_that_loses_all_its_runs_is_lost_and_the_answer_not_to_be_truste
 
 def test_where_no_run_is_left_nothing_is_written(spoilt, tmp_path):
     runs = [f"d-0{load}-25-0{i}" for load in (2500, 5000) for i in (1, 2, 3)]
-    told = call("identify", spoilt("probe zero", *runs), "--out", tmp_path / "out")
+    told = tpjb("identify", spoilt("probe zero", *runs), "--out", tmp_path / "out")
     assert told.exit_code == 2
     assert "X1A" in told.output
     assert "is dead" in told.output
@@ -161,7 +156,7 @@ def test_where_no_run_is_left_nothing_is_written(spoilt, tmp_path):
 
 def test_an_accelerometer_dead_in_all_runs_is_told_and_costs_no_run(spoilt, tmp_path):
     runs = [f"d-0{load}-25-0{i}" for load in (2500, 5000) for i in (1, 2, 3)]
-    told = call("identify", spoilt("accelerometer zero", *runs), "--out", tmp_path / "out")
+    told = tpjb("identify", spoilt("accelerometer zero", *runs), "--out", tmp_path / "out")
     assert told.exit_code == 0
     assert "accelerometer-dead" in told.output
     assert pd.read_csv(tmp_path / "out" / "coefficients.csv")["n_records"].tolist() == [3, 3]
@@ -170,7 +165,7 @@ def test_an_accelerometer_dead_in_all_runs_is_told_and_costs_no_run(spoilt, tmp_
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["torn chunk", "probe zero", "cut off"])
 def test_pivot_goes_on_without_a_damaged_run_and_says_which_pad_has_no_curve(spoilt, tmp_path, name):
-    told = call("pivot", spoilt(name, "p-2-up"), "--out", tmp_path / "out")
+    told = tpjb("pivot", spoilt(name, "p-2-up"), "--out", tmp_path / "out")
     assert told.exit_code == 3, told.output
     assert "pad 2: has no curve" in told.output
     assert told.output.count("p-2-up") >= 1
@@ -178,7 +173,7 @@ def test_pivot_goes_on_without_a_damaged_run_and_says_which_pad_has_no_curve(spo
 
 
 def test_most_dry_runs_damaged_is_no_accident(spoilt, tmp_path):
-    told = call("pivot", spoilt("missing group", "p-1-up", "p-2-up", "p-3-up"), "--out", tmp_path / "out")
+    told = tpjb("pivot", spoilt("missing group", "p-1-up", "p-2-up", "p-3-up"), "--out", tmp_path / "out")
     assert told.exit_code == 2
     assert all(f"p-{pad}-up" in told.output for pad in (1, 2, 3))
     assert not (tmp_path / "out").exists()
@@ -187,7 +182,7 @@ def test_most_dry_runs_damaged_is_no_accident(spoilt, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["missing file", "torn chunk", "probe NaN", "cell zero"])
 def test_locus_goes_on_without_a_damaged_direction(spoilt, tmp_path, name):
-    told = call("locus", spoilt(name, "l-01000-02"), "--out", tmp_path / "out")
+    told = tpjb("locus", spoilt(name, "l-01000-02"), "--out", tmp_path / "out")
     assert told.exit_code == 0, told.output
     assert "runs-refused: l-01000-02" in told.output
     assert pd.read_csv(tmp_path / "out" / "locus.csv")["run"].tolist() == ["l-01000-01", "l-01000-03"]
@@ -195,7 +190,7 @@ def test_locus_goes_on_without_a_damaged_direction(spoilt, tmp_path, name):
 
 
 def test_without_a_usable_sweep_positions_have_no_centre_and_the_command_says_so(spoilt, tmp_path):
-    told = call("locus", spoilt("missing group", "c-1"), "--out", tmp_path / "out")
+    told = tpjb("locus", spoilt("missing group", "c-1"), "--out", tmp_path / "out")
     assert told.exit_code == 3, told.output
     assert "runs-refused: c-1" in told.output
     assert "no-centre" in told.output

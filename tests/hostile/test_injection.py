@@ -9,20 +9,15 @@ import shutil
 import h5py
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
 import rigdata
 from rigdata.problem import RigDataError
-from tpjb_ident.cli.app import app
+from tests.command_line import tpjb
 from tpjb_ident.tables import safe_for_spreadsheets, write_table
 
 TAGS = "<script>alert(1)</script><img src=x onerror=alert(2)><svg onload=alert(3)>"
 NAMES = ["<script>x</script>", '"><img src=x onerror=y>', "=1+1", "\u202eabc", "\x1b[31mred", "javascript:alert(1)"]
 FORMULAS = ["=1+1", "+1", "-1+1", "@SUM(A1)", "\t=1", "\r=1", '=HYPERLINK("http://x")', "=cmd|' /C calc'!A0"]
-
-
-def tpjb(*words):
-    return CliRunner().invoke(app, [str(w) for w in words])
 
 
 class Page(html.parser.HTMLParser):

@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import Fault
+from tests.command_line import tpjb
 from tests.good_campaigns import SMALL_PLAN, rocker_rig, written
 from tpjb_ident.clearance import measure_run
-from tpjb_ident.cli.app import app
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
 from tpjb_ident.probe_gains import gain_ratio
 
@@ -54,7 +53,7 @@ def test_good_probes_are_not_doubted(tmp_path):
     assert "probes-contradict-clearance" not in found.points[0].quality
     polygon = measure_run(source.of_kind("clearance")[0], ANGLES)
     assert not [s for s in polygon.status if s.startswith("probe-gains-differ")]
-    assert CliRunner().invoke(app, ["check", str(source.path), "--out", str(tmp_path / "o")]).exit_code == 0
+    assert tpjb("check", source.path, "--out", tmp_path / "o").exit_code == 0
 
 
 @pytest.mark.slow
@@ -67,7 +66,7 @@ def test_unequal_gains_show_in_the_angles_of_the_polygon(tmp_path, channel, valu
     polygon = measure_run(source.of_kind("clearance")[0], ANGLES)
     (told,) = (s for s in polygon.status if s.startswith("probe-gains-differ"))
     assert says in told
-    out = CliRunner().invoke(app, ["check", str(source.path), "--out", str(tmp_path / "o")])
+    out = tpjb("check", source.path, "--out", tmp_path / "o")
     assert out.exit_code == 0
     assert "warning" in out.output
     assert "X1A read" in out.output.replace("\n", " ")
@@ -76,7 +75,7 @@ def test_unequal_gains_show_in_the_angles_of_the_polygon(tmp_path, channel, valu
 @pytest.mark.slow
 def test_the_pivot_command_says_that_its_probes_disagree(tmp_path):
     source = campaign(tmp_path, gain("X1A", 1.1), plan=replace(SMALL_PLAN, dynamic=(), locus=()))
-    out = CliRunner().invoke(app, ["pivot", str(source.path), "--out", str(tmp_path / "o")])
+    out = tpjb("pivot", source.path, "--out", tmp_path / "o")
     assert out.exit_code == 0, out.output
     assert "the sides stand as if X1A read 9" in out.output.replace("\n", " ")
 
@@ -84,7 +83,7 @@ def test_the_pivot_command_says_that_its_probes_disagree(tmp_path):
 @pytest.mark.slow
 def test_a_clearance_of_a_tenth_of_the_drawing_s_is_an_error_of_the_check(tmp_path):
     source = campaign(tmp_path, gain("X1*", 0.1), plan=SWEEP)
-    out = CliRunner().invoke(app, ["check", str(source.path), "--out", str(tmp_path / "o")])
+    out = tpjb("check", source.path, "--out", tmp_path / "o")
     assert out.exit_code == 2
     assert "the bearing file says 80 um" in out.output.replace("\n", " ")
 
@@ -104,6 +103,6 @@ def test_gains_are_found_from_turned_normals(axes):
 
 def test_the_condition_reaches_the_table(tmp_path):
     path = written(tmp_path / "c.h5", rocker_rig(3, gain("X1*", 10.0), plan=replace(SMALL_PLAN, dry=(), locus=())))
-    out = CliRunner().invoke(app, ["identify", str(path), "--out", str(tmp_path / "out")])
+    out = tpjb("identify", path, "--out", tmp_path / "out")
     assert out.exit_code == 3
     assert pd.read_csv(tmp_path / "out" / "coefficients.csv")["quality"].str.contains("probes-contradict").all()

@@ -96,14 +96,12 @@ def test_python_runs_as_it_stands(language, text, desk):
 
 @pytest.mark.parametrize(("language", "text"), of("sh"))
 def test_command_lines_have_commands_and_options_that_exist(language, text):
-    from typer.testing import CliRunner
-
-    from tpjb_ident.cli.app import app
+    from tests.command_line import tpjb
 
     for line in text.splitlines():
         words = shlex.split(line, comments=True)
         if words[:1] == ["tpjb"] and len(words) > 1:
-            shown = CliRunner().invoke(app, [words[1], "--help"])
+            shown = tpjb(words[1], "--help")
             assert shown.exit_code == 0, line
             for word in words[2:]:
                 if word.startswith("--"):

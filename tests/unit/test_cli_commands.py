@@ -12,16 +12,11 @@ import time
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
-from tpjb_ident.cli.app import app
+from tests.command_line import tpjb
 
 COMMANDS = ("check", "identify", "pivot", "locus", "predict", "compare", "diagnose", "plan", "evaluate", "verify",
             "simulate", "demo", "export")  # fmt: skip
-
-
-def tpjb(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
 @pytest.fixture(scope="module")

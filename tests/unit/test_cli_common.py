@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import shlex
@@ -12,23 +13,29 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tests.command_line import tpjb
 from tpjb_ident.cli.app import app
 from tpjb_ident.cli.examples import EXAMPLES
 from tpjb_ident.cli.sparkline import BARS, sparkline
 
 
-def tpjb(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
+@pytest.fixture(scope="module")
+def told_as_json(small_campaign, tmp_path_factory):
+    return tpjb("locus", small_campaign, "--out", tmp_path_factory.mktemp("json") / "o", "--json")
+
+
+@functools.cache
+def help_of(command):
+    return tpjb(command, "--help").stdout
 
 
 def commands():
     return {info.name for info in app.registered_commands}
 
 
-def test_json_is_one_document_with_the_results_in_it(small_campaign, tmp_path):
-    result = tpjb("locus", small_campaign, "--out", tmp_path / "o", "--json")
-    assert result.exit_code == 0
-    document = json.loads(result.stdout)
+def test_json_is_one_document_with_the_results_in_it(told_as_json):
+    assert told_as_json.exit_code == 0
+    document = json.loads(told_as_json.stdout)
     assert document["schema"] == "tpjb-command/1"
     assert (document["command"], document["exit_code"]) == ("locus", 0)
     assert "locus.csv" in document["outputs"]
@@ -49,13 +56,11 @@ def test_json_of_a_failure_names_it_and_keeps_the_exit_code(tmp_path):
     assert "no such file" in result.stderr
 
 
-def test_json_holds_no_nan(small_campaign, tmp_path):
-    result = tpjb("locus", small_campaign, "--out", tmp_path / "o", "--json")
-
+def test_json_holds_no_nan(told_as_json):
     def refuse(constant):
         raise AssertionError(constant)
 
-    json.loads(result.stdout, parse_constant=refuse)
+    json.loads(told_as_json.stdout, parse_constant=refuse)
 
 
 def test_quiet_says_nothing_when_all_is_well_and_errors_when_not(small_campaign, tmp_path):
@@ -69,7 +74,7 @@ def test_quiet_says_nothing_when_all_is_well_and_errors_when_not(small_campaign,
 
 @pytest.mark.parametrize("command", sorted(info.name for info in app.registered_commands))
 def test_every_command_takes_the_common_options_and_shows_examples(command):
-    text = tpjb(command, "--help").stdout
+    text = help_of(command)
     for option in ("--json", "--quiet", "--out"):
         assert option in text
     for example in EXAMPLES[command]:
@@ -79,7 +84,7 @@ def test_every_command_takes_the_common_options_and_shows_examples(command):
 def test_examples_are_of_commands_that_exist_and_their_options_too():
     assert set(EXAMPLES) >= commands()
     for name in commands():
-        shown = tpjb(name, "--help").stdout
+        shown = help_of(name)
         for line in EXAMPLES[name]:
             first, second, *rest = shlex.split(line.partition(" > ")[0])
             assert (first, second) == ("tpjb", name)
@@ -103,17 +108,26 @@ def test_a_mistyped_option_is_answered_with_the_nearest():
     assert "--method" in result.stderr
 
 
-def complete(words: str, shell: str = "bash") -> list[str]:
-    """Ask the program as a shell does."""
-    environment = {**os.environ, "_TPJB_COMPLETE": f"complete_{shell}", "COMP_WORDS": words,
-                   "COMP_CWORD": str(len(words.split(" ")) - 1)}  # fmt: skip
-    code = "from tpjb_ident.cli import main; main()"
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
-    return done.stdout.split()
+def asked_by_shell(what: str, **environment: str) -> str:
+    """What the program says to a shell that asks for completion, in this process."""
+    result = CliRunner().invoke(app, [], env={"_TPJB_COMPLETE": what, **environment}, prog_name="tpjb")
+    return result.stdout
+
+
+def words_typed(words: str) -> dict[str, str]:
+    return {"COMP_WORDS": words, "COMP_CWORD": str(len(words.split(" ")) - 1)}
+
+
+def complete(words: str) -> list[str]:
+    return asked_by_shell("complete_bash", **words_typed(words)).split()
 
 
 def test_the_shell_completes_commands_options_and_values():
-    assert "identify" in complete("tpjb iden")
+    # once as the shell itself does it
+    environment = {**os.environ, "_TPJB_COMPLETE": "complete_bash", **words_typed("tpjb iden")}
+    code = "from tpjb_ident.cli import main; main()"
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert done.stdout.split() == complete("tpjb iden") == ["identify"]
     assert "--method" in complete("tpjb identify --me")
     assert complete("tpjb identify --method mm") == ["mm-eiv", "mm"]
     assert complete("tpjb predict --thermal te") == ["tehd"]
@@ -121,10 +135,7 @@ def test_the_shell_completes_commands_options_and_values():
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_scripts_can_be_shown(shell):
-    environment = {**os.environ, "_TPJB_COMPLETE": f"source_{shell}"}
-    code = "from tpjb_ident.cli import main; main()"
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
-    assert "_TPJB_COMPLETE" in done.stdout
+    assert "_TPJB_COMPLETE" in asked_by_shell(f"source_{shell}")
 
 
 # init

@@ -7,17 +7,12 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
 from rigdata.virtual_rig import write_campaign
+from tests.command_line import tpjb
 from tests.unit.test_dynamic_identify import rig
-from tpjb_ident.cli.app import app
 
 DISTURBED = "d-05000-25-02"
-
-
-def tpjb(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
 @pytest.fixture(scope="module")

@@ -5,20 +5,15 @@ import json
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from tpjb_ident.cli.app import app
+from tests.command_line import tpjb
 
 ROCKER = Path(__file__).parents[2] / "model" / "bearings" / "rocker.toml"
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
-
-
 @pytest.mark.slow
 def test_plan_tells_floor_and_look_alikes_of_a_thin_campaign(tmp_path):
-    result = run(
+    result = tpjb(
         "plan", ROCKER, "--load", "5 kN", "--excitation", "25 Hz", "--locus", 0, "--no-dry", "--push", 0,
         "--no-temperatures", "--data-sets", "--out", tmp_path / "out",
     )  # fmt: skip
@@ -43,7 +38,7 @@ def test_plan_tells_floor_and_look_alikes_of_a_thin_campaign(tmp_path):
 
 
 def test_plan_without_dynamic_tests_is_refused(tmp_path):
-    result = run("plan", ROCKER, "--load", "abc", "--out", tmp_path / "out")
+    result = tpjb("plan", ROCKER, "--load", "abc", "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert not (tmp_path / "out").exists()
 
@@ -53,13 +48,13 @@ def test_plan_without_dynamic_tests_is_refused(tmp_path):
     [("--sizes", "six", "--sizes 'six'"), ("--noises", "-1", "positive"), ("--sizes", "1e9", "million")],
 )
 def test_evaluate_refuses_sizes_that_are_none(tmp_path, option, value, said):
-    result = run("evaluate", ROCKER, f"{option}={value}", "--out", tmp_path / "out")
+    result = tpjb("evaluate", ROCKER, f"{option}={value}", "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert said in result.output
     assert not (tmp_path / "out").exists()
 
 
 def test_evaluate_takes_processes_or_a_cluster_not_both(tmp_path):
-    result = run("evaluate", ROCKER, "--workers", 2, "--scheduler", "tcp://nobody:1", "--out", tmp_path / "out")
+    result = tpjb("evaluate", ROCKER, "--workers", 2, "--scheduler", "tcp://nobody:1", "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert "exclude each other" in result.output

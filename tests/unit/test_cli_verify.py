@@ -6,14 +6,9 @@ import json
 import shutil
 
 import pytest
-from typer.testing import CliRunner
 
-from tpjb_ident.cli.app import app
+from tests.command_line import tpjb
 from tpjb_ident.cli.moving_in import READY
-
-
-def tpjb(*words):
-    return CliRunner().invoke(app, [str(w) for w in words])
 
 
 @pytest.fixture(scope="module")

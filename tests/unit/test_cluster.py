@@ -107,15 +107,13 @@ def test_a_worker_killed_half_way_changes_no_bit(cluster, campaign_file, tmp_pat
 
 @pytest.mark.slow
 def test_the_command_line_works_on_a_cluster(cluster, small_campaign, tmp_path):
-    from typer.testing import CliRunner
-
-    from tpjb_ident.cli.app import app
+    from tests.command_line import tpjb
 
     wait_for(str(cluster.file), 1)
     tables = []
     for options in (["--scheduler", str(cluster.file)], ["--workers", "1"]):
         out = tmp_path / options[0].strip("-")
-        result = CliRunner().invoke(app, ["identify", str(small_campaign), "--out", str(out), *options])
+        result = tpjb("identify", small_campaign, "--out", out, *options)
         assert result.exit_code == 0, result.output
         tables.append([(out / f"{name}.csv").read_bytes() for name in ("coefficients", "estimators", "windows")])
     assert tables[0] == tables[1]
@@ -123,9 +121,7 @@ def test_the_command_line_works_on_a_cluster(cluster, small_campaign, tmp_path):
 
 @pytest.mark.slow
 def test_a_client_killed_half_way_is_taken_up_where_it_stopped(cluster, campaign_file, tmp_path, monkeypatch):
-    from typer.testing import CliRunner
-
-    from tpjb_ident.cli.app import app
+    from tests.command_line import tpjb
     from tpjb_ident.cli.identify import KEPT
     from tpjb_ident.dynamic.run_store import RunStore
 
@@ -154,14 +150,14 @@ def test_a_client_killed_half_way_is_taken_up_where_it_stopped(cluster, campaign
         plain(store, mark, result)
 
     monkeypatch.setattr(RunStore, "keep", keep)
-    again = CliRunner().invoke(app, words)
+    again = tpjb(*words)
     assert again.exit_code == 0, again.output
     assert len(kept) == len(set(kept)) == 12 - len(finished)  # the others, and each of them once
     assert not finished & set(kept)
     assert not (out / KEPT).exists()
 
     alone = tmp_path / "alone"
-    CliRunner().invoke(app, ["identify", str(campaign_file), "--workers", "1", "--out", str(alone)])
+    tpjb("identify", campaign_file, "--workers", "1", "--out", alone)
     for name in ("coefficients", "estimators", "windows"):
         assert (out / f"{name}.csv").read_bytes() == (alone / f"{name}.csv").read_bytes()
 

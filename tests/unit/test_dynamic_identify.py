@@ -51,6 +51,11 @@ def result(campaign):
     return identify(campaign)
 
 
+def only(campaign, point: str):
+    """The campaign of that point's runs: where nothing is learnt from the others, it says the same of the point."""
+    return replace(campaign, runs=tuple(run for run in campaign.runs if run.id.startswith(point)))
+
+
 def test_direct_coefficients_are_within_one_per_cent(result):
     assert len(result.points) == 3
     for p in result.points:
@@ -66,7 +71,7 @@ def test_mains_on_the_excitation_line_is_flagged_and_taken_off(campaign, result)
     assert "mains on excitation line" in struck.quality
     assert "mains corrected" in struck.quality
     assert "mains on excitation line" not in result.points[1].quality
-    plain = identify(campaign, IdentifySettings(correct=False, methods=())).points[-1]
+    (plain,) = identify(only(campaign, "d-05000-50"), IdentifySettings(correct=False, methods=())).points
     assert "mains corrected" not in plain.quality
     truth = true_vector(struck.point)
     with_it, without = (np.linalg.norm(p.stiffness.vector - truth) for p in (plain, struck))
@@ -126,8 +131,8 @@ def test_frequency_fits_cover_loads_run_at_several_frequencies(result):
 
 
 def test_a_bad_window_is_listed_with_its_run_time_and_reason(campaign):
-    spoiled = _with_offset(campaign, "d-05000-30-03", 0.9, 1.4)
-    point = identify(spoiled, IdentifySettings(methods=())).points[1]
+    spoiled = _with_offset(only(campaign, "d-05000-30"), "d-05000-30-03", 0.9, 1.4)
+    (point,) = identify(spoiled, IdentifySettings(methods=())).points
     listed = [w for w in point.rejected if w.run == "d-05000-30-03"]
     assert listed
     assert any(0.6 < w.time < 1.4 for w in listed)
@@ -168,7 +173,7 @@ def _with_offset(campaign, run_id: str, begin: float, end: float):
 def test_records_too_short_are_refused_with_the_length_needed(campaign):
     settings = IdentifySettings(phasors=PhasorSettings(excitation_lines=(22.25,)))
     with pytest.raises(RecordTooShortError, match=r"run d-03500-25-01: .*takes"):
-        identify(campaign, settings)
+        identify(only(campaign, "d-03500-25"), settings)
 
 
 def test_a_campaign_without_dynamic_runs_is_refused(campaign):

@@ -5,10 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from tests.command_line import tpjb
 from tests.unit.evidence_cases import followed, row, rows
-from tpjb_ident.cli.app import app
 from tpjb_ident.evidence.case import case_residuals, case_table
 from tpjb_ident.evidence.counts import abstention_table, confusion_matrix, impostors_table, plans_table
 from tpjb_ident.evidence.measures import closure_table, coverage_table, p_value_table, power_table, rules_table
@@ -149,7 +148,7 @@ def test_old_rows_become_tables_figures_and_a_page(tmp_path):
     file = tmp_path / "rows.jsonl"
     write_rows(file, rows())
     out = tmp_path / "out"
-    result = CliRunner().invoke(app, ["evaluate", str(bearing), "--rows", str(file), "--out", str(out)])
+    result = tpjb("evaluate", bearing, "--rows", file, "--out", out)
     assert result.exit_code == 0, result.output
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "False alarms (surrogate): 1 of 21" in page
@@ -168,7 +167,7 @@ def test_next_tests_alone_are_evidence_too(tmp_path):
     bearing.write_text("", encoding="utf-8")
     write_rows(tmp_path / "rows.jsonl", followed())
     arguments = ["evaluate", str(bearing), "--rows", str(tmp_path / "rows.jsonl"), "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(app, arguments)
+    result = tpjb(*arguments)
     assert result.exit_code == 0, result.output
     assert "What the suggested next test settles" in result.output
     assert (tmp_path / "out" / "figures" / "next-tests.png").exists()
@@ -179,7 +178,7 @@ def test_rows_that_are_none_are_refused(tmp_path):
     file.write_text("{}\n", encoding="utf-8")
     bearing = tmp_path / "rocker.toml"
     bearing.write_text("", encoding="utf-8")
-    result = CliRunner().invoke(app, ["evaluate", str(bearing), "--rows", str(file), "--out", str(tmp_path / "out")])
+    result = tpjb("evaluate", bearing, "--rows", file, "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert "no trial" in result.output
     assert not (tmp_path / "out").exists()

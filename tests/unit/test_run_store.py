@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
-from rigdata.virtual_rig import write_campaign
+from rigdata.virtual_rig import Timing, write_campaign
+from tests.good_campaigns import directions, written
 from tests.unit.test_dynamic_identify import rig
 from tpjb_ident.cli.identify import KEPT
 from tpjb_ident.dynamic import run_jobs, run_shelf
@@ -26,11 +27,14 @@ from tpjb_ident.executors import local_workers
 TABLES = ("coefficients", "estimators", "windows", "frequency_fits")
 
 
+POINTS = [(2500.0, 25.0), (5000.0, 25.0)]
+
+
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("rig") / "c.h5"
-    write_campaign(path, rig([(2500.0, 25.0), (5000.0, 25.0)], seed=8))
-    return path
+    """Six runs as short as they may be: what is kept of them is the same in kind."""
+    plan = {"directions": directions(3), "timing": Timing(dynamic_seconds=1.0)}
+    return written(tmp_path_factory.mktemp("rig") / "c.h5", rig(POINTS, seed=8, **plan))
 
 
 @pytest.fixture(scope="module")
@@ -90,10 +94,10 @@ def same(first, second) -> bool:
 def test_finished_runs_are_not_repeated_and_come_back_bit_for_bit(path, whole, tmp_path, counted):
     campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
     with pytest.raises(KeyboardInterrupt):
-        all_runs(campaign, settings, stop_after(7), store=store)
-    assert len(counted) == 7
+        all_runs(campaign, settings, stop_after(4), store=store)
+    assert len(counted) == 4
     again = all_runs(campaign, settings, silent, store=store)
-    assert sorted(counted) == sorted(run.id for run in campaign.of_kind("dynamic"))  # each of the twelve once
+    assert sorted(counted) == sorted(run.id for run in campaign.of_kind("dynamic"))  # each of the six once
     assert same(again, whole)
     counted.clear()
     with local_workers(2) as workers:
@@ -109,7 +113,7 @@ def test_what_waits_on_disk_comes_back_bit_for_bit(path, whole, tmp_path, monkey
     counted.clear()
     assert same(all_runs(campaign, settings, silent), whole)  # in a temporary folder
     assert same(all_runs(campaign, settings, silent, store=store), whole)  # in the store
-    assert len(counted) == 24
+    assert len(counted) == 12  # all six twice
     with shelved_runs(campaign, settings, silent, store=store) as shelf:
         store.clear()  # another command has ended
         assert np.array_equal(shelf.take(3).displacement.phasors, whole[3][0].displacement.phasors)
@@ -132,12 +136,12 @@ def test_what_has_changed_is_done_again(path, tmp_path, counted):
     counted.clear()
     campaign = load_campaign(copy)
     all_runs(campaign, replace(settings, find_lines=False), silent, store=store)
-    assert len(counted) == 12
+    assert len(counted) == 6
     gain = replace(campaign.channels["X1A"], gain=1.01 * campaign.channels["X1A"].gain)
     runs = tuple(replace(run, channels={**run.channels, "X1A": gain}) for run in campaign.runs)
     counted.clear()
     all_runs(replace(campaign, runs=runs), replace(settings, find_lines=False), silent, store=store)
-    assert len(counted) == 12
+    assert len(counted) == 6
 
 
 def test_a_damaged_or_foreign_file_is_no_result(path, tmp_path, counted):
@@ -175,7 +179,8 @@ def command(path: Path, out: Path, *options: str) -> list[str]:
 
 
 @pytest.mark.slow
-def test_a_killed_command_goes_on_and_ends_with_the_same_tables(path, tmp_path):
+def test_a_killed_command_goes_on_and_ends_with_the_same_tables(tmp_path):
+    path = written(tmp_path / "c.h5", rig(POINTS, seed=8))  # long enough to be killed half-way
     subprocess.run(command(path, tmp_path / "whole"), check=True, capture_output=True)
     assert sorted(p.name for p in (tmp_path / "whole").iterdir() if p.name.startswith(".")) == []
     out = tmp_path / "killed"
@@ -200,11 +205,9 @@ def test_an_error_leaves_nothing_behind(path, tmp_path):
     with h5py.File(copy, "r+") as file:
         for run in file["runs"]:
             del file[f"runs/{run}/X1A"]
-    from typer.testing import CliRunner
+    from tests.command_line import tpjb
 
-    from tpjb_ident.cli.app import app
-
-    result = CliRunner().invoke(app, ["identify", str(copy), "--out", str(tmp_path / "out")])
+    result = tpjb("identify", copy, "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert "X1A" in result.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["copy.h5"]

@@ -1,0 +1,18 @@
+"""The command line in this process, for tests that are not about its start-up."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import typer.testing
+
+from tpjb_ident.cli.app import app
+
+# typer builds all commands anew for every call, which takes longer than most calls that are tested
+typer.testing._get_command = functools.cache(typer.testing._get_command)
+
+
+def tpjb(*words: Any) -> Any:
+    """Run `tpjb words`; its output, exit code and exception."""
+    return typer.testing.CliRunner().invoke(app, [str(word) for word in words])
