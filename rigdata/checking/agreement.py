@@ -6,13 +6,16 @@ scatter about it themselves, so that a quiet rig shows a gain that is some per c
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigdata.checking.answers import Answer, misfit_of, solve_stiffness
+from rigdata.checking.gain_evidence import PointReadings
+from rigdata.checking.one_gain import gain_of_run
+from rigdata.checking.run_gains import channel_names
 from rigdata.checking.set_points import to_plane
 from rigdata.checking.wiring import repairs
 from rigdata.problem import Severity
@@ -27,11 +30,11 @@ _LEAST = 0.03
 _CHANCE = 1e-4
 #: Runs needed before one can be told apart from the others, and share of them that can be.
 _MIN_RUNS, _MOST = 4, 1 / 3
-#: A wrong gain explains a run if this share of its misfit, or less, is left.
-_EXPLAINED = 0.4
 
 
-def check_agreement(group: Sequence[Answer], stiffness: ComplexArray) -> set[int]:
+def check_agreement(
+    group: Sequence[Answer], stiffness: ComplexArray, readings: PointReadings | None = None
+) -> set[int]:
     """Name runs that answer otherwise than the others at their operating point; their places in the group.
 
     Parameters
@@ -40,6 +43,8 @@ def check_agreement(group: Sequence[Answer], stiffness: ComplexArray) -> set[int
         Runs of one operating point.
     stiffness : (2, 2) complex ndarray
         H that most of them agree on.
+    readings : PointReadings, optional
+        Of the same runs, for naming the channel whose gain explains one of them.
     """
     if len(group) < _MIN_RUNS:
         return set()
@@ -49,10 +54,12 @@ def check_agreement(group: Sequence[Answer], stiffness: ComplexArray) -> set[int
         allowed = max(_OUTLIER, 6 * float(np.median(misfits)))
         told = {i for i, misfit in enumerate(misfits) if misfit > allowed}
     told |= _apart(group, told)
-    others = [a for i, a in enumerate(group) if i not in told]
-    common = solve_stiffness(others) if told and len(others) > 1 else None
+    others = [i for i in range(len(group)) if i not in told]
+    common = solve_stiffness([group[i] for i in others]) if told and len(others) > 1 else None
     for i in sorted(told):
-        _tell(group[i], stiffness if common is None else common)
+        gain = None if readings is None else gain_of_run(readings, i, others)
+        hint = "" if gain is None else _as_if(channel_names(group)[gain.channels[0]], gain.gain)
+        _tell(group[i], stiffness if common is None else common, hint)
     return told
 
 
@@ -95,9 +102,13 @@ def _distance(one: Answer, others: Sequence[Answer]) -> tuple[float, float]:
     return ratio / float(fdtri(4, spare, 1 - _CHANCE)), misfit_of(one, stiffness)
 
 
-def _tell(answer: Answer, stiffness: ComplexArray) -> None:
+def _as_if(name: str, gain: float) -> str:
+    return f"; as if {name} read {abs(gain - 1):.0%} too {'much' if gain > 1 else 'little'}"
+
+
+def _tell(answer: Answer, stiffness: ComplexArray, gain: str) -> None:
     misfit = misfit_of(answer, stiffness)
-    hint = _name_misfit(answer, stiffness, misfit) or _name_gain(answer, stiffness, misfit)
+    hint = _name_misfit(answer, stiffness, misfit) or gain
     severity: Severity = "error" if misfit > 0.5 or (hint and misfit > 0.2) else "warning"
     share = f"{misfit:.0%}" if misfit > 0.1 else f"{misfit:.1%}"
     what = f"differs by {share} from the other runs at this operating point{hint}"
@@ -119,34 +130,3 @@ def _name_misfit(answer: Answer, stiffness: ComplexArray, misfit: float) -> str:
     tried.sort()
     clear = tried[0][0] < misfit / 4 and tried[0][0] < tried[1][0] / 2
     return f"; as if {tried[0][1]}" if clear else ""
-
-
-def _name_gain(answer: Answer, stiffness: ComplexArray, misfit: float) -> str:
-    """Name the one channel whose gain, some per cent off, explains a run apart from the others."""
-    rest = answer.force - stiffness @ answer.displacement
-    tried = []
-    for name, share in _shares(answer, stiffness):
-        # rest = (1 - 1/g) share, with g the gain that the readings have beyond the truth
-        part = float(np.real(np.vdot(share, rest)) / max(float(np.real(np.vdot(share, share))), 1e-300))
-        left = float(np.linalg.norm(rest - part * share) / np.linalg.norm(answer.force))
-        tried.append((left, part, name))
-    tried.sort()
-    if len(tried) < 2 or tried[0][0] > _EXPLAINED * misfit or tried[0][0] > 0.6 * tried[1][0] or tried[0][1] >= 1:
-        return ""
-    gain = 1 / (1 - tried[0][1])
-    return f"; as if {tried[0][2]} read {abs(gain - 1):.0%} too {'much' if gain > 1 else 'little'}"
-
-
-def _shares(answer: Answer, stiffness: ComplexArray) -> Iterator[tuple[str, ComplexArray]]:
-    """What every probe and cell contributes to force minus H times displacement, with the sign of its own reading."""
-    for i, channel in enumerate(answer.channels):
-        own = np.zeros(2, dtype=complex)
-        own[i] = answer.readings[i]
-        yield channel.name, np.asarray(-stiffness @ to_plane(answer.channels, own))
-    seen, where = answer.seen, answer.seen.pick("force")
-    if len(where) == 2 and seen.lines is not None:
-        cells = [seen.channels[i] for i in where]
-        for i, channel in enumerate(cells):
-            own = np.zeros(2, dtype=complex)
-            own[i] = seen.lines.phasor[where[i]]
-            yield channel.name, np.asarray(to_plane(cells, own))

@@ -40,6 +40,8 @@ class PointReadings:
         Mean readings [m], [N].
     probe_plane, cell_plane : (2, 2) ndarray
         From the two readings to X and Y.
+    centre : tuple of float or None
+        What each probe reads at the bearing's centre [m], None where not known.
     """
 
     probes: ComplexArray
@@ -49,6 +51,7 @@ class PointReadings:
     cell_means: FloatArray
     probe_plane: FloatArray
     cell_plane: FloatArray
+    centre: tuple[float | None, float | None] = (None, None)
 
     @property
     def displacement(self) -> ComplexArray:

@@ -7,8 +7,9 @@ or a warmer bearing names nothing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,8 +34,12 @@ _STRANGE = 6.0
 _AGREE = 3.0
 #: Smaller gains are no fault: calibrations promise no more.
 _LEAST = 0.01
-#: Another channel explains a run as well if its chance is not this many times greater.
-_AS_WELL = 1e3
+#: A part of the reading beyond this is no gain some per cent off.
+_MOST_PART = 0.9
+#: Another channel explains a run as well if it leaves no more than this: a thousandth of the likelihood.
+_AS_WELL = 2 * math.log(1e3)
+#: An explanation that lets the mean move freely must leave this much less: ln of the equations, times one more unknown.
+_FREE = 2.0
 #: Runs needed, and the share of them that can be at fault.
 _MIN_RUNS, _MOST = 4, 1 / 3
 
@@ -55,6 +60,8 @@ class WrongGain:
         Standard error of the gain.
     means : bool
         Whether the mean readings speak for it too.
+    chance : float
+        Probability of as clear a gain where there is none, for one channel of one run.
     """
 
     run: int
@@ -62,29 +69,25 @@ class WrongGain:
     gain: float
     error: float
     means: bool
+    chance: float
 
 
 @dataclass(frozen=True)
 class _Try:
-    """One channel's explanation of a run."""
+    """One channel's explanation of a run; `left` is the sum of squares that it leaves, over all equations."""
 
-    chance: float
     channel: int
     joint: Evidence
     means: bool
+    left: float
 
 
-def wrong_gains(
-    readings: PointReadings, centre: Sequence[float | None] = (None, None), known: Collection[int] = ()
-) -> list[WrongGain]:
+def wrong_gains(readings: PointReadings, known: Collection[int] = ()) -> list[WrongGain]:
     """Find runs with one wrong gain, the clearest first.
 
     Parameters
     ----------
     readings : PointReadings
-    centre : sequence of float or None
-        What each probe reads at the bearing's centre [m], None where not known. A gain may count from there, or, as
-        that of an amplifier, from 0 V.
     known : collection of int
         Runs that are at fault already; nothing is held against them.
 
@@ -98,22 +101,33 @@ def wrong_gains(
         left = [i for i in range(count) if i not in apart]
         if len(left) < _MIN_RUNS:
             break
-        tried = [(t.chance, i, t) for i in left for t in _tries(readings, i, [j for j in left if j != i], centre)]
-        tried.sort(key=lambda entry: entry[0])
+        tried = [gain_of_run(readings, i, [j for j in left if j != i]) for i in left]
+        clearest = min((t for t in tried if t is not None), key=lambda t: t.chance, default=None)
         # each run is tried with two cells and two probes, a probe with two zeros
-        if not tried or tried[0][0] > _CHANCE / (6 * len(left)):
+        if clearest is None or clearest.chance > _CHANCE / (6 * len(left)):
             break
-        chance, run, best = tried[0]
-        alike = dict.fromkeys(t.channel for c, i, t in tried if i == run and c <= max(_AS_WELL * chance, 1e-300))
-        gain = 1 / (1 - best.joint.part)
-        error = gain**2 / float(np.sqrt(best.joint.information))
-        found.append(WrongGain(run, tuple(alike), gain, error, best.means))
-        apart.add(run)
+        found.append(clearest)
+        apart.add(clearest.run)
     return found
 
 
-def _tries(readings: PointReadings, one: int, others: Sequence[int], centre: Sequence[float | None]) -> Iterator[_Try]:
-    """Explanations of run `one` by one channel's gain that hold by all rules but the probability."""
+def gain_of_run(readings: PointReadings, one: int, others: Sequence[int]) -> WrongGain | None:
+    """The gain of one channel that explains run `one` best beside the `others`; None where no single one does.
+
+    Where the best is too small to be a fault, no worse one is named in its place.
+    """
+    tried = sorted(_tries(readings, one, others), key=lambda t: t.left)
+    if not tried or abs(tried[0].joint.part) < _LEAST:
+        return None
+    best = tried[0]
+    alike = dict.fromkeys(t.channel for t in tried if t.left < best.left + _AS_WELL)
+    gain = 1 / (1 - best.joint.part)
+    error = gain**2 / float(np.sqrt(best.joint.information))
+    return WrongGain(one, tuple(alike), gain, error, best.means, best.joint.chance())
+
+
+def _tries(readings: PointReadings, one: int, others: Sequence[int]) -> Iterator[_Try]:
+    """Explanations of run `one` by one channel's gain that nothing in it contradicts."""
     dynamic, static = dynamic_difference(readings, one, others), static_difference(readings, one, others)
     stiffness = common_stiffness(readings, others)
     if dynamic is None or stiffness is None:
@@ -121,40 +135,39 @@ def _tries(readings: PointReadings, one: int, others: Sequence[int], centre: Seq
     for channel in range(4):
         pattern = dynamic_pattern(readings, one, channel, stiffness)
         shown = dynamic.evidence(pattern)
-        if shown.chance() > _PHASORS_SHOW or shown.part >= 0.9:
+        if shown.chance() > _PHASORS_SHOW or shown.part > _MOST_PART:
             continue
-        for lever, slack in _levers(readings, one, channel, centre, shown.part):
-            joint, means = _with_means(static, channel, lever, slack, shown)
-            if joint is None or abs(joint.part) < _LEAST or dynamic.misfit(pattern, joint.part) > _STRANGE:
-                continue
-            yield _Try(joint.chance(), channel, joint, means)
+        for lever, slack in _levers(readings, one, channel, shown.part):
+            found = _with_means(static, channel, lever, slack, shown)
+            rest = dynamic.misfit(pattern, found.joint.part)
+            if found.left <= _STRANGE and rest <= _STRANGE:
+                yield replace(found, left=len(pattern) * (found.left + rest) + (_FREE if lever is None else 0.0))
 
 
-def _levers(
-    readings: PointReadings, one: int, channel: int, centre: Sequence[float | None], part: float
-) -> Iterator[tuple[float | None, float]]:
-    """Readings that a gain would multiply in the mean, with the uncertainty of the shift; None where not known."""
+def _levers(readings: PointReadings, one: int, channel: int, part: float) -> Iterator[tuple[float | None, float]]:
+    """Readings that a gain would multiply in the mean, with the uncertainty of the shift; None where not known.
+
+    A probe's gain may count from the bearing's centre, or, as that of an amplifier, from 0 V.
+    """
     if channel >= 2:
         yield float(readings.cell_means[one, channel - 2]), 0.0
         return
-    mean, zero = float(readings.probe_means[one, channel]), centre[channel]
+    mean, zero = float(readings.probe_means[one, channel]), readings.centre[channel]
     yield mean, 0.0
     yield (None, 0.0) if zero is None else (mean - zero, lever_slack(mean - zero, part))
 
 
-def _with_means(
-    static: Difference | None, channel: int, lever: float | None, slack: float, shown: Evidence
-) -> tuple[Evidence | None, bool]:
-    """Join what the means say of a channel; None where they contradict its gain."""
-    if static is None or lever is None:
-        return shown, False
-    pattern = np.where(np.arange(4) == channel, lever, 0.0)
+def _with_means(static: Difference | None, channel: int, lever: float | None, slack: float, shown: Evidence) -> _Try:
+    """Join what the means say of a channel; left is what they differ by per equation, infinite in contradiction."""
+    if static is None:
+        return _Try(channel, shown, False, 0.0)
+    pattern = np.where(np.arange(4) == channel, 1.0 if lever is None else lever, 0.0)
     widened = static.widened(channel, slack)
     told = widened.evidence(pattern)
-    if told.information <= 0:
-        return shown, False
+    if lever is None or told.information <= 0:
+        # the mean may have moved by anything
+        return _Try(channel, shown, False, widened.misfit(pattern, told.part))
     apart = abs(told.part - shown.part) / np.sqrt(1 / told.information + 1 / shown.information)
     joint = shown.joined(told)
-    if apart > _AGREE or widened.misfit(pattern, joint.part) > _STRANGE:
-        return None, False
-    return joint, told.chance() < _PHASORS_SHOW
+    left = widened.misfit(pattern, joint.part) if apart <= _AGREE else np.inf
+    return _Try(channel, joint, told.chance() < _PHASORS_SHOW, left)

@@ -16,7 +16,7 @@ from rigdata.calibration import Channel
 from rigdata.checking.agreement import check_agreement
 from rigdata.checking.answers import Answer, answer_of, misfit_of, robust_stiffness
 from rigdata.checking.observation import Observation
-from rigdata.checking.run_gains import check_gains, probe_centres
+from rigdata.checking.run_gains import check_gains, point_readings, probe_centres
 from rigdata.checking.set_points import excited, to_plane
 from rigdata.checking.wiring import name_fault
 from rigdata.problem import Severity
@@ -53,7 +53,10 @@ def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[O
         if stiffness is None:
             continue
         _check_signs(group, stiffness)
-        check_gains(group, check_agreement(group, stiffness), centres)
+        readings = point_readings(group, centres)
+        told = check_agreement(group, stiffness, readings)
+        if readings is not None:
+            check_gains(group, told, readings)
 
 
 def definiteness(matrix: NDArray) -> float:

@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 _SECTORS, _MET = 36, 0.9
 
 
-def check_gains(group: Sequence[Answer], told: Collection[int], centres: dict[str, float]) -> None:
+def check_gains(group: Sequence[Answer], told: Collection[int], readings: PointReadings) -> None:
     """Name runs with one wrong gain.
 
     Parameters
@@ -29,38 +29,51 @@ def check_gains(group: Sequence[Answer], told: Collection[int], centres: dict[st
         Runs of one operating point, with the same displacement channels.
     told : collection of int
         Places of those already told to differ.
+    readings : PointReadings
+        Of the same runs.
+    """
+    for found in wrong_gains(readings, told):
+        _tell(group[found.run], found, [channel_names(group)[i] for i in found.channels])
+
+
+def channel_names(group: Sequence[Answer]) -> list[str]:
+    """Names of the two probes and two cells."""
+    first = group[0]
+    return [c.name for c in first.channels] + [first.seen.channels[i].name for i in first.seen.pick("force")]
+
+
+def point_readings(group: Sequence[Answer], centres: dict[str, float]) -> PointReadings | None:
+    """Phasors and means of all runs of a point, by channel; None where they have not the same two cells, or no means.
+
+    Parameters
+    ----------
+    group : sequence of Answer
+        Runs of one operating point, with the same displacement channels.
     centres : dict
         What probes read at the bearing's centre, by channel [m].
     """
-    cells = [[a.seen.channels[i] for i in a.seen.pick("force")] for a in group]
-    names = [c.name for c in cells[0]]
-    if len(names) != 2 or any([c.name for c in other] != names for other in cells):
-        return
-    readings = point_readings(group, cells[0])
-    if not all(np.all(np.isfinite(values)) for values in (readings.probe_means, readings.cell_means)):
-        return
-    channels = [*group[0].channels, *cells[0]]
-    for found in wrong_gains(readings, [centres.get(c.name) for c in channels[:2]], told):
-        _tell(group[found.run], found, [channels[i].name for i in found.channels])
-
-
-def point_readings(group: Sequence[Answer], cells: Sequence[Channel]) -> PointReadings:
-    """Phasors and means of all runs of a point, by channel."""
-    probes = group[0].channels
-    places = [(a.seen.pick("displacement"), a.seen.pick("force")) for a in group]
-    means = [a.seen.lines.mean for a in group if a.seen.lines is not None]
-    phasors = [a.seen.lines.phasor for a in group if a.seen.lines is not None]
-    cell_plane = _plane(cells)
-    cell_phasors = np.stack([p[w] for p, (_, w) in zip(phasors, places, strict=True)])
+    probes, seen = group[0].channels, [a.seen for a in group]
+    cells = [seen[0].channels[i] for i in seen[0].pick("force")]
+    names = [c.name for c in cells]
+    lines = [one.lines for one in seen if one.lines is not None]
+    if len(names) != 2 or len(lines) < len(group) or any([c.name for c in _cells(one)] != names for one in seen):
+        return None
+    places = [(one.pick("displacement"), one.pick("force")) for one in seen]
+    cell_plane, cell_phasors = _plane(cells), np.stack([f.phasor[c] for f, (_, c) in zip(lines, places, strict=True)])
     return PointReadings(
         probes=np.stack([a.readings for a in group]),
         cells=cell_phasors,
         inertia=np.stack([a.force for a in group]) - cell_phasors @ cell_plane.T,
-        probe_means=np.stack([m[w] for m, (w, _) in zip(means, places, strict=True)]),
-        cell_means=np.stack([m[w] for m, (_, w) in zip(means, places, strict=True)]),
+        probe_means=np.stack([f.mean[p] for f, (p, _) in zip(lines, places, strict=True)]),
+        cell_means=np.stack([f.mean[c] for f, (_, c) in zip(lines, places, strict=True)]),
         probe_plane=_plane(probes),
         cell_plane=cell_plane,
+        centre=(centres.get(probes[0].name), centres.get(probes[1].name)),
     )
+
+
+def _cells(seen: Observation) -> list[Channel]:
+    return [seen.channels[i] for i in seen.pick("force")]
 
 
 def _plane(channels: Sequence[Channel]) -> FloatArray:
