@@ -164,6 +164,14 @@ def test_h_and_the_angles_are_found_together(patterns):
     assert best.cost < 1e-8
     np.testing.assert_allclose(given.h(best.x), H, rtol=1e-6, atol=1.0)
     np.testing.assert_allclose(given.vectors(best.x), vectors, atol=1e-13)
+    # starts are run down to places that differ, best first, before they are polished
+    starts = given._candidates()
+    np.testing.assert_allclose(starts[0], H, atol=0.05 * np.abs(H).max())
+    size = np.linalg.norm(starts[0])
+    assert all(np.linalg.norm(a - b) > 1e-3 * size for i, a in enumerate(starts) for b in starts[:i])
+    noisy = replace(given, F=given.F + complex_normal(np.random.default_rng(6), 6, 2))
+    for minimum in noisy.solve():
+        assert minimum.cost == pytest.approx(np.sum(noisy.residual(minimum.x) ** 2))
     normal = given.jacobian(best.x).T @ given.jacobian(best.x)
     expected = np.linalg.inv(normal)[:8, :8] * given.scale**2
     size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
@@ -260,6 +268,7 @@ def test_struck_windows_and_lost_runs_do_not_enter_the_means():
     np.testing.assert_allclose(fit.pickup, vectors, atol=1e-9)
     D[data.run_index == 4] = np.nan
     assert fit_mains(replace(data, D=D, F=F), pickup, 1e-3) is None
+    assert fit_mains(shaken(per_run=1), pickup, 1e-3) is None
 
 
 def test_an_estimate_moves_to_the_mean_of_the_answers_and_knows_less():
@@ -316,15 +325,24 @@ def test_a_correction_takes_off_what_size_direction_and_mains_have_done():
     mended = both.apply(data)
     np.testing.assert_allclose(mended.F, clean.F, atol=1e-9)
     np.testing.assert_allclose(mended.D, clean.D, atol=1e-18)
-    wide = both.widened(stiff())
+    narrow = stiff(covariance=np.eye(8))
+    wide = both.widened(narrow)
     shift = 0.002 * np.concatenate([slope.real.ravel(), slope.imag.ravel()])
-    np.testing.assert_allclose(wide.covariance, stiff().covariance + 12.0 * np.eye(8) + np.outer(shift, shift))
-    np.testing.assert_allclose(wide.vector, stiff().vector + 1.0)
+    np.testing.assert_allclose(np.diag(wide.covariance), 13.0 + shift**2)
+    np.testing.assert_allclose(wide.covariance - np.diag(np.diag(wide.covariance)), _off_diagonal(shift))
+    np.testing.assert_allclose(wide.vector, narrow.vector + 1.0)
+    slight = replace(both, slope=np.zeros((2, 2)))
+    np.testing.assert_allclose(slight.widened(narrow).covariance, 13.0 * np.eye(8))
+    np.testing.assert_allclose(replace(slight, turn=None).widened(narrow).covariance, 6.0 * np.eye(8))
     plain = both.measured_only()
     assert plain.conditions == ("static-load-off",)
     assert plain.miss is miss
     np.testing.assert_array_equal(plain.apply(data).F, data.F)
     np.testing.assert_array_equal(plain.apply(data).D, data.D)
+
+
+def _off_diagonal(shift):
+    return np.outer(shift, shift) - np.diag(shift**2)
 
 
 def campaign(struck):

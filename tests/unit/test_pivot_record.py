@@ -7,7 +7,7 @@ import pytest
 
 from tpjb_ident.pivot.blocks import MOST_BLOCKS, Samples, cut_blocks
 from tpjb_ident.pivot.glitches import good_samples
-from tpjb_ident.pivot.steps import Hold, find_holds
+from tpjb_ident.pivot.steps import MAINS_PERIOD, Hold, _bin, find_holds
 
 RATE = 500.0
 
@@ -252,3 +252,74 @@ def test_one_bad_bin_does_not_split_a_hold_but_a_move_does():
 @pytest.mark.parametrize(("hold", "found"), [(0.26, 3), (0.16, 0)])
 def test_the_shortest_hold(hold, found):
     assert len(find_holds(*staircase(hold=hold, ramp=0.4))) == found
+
+
+@pytest.mark.parametrize(("rest", "bins"), [(0, 10), (9, 10), (11, 11)])
+def test_bins_are_medians_over_two_mains_periods(rest, bins):
+    """Twenty samples each at 500 Hz; the last counts with half of them; whenever the clock started."""
+    for start in (0.0, 1e3):
+        time = start + np.arange(200 + rest) / RATE
+        load = 7.0 * (time - start)
+        load[::20] += 1e3  # one wild sample of a bin is no matter
+        found = _bin(time, load)
+        assert len(found.time) == bins
+        np.testing.assert_allclose(found.time[:10] - start, (20 * np.arange(10) + 9.5) / RATE, atol=1e-9)
+        np.testing.assert_allclose(found.load[:10], 7.0 * (20 * np.arange(10) + 10.5 - 0.5) / RATE, atol=0.008)
+        assert found.width == pytest.approx(2 * MAINS_PERIOD)
+        assert found.noise == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("seconds", "periods"), [(30.0, 2), (79.0, 2), (101.0, 3), (399.0, 10)])
+def test_long_records_have_two_thousand_bins_of_whole_mains_periods(seconds, periods):
+    time = np.arange(int(seconds * 100) + 1) / 100.0
+    found = _bin(time, np.random.default_rng(1).standard_normal(len(time)))
+    assert found.width == pytest.approx(periods * MAINS_PERIOD)
+    assert abs(len(found.time) - seconds / found.width) <= 1
+
+
+def test_the_noise_of_a_bin_does_not_feel_ramps_nor_corners():
+    rng = np.random.default_rng(3)
+    time, load = staircase(hold=2.0)
+    noise = 5.0 * rng.standard_normal(len(load))
+    expected = 5.0 * np.sqrt(np.pi / 2 / 20)  # of a median of twenty
+    assert _bin(time, noise).noise == pytest.approx(expected, rel=0.25)
+    assert _bin(time, load + noise).noise == pytest.approx(_bin(time, noise).noise, rel=0.2)
+
+
+@pytest.mark.parametrize("samples", [1, 19, 40, 41, 60, 150])
+def test_a_record_of_a_few_bins_has_no_holds(samples):
+    assert find_holds(np.arange(samples) / RATE, np.full(samples, 500.0)) == ()
+
+
+@pytest.mark.parametrize(("levels", "branch"), [((200.0, 800.0, 1400.0), 1), ((4000.0, 3000.0, 2000.0), -1)])
+def test_noise_does_not_decide_how_a_first_hold_was_reached(levels, branch):
+    for seed in range(6):
+        time, load = staircase(np.random.default_rng(seed), levels=levels)
+        late = time > 0.5  # the record starts when the first level has been reached
+        found = find_holds(time[late], load[late])
+        assert [hold.branch for hold in found] == [branch] * 3
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_creep_that_is_slower_than_a_ramp_is_cut_off_either_end(sense):
+    """Sixty newtons per second are no ramp of two thousand; thirty newtons are no part of a level known to one."""
+    time, load = staircase(hold=3.0, levels=(1000.0, 2000.0))
+    load = load + 0.5 * np.random.default_rng(4).standard_normal(len(load))
+    begin = 0.5
+    since, left = time - begin, begin + 3.0 - time
+    load += 60.0 * sense * np.where((since >= 0) & (since < 0.5), 0.5 - since, 0.0)
+    load += 60.0 * sense * np.where((left >= 0) & (left < 0.5), 0.5 - left, 0.0)
+    first, second = find_holds(time, load)
+    assert first.start == pytest.approx(begin + 0.49, abs=0.09)
+    assert first.stop == pytest.approx(begin + 2.51, abs=0.09)
+    assert first.level == pytest.approx(1000.0, abs=0.3)
+    assert second.duration > 2.8
+
+
+def test_four_bins_are_a_hold():
+    """Six whole bins stand still, of which the two beside the ramps feel them."""
+    holds = find_holds(*staircase(hold=0.24, ramp=0.4))
+    assert len(holds) == 3
+    for k, one in enumerate(holds):
+        begin = 0.4 + 0.64 * k
+        assert begin - 1e-9 < one.start < one.stop < begin + 0.24 + 1e-9

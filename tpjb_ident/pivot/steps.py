@@ -77,7 +77,7 @@ def find_holds(time: FloatArray, load: FloatArray) -> tuple[Hold, ...]:
     rate = np.gradient(bins.load, bins.time)
     runs = _runs(np.abs(rate) < _still_rate(bins))
     holds = [hold for run in _merge(runs, bins) if (hold := _settle(run, bins)) is not None]
-    return tuple(_with_branches(holds, first_load=float(bins.load[0])))
+    return tuple(_with_branches(holds, float(bins.load[0]), SETTLED * bins.noise))
 
 
 def _bin(time: FloatArray, load: FloatArray) -> _Bins:
@@ -145,13 +145,13 @@ def _settle(run: tuple[int, int], bins: _Bins) -> Hold | None:
     return Hold(start, stop, float(np.median(bins.load[a:b])), 1)
 
 
-def _with_branches(holds: list[Hold], first_load: float) -> list[Hold]:
-    """Mark each hold as reached from below or from above."""
+def _with_branches(holds: list[Hold], first_load: float, noise: float) -> list[Hold]:
+    """Mark each hold as reached from below or from above; `noise` is what a reading may be off a level it is on [N]."""
     previous = first_load
     marked = []
     for k, hold in enumerate(holds):
         branch = 1 if hold.level >= previous else -1
-        if k == 0 and len(holds) > 1 and abs(hold.level - first_load) < 1e-3 * abs(hold.level):
+        if k == 0 and len(holds) > 1 and abs(hold.level - first_load) < max(noise, 1e-3 * abs(hold.level)):
             # the record starts on its first hold: it came the way the programme goes on
             branch = 1 if holds[1].level >= hold.level else -1
         marked.append(Hold(hold.start, hold.stop, hold.level, branch))
