@@ -81,7 +81,7 @@ def _suspect(
     if off_load and together:
         turned = [abs(math.remainder(record.angle + load.angle - a, 2 * math.pi)) for a in pad_angles]
         nearest = int(np.argmin(turned))
-        if turned[nearest] < settings.load_angle_limit and nearest != record.pad - 1:
+        if turned[nearest] < settings.load_angle_limit:
             return f"wrong pad: load and displacement both point at pad {nearest + 1}"
         return f"wrong angle: load and displacement turn together by {math.degrees(load.angle):+.0f} deg"
     if off_load != off_move:
