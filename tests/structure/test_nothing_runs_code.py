@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import ast
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-SOURCES = sorted(p for top in ("rigdata", "model", "tpjb_ident") for p in (ROOT / top).rglob("*.py"))
+from tests.structure.sources import ROOT, SOURCES, imports_and_calls, relative
+
 #: Modules that run what they read, or reach out of the machine.
 MODULES = {
     "pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "code", "codeop", "ctypes", "yaml",
@@ -31,7 +30,7 @@ ALLOWED = {
 def dangers(source: str) -> list[str]:
     """What `source` does that a reader of strangers' files must not."""
     found = []
-    for node in ast.walk(ast.parse(source)):
+    for node in imports_and_calls(source):
         if isinstance(node, ast.Import):
             found += [a.name for a in node.names if a.name.split(".")[0] in MODULES | {"subprocess"}]
         elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in MODULES | {"subprocess"}:
@@ -62,10 +61,9 @@ def _dangerous_call(node: ast.Call) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda p: p.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize("path", SOURCES, ids=relative)
 def test_no_source_runs_what_it_reads(path):
-    name = path.relative_to(ROOT).as_posix()
-    assert set(dangers(path.read_text(encoding="utf-8"))) <= ALLOWED.get(name, set())
+    assert set(dangers(path.read_text(encoding="utf-8"))) <= ALLOWED.get(relative(path), set())
 
 
 @pytest.mark.parametrize(
@@ -91,7 +89,7 @@ def test_raw_data_are_opened_for_reading_only():
     for path in (ROOT / "rigdata").rglob("*.py"):
         if "virtual_rig" in path.parts:
             continue
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in imports_and_calls(path.read_text(encoding="utf-8")):
             if isinstance(node, ast.Call):
                 function = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
                 values = [

@@ -7,29 +7,27 @@ import functools
 import re
 import sys
 import tomllib
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-OURS = ("rigdata", "model", "tpjb_ident")
+from tests.structure.sources import OURS, ROOT, SOURCES, imports_and_calls, relative
+
 #: The guard only looks whether the `model` found is ours.
 MAY_IMPORT_MODEL = ("compare", "diagnose", "cli", "model_guard.py")
-SOURCES = sorted(p for top in OURS for p in (ROOT / top).rglob("*.py"))
 
 
 @functools.cache
 def imported_modules(source: str) -> frozenset[str]:
     """Every module that `source` imports, at any depth, import_module("literal") included."""
     found = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in imports_and_calls(source):
         if isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, "relative import"
             found.add(node.module or "")
             found.update(f"{node.module}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "import_module":
+        elif getattr(node.func, "attr", "") == "import_module":
             found.update(a.value for a in node.args if isinstance(a, ast.Constant))
     return frozenset(found)
 
@@ -56,8 +54,7 @@ def test_no_import_goes_through_a_wall():
     assert len(SOURCES) > 30
     found = []
     for path in SOURCES:
-        name = path.relative_to(ROOT).as_posix()
-        found += breaches(name, imported_modules(path.read_text(encoding="utf-8")))
+        found += breaches(relative(path), imported_modules(path.read_text(encoding="utf-8")))
     assert not found, "\n".join(found)
 
 
@@ -105,7 +102,7 @@ def test_every_third_party_import_is_declared():
             if top not in sys.stdlib_module_names and top not in OURS and top != "bootstrap":
                 found.setdefault(top.lower(), path.name)
         # what an extra brings may be missing: only functions may import it
-        body = [node for node in ast.parse(text).body if isinstance(node, ast.Import | ast.ImportFrom)]
+        body = [n for n in imports_and_calls(text) if isinstance(n, ast.Import | ast.ImportFrom) and not n.col_offset]
         tops = {m.split(".")[0].lower() for m in imported_modules("\n".join(ast.unparse(n) for n in body))}
         at_top |= dict.fromkeys((tops & extras) - declared, path.name)
     assert not {top: name for top, name in found.items() if top not in declared | extras}

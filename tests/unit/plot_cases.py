@@ -246,10 +246,12 @@ def default_style():
 
 @functools.cache
 def picture(name: str):
-    """Figure of a case, drawn, and its grey levels."""
+    """Figure of a case, drawn, its grey levels, and whether it left the global style as it was."""
     with default_style():
+        before = dict(matplotlib.rcParams)
         figure = CASES[name]()
-        return figure, drawn(figure)
+        grey = drawn(figure)
+        return figure, grey, dict(matplotlib.rcParams) == before
 
 
 def main() -> None:

@@ -322,10 +322,10 @@ class Ramp:
 
 @pytest.mark.parametrize(("wedge", "filling"), [CASES[0], CASES[1], CASES[3]])
 def test_damping_is_what_a_slow_ramp_shows(wedge, filling):
-    one = grid, _ = film((80, 6))
+    one = grid, _ = film((60, 4))
     forces = solve(one, wedge, sharp=False, filling=filling)
     transit = 2.0 * RADIUS * (ARC[1] - ARC[0]) / SPEED
-    steps, final = 120, np.array(wedge)
+    steps, final = 80, np.array(wedge)
     rate = steps / (5.0 * transit)
     for k, unit in enumerate(np.eye(2)):
         ramp = Ramp(grid, filling)

@@ -61,6 +61,13 @@ def whole(tmp_path_factory):
     return source, truth, fit_pivots(source, ANGLES)
 
 
+@pytest.fixture(scope="module")
+def measured(whole):
+    """Both sweeps, the lighter push first."""
+    source, _, curves = whole
+    return measure_clearances(source, ANGLES, curves)
+
+
 def bearing_centre(truth):
     """Reading of the bearing centre (2,) [m] from the gap voltages."""
     gaps = np.array([truth.gap_voltage_V["X1A"], truth.gap_voltage_V["X1B"]])
@@ -84,9 +91,8 @@ def test_clearance_and_centre_with_one_pad_off(whole):
     assert "um (se)" in str(found)
 
 
-def test_two_push_loads_give_the_radial_stiffness(whole):
-    source, _, curves = whole
-    light, heavy = measure_clearances(source, ANGLES, curves)
+def test_two_push_loads_give_the_radial_stiffness(measured):
+    light, heavy = measured
     pair = radial_stiffness(light, heavy)
     true = (heavy.push_load - light.push_load) / (sphere(1, heavy.push_load) - sphere(1, light.push_load))
     assert pair.stiffness == pytest.approx(true, rel=0.15)
@@ -95,10 +101,10 @@ def test_two_push_loads_give_the_radial_stiffness(whole):
         radial_stiffness(light, light)
 
 
-def test_a_bearing_that_grew_shows_it_on_every_pad(whole, tmp_path):
-    source, _, curves = whole
+def test_a_bearing_that_grew_shows_it_on_every_pad(whole, measured, tmp_path):
+    _, _, curves = whole
     hot, _ = made(tmp_path / "hot.h5", clearance=tuple(CLEARANCE + 6e-6))
-    cold = measure_clearance(source, ANGLES, curves)
+    cold, _ = measured
     change = clearance_change(cold, measure_clearance(hot, ANGLES, curves))
     assert change.mean == pytest.approx(6e-6, abs=0.15e-6)
     assert change.per_pad == pytest.approx(6e-6, abs=0.3e-6)
@@ -108,9 +114,9 @@ def test_a_bearing_that_grew_shows_it_on_every_pad(whole, tmp_path):
         clearance_change(cold, replace(cold, angles=ANGLES + 0.1))
 
 
-def test_sweeps_side_by_side(whole):
-    source, _, curves = whole
-    light, heavy = measure_clearances(source, ANGLES, curves)
+def test_sweeps_side_by_side(whole, measured):
+    source, _, _ = whole
+    light, heavy = measured
     assert coldest_run(source.of_kind("clearance")).id == light.run
     hot = replace(heavy, run="hot", temperature=light.temperature + 20.0, clearance=light.clearance + 5e-6)
     frame = pairs_frame(light, [heavy, hot])
@@ -139,9 +145,8 @@ def test_the_cold_sweep_counts_however_small_the_hot_ones_push(whole):
     assert coldest_run([Warm()]).id == "warm"
 
 
-def test_the_push_below_the_dry_tests_is_marked_as_extrapolated(whole):
-    source, _, curves = whole
-    light, _ = measure_clearances(source, ANGLES, curves)
+def test_the_push_below_the_dry_tests_is_marked_as_extrapolated(measured):
+    light, _ = measured
     assert any(s.startswith("give-extrapolated") and "pads 1, 2, 3, 4, 5" in s for s in light.status)
 
 

@@ -49,8 +49,12 @@ def campaign(tmp_path_factory):
     return made(tmp_path_factory.mktemp("locus") / "c.h5", locus_points(6))
 
 
-def test_positions_from_the_bearing_centre(campaign):
-    polygon = measure_clearance(campaign, ANGLES)
+@pytest.fixture(scope="module")
+def polygon(campaign):
+    return measure_clearance(campaign, ANGLES)
+
+
+def test_positions_from_the_bearing_centre(campaign, polygon):
     found = measure_locus(campaign, polygon)
     assert len(found.points) == 6
     for point in found.points:
@@ -66,11 +70,11 @@ def test_positions_from_the_bearing_centre(campaign):
     assert "6 positions" in str(found)
 
 
-def test_without_a_polygon_positions_are_raw_and_say_so(campaign):
+def test_without_a_polygon_positions_are_raw_and_say_so(campaign, polygon):
     found = measure_locus(campaign)
     assert found.centre.tolist() == [0.0, 0.0]
     assert any(s.startswith("no-centre") for s in found.status)
-    both = measure_locus(campaign, measure_clearance(campaign, ANGLES))
+    both = measure_locus(campaign, polygon)
     shift = found.points[2].position - both.points[2].position
     assert shift == pytest.approx(both.centre)
 

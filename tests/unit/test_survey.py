@@ -53,11 +53,15 @@ def exports(tmp_path_factory):
     return folder, text
 
 
-def test_kinds_and_set_points_are_guessed_right(exports):
-    folder, _ = exports
+@pytest.fixture(scope="module")
+def found(exports):
     problems = []
-    found = survey(list(read_exports(folder, problems)))
+    surveyed = survey(list(read_exports(exports[0], problems)))
     assert not problems
+    return surveyed
+
+
+def test_kinds_and_set_points_are_guessed_right(found):
     kinds = dict(zip((e.rpartition("/")[2][0] for e in found.exports), (r.kind for r in found.runs), strict=True))
     assert kinds == {"c": "clearance", "d": "dynamic", "l": "locus", "p": "dry_pivot"}
     assert found.clock == "Zeit"
@@ -70,9 +74,8 @@ def test_kinds_and_set_points_are_guessed_right(exports):
     assert by_name["p-1-up.csv"].pad == 1
 
 
-def test_a_draft_says_what_is_missing_and_works_when_that_is_filled_in(exports):
+def test_a_draft_says_what_is_missing_and_works_when_that_is_filled_in(exports, found):
     folder, original = exports
-    found = survey(list(read_exports(folder, [])))
     draft = draft_manifest(found, "rig", "bearing.toml")
     assert MARK in draft
     (folder / "draft.toml").write_text(draft, encoding="utf-8")

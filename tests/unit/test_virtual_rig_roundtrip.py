@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from dataclasses import replace
@@ -62,11 +63,22 @@ def fitted_stiffness(runs, housing_mass=30.0):
     return np.linalg.solve(d, f).T
 
 
+@pytest.fixture(scope="module")
+def quiet(tmp_path_factory):
+    """The campaign without noise in any layout."""
+
+    @functools.cache
+    def campaign(layout):
+        target = tmp_path_factory.mktemp(layout) / ("c.h5" if layout == "hdf5" else "c")
+        write_campaign(target, quiet_rig(), layout)
+        return rigdata.load_campaign(target)
+
+    return campaign
+
+
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_noise_free_records_give_back_the_stiffness(tmp_path, layout):
-    target = tmp_path / ("c.h5" if layout == "hdf5" else "c")
-    write_campaign(target, quiet_rig(), layout)
-    runs = rigdata.load_campaign(target).of_kind("dynamic")
+def test_noise_free_records_give_back_the_stiffness(quiet, layout):
+    runs = quiet(layout).of_kind("dynamic")
     for frequency in (25.0, 40.0):
         omega = 2 * np.pi * frequency
         pair = [run for run in runs if run.point.excitation_hz == frequency]
@@ -102,10 +114,8 @@ def test_means_temperatures_and_speed_come_back(tmp_path, layout):
     np.testing.assert_allclose(run.record("K1").values, 2 * np.pi * 22.0, atol=1e-6)
 
 
-def test_manifest_set_points_are_those_of_the_plan(tmp_path):
-    rig = quiet_rig()
-    write_campaign(tmp_path / "c.h5", rig)
-    campaign = rigdata.load_campaign(tmp_path / "c.h5")
+def test_manifest_set_points_are_those_of_the_plan(quiet):
+    rig, campaign = quiet_rig(), quiet("hdf5")
     for planned, found in zip(rig.runs(), campaign.runs, strict=True):
         assert (planned.id, planned.kind) == (found.id, found.kind)
         if planned.point is not None:
