@@ -114,9 +114,9 @@ def _plan(run: Any, quantity: str) -> _Plan | None:
     chosen = [c for c in run.channels.values() if c.quantity == quantity and c.axis is not None]
     if len(chosen) != 2:
         return None
-    inverse = inverse_directions(tuple(c.axis for c in chosen))
-    if not np.isfinite(inverse).all() or abs(np.sin(chosen[0].axis - chosen[1].axis)) <= 0.05:
+    if abs(np.sin(chosen[0].axis - chosen[1].axis)) <= 0.05:
         return None
+    inverse = inverse_directions(tuple(c.axis for c in chosen))
     inverse = np.where(np.abs(inverse) < 1e-12, 0.0, inverse)  # cos 90 deg is not quite zero, but a pass over the data
     matrix = inverse * np.array([c.slope for c in chosen])
     return _Plan(tuple(c.name for c in chosen), matrix, inverse @ np.array([c.zero for c in chosen]))
