@@ -73,7 +73,7 @@ def test_a_full_disk_is_one_message_and_nothing_is_left(small_campaign, tmp_path
     out = tmp_path / "out"
     code, _, errors = end(command("identify", small_campaign, "--workers", 1, "--out", out, preexec_fn=limit))
     assert code == 2, errors
-    assert "File too large" in errors
+    assert f"--out {out}: File too large" in errors
     assert "room on the disk" in errors
     assert names_below(tmp_path) == []
 

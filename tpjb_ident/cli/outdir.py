@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import glob
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -14,6 +16,9 @@ from tpjb_ident.cli.locks import hold, is_abandoned, locked, release
 from tpjb_ident.cli.moving_in import RECORD, flush, former_runs, move_in
 
 __all__ = ["RECORD", "former_runs", "output_folder"]
+
+#: Full: the disk, the user's share of it, or the largest file that the system allows.
+_FULL = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 
 
 @contextlib.contextmanager
@@ -38,7 +43,7 @@ def output_folder(out: Path, command: str, inputs: tuple[Path, ...] = ()) -> Ite
     Raises
     ------
     BadInputError
-        `out` is a file, lies in a campaign, or holds files of the same names that tpjb did not write.
+        `out` is a file, lies in a campaign, holds files of the same names that tpjb did not write, or its disk is full.
     """
     target = _checked(out, inputs)
     try:
@@ -52,6 +57,13 @@ def output_folder(out: Path, command: str, inputs: tuple[Path, ...] = ()) -> Ite
         yield staging
         staging.chmod(0o755)
         _bring(staging, target, command)
+    except OSError as error:
+        if error.errno is None or error.errno not in _FULL:
+            raise
+        why = os.strerror(error.errno)  # libraries wrap it into words of their own
+        raise BadInputError(
+            f"--out {out}: {why}; nothing was written. Make room on the disk or give a folder on another one."
+        ) from error
     finally:
         release(lock)
         if staging.exists():
