@@ -82,34 +82,46 @@ def _plane(channels: Sequence[Channel]) -> FloatArray:
 
 
 def probe_centres(sweeps: Sequence[Observation]) -> dict[str, float]:
-    """What every probe reads at the bearing's centre [m]: mean over all directions of a clearance run's load.
-
-    Sides and corners of the polygon lie evenly around the centre. Runs whose load does not go around tell nothing.
-    """
+    """What every probe reads at the bearing's centre [m], from clearance runs whose load goes around."""
     found: dict[str, list[float]] = {}
     for seen in sweeps:
         cells, probes = seen.pick("force"), seen.pick("displacement")
         if len(cells) != 2 or not probes or "force" in seen.report.doubts or "displacement" in seen.report.doubts:
             continue
-        load = to_plane([seen.channels[i] for i in cells], seen.samples[:, cells].T)
-        angle = np.arctan2(load[1] - np.median(load[1]), load[0] - np.median(load[0]))
-        sector = np.floor((angle / (2 * math.pi) + 0.5) * _SECTORS) % _SECTORS
+        load = to_plane([seen.channels[i] for i in cells], seen.samples[:, cells].T).T
         for index in probes:
-            known = np.isfinite(seen.samples[:, index]) & np.isfinite(sector)
-            values, where = seen.samples[known, index], sector[known]
-            middles = [float(np.median(values[where == s])) for s in range(_SECTORS) if np.any(where == s)]
-            if len(middles) >= _MET * _SECTORS:
-                found.setdefault(seen.channels[index].name, []).append(float(np.mean(middles)))
+            centre = swept_centre(load, seen.samples[:, index])
+            if centre is not None:
+                found.setdefault(seen.channels[index].name, []).append(centre)
     return {name: float(np.median(values)) for name, values in found.items()}
 
 
+def swept_centre(load: FloatArray, reading: FloatArray) -> float | None:
+    """Mean of a probe's readings (n,) over all directions of a sweeping load (n, 2); None where it does not go around.
+
+    Sides and corners of the clearance polygon lie evenly around the centre.
+    """
+    known = np.isfinite(load).all(axis=1) & np.isfinite(reading)
+    if not known.any():
+        return None
+    across = load[known] - np.median(load[known], axis=0)
+    turn = np.arctan2(across[:, 1], across[:, 0]) / (2 * math.pi) + 0.5
+    sector = np.floor(turn * _SECTORS) % _SECTORS
+    middles = [float(np.median(reading[known][sector == s])) for s in range(_SECTORS) if np.any(sector == s)]
+    return float(np.mean(middles)) if len(middles) >= _MET * _SECTORS else None
+
+
 def _tell(answer: Answer, found: WrongGain, names: Sequence[str]) -> None:
+    cure = "Check this channel's amplifier, range and cable in this run; leave it out or repeat it"
+    answer.seen.report.say(f"gain {names[0]}", "warning", f"channel {names[0]}", gain_in_words(found, names), cure)
+
+
+def gain_in_words(found: WrongGain, names: Sequence[str]) -> str:
+    """What a wrong gain looks like; `names` are those of its channels, the likeliest first."""
     off = found.gain - 1
     others = f" (or {' or '.join(names[1:])} another gain)" if len(names) > 1 else ""
     by = "phasor and mean say so" if found.means else "its phasor says so, its mean cannot"
-    what = (
+    return (
         f"reads {abs(off):.1%} too {'much' if off > 0 else 'little'} (standard error {found.error:.1%}) beside the "
         f"other runs at this operating point{others}; {by}"
     )
-    cure = "Check this channel's amplifier, range and cable in this run; leave it out or repeat it"
-    answer.seen.report.say(f"gain {names[0]}", "warning", f"channel {names[0]}", what, cure)

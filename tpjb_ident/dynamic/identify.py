@@ -24,6 +24,7 @@ from tpjb_ident.dynamic.point_source import point_sources
 from tpjb_ident.dynamic.probe_scale import with_probe_doubts
 from tpjb_ident.dynamic.quality import amplitude, coherence, directional_pattern, flags, rejected_windows
 from tpjb_ident.dynamic.rlm import RlmSettings
+from tpjb_ident.dynamic.run_gains import channel_pairs, with_gain_doubts
 from tpjb_ident.dynamic.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.run_phasors import PhasorSettings
 from tpjb_ident.dynamic.run_shelf import RunShelf
@@ -118,12 +119,12 @@ def assemble(campaign: Any, shelf: RunShelf, settings: IdentifySettings, tell: P
     tell("estimating", 0, len(sources))
     first = [_first_estimate(source.load(), settings) for source in sources]
     corrections = find_corrections(sources, [digest.mains for digest in digests], axes, first)
-    differ = directions_differ(first)
+    differ, pairs = directions_differ(first), channel_pairs(campaign)
     points, changes = [], []
     for source, correction in zip(sources, corrections):
         data = source.load()
         used = correction if settings.correct else correction.measured_only()
-        point = identify_point(used.apply(data), temperatures, settings, differ)
+        point = with_gain_doubts(identify_point(used.apply(data), temperatures, settings, differ), data, pairs)
         by_method = {name: used.widened(est) for name, est in point.by_method.items()}
         change = apparent_change(data, by_method[settings.method], draws)
         changes.append(change)

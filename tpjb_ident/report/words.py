@@ -49,6 +49,8 @@ MEANING = {
     "probes-contradict-clearance": "The probes' readings cannot be lengths in this bearing: a sensitivity is several "
     "times off, and the coefficients with it. Check the sensitivities of the probes, and the bearing file.",
     "record-damaged": "A record had to be mended when it was read, and part of it is lost. Copy it again from the rig.",
+    "run-gain-off": "In one run a probe or cell reads some per cent more or less than in the others of this point. "
+    "Check its amplifier, range and cable there; leave the run out or repeat it.",
     "run-left-out": "A run at this point cannot be used and takes no part; the others stand.",
     "runs-left-out": "Some runs cannot be used and take no part; the others stand.",
     "run-without-data": "A run gave no usable window and takes no part.",
