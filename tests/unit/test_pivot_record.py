@@ -323,3 +323,19 @@ def test_four_bins_are_a_hold():
     for k, one in enumerate(holds):
         begin = 0.4 + 0.64 * k
         assert begin - 1e-9 < one.start < one.stop < begin + 0.24 + 1e-9
+
+
+def test_half_a_second_can_hold_a_hold():
+    time, load = staircase(hold=0.4, ramp=0.12, levels=(1000.0,))
+    (hold,) = find_holds(time, load)
+    assert hold.level == pytest.approx(1000.0)
+    assert 0.12 - 1e-9 <= hold.start < 0.21
+    assert hold.stop == pytest.approx(0.52, abs=0.05)
+
+
+def test_a_move_of_nine_standard_deviations_is_no_noise():
+    """Of a median of twenty samples; the levels before and after are two holds."""
+    rng = np.random.default_rng(2)
+    time, load = staircase(rng, hold=2.0)
+    load[(time > 1.5) & (time <= 2.5)] += 9 * 5.0 * np.sqrt(np.pi / 2 / 20)
+    assert len(find_holds(time, load)) == 4

@@ -98,11 +98,8 @@ def _bin(time: FloatArray, load: FloatArray) -> _Bins:
 
 def _still_rate(bins: _Bins) -> float:
     """Rate [N/s] below which the load counts as held."""
-    steps = np.abs(np.diff(bins.load))
-    # what is left of the total variation when the noise's own share (mean |difference| of noise) is taken
-    # out
-    travelled = max(float(np.sum(steps)) - len(steps) * 1.128 * bins.noise, float(np.ptp(bins.load)))
-    mean_rate = travelled / float(bins.time[-1] - bins.time[0])
+    # noise adds to the way, but at most a tenth of what the second limit is above it
+    mean_rate = float(np.sum(np.abs(np.diff(bins.load)))) / float(bins.time[-1] - bins.time[0])
     return max(STILL * mean_rate, 3.0 * bins.noise / (np.sqrt(2.0) * bins.width))
 
 
