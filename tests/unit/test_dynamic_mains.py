@@ -46,8 +46,9 @@ PROBES = np.stack([np.cos(AXES), np.sin(AXES)], axis=1)
 
 @pytest.fixture(autouse=True)
 def _few_starts(monkeypatch):
-    """Six runs with little pick-up need no two thousand starts."""
+    """Six runs with little pick-up need neither two thousand starts nor thirty of them polished."""
     monkeypatch.setattr(mains_angles, "_STARTS", 40)
+    monkeypatch.setattr(mains_angles, "_POLISHED", 6)
 
 
 def shaken(n=6, per_run=4, seed=1, h=H, load=5000.0, struck=False, noise=1e-13, force=500.0):
