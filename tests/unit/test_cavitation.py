@@ -49,8 +49,12 @@ def plain(wedge: tuple[float, float]) -> Profile:
     return lambda t: CLEARANCE * (1.0 - wedge[0] * np.cos(t) - wedge[1] * np.sin(t))
 
 
+#: Found once: it takes longer than the integral.
+GAUSS = np.polynomial.legendre.leggauss(60)
+
+
 def gauss(start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
-    at, weight = np.polynomial.legendre.leggauss(60)
+    at, weight = GAUSS
     return start + 0.5 * (end - start) * (at + 1.0), 0.5 * (end - start) * weight
 
 

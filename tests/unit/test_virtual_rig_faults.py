@@ -181,7 +181,7 @@ def test_missing_values_are_nan_in_every_layout(tmp_path):
     fault = Fault("nan_gap", FIRST, "X1A", start=0.5, length=0.1)
     layouts = [Hdf5Layout(), *(CsvLayout(missing=m, delimiter=";") for m in ("", "NaN", "-", "#N/A"))]
     for number, layout in enumerate(layouts):
-        write_campaign(tmp_path / f"c{number}", rig(fault), layout)
+        write_campaign(tmp_path / f"c{number}", rig(fault, seconds=0.8), layout)
         values = rigdata.load_campaign(tmp_path / f"c{number}").run(FIRST).record("X1A").values
         assert np.flatnonzero(np.isnan(values)).tolist() == list(range(500, 600))
 
