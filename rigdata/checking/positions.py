@@ -16,6 +16,9 @@ _MIN_RUNS = 5
 _FAR = 3.0
 #: A smaller distance is no jump: dry runs press the shaft against pads on all sides [m].
 _MIN_JUMP = {"running": 100e-6, "dry": 300e-6}
+#: Runs of one operating point needed, distance from their median in robust standard deviations, and the least [m]: a
+#: probe that drifts by 1.5 % of a gap of 1 mm within an operating point was touched, or its amplifier was.
+_LIKE_RUNS, _STEP, _LEAST_STEP = 4, 6.0, 15e-6
 
 
 def check_positions(runs: Sequence[Observation]) -> None:
@@ -35,6 +38,26 @@ def check_positions(runs: Sequence[Observation]) -> None:
                 seen.report.say(f"travel {name}", "warning", f"channel {name}", what, cure)
     for (name, state), means in places.items():
         _check_jumps(name, means, _MIN_JUMP[state])
+        points: dict[object, list[tuple[Observation, float]]] = {}
+        for seen, middle in means:
+            if seen.run.kind == "dynamic":
+                points.setdefault(seen.run.point, []).append((seen, middle))
+        for like in points.values():
+            _check_steps(name, like)
+
+
+def _check_steps(name: str, means: Sequence[tuple[Observation, float]]) -> None:
+    """One probe's means in the runs of one operating point."""
+    if len(means) < _LIKE_RUNS:
+        return
+    values = np.array([m for _, m in means])
+    off = values - np.median(values)
+    allowed = max(_STEP * 1.4826 * float(np.median(np.abs(off))), _LEAST_STEP)
+    for (seen, _), distance in zip(means, off):
+        if abs(distance) > allowed and "displacement" not in seen.report.doubts:
+            what = f"reads {1e6 * distance:+.0f} um on average beside the other runs at this operating point"
+            cure = "Check probe and amplifier: moved, or another gain in this run?"
+            seen.report.say(f"step {name}", "warning", f"channel {name}", what, cure)
 
 
 def _check_jumps(name: str, means: Sequence[tuple[Observation, float]], least: float) -> None:

@@ -16,6 +16,8 @@ from rigdata.checking.one_gain import WrongGain, wrong_gains
 from rigdata.checking.set_points import to_plane
 
 FloatArray = NDArray[np.float64]
+#: Median of the amplitude of a noise line, in standard deviations of its real part (Rayleigh).
+_MEDIAN = math.sqrt(2 * math.log(2))
 #: Sectors into which the directions of a sweep's load are sorted, and share of them that must be met.
 _SECTORS, _MET = 36, 0.9
 
@@ -69,6 +71,8 @@ def point_readings(group: Sequence[Answer], centres: dict[str, float]) -> PointR
         probe_plane=_plane(probes),
         cell_plane=cell_plane,
         centre=(centres.get(probes[0].name), centres.get(probes[1].name)),
+        noise=np.stack([np.concatenate([f.floor[p], f.floor[c]]) for f, (p, c) in zip(lines, places, strict=True)])
+        / _MEDIAN,
     )
 
 

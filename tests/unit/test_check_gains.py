@@ -171,6 +171,26 @@ def test_estimates_scatter_as_their_standard_errors_say(seed):
     assert 0.05 < np.sqrt(np.mean(off**2)) < 1.6
 
 
+def test_noise_that_the_records_tell_makes_a_run_surer():
+    readings = spoilt(point(scatter=1e-3, seed=4), 2, 0, 1.03, CENTRE[0])
+    others = [0, 1, 3, 4, 5]
+    # as `point` makes it: 1 nm on X and Y, 0.3 N on every cell
+    noise = np.tile([1e-9, 1e-9, 0.3, 0.3], (6, 1))
+    alone = dynamic_difference(readings, 2, others)
+    told = dynamic_difference(replace(readings, noise=noise), 2, others)
+    assert alone is not None
+    assert told is not None
+    assert (alone.spare, told.spare) == (12, 12 + 50)
+    assert np.all(np.diag(told.noise) >= np.diag(alone.noise))
+    assert np.diag(told.noise) == pytest.approx(np.diag(alone.noise), rel=1.5)
+    # runs that differ by much more than their noise count by themselves, and so does noise that is not known
+    for unlike in (0.1 * noise, np.nan * noise):
+        same = dynamic_difference(replace(readings, noise=unlike), 2, others)
+        assert same is not None
+        assert same.spare == 12
+        assert np.array_equal(same.noise, alone.noise)
+
+
 def test_evidence_in_exact_limits():
     one = Evidence(0.02, 1e4, 0.0)
     assert one.freedom == math.inf
@@ -241,6 +261,14 @@ def test_probe_centres_come_from_a_load_that_goes_around(tmp_path):
     half = replace(seen, samples=seen.samples[: len(seen.samples) // 2])
     assert probe_centres([half]) == {}
     assert probe_centres([]) == {}
+
+
+@pytest.mark.parametrize(("shift", "told"), [(14e-6, False), (16e-6, True), (-60e-6, True)])
+def test_a_probe_that_steps_within_an_operating_point_is_told(tmp_path, shift, told):
+    plan = replace(PLAN, locus=(), dry=(), clearance=())
+    path = written(tmp_path / "c.h5", stiff_rig(5, Fault("offset", RUN, "X1B", value=shift), plan=plan))
+    found = [(p.run, p.place) for p in rigdata.check_campaign(path) if "on average beside" in p.what]
+    assert found == ([(RUN, "channel X1B")] if told else [])
 
 
 def test_the_check_names_channel_and_gain_of_one_run(tmp_path):
