@@ -24,13 +24,14 @@ from tpjb_ident.locus import measure_locus
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 K = np.diag([1.2e8, 1.0e8])
+SWEEP = (ClearanceSweep(),)
 
 
-def made(path, locus, faults=(), noise=None, k=K):
+def made(path, locus, faults=(), noise=None, k=K, clearance=SWEEP):
     truth = RigTruth.constant(k, np.diag([4e5, 6e5]), pivot_stiffness=6e8)
     rig = VirtualRig(
         truth,
-        RigPlan(locus=locus, clearance=(ClearanceSweep(),)),
+        RigPlan(locus=locus, clearance=clearance),
         instruments=Instruments.like_paper(seed=2),
         noise=noise or Noise.like_samples(),
         faults=faults,
@@ -47,6 +48,12 @@ def true_position(direction, load=5000.0, k=K):
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
     return made(tmp_path_factory.mktemp("locus") / "c.h5", locus_points(6))
+
+
+@pytest.fixture(scope="module")
+def raw(campaign):
+    """Positions without a polygon."""
+    return measure_locus(campaign)
 
 
 @pytest.fixture(scope="module")
@@ -70,12 +77,11 @@ def test_positions_from_the_bearing_centre(campaign, polygon):
     assert "6 positions" in str(found)
 
 
-def test_without_a_polygon_positions_are_raw_and_say_so(campaign, polygon):
-    found = measure_locus(campaign)
-    assert found.centre.tolist() == [0.0, 0.0]
-    assert any(s.startswith("no-centre") for s in found.status)
+def test_without_a_polygon_positions_are_raw_and_say_so(campaign, polygon, raw):
+    assert raw.centre.tolist() == [0.0, 0.0]
+    assert any(s.startswith("no-centre") for s in raw.status)
     both = measure_locus(campaign, polygon)
-    shift = found.points[2].position - both.points[2].position
+    shift = raw.points[2].position - both.points[2].position
     assert shift == pytest.approx(both.centre)
 
 
@@ -114,7 +120,8 @@ def moved(run):
 
 
 def test_loads_off_their_set_point_are_named(tmp_path):
-    source = made(tmp_path / "c.h5", locus_points(4), faults=(Fault("wrong_load", run="l-*-02", value=1.2),))
+    heavier = Fault("wrong_load", run="l-*-02", value=1.2)
+    source = made(tmp_path / "c.h5", locus_points(4), faults=(heavier,), clearance=())
     found = measure_locus(source)
     status = next(s for s in found.status if s.startswith("load-off-set-point"))
     assert "-02" in status
@@ -133,7 +140,7 @@ def test_no_locus_is_an_error(tmp_path):
         measure_locus(source)
 
 
-def test_operating_points_survive(campaign):
-    point = measure_locus(campaign).points[0].point
+def test_operating_points_survive(raw):
+    point = raw.points[0].point
     assert isinstance(point, OperatingPoint)
     assert point.static_load == 5000.0

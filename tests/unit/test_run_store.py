@@ -158,7 +158,8 @@ def test_a_damaged_or_foreign_file_is_no_result(path, tmp_path, counted):
 
 
 def test_csv_runs_have_fingerprints_of_their_own_bytes(tmp_path):
-    write_campaign(tmp_path / "folder", rig([(2500.0, 25.0)], seed=8), "csv-german")
+    two = rig(POINTS[:1], seed=8, directions=directions(2), timing=Timing(dynamic_seconds=1.0))
+    write_campaign(tmp_path / "folder", two, "csv-german")
     run, other = load_campaign(tmp_path / "folder").of_kind("dynamic")[:2]
     mark = fingerprint(run, 30.0, PhasorSettings())
     assert mark != fingerprint(other, 30.0, PhasorSettings())
