@@ -22,7 +22,9 @@ from tpjb_ident.dynamic.stretches import open_stretches
 from tpjb_ident.dynamic.windows import WindowSettings
 
 RATE = 1000.0
-POINT = OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22.0, 2 * math.pi * 25.0)
+#: No whole number of cycles in a second, so that a wrong origin of time shows.
+DRIVEN = 33.7
+POINT = OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22.0, 2 * math.pi * DRIVEN)
 
 
 @dataclass
@@ -72,7 +74,9 @@ def readings(count, n=50, seed=1):
 @pytest.mark.parametrize(("zero", "polarity"), [(0.0, 1), (2e-3, -1)])
 def test_two_channels_become_rows_in_one_request(axes, zero, polarity):
     tach = Channel("K", "speed", "Hz", 2 * math.pi)
-    run = run_of(readings(2) | {"K": np.full(50, 22.0)}, [*probes(axes, zero, polarity), tach])
+    cells = [Channel(name, "force", axis=axis) for name, axis in (("LH", 0.0), ("LV", math.pi / 2))]
+    data = readings(2) | {"K": np.full(50, 22.0), "LH": np.ones(50), "LV": np.ones(50)}
+    run = run_of(data, [*probes(axes, zero, polarity), tach, *cells])
     expected = run.vector("displacement", 7, 30).values.T
     run.reader.asked.clear()
     with open_stretches(run, ("displacement",)) as stretches:
@@ -119,7 +123,7 @@ def test_three_channels_and_those_without_an_axis_are_left_to_the_run():
             stretches.read(0, 50)
 
 
-LINES = known_lines((25.0,), 22.0, RATE)
+LINES = known_lines((DRIVEN,), 22.0, RATE)
 Z = {"displacement": 1e-6 * np.array([1.0 + 0.5j, -0.4j]), "force": np.array([300.0j, 200.0 - 80.0j])}
 RUNOUT = 2e-6 * np.array([1.0, 1.0j])
 
@@ -139,7 +143,7 @@ class Held:
         for quantity in quantities:
             z = Z.get(quantity, np.array([0.02, 0.01j]))
             own = t - (late if quantity == "force" else 0.0)
-            wave = np.outer(np.exp(2j * math.pi * 25.0 * own), z).real
+            wave = np.outer(np.exp(2j * math.pi * DRIVEN * own), z).real
             wave += np.outer(shaft, RUNOUT).real * (quantity == "displacement")
             self.data[quantity] = wave + (1e-4 if quantity == "displacement" else 700.0)
 
@@ -180,6 +184,17 @@ def test_windows_are_the_same_in_chunks_of_any_length(monkeypatch, chunk):
     np.testing.assert_allclose(more.acceleration.phasors[:, 0], np.tile([0.02, 0.01j], (10, 1)), atol=1e-10)
 
 
+def test_a_run_on_file_without_a_clock_counts_its_samples():
+    held = Held()
+    described = [Channel(f"{q[0]}{a}", q, axis=a * math.pi / 2) for q in ("displacement", "force") for a in (0, 1)]
+    data = {c.name: held.data[c.quantity][:, int(c.name[1])] for c in described}
+    found = taken(run_of(data, described))
+    exact(found)
+    exact(found, "force")
+    np.testing.assert_allclose(found.start, 0.4 * np.arange(10))
+    assert np.isnan(found.speeds).all()
+
+
 def test_a_channel_recorded_late_is_put_back():
     late = 3e-3
     settings = PhasorSettings(windows=FIXED.windows, delays={"force": late})
@@ -187,7 +202,7 @@ def test_a_channel_recorded_late_is_put_back():
     exact(found, "force")
     exact(found)
     plain = taken(Held(late=late))
-    turned = np.exp(-2j * math.pi * 25.0 * late) * Z["force"]
+    turned = np.exp(-2j * math.pi * DRIVEN * late) * Z["force"]
     np.testing.assert_allclose(plain.cell_force.phasors[:, 0], np.tile(turned, (10, 1)), rtol=1e-9)
     np.testing.assert_allclose(found.cell_force.mean, plain.cell_force.mean)
 
@@ -207,13 +222,13 @@ def test_a_clock_may_start_anywhere_and_stray_within_a_window():
         little = even.copy()
         little[801:1200] += share * MAX_JITTER / RATE
         error = np.abs(taken(Held(stamps=little)).displacement.phasors[2, 0] - Z["displacement"]).max()
-        late = 2 * math.pi * 25.0 * share * MAX_JITTER / RATE * np.abs(Z["displacement"]).max()
+        late = 2 * math.pi * DRIVEN * share * MAX_JITTER / RATE * np.abs(Z["displacement"]).max()
         assert error == pytest.approx(0.0 if own else late, abs=0.02 * late)
 
 
 def test_stamps_that_are_missing_leave_their_samples_out():
     stamps = np.arange(4000) / RATE
-    stamps[[850, 900, 1190]] = np.nan
+    stamps[[400, 850, 900, 1190]] = np.nan
     stamps[1200:1600] = np.nan
     stamps[1210:1225] = np.arange(1210, 1225) / RATE
     found = taken(Held(stamps=stamps))
@@ -253,21 +268,21 @@ def test_a_long_disturbance_is_told_by_the_other_windows(monkeypatch):
         run = Held()
         run.data["displacement"] += 2e-8 * np.random.default_rng(3).standard_normal((4000, 2))
         part = slice(1300, 1380)
-        run.data["displacement"][part] += 4e-6 * np.cos(2 * math.pi * 25 * run.stamps[part])[:, None]
+        run.data["displacement"][part] += 4e-6 * np.cos(2 * math.pi * DRIVEN * run.stamps[part])[:, None]
         found = taken(run)
         exact(found, tolerance=0.02)
         assert found.displacement.lost[3] > 0.15
         assert found.displacement.lost[[0, 1, 2, 4, 5, 6, 7, 8, 9]].max() < 0.05
 
 
-FREQUENCIES = np.array([25.0, 22.0])
+FREQUENCIES = np.array([25.3, 22.0])
 
 
 def pieces(length, n=6, noise=0.01, unit=1.0, seed=4):
     rng = np.random.default_rng(seed)
     t = np.arange(n * length) / RATE
     z = unit * np.array([1.0 + 0.5j, 20.0j])
-    rows = np.stack([(a * np.exp(2j * math.pi * 25.0 * t)).real for a in z]) + 700.0 * unit
+    rows = np.stack([(a * np.exp(2j * math.pi * 25.3 * t)).real for a in z]) + 700.0 * unit
     rows = rows + noise * np.abs(z)[:, None] * rng.standard_normal(rows.shape)
     return rows.reshape(2, n, length), z, np.arange(n) * length / RATE
 
@@ -303,11 +318,11 @@ def test_a_window_of_its_own_clock_has_its_mean_and_noise():
     rng = np.random.default_rng(5)
     t = 3.0 + np.sort(rng.uniform(0.0, 0.5, 500))
     z = np.array([2.0 - 1.0j, 0.5j])
-    values = np.outer(np.exp(2j * math.pi * 25.0 * t), z).real + [700.0, -30.0] + 0.01 * rng.standard_normal((500, 2))
+    values = np.outer(np.exp(2j * math.pi * 25.3 * t), z).real + [700.0, -30.0] + 0.01 * rng.standard_normal((500, 2))
     values[40, 0] = np.nan
     found = fit_uneven(values, t, FREQUENCIES, 1.0)
     # phasors count from the origin, two seconds before the first sample
-    np.testing.assert_allclose(found.phasors[0, 0], z * np.exp(2j * math.pi * 25.0 * 1.0), atol=5e-3)
+    np.testing.assert_allclose(found.phasors[0, 0], z * np.exp(2j * math.pi * 25.3 * 1.0), atol=5e-3)
     np.testing.assert_allclose(found.mean[0], [700.0, -30.0], atol=5e-3)
     np.testing.assert_allclose(found.noise[0], 0.01, rtol=0.2)
     assert found.lost[0] == pytest.approx(1 / 500)
