@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import mmap
 import os
 import random
 import shutil
@@ -22,6 +23,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,7 +58,26 @@ def tables(folder: Path) -> dict[str, str]:
     return {n: h for n, h in files_with_hash(folder).items() if n != "run.json" and not n.startswith(".tpjb")}
 
 
-def start(words: list[str], log: Path, die_at_step: int | None = None, counter: Path | None = None) -> int:
+def watch_steps(at_step: Callable[[int], None]) -> None:
+    """Have `at_step` called, with a number that counts from 1, just before every step of this process on the disk."""
+    steps = 0
+    inside = False
+
+    def watch(event: str, arguments: tuple) -> None:
+        nonlocal steps, inside
+        writing = event == "open" and isinstance(arguments[2], int) and bool(arguments[2] & _WRITING)
+        if (writing or event in _STEPS) and not inside:
+            steps += 1
+            inside = True  # its own steps are none of the command's
+            try:
+                at_step(steps)
+            finally:
+                inside = False
+
+    sys.addaudithook(watch)
+
+
+def start(words: list[str], log: Path, at_step: Callable[[int], None] = lambda step: None) -> int:
     """Fork a process that runs the command line; its id."""
     child = os.fork()
     if child:
@@ -65,17 +86,7 @@ def start(words: list[str], log: Path, die_at_step: int | None = None, counter: 
     handle = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     os.dup2(handle, 1)
     os.dup2(handle, 2)
-    steps = 0
-
-    def watch(event: str, arguments: tuple) -> None:
-        nonlocal steps
-        writing = event == "open" and isinstance(arguments[2], int) and bool(arguments[2] & _WRITING)
-        if writing or event in _STEPS:
-            steps += 1
-            if steps == die_at_step:
-                os.kill(os.getpid(), signal.SIGKILL)
-
-    sys.addaudithook(watch)
+    watch_steps(at_step)
     code = 1
     try:
         from tpjb_ident.cli.app import app
@@ -85,8 +96,6 @@ def start(words: list[str], log: Path, die_at_step: int | None = None, counter: 
     except SystemExit as end:
         code = int(end.code or 0)
     finally:
-        if counter is not None:
-            counter.write_text(str(steps))
         os._exit(code)
 
 
@@ -120,10 +129,14 @@ class Bench:
 
     def reference(self, command: str) -> Reference:
         """Run once undisturbed."""
-        out, counter = self.folder / f"reference-{command}", self.folder / "steps"
+        out, counter = self.folder / f"reference-{command}", mmap.mmap(-1, 8)
+
+        def count(step: int) -> None:
+            counter[:] = step.to_bytes(8, "little")
+
         began = time.time()
-        code = wait(start(self.words(command, out), self.folder / "log", counter=counter))
-        return Reference(tables(out), code, time.time() - began, int(counter.read_text()))
+        code = wait(start(self.words(command, out), self.folder / "log", count))
+        return Reference(tables(out), code, time.time() - began, int.from_bytes(counter[:], "little"))
 
     def raw_data_changed(self) -> bool:
         state = hashlib.sha256(self.campaign.read_bytes()).hexdigest(), self.campaign.stat().st_mode
@@ -192,7 +205,12 @@ def trial(bench: Bench, command: str, reference: Reference, rng: random.Random) 
     # Half of the kills hit the disk steps, the last of which put the results in place: one step where the folder is
     # new, some twenty more where it holds former results.
     step = None if rng.random() < 0.5 else max(1, reference.steps + 25 * former - rng.randrange(40))
-    child = start(bench.words(command, out), log, step)
+
+    def die(at: int) -> None:
+        if at == step:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    child = start(bench.words(command, out), log, die)
     if step is None:
         time.sleep(rng.uniform(0.0, 1.1) * reference.seconds)
         os.kill(child, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""Real disks in a mount namespace of their own: full ones, read-only ones, and folders that belong to somebody else."""
+"""Real disks in a mount namespace of their own: full ones, read-only ones, and one whose power is cut."""
 
 from __future__ import annotations
 
@@ -93,3 +93,15 @@ def test_results_for_a_read_only_disk_are_refused_before_any_work(tmp_path):
     code, errors = in_namespace(f'{sealed} && exec "$0" -m tpjb_ident "$@"', *predict("5 kN", tmp_path / "out"))
     assert code == 2
     assert f"--out {tmp_path / 'out'}: cannot be made (Read-only file system). Give another folder." in errors
+
+
+@pytest.mark.skipif(not shutil.which("mkfs.ext4") or not Path("/dev/loop-control").exists(), reason="takes loop, ext4")
+def test_power_cut_at_any_step_leaves_former_or_whole_results():
+    bench = ROOT / "tests" / "benchmarks" / "fault_power.py"
+    done = subprocess.run(
+        [sys.executable, bench, "--trials", "1", "--commands", "locus", "--reruns", "1"],
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "cut after the end, results new" in done.stdout
+    assert "cut on the way" in done.stdout

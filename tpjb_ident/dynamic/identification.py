@@ -106,7 +106,8 @@ class Identification:
                 place = f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz"
                 places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
         for name, found in places.items():
-            more = f" (and at {len(found) - 1} more points)" if len(found) > 1 else ""
+            others = len(found) - 1
+            more = f" (and at {others} more point{'s' if others > 1 else ''})" if others else ""
             told.append(f"{name} at {found[0]}{more}")
         return tuple(told)
 
