@@ -71,7 +71,7 @@ def readings(count, n=50, seed=1):
 
 
 @pytest.mark.parametrize("axes", [(45.0, 135.0), (0.0, 90.0), (90.0, 0.0), (10.0, 70.0), (0.0, 3.0), (180.0, 90.0)])
-@pytest.mark.parametrize(("zero", "polarity"), [(0.0, 1), (2e-3, -1)])
+@pytest.mark.parametrize(("zero", "polarity"), [(0.0, 1), (2e-3, -1), (1.0, 1)])
 def test_two_channels_become_rows_in_one_request(axes, zero, polarity):
     tach = Channel("K", "speed", "Hz", 2 * math.pi)
     cells = [Channel(name, "force", axis=axis) for name, axis in (("LH", 0.0), ("LV", math.pi / 2))]

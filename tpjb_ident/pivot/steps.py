@@ -17,7 +17,7 @@ IntArray = NDArray[np.int_]
 
 STILL = 0.2  # share of the mean rate of change below which the load counts as held
 SETTLED = 4.0  # noise standard deviations within which the load must lie of the hold's own level
-SHORTEST = 0.15  # shortest hold [s]
+FEWEST = 4  # bins of a hold: 0.16 s, longer in long records
 MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
 
 
@@ -126,7 +126,7 @@ def _merge(runs: list[tuple[int, int]], bins: _Bins) -> list[tuple[int, int]]:
 def _settle(run: tuple[int, int], bins: _Bins) -> Hold | None:
     """Cut the overshoot off the front of a run and the first moving bin off either end."""
     a, b = run
-    while b - a >= 4:
+    while b - a >= FEWEST:
         level = float(np.median(bins.load[a:b]))
         noise = max(bins.noise, 1.4826 * float(np.median(np.abs(bins.load[a:b] - level))), 1e-9 * abs(level))
         if abs(bins.load[a] - level) > SETTLED * noise:
@@ -135,10 +135,10 @@ def _settle(run: tuple[int, int], bins: _Bins) -> Hold | None:
             b -= 1
         else:
             break
-    start = float(bins.time[a]) - 0.5 * bins.width if a < len(bins.time) else 0.0
-    stop = float(bins.time[b - 1]) + 0.5 * bins.width
-    if b - a < 4 or stop - start < SHORTEST:
+    if b - a < FEWEST:
         return None
+    start = float(bins.time[a]) - 0.5 * bins.width
+    stop = float(bins.time[b - 1]) + 0.5 * bins.width
     return Hold(start, stop, float(np.median(bins.load[a:b])), 1)
 
 
