@@ -123,7 +123,11 @@ EXTREMES = {
 }
 
 
-@pytest.mark.parametrize("name", EXTREMES)
+#: Solved in `test_model_conditions` already, with every name that their status must have.
+TWICE = ("overload", "shaft on the pads' edges", "film starts behind the pivot")
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in TWICE)) for n in EXTREMES])
 def test_extremes_end_in_a_number_or_a_status(rocker, name):
     bearing, load, more = EXTREMES[name](rocker)
     point = {"load_direction": DOWN, "speed": SPEED, "mesh": COARSE} | more
