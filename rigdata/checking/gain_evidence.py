@@ -25,6 +25,8 @@ _LEAST_PHASOR, _LEAST_LOAD, _LEAST_POSITION = 1e-4, 1e-3, 10e-9
 #: Runs whose scatter has up to this many times the variance of their records' noise differ by that noise: 5 % of all
 #: that do have more, with 12 degrees of freedom. Every record's noise was taken from 10 lines.
 _NO_MORE, _LINES_TELL = 1.75, 10
+#: Fewer degrees of freedom cannot tell whether runs differ by noise alone.
+_TELLING = 8
 #: How well the zero of a probe, and so its distance from there, is known from a clearance run.
 _LEVER_KNOWN = 0.25
 
@@ -169,14 +171,32 @@ def dynamic_difference(readings: PointReadings, one: int, others: Sequence[int])
     leverage = float(np.real(own.conj() @ np.linalg.solve(unit.T @ unit.conj(), own))) / size**2
     each = float(np.sum(np.abs(scatter) ** 2)) / spare
     told = _noise_told(readings, others, stiffness)
-    if 0 < each <= _NO_MORE * told:
+    if spare >= _TELLING and 0 < each <= _NO_MORE * told:
         # the runs differ by no more than their records' noise lets them, which is known from many lines
         each, spare = max(each, told), spare + _LINES_TELL * len(others)
     variance = each * size**2 * (1 + leverage)
     variance += (_LEAST_PHASOR * float(np.linalg.norm(force[one]))) ** 2
-    softer, looser = stacked(stiffness.real @ own), stacked(1j * stiffness.imag @ own)
-    honest = HONEST**2 * (np.outer(softer, softer) + np.outer(looser, looser))
+    changes = _bearing_changes(stiffness, own)
+    honest = changes @ np.diag(HONEST**2 + _bearing_wander(readings, others, stiffness)) @ changes.T
     return Difference(stacked(force[one] - stiffness @ own), variance * np.eye(4), honest, spare)
+
+
+def _bearing_changes(stiffness: ComplexArray, displacement: ComplexArray) -> FloatArray:
+    """Force by stiffness and by damping alone, (4, 2) as `stacked` [N]: what a stiffer, a more damped bearing adds."""
+    return np.stack(
+        [stacked(stiffness.real @ displacement), stacked(1j * stiffness.imag @ displacement)],
+        axis=1,
+    )
+
+
+def _bearing_wander(readings: PointReadings, runs: Sequence[int], stiffness: ComplexArray) -> FloatArray:
+    """Variances by which some runs' stiffness and damping, as shares, differ about the matrix fitted to them, (2,)."""
+    shares = []
+    for displacement, force in zip(readings.displacement[list(runs)], readings.force[list(runs)], strict=True):
+        rest = stacked(force - stiffness @ displacement)
+        shares.append(np.linalg.lstsq(_bearing_changes(stiffness, displacement), rest, rcond=None)[0])
+    # the matrix took 8 of the 4 n equations along
+    return np.asarray(np.mean(np.square(shares), axis=0) * len(runs) / (len(runs) - 2))
 
 
 def _noise_told(readings: PointReadings, runs: Sequence[int], stiffness: ComplexArray) -> float:
