@@ -208,7 +208,7 @@ def _iterate(search: _Search) -> Equilibrium:
             memory.reset()
         before = _state(search) if left > SLOW * best_left and not isothermal else None
         heat_change = _solve_films(search)
-        if any(not f.idle and f.forces is not None and f.forces.steps < 0 for f in search.films):
+        if _film_lost(search):
             return _result(search, iteration, math.inf, heat_change, ("film lost", "not converged"))
         residual, shift, moves = newton_step(search.setup, search.load, search.films)
         if not (math.isfinite(residual) and np.all(np.isfinite(shift)) and np.all(np.isfinite(moves))):
@@ -283,6 +283,8 @@ def _solve_films(search: _Search) -> float:
         if film.idle:
             film.forces = film.foreseen = film.step = None
             film.work.pressure[:] = 0.0
+    if _film_lost(search):
+        return math.inf  # what has no pressure has no flow that could carry heat
     change = 0.0
     if setup.thermal != "isothermal":
         change = _warm_films(search, [f for f in search.films if f.forces is not None and f.forces.steps > 0], oil)
@@ -290,6 +292,10 @@ def _solve_films(search: _Search) -> float:
         # a deformation counts like a temperature change of the same weight in the film's resistance
         change = max(change, HEAT_PER_FORCE * _bend_pads(search))
     return change
+
+
+def _film_lost(search: _Search) -> bool:
+    return any(not f.idle and f.forces is not None and f.forces.steps < 0 for f in search.films)
 
 
 def _solve_pressure(search: _Search, film: PadFilm) -> None:
