@@ -105,8 +105,8 @@ def _table_start(lines: list[str], delimiter: str, decimal: str) -> tuple[int, i
     run, width = 0, 0
     for i, line in enumerate(lines):
         cells = _cells(line, delimiter)
-        numbers = sum(is_number(c, decimal) for c in cells)
-        good = numbers > 0 and all(is_number(c, decimal) or is_missing(c) for c in cells) and len(cells) > 1
+        good = len(cells) > 1 and all(is_number(c, decimal) or is_missing(c) for c in cells)
+        good = good and any(is_number(c, decimal) for c in cells)
         run, width = (run + 1, width) if good and len(cells) == width else (int(good), len(cells) if good else 0)
         last = i == len(lines) - 1
         if run >= _RUN or (run and last):
