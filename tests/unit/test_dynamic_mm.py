@@ -119,7 +119,7 @@ def two_opinions(tightness, seed=3):
     return X, X @ H.T * np.where(few, 2.0, 1.0)[:, None] + E, label
 
 
-@pytest.mark.parametrize(("tightness", "answer"), [(1.0, 1.0), (2.0, 1.0), (6.0, 2.0), (50.0, 2.0)])
+@pytest.mark.parametrize(("tightness", "answer"), [(1.0, 1.0), (3.0, 1.0), (6.0, 2.0), (50.0, 2.0)])
 def test_a_smaller_core_must_be_several_times_tighter(tightness, answer):
     X, Y, label = two_opinions(tightness)
     start = robust_start(Regression(X, Y), label, 1)
@@ -142,6 +142,36 @@ def test_one_start_that_fits_exactly_is_the_answer():
         np.testing.assert_allclose(found, H, atol=1e-9)
 
 
+def test_windows_that_fit_exactly_but_are_few_do_not_win():
+    """Two of five, computed by another H: what they leave is nothing, and no noise that others could be held to."""
+    X, Y, label = two_opinions(1e40)
+    start = robust_start(Regression(X, Y), label, 1)
+    assert not start.exact
+    np.testing.assert_allclose(start.coefficients, H, atol=0.05)
+    assert np.trace(start.scatter).real == pytest.approx(2 * 0.05**2, rel=0.4)
+
+
+def test_two_runs_that_fit_by_themselves_are_no_core():
+    """Runs differ by thirty times the noise within them: any two are fitted to the noise, by an H of their own.
+
+    Half of the windows, three runs, are not.
+    """
+    rng = np.random.default_rng(12)
+    label = np.repeat(np.arange(6), 20)
+    X = complex_normal(rng, 6, 2)[label] + 0.005 * complex_normal(rng, 120, 2)
+    Y = X @ H.T + 0.3 * complex_normal(rng, 6, 2)[label] + 0.01 * complex_normal(rng, 120, 2)
+    start = robust_start(Regression(X, Y), label, 1)
+    accepted = distance2(Regression(X, Y).terms(start.coefficients), start.scatter) < chi2.ppf(0.99, 4)
+    assert len(np.unique(label[accepted])) >= 3
+    assert np.trace(start.scatter).real > 5 * 2 * 0.01**2
+
+
+def test_a_displacement_that_is_nothing_is_no_division_by_nothing():
+    X, Y, _ = windows(10)
+    X[:, 1] = 0.0
+    assert np.isfinite(Regression(X, Y).fit(np.ones(60))).all()
+
+
 def test_a_component_without_noise_is_found_exactly_beside_one_with_noise():
     rng = np.random.default_rng(9)
     X, label = complex_normal(rng, 60, 2), np.arange(60) % 6
@@ -162,9 +192,9 @@ def test_starts_are_pairs_of_windows_that_differ_in_direction_and_cores_the_near
     alone = trimmed_start._start_pairs(np.zeros(40, dtype=int), 1)
     assert (alone[:, 0] != alone[:, 1]).all()
     assert len(alone) == trimmed_start.STARTS
-    distance = np.random.default_rng(2).random((50, 9))
-    nearest = trimmed_start._nearest(distance, 4)
-    np.testing.assert_array_equal(nearest, np.argsort(np.argsort(distance)) < 4)
+    distance = np.random.default_rng(2).random((20, 300))
+    nearest = trimmed_start._nearest(distance, 150)
+    np.testing.assert_array_equal(nearest, np.argsort(np.argsort(distance)) < 150)
 
 
 SCATTER = 0.02 * np.array([[0.5, 0, 0, 0], [0, 0.4, 0, 0], [0.9, 0.4j, 0.3, 0], [-0.4j, 0.6, 0.1, 0.3]])
