@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -32,7 +33,7 @@ class Shelf:
 
     def __init__(self, runs, left_out=()):
         self._runs, self.left_out = runs, left_out
-        self.digests = [digest(RunResult(run, {1: 300.0 + k, 2: 310.0})) for k, run in enumerate(runs)]
+        self.digests = [digest(RunResult(run, {1: 300.0 + k * k, 2: 310.0})) for k, run in enumerate(runs)]
         self.places = list(range(len(runs)))
 
     def take(self, place):
@@ -73,7 +74,7 @@ def test_every_point_has_its_coefficients_and_all_their_errors(result):
         assert p.stiffness.weights.shape == (5 * WINDOWS, 2)
         for est in p.by_method.values():
             np.testing.assert_array_equal(est.systematic, p.stiffness.systematic)
-    assert [p.temperatures[1] for p in result.points] == [302.0, 307.0]
+    assert [p.temperatures[1] for p in result.points] == [306.0, 351.0]
     assert (result.campaign, result.method, result.conditions) == ("c", "mm-eiv", ())
 
 
@@ -118,7 +119,7 @@ def test_progress_and_what_is_missing_are_told(runs):
     assert "1 of 6 dynamic runs take no part: gone (torn)" in made.conditions[1].detail
 
 
-@pytest.mark.parametrize("method", ["iv", "mm", "ols"])
+@pytest.mark.parametrize("method", ["iv", "mm", "rlm:tukey"])
 def test_the_default_method_may_be_any(runs, method):
     made = found(runs[:5], method=method, methods=("mm-eiv",))
     (p,) = made.points
@@ -126,3 +127,28 @@ def test_the_default_method_may_be_any(runs, method):
     assert p.stiffness.method == method
     assert made.method == method
     np.testing.assert_allclose(p.stiffness.h, law(LOADS[0], 0.0), atol=0.01 * np.abs(p.stiffness.h).max())
+
+
+def test_whatever_the_method_loads_are_brought_to_their_set_points(runs, result):
+    for p, other in zip(found(runs, method="iv").points, result.points, strict=True):
+        true = law(p.point.static_load, 0.0)
+        np.testing.assert_allclose(p.stiffness.h, true, atol=2e-3 * np.abs(true).max())
+        assert p.load_miss.size.tolist() == other.load_miss.size.tolist()
+
+
+def test_windows_that_are_rejected_in_one_direction_are_pointed_out(runs):
+    spoilt = runs[2].cell_force.phasors.copy()
+    spoilt[:3] += 300.0 * np.exp(2j * np.arange(3))[:, None, None]
+    odd = replace(runs[2], cell_force=replace(runs[2].cell_force, phasors=spoilt))
+    (p,) = found([*runs[:2], odd, *runs[3:5]]).points
+    (told,) = [c for c in p.quality if c == "directional-rejection"]
+    assert "3000-2 at 72 deg (3 of 6)" in told.detail
+    assert [w.run for w in p.rejected] == ["3000-2"] * 3
+
+
+def test_a_single_run_has_no_coefficients_and_no_error_of_its_place(runs):
+    (p,) = found(runs[:1]).points
+    assert np.isnan(p.stiffness.h).all()
+    assert np.isnan(p.position_se).all()
+    assert "fewer-than-two-directions" in p.quality
+    assert p.n_records == 1
