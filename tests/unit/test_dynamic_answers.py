@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.unit.phasor_cases import H, complex_normal
+from tpjb_ident.dynamic.drive_phase import aligned
 from tpjb_ident.dynamic.estimate import METHODS, estimate_dynamic_stiffness, estimate_table
 from tpjb_ident.dynamic.instrumental import instrumental_fit
 from tpjb_ident.dynamic.phasor_table import phasor_table
@@ -152,3 +153,52 @@ def test_computed_windows_whose_motion_varies_are_taken(method, noise):
     np.testing.assert_allclose(est.h, H, rtol=1e-7)
     assert np.isfinite(est.covariance).all()
     assert est.standard_error.max() < 1e-3 * noise
+
+
+def test_what_does_not_fit_together_is_refused_and_what_is_missing_left_out():
+    D, F, label = windows(9, g=3, n=4)
+    with pytest.raises(ValueError, match="one label per window: 12 windows, 11 labels"):
+        phasor_table(D, F, label[:-1])
+    with pytest.raises(ValueError, match=r"reference must be \(12, 2\) like D, got \(11, 2\)"):
+        phasor_table(D, F, label, D[:-1])
+    for wrong in (F[:-1], F[:, :1], F[0]):
+        with pytest.raises(ValueError, match=r"D and F must both be \(n, 2\)"):
+            phasor_table(D, wrong)
+    reference = D.copy()
+    D[0, 0], F[5, 1], reference[11, 1] = np.nan, np.inf, np.nan
+    table = phasor_table(D, F, label, reference)
+    np.testing.assert_array_equal(np.flatnonzero(~table.valid), [0, 5, 11])
+    assert (len(table), table.n_directions) == (9, 3)
+    for given, found, scale in ((D, table.D, table.d_scale), (F, table.F, table.f_scale)):
+        np.testing.assert_allclose(found * scale, given[table.valid])
+        assert np.median(np.linalg.norm(found, axis=1)) == pytest.approx(1.0)
+    assert table.h_scale == table.f_scale / table.d_scale
+    # every window a direction of its own; nothing at all, and nothing but zeros
+    assert phasor_table(D[1:5], F[1:5]).n_directions == 4
+    empty = phasor_table(D[:0], F[:0])
+    assert (len(empty), empty.n_directions, empty.h_scale) == (0, 0, 1.0)
+    assert phasor_table(0 * D[1:5], F[1:5]).d_scale == 1.0
+
+
+def test_a_wandering_direction_is_turned_and_the_others_kept():
+    """Phases of chance in the last direction: its windows come to one phase, whatever struck ones say."""
+    rng = np.random.default_rng(10)
+    pattern = complex_normal(rng, 3, 4)
+    label = np.repeat(np.arange(3), 8)
+    turn = np.where(label == 2, np.exp(2j * np.pi * rng.random(24)), 1.0)
+    z = pattern[label] * turn[:, None]
+    z[16] = 50.0
+    weights = np.where(np.arange(24) == 16, 0.0, 1.0)
+    found, wandering = aligned(z, label, weights)
+    assert wandering == 1
+    np.testing.assert_array_equal(found[:16], z[:16])
+    np.testing.assert_allclose(found[17:], np.tile(found[17], (7, 1)), atol=1e-12)
+    assert abs(np.vdot(found[17], pattern[2])) == pytest.approx(np.linalg.norm(pattern[2]) ** 2)
+    assert z[17, 0] == pattern[2, 0] * turn[17]
+    # three windows tell a phase, two do not
+    few = np.where((label == 2) & (np.arange(24) > 19), 0.0, weights)
+    assert aligned(z, label, few)[1] == 1
+    few[17] = 0.0
+    same, none = aligned(z, label, few)
+    assert none == 0
+    assert same is z
