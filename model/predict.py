@@ -19,6 +19,7 @@ from model.equilibrium import Equilibrium, solve_equilibrium
 from model.growth import grown
 from model.options import Options
 from model.pivots import pivot_laws
+from model.possible import check_possible
 from model.power import power_loss
 from model.setup import Mesh, Setup
 from model.units import to_si
@@ -228,6 +229,8 @@ def predict(
 
     Raises
     ------
+    BearingError
+        The bearing has a number that no bearing has; a ValueError too.
     OperatingPointError
         A load, direction, speed or excitation that no bearing can have; a ValueError too.
     ValueError
@@ -237,6 +240,7 @@ def predict(
         raise ValueError(f"thermal must be isothermal, adiabatic or tehd, got {thermal!r}")
     if not (options is None or isinstance(options, Options)):
         raise ValueError(f"options must be an Options object, got {options!r}")
+    check_possible(bearing)
     plain = Setup(bearing, pivot_laws(pivots, bearing), thermal, _mesh(mesh), options=options or Options())
     setup = apply_effects(plain, effects)
     speed_si = _number(speed, "angular speed", "speed")

@@ -58,7 +58,9 @@ def check_agreement(
     common = solve_stiffness([group[i] for i in others]) if told and len(others) > 1 else None
     for i in sorted(told):
         gain = None if readings is None else gain_of_run(readings, i, others)
-        hint = "" if gain is None else _as_if(channel_names(group)[gain.channels[0]], gain.gain)
+        hint = (
+            "" if gain is None or gain.chance > _CHANCE else _as_if(channel_names(group)[gain.channels[0]], gain.gain)
+        )
         _tell(group[i], stiffness if common is None else common, hint)
     return told
 

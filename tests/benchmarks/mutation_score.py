@@ -27,7 +27,12 @@ import pytest
 
 ROOT = mutation_trial.ROOT
 UNIT = "tests/unit/"
-_DYNAMIC = (UNIT + "test_dynamic_*.py", UNIT + "test_load_direction.py", UNIT + "test_tables.py", UNIT + "test_run_store.py")
+_DYNAMIC = (
+    UNIT + "test_dynamic_*.py",
+    UNIT + "test_load_direction.py",
+    UNIT + "test_tables.py",
+    UNIT + "test_run_store.py",
+)
 _PIVOT = (UNIT + "test_pivot_*.py", UNIT + "test_virtual_rig_dry.py", "tests/recovery/test_pivot_recovery.py")
 _ESTIMATOR = (UNIT + "test_dynamic_estimate.py", UNIT + "test_dynamic_exact_limits.py")
 #: Folder or file: the tests that are asked; of several that fit, the longest name counts.

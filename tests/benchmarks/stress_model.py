@@ -166,6 +166,8 @@ def main() -> None:
         if fault:
             faults += 1
             print(f"case {number}: {fault}", flush=True)
+        if number % 100 == 99:
+            print(f"{number + 1} cases, {faults} at fault", file=sys.stderr, flush=True)
     for outcome, count in outcomes.most_common():
         print(f"{count:6d}  {outcome}")
     print(f"slowest case {slowest:.1f} s of processor time (compilation included); {faults} at fault")

@@ -228,10 +228,11 @@ def show_frequency_fits(result: Identification) -> None:
     if rows:
         columns = ["load kN", "model", "chi-square", "dof", "probability", "misfit %", "verdict"]
         table("over frequency", columns, rows, words=(1, 6))
-    for group in result.frequency_fits():
-        if group.supported not in group.fits:
-            load = f"{group.points[0].point.static_load / 1e3:g} kN"
-            say(f"note: at {load} the data refuse K-C and K-C-M; use the coefficients of each excitation frequency")
+    refusing = [g.points[0].point.static_load for g in result.frequency_fits() if g.supported not in g.fits]
+    if refusing:
+        loads = ", ".join(f"{load / 1e3:g}" for load in refusing[:6]) + " kN"
+        more = f" and {len(refusing) - 6} more loads" if len(refusing) > 6 else ""
+        say(f"note: at {loads}{more} the data refuse K-C and K-C-M; use the coefficients of each excitation frequency")
 
 
 def refuse_untrusted(result: Identification) -> None:
