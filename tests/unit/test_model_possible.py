@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from model.bearing import Bearing, BearingError, Material, Oil, Pad, Pivot
+from model.bearing import Bearing, BearingError, Material, Oil, Pivot
 from model.bearing_file import load_bearing
 from model.possible import BOUNDS, check_possible
 from model.predict import predict
