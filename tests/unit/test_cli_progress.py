@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from tests.command_line import tpjb
 from tpjb_ident.cli import show
 
 
@@ -43,3 +44,10 @@ def test_what_the_first_one_had_to_compile_is_not_foretold_of_the_rest(lines):
     lines(0.0, 0, 14)
     assert lines(60.0, 1, 14) == ["identifying: 1 of 14 (d-1)"]
     assert lines(92.0, 5, 14)[-1] == "identifying: 5 of 14, about 1 min left (d-1)"
+
+
+def test_a_check_tells_how_many_runs_it_has_read(small_campaign, tmp_path, monkeypatch):
+    monkeypatch.setattr(show, "LINE_EVERY", 0.0)
+    result = tpjb("check", small_campaign, "--out", tmp_path / "out")
+    assert result.exit_code == 0
+    assert "tpjb: doing: reading small.h5: 9 of 10" in result.stderr

@@ -33,8 +33,8 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
     if not campaign.exists():
         raise BadInputError(f"{campaign}: no such file or folder. Give a campaign folder or an HDF5 file.")
     campaign = campaign_place(campaign)
-    with progress(f"reading {campaign.name}"):
-        problems = check_campaign(campaign)
+    with progress(f"reading {campaign.name}") as show:
+        problems = check_campaign(campaign, lambda done, of: show("runs", done, of))
         opened = _opened(campaign)
         if opened is not None:
             more = bearing_problems(opened, problems)
