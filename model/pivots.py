@@ -231,7 +231,7 @@ class MeasuredPivot:
             raise ValueError("a pivot curve must be finite")
         if np.any(np.diff(load) <= 0) or np.any(np.diff(points) <= 0):
             raise ValueError("a pivot curve must rise strictly in load and deflection")
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore"):  # an infinite slope is refused in the next line
             slopes = np.diff(points) / np.diff(load)
         if not np.all((slopes > 1e-100) & (slopes < 1e100)):
             raise ValueError("a pivot curve must have slopes that are numbers")

@@ -51,7 +51,7 @@ class CampaignPlan:
     @property
     def floor(self) -> FloatArray:
         """Smallest change of every parameter that would be seen (3 standard deviations), in its nearly linear form."""
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore"):  # what cannot be detected has an infinite floor
             return 3.0 * np.array([c.step for c in self.candidates]) / self.detectable
 
     @property
@@ -183,7 +183,7 @@ def signatures(
 def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:
     """Sizes and separations of whitened signatures (n, k)."""
     size = np.linalg.norm(white, axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):  # a signature of nothing has no direction: NaN
         unit = white / size
     cosine = np.clip(unit.T @ unit, -1.0, 1.0)
     separation = SEEN * np.sqrt(1.0 - cosine**2)

@@ -196,7 +196,7 @@ def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_betw
     """
     between = np.maximum(total - repeat, 0.0)
     spread = repeat**2 / max(dof_repeat, 1.0) + between**2 / dof_between
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):  # no spread at all: the next line says what then
         dof = total**2 / spread
     return np.where(np.isfinite(dof), np.maximum(dof, 1.0), max(dof_repeat, 1.0))
 

@@ -111,7 +111,7 @@ def _end_of_group(svg: str, start: int) -> int:
 
 def _titled(one: Spots, match: re.Match[str]) -> str:
     place = np.array([float(match[1]), float(match[2])])
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore"):  # a spot off the axes has no place, and NaN is never near
         away = np.abs(one.places - place).max(axis=1)
     if not np.isfinite(away).any():
         return match[0]
