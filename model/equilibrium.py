@@ -29,7 +29,7 @@ from model.carrying import (
 from model.conditions import overloaded_pads, unsupported
 from model.film_state import least_share
 from model.first_position import first_position
-from model.heat_paths import couples_heat, settle_temperatures
+from model.heat_paths import BOUNDLESS, couples_heat, settle_temperatures
 from model.newton_step import newton_step
 from model.pad_bending import bending_step, change_of_shape, wanted_shapes
 from model.pad_film import PadFilm, pad_films
@@ -210,8 +210,10 @@ def _iterate(search: _Search) -> Equilibrium:
         heat_change = _solve_films(search)
         if _film_lost(search):
             return _result(search, iteration, math.inf, heat_change, ("film lost", "not converged"))
+        if not heat_change < BOUNDLESS:
+            return _result(search, iteration, math.inf, heat_change, ("heat without bounds", "not converged"))
         residual, shift, moves = newton_step(search.setup, search.load, search.films)
-        if not (math.isfinite(residual) and np.all(np.isfinite(shift)) and np.all(np.isfinite(moves))):
+        if not (math.isfinite(residual) and np.isfinite([*search.position, *shift]).all() and np.isfinite(moves).all()):
             return _result(search, iteration, math.inf, heat_change, ("singular", "not converged"))
         best_left, left = min(best_left, left), max(residual, heat_change / HEAT_PER_FORCE)
         near = residual < NEAR and heat_change < NEAR_HEAT

@@ -34,6 +34,8 @@ NUSSELT = 3.0
 #: Conduction is solved to this share in every step of the equilibrium; what is left contracts with the rest.
 CONDUCTION_TOLERANCE = 0.01
 KRYLOV_STEPS = 12
+#: Kelvins beyond which a film is no film: squares would overflow.
+BOUNDLESS = 1e30
 
 
 def couples_heat(setup: Setup) -> bool:
@@ -83,7 +85,7 @@ def settle_temperatures(
         asked = fresh + inlet * by_inlet + journal * by_journal - film.work.temperature
         film.temperature_change = float(np.abs(asked).max())
         film.work.temperature[:] += limits[0] * min(1.0, limits[1] / max(film.temperature_change, 1e-30)) * asked
-        change = max(change, film.temperature_change)
+        change = float(np.maximum(change, film.temperature_change))  # a NaN is not to be lost
     return change, heat.limited, journal if setup.options.isothermal_journal else math.nan
 
 
@@ -125,11 +127,15 @@ class FilmHeat:
         if not self.setup.options.conduction or give is None:
             self._march(film, fields, sources)
             return fields
+        if not np.abs(work.temperature).max() < BOUNDLESS:
+            return np.full_like(fields, math.nan)
         # what the pad takes at the present temperature is known; its answer to the change is solved for
         station = film.grid.dx * film.grid.height[None, :]
         present, supply = work.temperature, self.setup.inlet_temperature
         sources[0] -= (give.flux @ (give.warmth @ (present - supply).ravel())).reshape(present.shape) * station
         self._march(film, fields, sources)
+        if not np.abs(fields).max() < BOUNDLESS:
+            return fields
         # as a correction, which vanishes at the equilibrium, and with it what the Krylov steps leave unsolved
         missing = fields[0] + film.inlet * fields[1] + self.journal * fields[2] - present
         for m in (1, 2):

@@ -29,6 +29,8 @@ ComplexArray = NDArray[np.complex128]
 
 #: No shaker excites faster [rad/s]; beyond, squares overflow.
 FASTEST = 1e9
+#: Loads below do not push [N].
+NO_LOAD = 1e-200
 
 
 class OperatingPointError(ValueError):
@@ -283,7 +285,9 @@ def predict_setup(
     except TypeError as error:
         raise ValueError(f"excitation must be numbers [rad/s], got {excitation!r}") from error
     _check_point(load, load_direction, speed, omega)
-    force = load * np.array([math.cos(load_direction), math.sin(load_direction)])
+    # A load near the smallest float is none: its quotients would not be numbers.
+    pushing = load if load > NO_LOAD else 0.0
+    force = pushing * np.array([math.cos(load_direction), math.sin(load_direction)])
     setup, equilibrium = _solve_as_it_runs(setup, force, speed, start)
     lines = np.atleast_1d(omega)
     if equilibrium.converged:

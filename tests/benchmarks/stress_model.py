@@ -5,7 +5,7 @@
 Up to four numbers of a good bearing are multiplied by up to 1e12, or become zero, negative, the smallest or a huge
 float, infinite or NaN; load, speed, excitation, pivots, heat model, options and effects are as wild. Warnings
 are errors. A case is at fault if anything else is raised than a refusal of this package, if a converged prediction is
-not finite, if one that has not converged does not say so or gives numbers, or if it takes over 20 s.
+not finite, if one that has not converged does not say so or gives numbers, or if it takes over a minute.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from model.predict import Prediction, predict
 ROOT = Path(__file__).resolve().parents[2]
 BEARINGS = sorted((ROOT / "model" / "bearings").glob("*.toml"))
 HOSTILE = (0.0, -1.0, 5e-324, 1e-300, 1e300, math.inf, -math.inf, math.nan)
-SLOWEST = 20.0
+SLOWEST = 60.0
 
 
 class TooSlowError(BaseException):

@@ -12,6 +12,7 @@ import pytest
 from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.effects import Effect
+from model.options import Options
 from model.predict import Prediction, predict
 
 SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
@@ -93,6 +94,7 @@ def sane(p: Prediction) -> None:
 EXTREMES = {
     "no load": lambda b: (b, 0.0, {}),
     "feather": lambda b: (b, 1e-9, {}),
+    "the smallest load": lambda b: (b, 5e-324, {"thermal": "isothermal"}),
     "overload": lambda b: (b, 1e5, {}),
     "absurd load": lambda b: (b, 1e300, {}),
     "soft pivots": lambda b: (b, 5000.0, {"pivots": 1e6}),
@@ -119,6 +121,16 @@ EXTREMES = {
     "shaft on the pads' edges": lambda b: (b, 5000.0, {"effects": [Effect("misalignment", angle=2e-3, direction=0.0)]}),
     "film starts behind the pivot": lambda b: (b, 5000.0, {"effects": [Effect("starvation", arc_fraction=0.6)]}),
     "all oil carried over": lambda b: (b, 5000.0, {"effects": [Effect("hot_oil_carryover", fraction=0.98)]}),
+    "film lost beside a journal that takes heat": lambda b: (
+        pads(b, pad_clearance=2e-9, assembled_clearance=1e-9),
+        5000.0,
+        {"options": Options(isothermal_journal=True)},
+    ),
+    "film lost beside pads that take heat": lambda b: (
+        pads(b, pad_clearance=2e-9, assembled_clearance=1e-9),
+        1e5,
+        {"options": Options(conduction=True)},
+    ),
     "stuck pads": lambda b: (b, 5000.0, {"effects": [Effect("pivot_rotation", rotational_stiffness=1e6)]}),
 }
 
