@@ -168,6 +168,8 @@ class FilmHeat:
 def minimal_residual(apply: Callable[[FloatArray], FloatArray], right: FloatArray, tolerance: float) -> FloatArray:
     """Solve apply(x) = right by GMRES, in at most `KRYLOV_STEPS` steps, to a share `tolerance` of the right-hand side.
 
+    NaN where `apply` grows beyond `BOUNDLESS`.
+
     Notes
     -----
     Y. Saad, M. H. Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856.
@@ -176,6 +178,8 @@ def minimal_residual(apply: Callable[[FloatArray], FloatArray], right: FloatArra
     basis, images = [right / size], []
     for _ in range(KRYLOV_STEPS):
         image = apply(basis[-1])
+        if not np.abs(image).max() < BOUNDLESS:
+            return np.full_like(right, math.nan)
         images.append(image)
         columns = np.column_stack(images)
         weights = np.linalg.lstsq(columns, right, rcond=None)[0]

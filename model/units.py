@@ -7,9 +7,11 @@ import math
 import re
 from typing import Any
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
+_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d{1,3})?"
 _UNIT = r"[A-Za-zµμ°%Ω][A-Za-z0-9µμ°%Ω/*^ .]{0,40}|1/[A-Za-z]{1,10}|"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*({_UNIT})\s*")
+#: Characters of a quantity; more are a slip or a bomb.
+LONGEST = 200
 #: What each physical dimension is called and its SI unit as pint writes it.
 SI_UNITS = {
     "length": "m",
@@ -94,6 +96,8 @@ def parse_quantity(value: str | float | int, dimension: str, name: str = "value"
             return _finite(float(value), name)
         except OverflowError as error:
             raise UnitError(f"{name}: a whole number of hundreds of digits is not a quantity") from error
+    if len(value) > LONGEST:
+        raise UnitError(f"{name}: a text of {len(value)} characters is not a quantity")
     match = _QUANTITY.fullmatch(value)
     if match is None:
         raise UnitError(f"{name}: {value!r} is not a number with a unit")

@@ -11,8 +11,11 @@ from model.bearing_file import load_bearing, parse_bearing
 from model.effects import EffectError, load_effects
 from model.pivots import load_pivots
 from model.toml_text import MAX_DEPTH, parse_toml
+from model.units import UnitError, parse_quantity
 from rigdata.manifest import parse_manifest
 from rigdata.problem import RigDataError
+from tpjb_ident.cli.errors import BadInputError
+from tpjb_ident.cli.quantities import parse_values
 
 BOMBS = {
     "dotted key": "a." * 16_000 + "a = 1",
@@ -112,3 +115,13 @@ def test_what_long_fuzzing_found_is_refused_in_words(rocker_file, tmp_path):
         (tmp_path / "p.toml").write_text(f'schema = "tpjb-pivots/1"\n[[pads]]\npad = 1\n{curve}')
         with pytest.raises(BearingError, match="slopes that are numbers"):
             load_pivots(tmp_path / "p.toml")
+
+
+def test_a_number_of_thousands_of_digits_costs_no_time():
+    began = time.process_time()
+    with pytest.raises(UnitError, match="delay: a text of 60000 characters is not a quantity"):
+        parse_quantity("9" * 60_000, "time", "delay")
+    with pytest.raises(BadInputError, match="--load: '999"):
+        parse_values("9" * 60_000 + " kN", "force", "--load")
+    # the search for the end of the number took seconds, with the square of the digits
+    assert time.process_time() - began < 1.0

@@ -115,12 +115,12 @@ def _range(start: float, stop: float, step: float, where: str) -> list[float]:
 
 
 def _quantity(text: str, unit: str, dimension: str, option: str) -> tuple[float, str]:
-    from model.units import UnitError, parse_quantity
+    from model.units import LONGEST, UnitError, parse_quantity
 
-    match = _PART.fullmatch(text)
+    match = _PART.fullmatch(text) if len(text) <= LONGEST else None
     if match is None:
         raise BadInputError(
-            f"{option}: {text.strip()!r} is not a number with a unit. Write, for instance, "
+            f"{option}: {text.strip()[:LONGEST]!r} is not a number with a unit. Write, for instance, "
             f'{option} "{_example(dimension)}".'
         )
     unit = match[2] or unit
