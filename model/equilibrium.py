@@ -290,7 +290,7 @@ def _solve_films(search: _Search) -> float:
     change = 0.0
     if setup.thermal != "isothermal":
         change = _warm_films(search, [f for f in search.films if f.forces is not None and f.forces.steps > 0], oil)
-    if setup.flexible_pads:
+    if setup.flexible_pads and change < BOUNDLESS:
         # a deformation counts like a temperature change of the same weight in the film's resistance
         change = max(change, HEAT_PER_FORCE * _bend_pads(search))
     return change
