@@ -208,10 +208,9 @@ def _iterate(search: _Search) -> Equilibrium:
             memory.reset()
         before = _state(search) if left > SLOW * best_left and not isothermal else None
         heat_change = _solve_films(search)
-        if _film_lost(search):
-            return _result(search, iteration, math.inf, heat_change, ("film lost", "not converged"))
         if not heat_change < BOUNDLESS:
-            return _result(search, iteration, math.inf, heat_change, ("heat without bounds", "not converged"))
+            name = "film lost" if any(f.lost for f in search.films) else "heat without bounds"
+            return _result(search, iteration, math.inf, heat_change, (name, "not converged"))
         residual, shift, moves = newton_step(search.setup, search.load, search.films)
         if not (math.isfinite(residual) and np.isfinite([*search.position, *shift]).all() and np.isfinite(moves).all()):
             return _result(search, iteration, math.inf, heat_change, ("singular", "not converged"))
@@ -285,7 +284,7 @@ def _solve_films(search: _Search) -> float:
         if film.idle:
             film.forces = film.foreseen = film.step = None
             film.work.pressure[:] = 0.0
-    if _film_lost(search):
+    if any(f.lost for f in search.films):
         return math.inf  # what has no pressure has no flow that could carry heat
     change = 0.0
     if setup.thermal != "isothermal":
@@ -294,10 +293,6 @@ def _solve_films(search: _Search) -> float:
         # a deformation counts like a temperature change of the same weight in the film's resistance
         change = max(change, HEAT_PER_FORCE * _bend_pads(search))
     return change
-
-
-def _film_lost(search: _Search) -> bool:
-    return any(not f.idle and f.forces is not None and f.forces.steps < 0 for f in search.films)
 
 
 def _solve_pressure(search: _Search, film: PadFilm) -> None:

@@ -85,6 +85,11 @@ class PadFilm:
     temperature_change: float = field(default=math.inf)
     solver: FilmSolver = solve_film
 
+    @property
+    def lost(self) -> bool:
+        """Whether the film closed, so that it has no pressure."""
+        return not self.idle and self.forces is not None and self.forces.steps < 0
+
     def reach(self, position: FloatArray) -> float:
         """Approach a of the film if the pivot did not give way [m]."""
         return self.gap + float(self.normal @ position)

@@ -41,7 +41,7 @@ def check_gains(group: Sequence[Answer], told: Collection[int], readings: PointR
 def channel_names(group: Sequence[Answer]) -> list[str]:
     """Names of the two probes and two cells."""
     first = group[0]
-    return [c.name for c in first.channels] + [first.seen.channels[i].name for i in first.seen.pick("force")]
+    return [c.name for c in (*first.channels, *_cells(first.seen))]
 
 
 def point_readings(group: Sequence[Answer], centres: dict[str, float]) -> PointReadings | None:
@@ -55,7 +55,7 @@ def point_readings(group: Sequence[Answer], centres: dict[str, float]) -> PointR
         What probes read at the bearing's centre, by channel [m].
     """
     probes, seen = group[0].channels, [a.seen for a in group]
-    cells = [seen[0].channels[i] for i in seen[0].pick("force")]
+    cells = _cells(seen[0])
     names = [c.name for c in cells]
     lines = [one.lines for one in seen if one.lines is not None]
     if len(names) != 2 or len(lines) < len(group) or any([c.name for c in _cells(one)] != names for one in seen):

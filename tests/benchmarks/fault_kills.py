@@ -187,6 +187,15 @@ def faults_after_kill(out: Path, old: dict[str, str], new: dict[str, str]) -> li
     return found
 
 
+def state_and_faults(out: Path, old: dict[str, str], new: dict[str, str]) -> tuple[str, list[str]]:
+    """Which results are there: new, absent, former or on their way in; and what is wrong with them."""
+    wrong, now = faults_after_kill(out, old, new), tables(out)
+    state = "new" if now == new else "absent" if not now else "former" if now == old else "moving in"
+    if state == "moving in" and (out / "run.json").exists():
+        wrong.append("a mixture of former and new tables with a run.json")
+    return state, wrong
+
+
 def faults_after_rerun(out: Path, code: int, reference: Reference) -> list[str]:
     """How the rerun differs from an undisturbed run."""
     found = [] if code == reference.code else [f"the rerun ends with {code}, not {reference.code}"]
@@ -215,11 +224,7 @@ def trial(bench: Bench, command: str, reference: Reference, rng: random.Random) 
         time.sleep(rng.uniform(0.0, 1.1) * reference.seconds)
         os.kill(child, signal.SIGKILL)
     code = wait(child)
-    wrong = faults_after_kill(out, old, reference.tables)
-    now = tables(out)
-    state = "new" if now == reference.tables else "absent" if not now else "former" if now == old else "moving in"
-    if state == "moving in" and (out / "run.json").exists():
-        wrong.append("a mixture of former and new tables with a run.json")
+    state, wrong = state_and_faults(out, old, reference.tables)
     wrong += ["the raw data has changed"] * bench.raw_data_changed()
     wrong += faults_after_rerun(out, wait(start(bench.words(command, out), log)), reference)
     shutil.rmtree(place)
@@ -241,18 +246,22 @@ def run(kills: int, seed: int, commands: tuple[str, ...]) -> tuple[Counter[str],
     return outcomes, wrong
 
 
+def tell(outcomes: Counter[str], wrong: Counter[str]) -> None:
+    """Print both and end the program, with 1 where anything is wrong."""
+    for title, counts in (("outcomes", outcomes), ("WRONG", wrong)):
+        print(f"{title}:")
+        for text, count in sorted(counts.items()):
+            print(f"  {count:5d}  {text}")
+    sys.exit(bool(wrong))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=COMMANDS)
     given = parser.parse_args()
-    outcomes, wrong = run(given.kills, given.seed, tuple(given.commands))
-    for title, counts in (("outcomes", outcomes), ("WRONG", wrong)):
-        print(f"{title}:")
-        for text, count in sorted(counts.items()):
-            print(f"  {count:5d}  {text}")
-    sys.exit(bool(wrong))
+    tell(*run(given.kills, given.seed, tuple(given.commands)))
 
 
 if __name__ == "__main__":

@@ -28,14 +28,14 @@ from fault_kills import (
     COMMANDS,
     Bench,
     Reference,
-    faults_after_kill,
     faults_after_rerun,
     make_bench,
     prepare,
     start,
-    tables,
+    state_and_faults,
+    tell,
     wait,
-)  # fmt: skip
+)
 
 #: Seconds after which ext4 writes its journal unasked: longer than a command takes.
 COMMIT = 300
@@ -67,7 +67,6 @@ class Trial:
 
     command: str
     old: dict[str, str]
-    code: int
     cuts: tuple[Path, ...]
 
 
@@ -82,9 +81,9 @@ def trial(bench: Bench, command: str, former: bool, place: Path) -> Trial:
         old = prepare(bench, point / "out", command, former)
         os.sync()  # the former results are long on the disk
         child = start(bench.words(command, point / "out"), place / "log", at_step=cut)
-        code = wait(child)
+        wait(child)
         cut(9999)
-    return Trial(command, old, code, tuple(sorted(place.glob("cut-*"))))
+    return Trial(command, old, tuple(sorted(place.glob("cut-*"))))
 
 
 def judged(bench: Bench, tried: Trial, reference: Reference, place: Path, rerun: set[int]) -> Iterator[tuple[str, str]]:
@@ -93,14 +92,7 @@ def judged(bench: Bench, tried: Trial, reference: Reference, place: Path, rerun:
         last = number == len(tried.cuts) - 1
         with mounted(image, place / "after") as folder:
             out = folder / "out"
-            wrong = faults_after_kill(out, tried.old, reference.tables)
-            now = tables(out)
-            state = (
-                "new" if now == reference.tables else "absent" if not now
-                else "former" if now == tried.old else "moving in"
-            )  # fmt: skip
-            if state == "moving in" and (out / "run.json").exists():
-                wrong.append("a mixture of former and new tables with a run.json")
+            state, wrong = state_and_faults(out, tried.old, reference.tables)
             if last and (state != "new" or not (out / "run.json").exists()):
                 wrong.append(f"the command had ended, and its results are {state}")
             if number in rerun:
@@ -142,12 +134,7 @@ def main() -> None:
     if "TPJB_IN_NAMESPACE" not in os.environ:  # mounts that nobody else sees, and that go with this process
         words = ["unshare", "-m", sys.executable, *sys.argv]
         os.execvpe(words[0], words, {**os.environ, "TPJB_IN_NAMESPACE": "1"})
-    outcomes, wrong = run(given.trials, given.seed, tuple(given.commands), given.reruns)
-    for title, counts in (("outcomes", outcomes), ("WRONG", wrong)):
-        print(f"{title}:")
-        for text, count in sorted(counts.items()):
-            print(f"  {count:5d}  {text}")
-    sys.exit(bool(wrong))
+    tell(*run(given.trials, given.seed, tuple(given.commands), given.reruns))
 
 
 if __name__ == "__main__":
