@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -268,7 +268,8 @@ class Hdf5Reader:
         with self._group() as group:
             return tuple(group.keys())
 
-    def _known(self) -> _Facts:
+    def _known(self, opened: Any = None) -> _Facts:
+        """Give the facts, from the group that the caller has `opened` if any must be read."""
         try:
             state = self.path.stat()
         except OSError as error:
@@ -276,7 +277,7 @@ class Hdf5Reader:
         signature = (state.st_size, state.st_mtime_ns)
         facts = self.facts.get("")
         if facts is None or facts.signature != signature:
-            with self._group() as group:
+            with nullcontext(opened) if opened is not None else self._group() as group:
                 attribute = group.attrs.get("sample_rate_hz")
                 rate = None if attribute is None else self._checked_rate(attribute)
                 clock = self.clock is not None and has_link(group, self.clock.name)
@@ -334,8 +335,8 @@ class Hdf5Reader:
         """Raw readings; only the chunks of the slice are read."""
         if stop - start > MAX_REQUEST:
             raise self._error("", f"{stop - start} samples asked for at once", "Read the run in slices")
-        length = self._known().length
         with self._group() as group:
+            length = self._known(group).length
             columns = []
             for name in names:
                 dataset = self._dataset(group, name)

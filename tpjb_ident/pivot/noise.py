@@ -117,30 +117,50 @@ class NoiseSeries:
 
 
 class _Rotated:
-    """A series in the basis in which white and 1/f noise are both diagonal: microseconds per evaluation."""
+    """Series of one shape, each in the basis in which white and 1/f noise are both diagonal.
 
-    def __init__(self, series: NoiseSeries, unit: float) -> None:
-        root = np.sqrt(series.duration)
-        kernel = flicker_kernel(series.time, series.duration) * np.outer(root, root)
-        self.flicker, basis = np.linalg.eigh(kernel)
-        scale = np.maximum(np.max(np.abs(series.mean), axis=0), 1e-300)
-        mean, _ = np.linalg.qr((series.mean / scale) * root[:, None])
-        drift = (series.time - np.mean(series.time)) * root
-        columns = np.column_stack([mean, drift, series.values / unit * root])
-        self.columns = basis.T @ columns
-        self.size = mean.shape[1]
+    Every level that the search tries costs a few products of small matrices for all of them together.
+    """
+
+    def __init__(self, alike: Sequence[NoiseSeries], unit: float) -> None:
+        turned = [_rotated(s, unit) for s in alike]
+        self.flicker = np.stack([spectrum for spectrum, _ in turned])
+        self.columns = np.stack([columns for _, columns in turned])
+        self.size = alike[0].mean.shape[1]
 
     def minus_log_likelihood(self, white: float, flicker: float, drift: float) -> float:
-        variance = white + flicker * np.maximum(self.flicker, 0.0)
+        """Sum over the series; levels in the unit of `__init__`."""
+        variance = white + flicker * self.flicker
         p = self.size
-        gram = self.columns.T @ (self.columns / variance[:, None])
+        gram = np.swapaxes(self.columns, 1, 2) @ (self.columns / variance[..., None])
         # the drift is a random column: Woodbury takes it out of every product at once
         u = gram[:, p]
-        inflation = 1.0 + drift**2 * u[p]
-        gram = gram - drift**2 * np.outer(u, u) / inflation
-        xx, xy, yy = gram[:p, :p], gram[:p, p + 1], gram[p + 1, p + 1]
-        log_det = np.sum(np.log(variance)) + np.log(inflation) + np.linalg.slogdet(xx)[1]
-        return 0.5 * float(log_det + yy - xy @ np.linalg.solve(xx, xy))
+        inflation = 1.0 + drift**2 * u[:, p]
+        gram = gram - drift**2 * u[:, :, None] * u[:, None, :] / inflation[:, None, None]
+        xx, xy, yy = gram[:, :p, :p], gram[:, :p, p + 1], gram[:, p + 1, p + 1]
+        log_det = np.log(variance).sum() + np.log(inflation).sum() + np.linalg.slogdet(xx)[1].sum()
+        explained = np.sum(xy * np.linalg.solve(xx, xy[..., None])[..., 0])
+        return 0.5 * float(log_det + yy.sum() - explained)
+
+
+def _rotated(series: NoiseSeries, unit: float) -> tuple[FloatArray, FloatArray]:
+    """Spectrum (m,) of the 1/f noise over the white, and signal, drift and values (m, p + 2) in its basis."""
+    root = np.sqrt(series.duration)
+    kernel = flicker_kernel(series.time, series.duration) * np.outer(root, root)
+    spectrum, basis = np.linalg.eigh(kernel)
+    scale = np.maximum(np.max(np.abs(series.mean), axis=0), 1e-300)
+    mean, _ = np.linalg.qr((series.mean / scale) * root[:, None])
+    drift = (series.time - np.mean(series.time)) * root
+    columns = np.column_stack([mean, drift, series.values / unit * root])
+    return np.maximum(spectrum, 0.0), basis.T @ columns
+
+
+def _by_shape(series: Sequence[NoiseSeries]) -> list[list[NoiseSeries]]:
+    """Series grouped by their numbers of blocks and of signal columns."""
+    groups: dict[tuple[int, ...], list[NoiseSeries]] = {}
+    for one in series:
+        groups.setdefault(one.mean.shape, []).append(one)
+    return list(groups.values())
 
 
 def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float, learn_drift: bool = True) -> NoiseModel:
@@ -170,7 +190,7 @@ def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float, learn_drift
         raise ValueError("no series is long enough to learn noise from: record longer holds")
     white = float(np.median([_white_level(s) for s in usable]))
     unit = np.sqrt(white)
-    rotated = [_Rotated(s, unit) for s in usable]
+    rotated = [_Rotated(alike, unit) for alike in _by_shape(usable)]
     prior = np.log(drift_rate / unit)
     spread = 1.0 if learn_drift else PINNED
 
