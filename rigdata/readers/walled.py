@@ -108,7 +108,8 @@ def main(module: str, path: Path) -> None:
     reader = importlib.import_module(f"rigdata.readers.{module}")
     _limit_memory(path)
     try:
-        found = reader.read_walled_in(path)
+        with contextlib.redirect_stdout(sys.stderr):  # asammdf prints what it finds; the answer would begin with that
+            found = reader.read_walled_in(path)
     except MemoryError:
         error = "claims more data than its size can hold"
     except Exception as problem:  # whatever another library raises on a broken file: it is the file's fault here

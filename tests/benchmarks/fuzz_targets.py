@@ -230,6 +230,31 @@ def foreign_target(folder: Path, suffix: str) -> Target:
     return Target(suffix.lstrip("."), (seed.read_bytes(),), feed, (RigDataError,))
 
 
+def mdf_target(folder: Path) -> Target:
+    """MDF: as the others, but its wall keeps a child with asammdf imported (a case else costs a second)."""
+    from unittest import mock
+
+    import asammdf
+    from warm_wall import WarmWall
+
+    plain = foreign_target(folder, ".mf4")
+    wall = WarmWall()
+
+    def feed(data: bytes) -> None:
+        with mock.patch("rigdata.readers.walled.subprocess.run", wall.run):
+            plain.feed(data)
+
+    seeds = [*plain.seeds]
+    time = np.arange(60) / 100.0
+    channels = [asammdf.Signal(np.sin(7 * time), time, name="X1A", unit="um", conversion={"a": 2.0, "b": 1.0})]
+    for version, packed in (("4.11", 1), ("4.10", 2), ("3.30", 0)):
+        path = folder / f"seed-{version}"
+        with asammdf.MDF(version=version) as file:
+            file.append(channels)
+            seeds.append(Path(file.save(path, overwrite=True, compression=packed)).read_bytes())
+    return Target("mf4", tuple(seeds), feed, plain.documented)
+
+
 def _write_foreign(path: Path) -> None:
     time = np.arange(120) / 100.0
     values = np.sin(time)
@@ -391,7 +416,7 @@ _READER_SOURCES = {
     "parquet": ("rigdata/readers/parquet.py",),
     "tdms": ("rigdata/readers/tdms.py",),
     "uff": ("rigdata/readers/uff58.py",),
-    "mf4": ("rigdata/readers/mdf4.py",),
+    "mf4": ("rigdata/readers/mdf4.py", "rigdata/readers/walled.py"),
     "asc": ("rigdata/readers/catman.py", "rigdata/readers/text_head.py", "rigdata/readers/csv_table.py"),
 }
 
@@ -420,6 +445,8 @@ def make_target(name: str, folder: Path) -> Target:
     }
     if name in makers:
         return makers[name](folder)
+    if name == "mf4":
+        return mdf_target(folder)
     if name in FOREIGN:
         return foreign_target(folder, "." + name)
     sys.exit(f"no target {name!r}; there are {', '.join(TARGETS)}")

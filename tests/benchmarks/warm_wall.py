@@ -1,6 +1,6 @@
 """A stand-in for the child process of `rigdata.readers.walled` that reads one file after the other until it dies.
 
-The wall starts an interpreter and imports asammdf for every file: a second. A fuzzer wants a hundred files in that time.
+The wall starts an interpreter and imports asammdf for every file: a second, in which a fuzzer wants a hundred files.
 Here one forked child keeps its imports and answers like the real one, with the same limits of memory; what differs is
 that it has read other files before, and a shorter time limit.
 """

@@ -7,6 +7,7 @@ import os
 import sys
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,6 +32,19 @@ def test_numbers_cross_the_wall_bit_for_bit(capsysbinary):
         assert one.values.tobytes() == back.values.tobytes()
         assert (one.time is None) == (back.time is None)
         assert one.time is None or one.time.tobytes() == back.time.tobytes()
+
+
+def test_what_a_library_prints_is_no_part_of_the_answer(tmp_path, monkeypatch, capsysbinary):
+    def read_walled_in(path):
+        print("a channel looks odd")  # asammdf says such things of files that it can read
+        return [Series("X1A", "V", np.arange(3.0), None, "")]
+
+    monkeypatch.setitem(sys.modules, "rigdata.readers.talks", SimpleNamespace(read_walled_in=read_walled_in))
+    monkeypatch.setattr(walled, "_limit_memory", lambda path: None)
+    walled.main("talks", tmp_path)
+    head, _, body = capsysbinary.readouterr().out.partition(b"\n")
+    (back,) = walled._unpack(json.loads(head), body)
+    assert back.values.tolist() == [0.0, 1.0, 2.0]
 
 
 def test_a_child_that_dies_is_told(tmp_path):
