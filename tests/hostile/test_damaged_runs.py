@@ -126,6 +126,7 @@ def test_a_check_names_every_damaged_run(spoilt):
         shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
+@pytest.mark.slow
 def test_a_record_that_lost_its_end_is_said_to_be_damaged(spoilt, tmp_path):
     path = spoilt("missing file")
     file = path / "runs" / f"{RUN}.csv"
@@ -136,6 +137,7 @@ def test_a_record_that_lost_its_end_is_said_to_be_damaged(spoilt, tmp_path):
     assert f"{RUN}.csv" in told.output
 
 
+@pytest.mark.slow
 def test_a_point_that_loses_all_its_runs_is_lost_and_the_answer_not_to_be_trusted(spoilt, tmp_path):
     told = tpjb(
         "identify", spoilt("missing group", *(f"d-05000-25-0{i}" for i in (1, 2, 3))), "--out", tmp_path / "out"
@@ -154,6 +156,7 @@ def test_where_no_run_is_left_nothing_is_written(spoilt, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_an_accelerometer_dead_in_all_runs_is_told_and_costs_no_run(spoilt, tmp_path):
     runs = [f"d-0{load}-25-0{i}" for load in (2500, 5000) for i in (1, 2, 3)]
     told = tpjb("identify", spoilt("accelerometer zero", *runs), "--out", tmp_path / "out")
@@ -189,6 +192,7 @@ def test_locus_goes_on_without_a_damaged_direction(spoilt, tmp_path, name):
     assert len(pd.read_csv(tmp_path / "out" / "clearance.csv")) == 5
 
 
+@pytest.mark.slow
 def test_without_a_usable_sweep_positions_have_no_centre_and_the_command_says_so(spoilt, tmp_path):
     told = tpjb("locus", spoilt("missing group", "c-1"), "--out", tmp_path / "out")
     assert told.exit_code == 3, told.output

@@ -38,6 +38,7 @@ def run(rpm: float, thermal: str) -> Prediction:
     return p
 
 
+@pytest.mark.slow
 def test_adiabatic_film_heats_by_what_the_load_says():
     # without carry-over and without heat into the pads the rise of a film that carries W is bound to W, not to the
     # speed: mu U / h^2 is what carries. Film and power grow with speed as they must.
@@ -49,6 +50,7 @@ def test_adiabatic_film_heats_by_what_the_load_says():
     assert [p.min_film for p in runs] == sorted(p.min_film for p in runs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rpm", [1000, *(pytest.param(rpm, marks=pytest.mark.slow) for rpm in (2000, 3000)), 4000])
 def test_peak_pad_temperatures_with_all_paths_of_heat(rpm):
     # The reference gives neither the pads' convection nor the share of hot oil that the next pad drinks; 750 W/m^2/K

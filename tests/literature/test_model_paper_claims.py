@@ -26,6 +26,7 @@ def test_spheres_are_much_softer_than_rockers():  # claim 5
         assert paper.give("spherical", False, load) > 4.0 * paper.give("rocker", False, load)
 
 
+@pytest.mark.slow
 def test_soft_pivots_enlarge_the_locus():  # claim 7
     with_kirk, with_measured = paper.locus_sizes()
     assert 1.05 < with_measured / with_kirk < 1.3

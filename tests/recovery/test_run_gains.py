@@ -57,6 +57,7 @@ def test_runs_that_each_have_a_temperature_of_their_own_are_not_blamed(tmp_path,
     assert found(written(tmp_path / "c.h5", stiff_rig(seed, plan=plan, stiffness=stiffness, position=position))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "says"), [(None, None), (("X1A", 1.05), "X1A reads 5"), (("L1V", 0.95), "L1V reads")]
 )

@@ -47,6 +47,7 @@ def test_probes_ten_times_off_make_every_point_doubtful(tmp_path, faults, sweep,
     assert says in told.detail
 
 
+@pytest.mark.slow
 def test_good_probes_are_not_doubted(tmp_path):
     source = campaign(tmp_path)
     found = identify(source, IdentifySettings(methods=(), method="ols", clearance=CLEARANCE))
@@ -101,6 +102,7 @@ def test_gains_are_found_from_turned_normals(axes):
     assert np.isnan(gain_ratio(ANGLES[:3], tilt[:3], np.full(3, 1e-4), axes).value)
 
 
+@pytest.mark.slow
 def test_the_condition_reaches_the_table(tmp_path):
     path = written(tmp_path / "c.h5", rocker_rig(3, gain("X1*", 10.0), plan=replace(SMALL_PLAN, dry=(), locus=())))
     out = tpjb("identify", path, "--out", tmp_path / "out")

@@ -324,6 +324,7 @@ class Ramp:
         return entries
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("wedge", "filling"), [CASES[0], CASES[1], CASES[3]])
 def test_damping_is_what_a_slow_ramp_shows(wedge, filling):
     one = grid, _ = film((60, 4))

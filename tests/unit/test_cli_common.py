@@ -207,6 +207,7 @@ def test_show_answers_a_wrong_run_with_the_nearest(small_campaign):
     assert "Did you mean 'd-02500-25-01'" in result.stderr
 
 
+@pytest.mark.slow
 def test_show_of_a_lone_file_draws_a_picture(folder, tmp_path):
     result = tpjb("show", folder / "test-5kN.csv", "--picture", "--out", tmp_path / "o")
     assert result.exit_code == 0, result.stderr

@@ -106,6 +106,7 @@ def test_several_excitation_lines_of_each_record(tmp_path):
     np.testing.assert_allclose(frame["kyy_N_per_m"], 1.8e8, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_a_known_delay_turns_the_phases(small_campaign, plain, tmp_path):
     """A force that was recorded late leads what it seems to be: h turns ahead by omega times the delay."""
     h, delays = [], ("--delay", "force=1 ms", "--delay", "acceleration=1 ms")

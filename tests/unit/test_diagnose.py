@@ -119,6 +119,7 @@ def test_localise_finds_the_observable_and_its_pad(observations):
     assert worst.share > 0.99
 
 
+@pytest.mark.slow
 def test_forward_answers_do_not_depend_on_what_was_asked_before(setup, observations):
     forward = Forward(setup, observations.layout, observations.elements)
     forward()
@@ -135,6 +136,7 @@ def test_forward_says_where_there_is_no_equilibrium(setup):
         planned_observations(setup, hopeless)
 
 
+@pytest.mark.slow
 def test_plan_tells_what_direct_coefficients_alone_cannot(setup, layout):
     pool = [c for c in candidates(setup.bearing) if c.name in {"probe_gain", "loadcell_gain"}]
     bare = Layout(tuple(replace(t, pads=()) for t in layout.dynamic))

@@ -273,6 +273,7 @@ def test_conditions_compare_by_name_and_survive_pickling():
     assert c.sentence() == "low-coherence: coherence 0.5 < 0.9"
 
 
+@pytest.mark.slow
 def test_workers_change_no_number_even_when_jobs_are_lost(campaign):
     from concurrent.futures import Executor, Future
 

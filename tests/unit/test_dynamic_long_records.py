@@ -83,6 +83,7 @@ def test_a_kept_file_serves_many_requests_and_lets_go(run):
     assert reader.held == {}
 
 
+@pytest.mark.slow
 def test_a_long_run_is_read_once_and_says_the_same():
     """Beyond SHORT samples lines are looked for in the beginning; the shaft is off its set point here."""
 

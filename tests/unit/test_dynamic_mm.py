@@ -75,6 +75,7 @@ def test_more_windows_than_the_start_looks_at_are_all_fitted():
     np.testing.assert_allclose(equation, 0.0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_the_first_scatter_is_that_of_the_noise():
     """Mean over draws: trimming, core and fitted parameters are allowed for, for two components and for one."""
     noise = np.array([[1.0, 0.3j], [-0.3j, 0.5]])

@@ -78,6 +78,7 @@ def test_softer_and_stiffer_pads_converge(bearing, factor):
     assert p.equilibrium.iterations <= 18
 
 
+@pytest.mark.slow
 def test_starved_and_misaligned_films_bend_too(bearing):
     for effect in (Effect("starvation", arc_fraction=0.15), Effect("misalignment", angle=1e-4, direction=-1.2)):
         p = predict(bearing, 5000.0, speed=SPEED, thermal="tehd", effects=[effect])

@@ -92,6 +92,7 @@ def test_a_load_between_two_pads_is_held_and_one_beside_them_is_not(rocker):
     assert not unsupported(Setup(bearing, pivot_laws("kirk", bearing)), np.zeros(2))
 
 
+@pytest.mark.slow
 def test_what_is_unsupported_never_converges(rocker):
     two = rocker.with_pads(rocker.pads[:2])
     setup = Setup(two, pivot_laws("kirk", two))

@@ -134,6 +134,7 @@ def test_upper_pads_unload_and_are_listed(rocker):
     assert_equilibrium(p)
 
 
+@pytest.mark.slow
 def test_offset_pads_take_up_their_load_on_their_pivots(rocker):
     # preload 0.1 and a pivot behind the middle: the pads carry down to a fold at a < 0, on soft pivots beyond it
     pads = tuple(replace(p, pivot_offset=0.55, pad_clearance=p.assembled_clearance / 0.9) for p in rocker.pads)

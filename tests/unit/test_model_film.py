@@ -154,6 +154,7 @@ def reference_force(grid: FilmGrid, wedge: tuple[float, float], rates: tuple[flo
     return np.array([weighted @ grid.cos[1:-1], weighted @ grid.sin[1:-1]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wedge", [(0.6, 0.25), (0.85, 0.1), (0.2, 0.4)])
 def test_stiffness_and_damping_are_differences_of_an_independent_solvers_forces(wedge):
     grid, _, forces = solve((160, 8), wedge, sharp=True)

@@ -81,6 +81,7 @@ def test_carried_over_oil_goes_round(rocker):
     assert p.equilibrium.iterations < 20
 
 
+@pytest.mark.slow
 def test_all_paths_together_converge_with_few_steps(rocker):
     options = Options(conduction=True, isothermal_journal=True, growth=Growth(housing=48.0))
     p = run(rocker, options, thermal="tehd", effects=[Effect("hot_oil_carryover", fraction=0.7)])

@@ -135,11 +135,17 @@ EXTREMES = {
 }
 
 
-#: Solved in `test_model_conditions` already, with every name that their status must have.
-TWICE = ("overload", "shaft on the pads' edges", "film starts behind the pivot")
+#: Solved in `test_model_conditions` already, with every name that their status must have; and what takes its time.
+SLOW = (
+    "overload",
+    "shaft on the pads' edges",
+    "film starts behind the pivot",
+    "film lost beside a journal that takes heat",
+    "film lost beside pads that take heat",
+)
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in TWICE)) for n in EXTREMES])
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in EXTREMES])
 def test_extremes_end_in_a_number_or_a_status(rocker, name):
     bearing, load, more = EXTREMES[name](rocker)
     point = {"load_direction": DOWN, "speed": SPEED, "mesh": COARSE} | more

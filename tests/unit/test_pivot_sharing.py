@@ -115,6 +115,7 @@ def test_a_mistake_in_one_run_is_named(mistake, said):
     assert (None if found[4] is None else found[4].what) == said
 
 
+@pytest.mark.slow
 def test_phases_of_chance_are_no_signature():
     rng = np.random.default_rng(0)
     found = []

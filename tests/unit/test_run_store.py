@@ -119,6 +119,7 @@ def test_what_waits_on_disk_comes_back_bit_for_bit(path, whole, tmp_path, monkey
         assert np.array_equal(shelf.take(3).displacement.phasors, whole[3][0].displacement.phasors)
 
 
+@pytest.mark.slow
 def test_what_has_changed_is_done_again(path, tmp_path, counted):
     import h5py
 
