@@ -212,7 +212,7 @@ def show_coefficients(result: Identification) -> None:
             f"{100 * p.outlier_fraction:.0f}", "; ".join(str(q) for q in p.quality) or "ok",
         ])  # fmt: skip
     columns = ["load kN", "exc. Hz", "kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m", "out %", "quality"]
-    table(f"{result.campaign}: {result.method}, 95 % intervals", columns, rows, words=(6,))
+    table(f"{result.campaign}: {result.method}, 95 % intervals", columns, rows, words=(7,), whole="coefficients.csv")
 
 
 def show_frequency_fits(result: Identification) -> None:
@@ -227,7 +227,7 @@ def show_frequency_fits(result: Identification) -> None:
             rows.append([f"{point.static_load / 1e3:g}", name, *figures, verdict])
     if rows:
         columns = ["load kN", "model", "chi-square", "dof", "probability", "misfit %", "verdict"]
-        table("over frequency", columns, rows, words=(1, 6))
+        table("over frequency", columns, rows, words=(1, 6), whole="frequency_fits.csv")
     refusing = [g.points[0].point.static_load for g in result.frequency_fits() if g.supported not in g.fits]
     if refusing:
         loads = ", ".join(f"{load / 1e3:g}" for load in refusing[:6]) + " kN"

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Seconds between two lines about progress where there is no terminal.
 LINE_EVERY = 30.0
+#: Rows of a table that are printed where a file has them all.
+MOST_ROWS = 40
 #: Share of a step from which its speed is known well enough to tell the time left.
 FORETELLS = 0.02
 #: Called with what is being done, how many are done, of how many.
@@ -55,8 +57,13 @@ def note_line(kind: str, text: str) -> None:
     _console(stderr=True).print(f"tpjb: {kind}: {printable(text)}", markup=False)
 
 
-def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int] = (0,)) -> None:
-    """Print a table; columns of words stand left, numbers right."""
+def table(
+    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int] = (0,), whole: str = ""
+) -> None:
+    """Print a table; columns of words stand left, numbers right.
+
+    Of a long table that stands in a file, the one named `whole`, the first `MOST_ROWS` are printed.
+    """
     voice().tables.append({"title": title, "columns": list(columns), "rows": [list(row) for row in rows]})
     if voice().silent:
         return
@@ -68,9 +75,12 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], wor
     for i, column in enumerate(columns):
         side: Literal["left", "right"] = "left" if i in words else "right"
         grid.add_column(Text(printable(column)), justify=side, no_wrap=i < len(columns) - 1, overflow="fold")
-    for row in rows:
+    shown = rows[:MOST_ROWS] if whole else rows
+    for row in shown:
         grid.add_row(*(Text(printable(cell)) for cell in row))
     _console().print(grid)
+    if len(shown) < len(rows):
+        _console().print(f"{len(rows) - len(shown)} more rows: {whole} has all {len(rows)}", markup=False)
 
 
 @contextlib.contextmanager
