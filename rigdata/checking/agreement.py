@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdata.checking.answers import Answer, misfit_of, solve_stiffness
-from rigdata.checking.gain_evidence import PointReadings
+from rigdata.checking.gain_evidence import PointReadings, leverage
 from rigdata.checking.one_gain import gain_of_run
 from rigdata.checking.run_gains import channel_names
 from rigdata.checking.set_points import to_plane
@@ -97,10 +97,8 @@ def _distance(one: Answer, others: Sequence[Answer]) -> tuple[float, float]:
     rest = np.stack([a.force - stiffness @ a.displacement for a in others]) / scales[:, None]
     variance = float(np.sum(np.abs(rest) ** 2)) / spare
     size = float(np.linalg.norm(one.displacement))
-    own = one.displacement / size
-    leverage = float(np.real(own.conj() @ np.linalg.solve(unit.T @ unit.conj(), own)))
     residual = float(np.linalg.norm(one.force - stiffness @ one.displacement)) / size
-    ratio = residual**2 / 4 / (max(variance, 1e-300) * (1 + leverage))
+    ratio = residual**2 / 4 / (max(variance, 1e-300) * (1 + leverage(unit, one.displacement / size)))
     return ratio / float(fdtri(4, spare, 1 - _CHANCE)), misfit_of(one, stiffness)
 
 

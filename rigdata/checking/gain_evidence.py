@@ -154,27 +154,27 @@ class Evidence:
         return Evidence(mine * self.part + its * other.part, information, mine**4 * self.doubt + its**4 * other.doubt)
 
 
-def dynamic_difference(readings: PointReadings, one: int, others: Sequence[int]) -> Difference | None:
+def dynamic_difference(
+    readings: PointReadings, one: int, others: Sequence[int], stiffness: ComplexArray
+) -> Difference | None:
     """Force of run `one` minus H of the `others` times its displacement: Re X, Re Y, Im X, Im Y [N].
 
-    H is their weighted least-squares matrix; None where they do not determine it, or leave no scatter.
+    H is their `common_stiffness`; None where they leave no scatter.
     """
-    stiffness = common_stiffness(readings, others)
     spare = 2 * (2 * len(others) - 4)
-    if stiffness is None or spare < 4:
+    if spare < 4:
         return None
     displacement, force = readings.displacement, readings.force
     sizes = np.linalg.norm(displacement[list(others)], axis=1)[:, None]
     unit = displacement[list(others)] / sizes
     scatter = (force[list(others)] - displacement[list(others)] @ stiffness.T) / sizes
     own, size = displacement[one], float(np.linalg.norm(displacement[one]))
-    leverage = float(np.real(own.conj() @ np.linalg.solve(unit.T @ unit.conj(), own))) / size**2
     each = float(np.sum(np.abs(scatter) ** 2)) / spare
     told = _noise_told(readings, others, stiffness)
     if spare >= _TELLING and 0 < each <= _NO_MORE * told:
         # the runs differ by no more than their records' noise lets them, which is known from many lines
         each, spare = max(each, told), spare + _LINES_TELL * len(others)
-    variance = each * size**2 * (1 + leverage)
+    variance = each * size**2 * (1 + leverage(unit, own / size))
     variance += (_LEAST_PHASOR * float(np.linalg.norm(force[one]))) ** 2
     changes = _bearing_changes(stiffness, own)
     honest = changes @ np.diag(HONEST**2 + _bearing_wander(readings, others, stiffness)) @ changes.T
@@ -225,14 +225,20 @@ def common_stiffness(readings: PointReadings, runs: Sequence[int]) -> ComplexArr
     return np.asarray(np.linalg.lstsq(unit, force / sizes[:, None], rcond=None)[0].T)
 
 
-def static_difference(readings: PointReadings, one: int, others: Sequence[int]) -> Difference | None:
+def leverage(fitted: ComplexArray, own: ComplexArray) -> float:
+    """Variance that a matrix fitted to displacements (n, 2) gives to its answer to one more (2,), over theirs."""
+    return float(np.real(own.conj() @ np.linalg.solve(fitted.T @ fitted.conj(), own)))
+
+
+def static_difference(
+    readings: PointReadings, one: int, others: Sequence[int], stiffness: ComplexArray
+) -> Difference | None:
     """Mean readings of run `one` minus those of the `others`: probe, probe [m], cell, cell [N].
 
     A load that misses its set point shows in the cells and, over the stiffness, in the probes; what positions wander by
     besides is their scatter. None where the stiffness cannot carry a load.
     """
-    stiffness = common_stiffness(readings, others)
-    if stiffness is None or len(others) < 2 or np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
+    if len(others) < 2 or np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
         return None
     compliance = np.linalg.inv(stiffness.real)
     rows = list(others)

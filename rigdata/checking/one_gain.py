@@ -128,9 +128,12 @@ def gain_of_run(readings: PointReadings, one: int, others: Sequence[int]) -> Wro
 
 def _tries(readings: PointReadings, one: int, others: Sequence[int]) -> Iterator[_Try]:
     """Explanations of run `one` by one channel's gain that nothing in it contradicts."""
-    dynamic, static = dynamic_difference(readings, one, others), static_difference(readings, one, others)
     stiffness = common_stiffness(readings, others)
-    if dynamic is None or stiffness is None:
+    if stiffness is None:
+        return
+    dynamic = dynamic_difference(readings, one, others, stiffness)
+    static = static_difference(readings, one, others, stiffness)
+    if dynamic is None:
         return
     for channel in range(4):
         pattern = dynamic_pattern(readings, one, channel, stiffness)

@@ -71,6 +71,13 @@ def spoilt(readings: PointReadings, run: int, channel: int, gain: float, zero: f
     return replace(readings, **changed)
 
 
+def differences(readings, one, others):
+    """How a run differs from the others, dynamically and statically."""
+    stiffness = common_stiffness(readings, others)
+    assert stiffness is not None
+    return tuple(f(readings, one, others, stiffness) for f in (dynamic_difference, static_difference))
+
+
 @pytest.mark.parametrize("gain", [0.95, 0.97, 1.03, 1.05])
 @pytest.mark.parametrize("channel", range(4))
 def test_a_gain_in_one_run_comes_back(channel, gain):
@@ -118,7 +125,7 @@ def test_a_bearing_that_wanders_from_run_to_run_is_learnt(seed):
     share[2] = 1.07
     readings = replace(made, cells=made.cells * share, inertia=made.inertia * share)
     others = [0, 1, 3, 4, 5, 6, 7]
-    steady, wandering = dynamic_difference(made, 2, others), dynamic_difference(readings, 2, others)
+    steady, wandering = (differences(some, 2, others)[0] for some in (made, readings))
     assert steady is not None
     assert wandering is not None
     # 1 % is what honest runs are credited with; these show some 3 % more
@@ -167,8 +174,7 @@ def test_one_direction_of_excitation_tells_nothing():
     same = {n: np.tile(getattr(readings, n)[:1], (6, 1)) for n in ("probes", "cells", "inertia")}
     alike = replace(readings, **same)
     assert common_stiffness(alike, range(6)) is None
-    assert dynamic_difference(alike, 0, range(1, 6)) is None
-    assert static_difference(alike, 0, range(1, 6)) is None
+    assert gain_of_run(spoilt(alike, 2, 3, 1.05), 2, [0, 1, 3, 4, 5]) is None
     assert wrong_gains(spoilt(alike, 2, 3, 1.05)) == []
 
 
@@ -191,8 +197,8 @@ def test_noise_that_the_records_tell_makes_a_run_surer():
     others = [0, 1, 3, 4, 5]
     # as `point` makes it: 1 nm on X and Y, 0.3 N on every cell
     noise = np.tile([1e-9, 1e-9, 0.3, 0.3], (6, 1))
-    alone = dynamic_difference(readings, 2, others)
-    told = dynamic_difference(replace(readings, noise=noise), 2, others)
+    alone, _ = differences(readings, 2, others)
+    told, _ = differences(replace(readings, noise=noise), 2, others)
     assert alone is not None
     assert told is not None
     assert (alone.spare, told.spare) == (12, 12 + 50)
@@ -200,7 +206,7 @@ def test_noise_that_the_records_tell_makes_a_run_surer():
     assert np.diag(told.noise) == pytest.approx(np.diag(alone.noise), rel=1.5)
     # runs that differ by much more than their noise count by themselves, and so does noise that is not known
     for unlike in (0.1 * noise, np.nan * noise):
-        same = dynamic_difference(replace(readings, noise=unlike), 2, others)
+        same, _ = differences(replace(readings, noise=unlike), 2, others)
         assert same is not None
         assert same.spare == 12
         assert np.array_equal(same.noise, alone.noise)
