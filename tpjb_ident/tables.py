@@ -50,7 +50,8 @@ def write_text(path: Path, text: str) -> None:
 
 
 def _write_utf8(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")
+    # UTF-8 has no sign for a file name's broken bytes; JSON reads the escape back as what it stands for
+    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def write_table(folder: Path, name: str, frame: pd.DataFrame) -> tuple[Path, Path]:

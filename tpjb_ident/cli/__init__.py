@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 def main() -> None:
     """Run the command line; the entry point of `tpjb` and of ``python -m tpjb_ident``."""
     import sys
 
+    for stream in (sys.stdout, sys.stderr):
+        _never_refuse(stream)
     try:
         from tpjb_ident.cli.app import app
 
@@ -14,3 +18,15 @@ def main() -> None:
     except KeyboardInterrupt:  # while the libraries are loaded, before any command has begun
         print("tpjb: interrupted: nothing was written.", file=sys.stderr)
         sys.exit(130)
+    except OSError as error:  # of the streams: commands turn their own into messages
+        print(f"tpjb: error: cannot print: {error.strerror or error}.", file=sys.stderr)
+        sys.exit(2)
+
+
+def _never_refuse(stream: Any) -> None:
+    """Let a terminal or a pipe that has no µ or ± show a question mark: no result is lost to a sign."""
+    if not hasattr(stream, "reconfigure"):  # none at all (pythonw), or a caller's own
+        return
+    utf8 = "utf" in (stream.encoding or "").lower()
+    # UTF-8 lacks only what stands for a file name's broken bytes; written as an escape, that is valid JSON too
+    stream.reconfigure(errors="backslashreplace" if utf8 else "replace")

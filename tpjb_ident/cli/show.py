@@ -26,7 +26,11 @@ Progress = Callable[[str, int, int], None]
 def _console(stderr: bool = False) -> Console:
     from rich.console import Console
 
-    console = Console(stderr=stderr, highlight=False, soft_wrap=True)
+    class Patient(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError  # `guarded` ends the command well; rich would say 1
+
+    console = Patient(stderr=stderr, highlight=False, soft_wrap=True)
     if not console.is_terminal:
         console.width = 140  # a log file has no edge to fold at
     return console

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -104,7 +105,9 @@ def speaking(command: str, as_json: bool, quiet: bool) -> Iterator[Voice]:
     finally:
         mine, _current = _current, before
         if as_json:
-            typer.echo(json.dumps(_plain(mine.document(code)), indent=1, ensure_ascii=False, allow_nan=False))
+            # escapes where standard output is not UTF-8, which every program that reads JSON expects
+            ascii_only = "utf" not in (sys.stdout.encoding or "").lower()
+            typer.echo(json.dumps(_plain(mine.document(code)), indent=1, ensure_ascii=ascii_only, allow_nan=False))
 
 
 def _data(folder: Path, outputs: Sequence[str]) -> dict[str, Any]:
