@@ -7,7 +7,9 @@ stamped with the sources of all of them.
 
 from __future__ import annotations
 
+import functools
 import hashlib
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -36,6 +38,11 @@ OPTIONS: dict[str, Any] = {
     "fastmath": {"contract", "reassoc", "arcp", "nsz"},
     "nogil": True,
 }
+#: Where nothing can be written: a read-only installation and a user without a home, as services and containers have.
+_NO_PLACE = (
+    "there is no folder to keep the model's machine code in, so every process compiles it again, which takes half a "
+    "minute: set NUMBA_CACHE_DIR to a folder that can be written"
+)
 
 
 def _stamp() -> str:
@@ -48,9 +55,27 @@ def _stamp() -> str:
 STAMP = _stamp()
 
 
+@functools.cache  # once, not for every loop
+def _tell(what: str) -> None:
+    warnings.warn(what, RuntimeWarning, stacklevel=3)
+
+
 def compiled(function: Function) -> Function:
-    """Compile with numba, cached on disk under the stamp of all kernels."""
-    dispatcher: Any = njit(cache=True, **OPTIONS)(function)
+    """Compile with numba, cached on disk under the stamp of all kernels.
+
+    Warns
+    -----
+    RuntimeWarning
+        Neither the sources' folder nor the user's own can be written: every process compiles anew.
+    """
+    dispatcher: Any
+    try:
+        dispatcher = njit(cache=True, **OPTIONS)(function)
+    except RuntimeError as error:
+        if "cannot cache" not in str(error):
+            raise
+        _tell(_NO_PLACE)
+        dispatcher = njit(**OPTIONS)(function)
     store = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if store is not None and hasattr(store, "_source_stamp"):
         store._source_stamp = STAMP

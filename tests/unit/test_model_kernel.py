@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numba.core.caching
+import pytest
+
 import model.energy
 import model.film
 import model.newton_step
@@ -42,3 +45,21 @@ def test_without_numbas_cache_the_code_is_compiled_anew(monkeypatch):
 
     monkeypatch.setattr(kernel, "njit", other)
     assert kernel.compiled(kernel._stamp) == ("_stamp", False)
+
+
+def test_where_nothing_can_be_written_the_code_is_compiled_and_the_cure_is_told(monkeypatch):
+    monkeypatch.setattr(numba.core.caching.CacheImpl, "_locator_classes", [])
+    kernel._tell.cache_clear()
+    with pytest.warns(RuntimeWarning, match="NUMBA_CACHE_DIR") as told:
+        twice, thrice = kernel.compiled(lambda x: 2.0 * x), kernel.compiled(lambda x: 3.0 * x)
+    assert (twice(3.0), thrice(3.0)) == (6.0, 9.0)
+    assert len(told) == 1
+
+
+def test_other_troubles_of_the_compiler_are_not_taken_for_that(monkeypatch):
+    def broken(**options):
+        raise RuntimeError("another")
+
+    monkeypatch.setattr(kernel, "njit", broken)
+    with pytest.raises(RuntimeError, match="another"):
+        kernel.compiled(kernel._stamp)
