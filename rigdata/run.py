@@ -10,9 +10,12 @@ import numpy as np
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import RunReader
+from rigdata.readers.base import FloatArray, RunReader
 from rigdata.record import Record, VectorRecord
 from rigdata.vector import solve_vector
+
+#: Sample rates beyond these are none [Hz]: times counted from them overflow.
+LEAST_RATE, MOST_RATE = 1e-6, 1e12
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,18 @@ class Run:
     @property
     def sample_rate(self) -> float:
         """Nominal sample rate [Hz]: time column or HDF5 attribute, else the run's, else the campaign's."""
-        return self.reader.rate()
+        rate = self.reader.rate()
+        if not LEAST_RATE <= rate <= MOST_RATE:
+            raise self._error(
+                "sample rate", f"is {rate:g} Hz", "Check the time column, and sample_rate in the manifest"
+            )
+        return rate
+
+    def time(self, start: int | None = None, stop: int | None = None) -> FloatArray:
+        """Read or count the times of some samples [s]."""
+        first, last = self._slice(start, stop)
+        self.sample_rate  # noqa: B018 (refuses a rate that times cannot be counted from)
+        return self.reader.time(first, last)
 
     def _slice(self, start: int | None, stop: int | None) -> tuple[int, int]:
         length = self.length
@@ -117,7 +131,7 @@ class Run:
             name=name,
             quantity=channel.quantity,
             values=channel.to_si(reading),
-            time=self.reader.time(first, last),
+            time=self.time(first, last),
             rate=self.sample_rate,
             axis=channel.axis,
         )
@@ -158,7 +172,7 @@ class Run:
         return VectorRecord(
             quantity=quantity,
             values=solve_vector(axes, values),
-            time=self.reader.time(first, last),
+            time=self.time(first, last),
             rate=self.sample_rate,
             names=names,
         )

@@ -109,7 +109,7 @@ def observe(run: Run) -> Observation:
 
 def _usable_time(report: Reporter, run: Run, length: int) -> FloatArray | None:
     try:
-        time = run.reader.time(0, min(length, BLOCK))
+        time = run.time(0, min(length, BLOCK))
         check_clock(report, time)
     except RigDataError as error:
         report.take(error.problems)

@@ -14,17 +14,20 @@ import numpy as np
 from rigdata.calibration import Channel
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, FloatArray, rate_of_time, undescribed
-from rigdata.readers.hdf5_heaps import broken_heap
+from rigdata.readers.hdf5_hash import group_hash, is_plain
+from rigdata.readers.hdf5_heaps import broken_heap, text_is_too_long
 from rigdata.readers.hdf5_links import has_link, resolve
 
 #: Filters that the HDF5 library brings along; any other would load foreign code.
 _FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}
 _MAX_CHUNK = 256 * 2**20
 _MAX_TEXT = 8 * 2**20
+#: Class of texts in HDF5's types (H5T_STRING), and bytes of an attribute that is one number.
+_STRING, _MOST_NUMBER = 3, 64
 #: Members of a group that are looked at, and faults that are listed.
 _MAX_MEMBERS, _LISTED = 4096, 20
-
-
+#: Attribute of a run's group.
+_RATE = "sample_rate_hz"
 #: Key under which an open group is kept; no dataset can have this name.
 _GROUP = "/"
 #: Bytes of unpacked chunks that the library keeps per dataset.
@@ -110,16 +113,18 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
     with open_readonly(path, file) as handle:
         if "manifest" not in handle.attrs:
             raise _refuse(file, "root attribute manifest", "is missing", "Store campaign.toml's text there")
-        manifest = _text_attribute(handle, "manifest", file)
-        bearing = _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
+        manifest = _text_attribute(path, handle, "manifest", file)
+        bearing = _text_attribute(path, handle, "bearing", file) if "bearing" in handle.attrs else ""
     return manifest, bearing
 
 
-def _text_attribute(handle: Any, name: str, file: str) -> str:
+def _text_attribute(path: Path, handle: Any, name: str, file: str) -> str:
     place = f"root attribute {name}"
     stored = handle.attrs.get_id(name)
-    if stored.get_storage_size() > _MAX_TEXT or stored.get_type().get_class() != 3:  # 3: H5T_STRING
+    if stored.get_storage_size() > _MAX_TEXT or stored.get_type().get_class() != _STRING:
         raise _refuse(file, place, "is not a text, or far too long", "Store it as one UTF-8 string")
+    if text_is_too_long(path, name, handle.userblock_size):
+        raise _refuse(file, place, "claims a text longer than the file", "Copy the file again from the rig")
     value = handle.attrs[name]
     value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
     if isinstance(value, bytes):
@@ -278,8 +283,7 @@ class Hdf5Reader:
         facts = self.facts.get("")
         if facts is None or facts.signature != signature:
             with nullcontext(opened) if opened is not None else self._group() as group:
-                attribute = group.attrs.get("sample_rate_hz")
-                rate = None if attribute is None else self._checked_rate(attribute)
+                rate = self._checked_rate(group.attrs)
                 clock = self.clock is not None and has_link(group, self.clock.name)
                 members = tuple(itertools.islice(group, _MAX_MEMBERS))
                 facts = _Facts(signature, self._length(group), rate, clock, members)
@@ -303,10 +307,14 @@ class Hdf5Reader:
             raise self._error("", "the group holds no dataset of numbers", "Store one dataset per channel")
         return max(lengths, key=lambda n: (lengths[n], n))
 
-    def _checked_rate(self, value: object) -> float:
-        place, cure = "attribute sample_rate_hz", "Store one positive number, in Hz"
+    def _checked_rate(self, attributes: Any) -> float | None:
+        if _RATE not in attributes:
+            return None
+        place, cure = f"attribute {_RATE}", "Store one positive number, in Hz"
+        if not is_plain(attributes.get_id(_RATE), _MOST_NUMBER):
+            raise self._error(place, "is not a number", cure)
         try:
-            rate = float(np.asarray(value).reshape(()))
+            rate = float(np.asarray(attributes[_RATE]).reshape(()))
         except (ValueError, TypeError) as error:
             raise self._error(place, "is not a number", cure) from error
         if not 0.0 < rate < 1e12:
@@ -356,8 +364,6 @@ class Hdf5Reader:
 
     def stored_hash(self) -> str:
         """SHA-256 of the run as it is stored: its datasets' packed bytes and its attributes."""
-        from rigdata.readers.hdf5_hash import group_hash
-
         with self._group() as group:
             usable = []
             for name in self._known().members:

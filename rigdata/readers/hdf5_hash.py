@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 _PIECE = 2**20
+#: HDF5's classes of types: integers, floats, texts.
+_PLAIN, _STRING = (0, 1, 3), 3
 
 
 def group_hash(path: Path, group: Any, names: tuple[str, ...]) -> str:
@@ -35,8 +37,25 @@ def group_hash(path: Path, group: Any, names: tuple[str, ...]) -> str:
             for offset, size in _pieces(dataset):
                 digest.update(repr((offset, size)).encode())
                 _feed(digest, file, offset + group.file.userblock_size, size)
-        digest.update(repr([(key, repr(group.attrs[key])) for key in sorted(group.attrs)]).encode())
+        digest.update(repr(_numbers(group)).encode())
     return digest.hexdigest()
+
+
+def _numbers(group: Any) -> list[tuple[str, str]]:
+    """Attributes that lie in the group itself, as the rate; of what they refer to elsewhere no result depends."""
+    names = sorted(key for key in group.attrs if is_plain(group.attrs.get_id(key), _PIECE))
+    return [(key, repr(group.attrs[key])) for key in names]
+
+
+def is_plain(attribute: Any, most: int) -> bool:
+    """Whether an attribute is made of numbers or texts of up to `most` bytes that stand where it stands itself.
+
+    A text elsewhere in the file is as long as its reference says, and a damaged one says gigabytes, for which the
+    library makes room before it looks.
+    """
+    kind = attribute.get_type()
+    within = kind.get_class() in _PLAIN and not (kind.get_class() == _STRING and kind.is_variable_str())
+    return within and attribute.get_storage_size() <= most
 
 
 def _filters(dataset: Any) -> list[Any]:

@@ -7,6 +7,7 @@ can make it; so such files are found here, by the layout of the HDF5 File Format
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -15,6 +16,9 @@ _HEADER, _OBJECT = 16, 16
 #: Texts in attributes stand near the start or the end; the rest of a large file is samples [bytes].
 _SCANNED = 2**26
 _LARGEST_HEAP = 2**28
+#: A reference to a text: its length, the address of its heap, its number there; it follows its attribute's name, behind
+#: the descriptions of type and shape.
+_REFERENCE, _BEHIND = struct.Struct("<IQI"), 80
 
 
 def broken_heap(path: Path) -> int | None:
@@ -32,17 +36,52 @@ def broken_heap(path: Path) -> int | None:
     """
     with path.open("rb") as stream:
         size = stream.seek(0, 2)
-        starts = [0] if size <= 2 * _SCANNED else [0, size - _SCANNED]
-        length = size if size <= 2 * _SCANNED else _SCANNED
-        for start in starts:
-            stream.seek(start)
-            block = stream.read(length)
-            at = block.find(_SIGNATURE)
-            while at >= 0:
+        for start, block in _ends(stream, size):
+            for at in _places(block, _SIGNATURE):
                 if not _is_sound(stream, start + at, size):
                     return start + at
-                at = block.find(_SIGNATURE, at + 1)
     return None
+
+
+def text_is_too_long(path: Path, name: str, base: int = 0) -> bool:
+    """Whether an attribute's reference claims a text longer than the file: the library would make room for it first.
+
+    Parameters
+    ----------
+    path : Path
+        HDF5 file; its first and last 64 MB are looked at.
+    name : str
+        Of the attribute.
+    base : int
+        Size of the user block, from which addresses count [bytes].
+    """
+    with path.open("rb") as stream:
+        size = stream.seek(0, 2)
+        blocks = list(_ends(stream, size))
+    heaps = {start + at - base for start, block in blocks for at in _places(block, _SIGNATURE)}
+    for _, block in blocks:
+        for at in _places(block, name.encode() + b"\0"):
+            behind = block[at + len(name) : at + len(name) + _BEHIND]
+            for place in range(len(behind) - _REFERENCE.size + 1):
+                length, address, _ = _REFERENCE.unpack_from(behind, place)
+                if address in heaps and length > size:
+                    return True
+    return False
+
+
+def _ends(stream: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
+    """Start and bytes of a file's first and last part."""
+    starts = [0] if size <= 2 * _SCANNED else [0, size - _SCANNED]
+    for start in starts:
+        stream.seek(start)
+        yield start, stream.read(size if size <= 2 * _SCANNED else _SCANNED)
+
+
+def _places(block: bytes, wanted: bytes) -> Iterator[int]:
+    at = block.find(wanted)
+    while at >= 0:
+        yield at
+        at = block.find(wanted, at + 1)
 
 
 def _is_sound(stream: BinaryIO, at: int, size: int) -> bool:

@@ -13,6 +13,7 @@ import pytest
 import rigdata
 from rigdata.problem import RigDataError
 from rigdata.readers import hdf5
+from rigdata.readers.hdf5_heaps import text_is_too_long
 
 MANIFEST = """\
 schema = "tpjb-rig/1"
@@ -344,3 +345,45 @@ def test_signalling_nan_is_missing(tmp_path):
         del file["runs/c-1/X1A"]
         file["runs/c-1/X1A"] = np.full(N, 0x7F800001, dtype="u4").view("f4")
     assert np.isnan(rigdata.load_campaign(tmp_path / "c.h5").run("c-1").record("X1A").values).all()
+
+
+@pytest.mark.parametrize("name", ["manifest", "bearing"])
+@pytest.mark.parametrize("block", [0, 512])
+def test_a_text_that_claims_gigabytes_is_refused_before_room_is_made(tmp_path, name, block):
+    """A wrong byte in the length of a text: found by fuzzing, the library made room for 4 GB."""
+    path = tmp_path / "a.h5"
+    texts = {"manifest": MANIFEST, "bearing": 'name = "b"' + " " * 300}
+    with h5py.File(path, "w", userblock_size=block) as file:
+        file.attrs.update(texts)
+    data = bytearray(path.read_bytes())
+    for at in range(data.index(name.encode() + b"\0"), len(data) - 4):
+        if int.from_bytes(data[at : at + 4], "little") == len(texts[name]):
+            data[at + 3] = 0xF0
+            break
+    assert not text_is_too_long(path, name, block)
+    path.write_bytes(data)
+    assert text_is_too_long(path, name, block)
+    with pytest.raises(RigDataError, match=f"root attribute {name}: claims a text longer than the file"):
+        rigdata.load_campaign(path)
+
+
+def test_a_rate_that_stands_elsewhere_in_the_file_is_refused(tmp_path):
+    make(tmp_path / "a.h5", rate="500")
+    refused(tmp_path / "a.h5", "attribute sample_rate_hz", "is not a number")
+
+
+@pytest.mark.parametrize("rate", ["1e-300 Hz", "1e13 Hz"])
+def test_a_rate_that_no_times_can_be_counted_from_is_refused(tmp_path, rate):
+    make(tmp_path / "a.h5", MANIFEST.replace("10 Hz", rate), rate=None)
+    refused(tmp_path / "a.h5", "sample rate: is 1e", "sample_rate in the manifest")
+
+
+def test_the_stored_hash_reads_no_attribute_that_stands_elsewhere(tmp_path):
+    run = make(tmp_path / "a.h5")
+    before = run.reader.stored_hash()
+    with change(tmp_path / "a.h5") as file:
+        file["runs/c-1"].attrs["comment"] = "a text in the heap"
+    assert run.reader.stored_hash() == before
+    with change(tmp_path / "a.h5") as file:
+        file["runs/c-1"].attrs["mark"] = np.bytes_("here")
+    assert run.reader.stored_hash() != before
