@@ -49,7 +49,7 @@ class WarmWall:
 
     def _answer(self, size: int, until: float) -> bytes:
         """`size` bytes, fewer where the child has died."""
-        got = b""
+        got = bytearray()  # a bomb unpacks to hundreds of megabytes, which come in small pieces
         while len(got) < size:
             ready, _, _ = select.select([self.answers], [], [], max(until - time.monotonic(), 0.0))
             if not ready:
@@ -59,7 +59,7 @@ class WarmWall:
             if not piece:
                 break
             got += piece
-        return got
+        return bytes(got)
 
     def end(self) -> int:
         """End the child; its exit status."""
