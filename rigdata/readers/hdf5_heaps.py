@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-_SIGNATURE = b"GCOL\x01\x00\x00\x00"
+#: With the version; three reserved bytes follow, which the library does not look at.
+_SIGNATURE, _RESERVED = b"GCOL\x01", b"\0\0\0"
 _HEADER, _OBJECT = 16, 16
 #: Texts in attributes stand near the start or the end; the rest of a large file is samples [bytes].
 _SCANNED = 2**26
@@ -85,10 +86,12 @@ def _places(block: bytes, wanted: bytes) -> Iterator[int]:
 
 
 def _is_sound(stream: BinaryIO, at: int, size: int) -> bool:
-    stream.seek(at + 8)
-    (length,) = struct.unpack("<Q", stream.read(8).ljust(8, b"\0"))
+    stream.seek(at)
+    header = stream.read(_HEADER).ljust(_HEADER, b"\0")
+    (length,) = struct.unpack_from("<Q", header, 8)
     if length < _HEADER or at + length > size or length > _LARGEST_HEAP:
-        return False
+        # with odd reserved bytes: samples that look like a heap by chance
+        return header[len(_SIGNATURE) : 8] != _RESERVED
     heap = stream.read(length - _HEADER)
     place = 0
     while place + _OBJECT <= len(heap):

@@ -24,6 +24,7 @@ import os
 import platform
 import random
 import resource
+import select
 import signal
 import struct
 import sys
@@ -43,6 +44,8 @@ from fuzz_targets import ROOT, TARGETS, Target, make_target, source_hash
 
 #: CPU seconds and bytes of growth above which a case is a finding.
 SLOWEST, LARGEST = 5.0, 2**31
+#: Seconds at one case after which the process is taken for hung.
+HANG = 120.0
 #: Bytes of an input.
 LONGEST = 65536
 #: Cases per child process.
@@ -149,6 +152,18 @@ def _child(target: Target, block: range, seed: int, corpus: Path, board: mmap.mm
         stream.write(answer)
 
 
+def _ended_if_it_hangs(child: int, answer: int, board: mmap.mmap) -> bool:
+    """Wait for a child's answer; end one that stays at a case, in code that no signal of Python's interrupts."""
+    number, since = board[:8], time.monotonic()
+    while not select.select([answer], [], [], 2.0)[0]:
+        if board[:8] != number:
+            number, since = board[:8], time.monotonic()
+        elif time.monotonic() - since > HANG:
+            os.kill(child, signal.SIGKILL)
+            return True
+    return False
+
+
 def run_block(target: Target, block: range, seed: int, corpus: Path, board: mmap.mmap) -> dict[str, Any]:
     """One child process; what it found, a crash of the process included."""
     reading, writing = os.pipe()
@@ -164,6 +179,7 @@ def run_block(target: Target, block: range, seed: int, corpus: Path, board: mmap
         finally:
             os._exit(code)
     os.close(writing)
+    hung = _ended_if_it_hangs(child, reading, board)
     with os.fdopen(reading) as stream:
         text = stream.read()
     _, status = os.waitpid(child, 0)
@@ -171,7 +187,7 @@ def run_block(target: Target, block: range, seed: int, corpus: Path, board: mmap
         return dict(json.loads(text))
     (number,) = struct.unpack("<q", board[:8])
     (size,) = struct.unpack("<q", board[16:24])
-    what = f"the process died (status {status})"
+    what = f"no end after {HANG:g} s, in a library" if hung else f"the process died (status {status})"
     done = number - block.start + 1
     return {
         "cases": done,

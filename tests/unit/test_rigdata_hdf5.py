@@ -323,11 +323,13 @@ def test_display_name_and_limits_are_documented():
     assert 32015 not in hdf5._FILTERS
 
 
-def test_heap_that_the_library_would_walk_for_ever(tmp_path):
+@pytest.mark.parametrize("reserved", [0, 0x7F])
+def test_heap_that_the_library_would_walk_for_ever(tmp_path, reserved):
     """One wrong byte: the free space of the heap that holds the manifest claims size zero."""
     path = tmp_path / "c.h5"
     make(path)
     data = bytearray(path.read_bytes())
+    data[data.index(b"GCOL") + 5] = reserved  # which nobody looks at
     at = data.index(b"GCOL") + 16
     index, need = int.from_bytes(data[at : at + 2], "little"), int.from_bytes(data[at + 8 : at + 16], "little")
     while index:
@@ -337,6 +339,13 @@ def test_heap_that_the_library_would_walk_for_ever(tmp_path):
     path.write_bytes(bytes(data))
     with pytest.raises(RigDataError, match="damaged"):
         rigdata.load_campaign(path)
+
+
+def test_samples_that_look_like_a_heap_by_chance_are_none(tmp_path):
+    make(tmp_path / "c.h5")
+    with change(tmp_path / "c.h5") as file:
+        file["runs/c-1"].create_dataset("X2", data=np.frombuffer(b"GCOL\x01abc" + b"\xff" * 8, dtype="u1"))
+    assert rigdata.load_campaign(tmp_path / "c.h5").run("c-1").length == N
 
 
 def test_signalling_nan_is_missing(tmp_path):
