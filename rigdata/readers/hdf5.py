@@ -15,7 +15,7 @@ from rigdata.calibration import Channel
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, FloatArray, rate_of_time, undescribed
 from rigdata.readers.hdf5_hash import group_hash, is_plain
-from rigdata.readers.hdf5_heaps import broken_heap, text_is_too_long
+from rigdata.readers.hdf5_heaps import broken_heap, too_long_text
 from rigdata.readers.hdf5_links import has_link, resolve
 
 #: Filters that the HDF5 library brings along; any other would load foreign code.
@@ -113,18 +113,20 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
     with open_readonly(path, file) as handle:
         if "manifest" not in handle.attrs:
             raise _refuse(file, "root attribute manifest", "is missing", "Store campaign.toml's text there")
-        manifest = _text_attribute(path, handle, "manifest", file)
-        bearing = _text_attribute(path, handle, "bearing", file) if "bearing" in handle.attrs else ""
+        damaged = too_long_text(path, ("manifest", "bearing"), handle.userblock_size)
+        if damaged is not None:
+            what = "claims a text longer than the file"
+            raise _refuse(file, f"root attribute {damaged}", what, "Copy the file again from the rig")
+        manifest = _text_attribute(handle, "manifest", file)
+        bearing = _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
     return manifest, bearing
 
 
-def _text_attribute(path: Path, handle: Any, name: str, file: str) -> str:
+def _text_attribute(handle: Any, name: str, file: str) -> str:
     place = f"root attribute {name}"
     stored = handle.attrs.get_id(name)
     if stored.get_storage_size() > _MAX_TEXT or stored.get_type().get_class() != _STRING:
         raise _refuse(file, place, "is not a text, or far too long", "Store it as one UTF-8 string")
-    if text_is_too_long(path, name, handle.userblock_size):
-        raise _refuse(file, place, "claims a text longer than the file", "Copy the file again from the rig")
     value = handle.attrs[name]
     value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
     if isinstance(value, bytes):

@@ -7,7 +7,7 @@ can make it; so such files are found here, by the layout of the HDF5 File Format
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -44,30 +44,37 @@ def broken_heap(path: Path) -> int | None:
     return None
 
 
-def text_is_too_long(path: Path, name: str, base: int = 0) -> bool:
-    """Whether an attribute's reference claims a text longer than the file: the library would make room for it first.
+def too_long_text(path: Path, names: Sequence[str], base: int = 0) -> str | None:
+    """Find an attribute whose reference claims a text longer than the file: the library would make room for it first.
 
     Parameters
     ----------
     path : Path
         HDF5 file; its first and last 64 MB are looked at.
-    name : str
-        Of the attribute.
+    names : sequence of str
+        Of the attributes.
     base : int
         Size of the user block, from which addresses count [bytes].
+
+    Returns
+    -------
+    str or None
+        Its name; None where all are sound.
     """
     with path.open("rb") as stream:
         size = stream.seek(0, 2)
-        blocks = list(_ends(stream, size))
-    heaps = {start + at - base for start, block in blocks for at in _places(block, _SIGNATURE)}
-    for _, block in blocks:
-        for at in _places(block, name.encode() + b"\0"):
-            behind = block[at + len(name) : at + len(name) + _BEHIND]
-            for place in range(len(behind) - _REFERENCE.size + 1):
-                length, address, _ = _REFERENCE.unpack_from(behind, place)
-                if address in heaps and length > size:
-                    return True
-    return False
+        heaps, behind = set[int](), list[tuple[str, bytes]]()
+        for start, block in _ends(stream, size):
+            heaps.update(start + at - base for at in _places(block, _SIGNATURE))
+            for name in names:
+                ends = (at + len(name) for at in _places(block, name.encode() + b"\0"))
+                behind += [(name, block[end : end + _BEHIND]) for end in ends]
+    for name, piece in behind:
+        for place in range(len(piece) - _REFERENCE.size + 1):
+            length, address, _ = _REFERENCE.unpack_from(piece, place)
+            if address in heaps and length > size:
+                return name
+    return None
 
 
 def _ends(stream: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:

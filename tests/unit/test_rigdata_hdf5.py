@@ -13,7 +13,7 @@ import pytest
 import rigdata
 from rigdata.problem import RigDataError
 from rigdata.readers import hdf5
-from rigdata.readers.hdf5_heaps import text_is_too_long
+from rigdata.readers.hdf5_heaps import too_long_text
 
 MANIFEST = """\
 schema = "tpjb-rig/1"
@@ -369,9 +369,9 @@ def test_a_text_that_claims_gigabytes_is_refused_before_room_is_made(tmp_path, n
         if int.from_bytes(data[at : at + 4], "little") == len(texts[name]):
             data[at + 3] = 0xF0
             break
-    assert not text_is_too_long(path, name, block)
+    assert too_long_text(path, list(texts), block) is None
     path.write_bytes(data)
-    assert text_is_too_long(path, name, block)
+    assert too_long_text(path, list(texts), block) == name
     with pytest.raises(RigDataError, match=f"root attribute {name}: claims a text longer than the file"):
         rigdata.load_campaign(path)
 
