@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from model.equilibrium import Equilibrium
 
 
@@ -9,13 +11,15 @@ def power_loss(equilibrium: Equilibrium, surface_speed: float) -> float:
     """Work the journal does on all films [W]: wall shear mu U / h + h/2 dp/dx, times U, over the full film.
 
     Where the film is ruptured only its striated share shears; that share is h_rupture / h, taken from the film
-    thickness at the line's rupture.
+    thickness at the line's rupture. NaN where a film is lost.
     """
     total = 0.0
     for film in equilibrium.films:
         if film.idle:
             continue
         work, grid = film.work, film.grid
+        if not work.thickness.min() > 0:  # a lost film, of a prediction that did not converge
+            return math.nan
         couette = work.viscosity * surface_speed**2 / work.thickness
         share = work.thickness * 0 + 1.0
         for j in range(share.shape[1]):

@@ -157,6 +157,13 @@ def test_extreme_speeds(rocker, speed):
     sane(predict(rocker, 5000.0, DOWN, speed, 100.0, mesh=COARSE))
 
 
+def test_a_shaft_that_hardly_turns_loses_its_films_and_no_power(rocker):
+    p = predict(rocker, 5000.0, DOWN, 1e-28, pivots="kirk", mesh=COARSE)
+    sane(p)
+    assert "film lost" in p.status
+    assert math.isnan(p.power_loss)
+
+
 def test_unloaded_directions_of_a_single_pad_are_no_equilibrium(rocker):
     p = predict(rocker.with_pads(rocker.pads[:1]), 5000.0, 1.5, SPEED, mesh=COARSE)
     assert not p.converged
