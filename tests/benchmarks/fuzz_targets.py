@@ -442,11 +442,10 @@ def make_target(name: str, folder: Path) -> Target:
         "csv": csv_target,
         "hdf5": hdf5_target,
         "cli": command_target,
+        "mf4": mdf_target,
     }
     if name in makers:
         return makers[name](folder)
-    if name == "mf4":
-        return mdf_target(folder)
     if name in FOREIGN:
         return foreign_target(folder, "." + name)
     sys.exit(f"no target {name!r}; there are {', '.join(TARGETS)}")

@@ -41,14 +41,14 @@ class WarmWall:
             self._fork()
         self.cases += 1
         os.write(self.asks, "\t".join([command[3], command[4], env["TMPDIR"]]).encode() + b"\n")
-        head = self._answer(8, time.monotonic() + SECONDS)
-        body = self._answer(struct.unpack("<q", head)[0], time.monotonic() + SECONDS) if len(head) == 8 else b""
-        if len(head) == 8:
-            return subprocess.CompletedProcess(command, 0, body, b"")
-        return subprocess.CompletedProcess(command, self.end() or 1, b"", b"")
+        head = self._answer(8)
+        if len(head) < 8:
+            return subprocess.CompletedProcess(command, self.end() or 1, b"", b"")
+        return subprocess.CompletedProcess(command, 0, self._answer(struct.unpack("<q", head)[0]), b"")
 
-    def _answer(self, size: int, until: float) -> bytes:
+    def _answer(self, size: int) -> bytes:
         """`size` bytes, fewer where the child has died."""
+        until = time.monotonic() + SECONDS
         got = bytearray()  # a bomb unpacks to hundreds of megabytes, which come in small pieces
         while len(got) < size:
             ready, _, _ = select.select([self.answers], [], [], max(until - time.monotonic(), 0.0))
