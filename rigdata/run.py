@@ -127,12 +127,13 @@ class Run:
             raise self._error(f"channel {name}", "is not described in the manifest", f"Described: {known}")
         first, last = self._slice(start, stop)
         (reading,) = self.reader.read([name], first, last)
+        rate = self.sample_rate  # refused before times are counted from it
         return Record(
             name=name,
             quantity=channel.quantity,
             values=channel.to_si(reading),
-            time=self.time(first, last),
-            rate=self.sample_rate,
+            time=self.reader.time(first, last),
+            rate=rate,
             axis=channel.axis,
         )
 
@@ -169,11 +170,12 @@ class Run:
         first, last = self._slice(start, stop)
         readings = self.reader.read(names, first, last)
         values = np.stack([c.to_si(r) for c, r in zip(chosen, readings)], axis=1)
+        rate = self.sample_rate  # refused before times are counted from it
         return VectorRecord(
             quantity=quantity,
             values=solve_vector(axes, values),
-            time=self.time(first, last),
-            rate=self.sample_rate,
+            time=self.reader.time(first, last),
+            rate=rate,
             names=names,
         )
 
