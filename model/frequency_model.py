@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from model.dynamics import bearing_impedance, pad_matrices
+from model.dynamics.reduction import bearing_impedance, pad_matrices
 from model.predict import Prediction
 
 FloatArray = NDArray[np.float64]

@@ -2,7 +2,7 @@
 
 The drawing's clearances hold at the temperature they were measured at. A journal that is hotter takes its growth from
 Cb and Cp alike; a housing that is hotter gives it to Cb; pads that are hotter take their thickness from Cb and give
-their larger radius to Cp. What pads grow above the oil's supply temperature, unevenly, is `model.pad_bending`.
+their larger radius to Cp. What pads grow above the oil's supply temperature, unevenly, is `model.pad.bending`.
 """
 
 from __future__ import annotations

@@ -16,14 +16,14 @@ class Options:
     Attributes
     ----------
     conduction : bool
-        The pads conduct the film's heat to their backs and edges; see `model.heat_paths`.
+        The pads conduct the film's heat to their backs and edges; see `model.statics.heat_paths`.
     isothermal_journal : bool
         The journal passes heat from hot films to cold ones and keeps none.
     growth : Growth, optional
         Clearances change with the temperatures of journal, housing and pads; see `model.growth`.
     cavitation : {"swift-stieber", "jfo"}
         What happens where the film ruptures: p = 0 and dp/dn = 0 alone, or with the oil conserved (Jakobsson, Floberg
-        and Olsson), see `model.cavitation`.
+        and Olsson), see `model.film.cavitation`.
     """
 
     conduction: bool = False

@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.bearing import Bearing
-from model.dynamics import PadMatrices, bearing_impedance, pad_matrices
+from model.dynamics.reduction import PadMatrices, bearing_impedance, pad_matrices
 from model.effects import Effect, apply_effects
-from model.equilibrium import Equilibrium, solve_equilibrium
 from model.growth import grown
 from model.options import Options
 from model.pivots import pivot_laws
 from model.possible import check_possible
-from model.power import power_loss
 from model.setup import Mesh, Setup
+from model.statics.equilibrium import Equilibrium, solve_equilibrium
+from model.statics.power import power_loss
 from model.units import to_si
 
 FloatArray = NDArray[np.float64]

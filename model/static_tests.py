@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from model.equilibrium import Equilibrium
 from model.predict import Prediction, predict_setup
 from model.setup import Setup
-from model.warm_start import carried_on
+from model.statics.equilibrium import Equilibrium
+from model.statics.warm_start import carried_on
 
 FloatArray = NDArray[np.float64]
 

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rigdata.calibration import Channel
     from rigdata.campaign import Campaign, load_campaign
-    from rigdata.checks import check_campaign
     from rigdata.operating_point import OperatingPoint
     from rigdata.problem import Problem, RigDataError
     from rigdata.record import Record, VectorRecord
@@ -31,7 +30,6 @@ _HOMES = {
     "RigDataError": "problem",
     "Run": "run",
     "VectorRecord": "record",
-    "check_campaign": "checks",
     "load_campaign": "campaign",
 }
 
@@ -44,7 +42,6 @@ __all__ = [
     "RigDataError",
     "Run",
     "VectorRecord",
-    "check_campaign",
     "load_campaign",
 ]
 

@@ -171,8 +171,8 @@ def _read_text(path: Path, file: str, limit: int) -> str:
 
 
 def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
-    from rigdata.readers.csv import CsvReader, TableCache
-    from rigdata.readers.foreign import ForeignReader, is_foreign
+    from rigdata.readers.formats.foreign import ForeignReader, is_foreign
+    from rigdata.readers.text.csv import CsvReader, TableCache
 
     text = _read_text(manifest_path, manifest_path.name, MAX_MANIFEST)
     manifest = parse_manifest(text, manifest_path.name)
@@ -219,7 +219,7 @@ def _bearing_text(folder: Path, manifest: Manifest, file: str, files: dict[str, 
 
 
 def _load_hdf5(path: Path) -> Campaign:
-    from rigdata.readers.hdf5 import Hdf5Reader, read_texts
+    from rigdata.readers.hdf5.reader import Hdf5Reader, read_texts
 
     text, bearing = read_texts(path, path.name)
     manifest = parse_manifest(text, f"{path.name}:manifest")

@@ -15,6 +15,6 @@ if (builder := getattr(typer.testing, "_get_command", None)) is not None:
     typer.testing._get_command = functools.cache(builder)
 
 
-def tpjb(*words: Any) -> Any:
-    """Run `tpjb words`; its output, exit code and exception."""
+def tpjb(*words: Any, app: typer.Typer = app) -> Any:
+    """Run `tpjb words`, or another program of commands; its output, exit code and exception."""
     return typer.testing.CliRunner().invoke(app, [str(word) for word in words])

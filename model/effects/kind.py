@@ -5,8 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from model.setup import Setup
@@ -148,44 +147,3 @@ def _nearest(name: str, known: Iterable[str]) -> str:
     known = list(known)
     near = difflib.get_close_matches(name, known, n=1)
     return f" Did you mean {near[0]!r}?" if near else f" Known: {', '.join(known)}."
-
-
-@dataclass(frozen=True)
-class Effect:
-    """An effect with its parameters: ``Effect("soft_pivot", pad=5, stiffness_factor=0.3)``.
-
-    Attributes
-    ----------
-    name : str
-    parameters : mapping
-        SI numbers by name.
-
-    Raises
-    ------
-    EffectError
-        Unknown effect or parameter, with the nearest known one.
-    """
-
-    name: str
-    parameters: Mapping[str, float] = field(default_factory=dict)
-
-    def __init__(self, name: str, **parameters: Any) -> None:
-        from model.effects import kind_of
-
-        kind = kind_of(name)
-        object.__setattr__(self, "name", kind.name)
-        object.__setattr__(self, "parameters", MappingProxyType(kind.check(parameters)))
-
-    def __reduce__(self) -> Any:
-        return _rebuild, (self.name, dict(self.parameters))
-
-    def __repr__(self) -> str:
-        inside = ", ".join(f"{k}={v:g}" for k, v in self.parameters.items())
-        return f"Effect({self.name!r}{', ' if inside else ''}{inside})"
-
-    def __hash__(self) -> int:
-        return hash((self.name, tuple(sorted(self.parameters.items()))))
-
-
-def _rebuild(name: str, parameters: dict[str, float]) -> Effect:
-    return Effect(name, **parameters)

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.catman import time_column
-from rigdata.readers.foreign import FORMATS, read_foreign
+from rigdata.readers.formats.foreign import FORMATS, read_foreign
 from rigdata.readers.series import Series, without_twins
+from rigdata.readers.text.catman import time_column
 
 TEXT = (".csv", ".txt", ".asc", ".dat", ".tsv")
 MOST_FILES = 5000

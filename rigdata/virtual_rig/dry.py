@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigdata.virtual_rig.chance import stream
 from rigdata.virtual_rig.motion import RunPhysics, SlowMotion
-from rigdata.virtual_rig.noise import Noise
+from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import DryTest, PlannedRun
 from rigdata.virtual_rig.truth import FloatArray, RigTruth, VirtualRigError
 

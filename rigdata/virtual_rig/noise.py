@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from math import radians
+from zlib import crc32
+
+import numpy as np
 
 from rigdata.virtual_rig.truth import VirtualRigError
 
@@ -231,3 +234,12 @@ class Noise:
         """Return it with the channels' noise `factor` times as strong; shaft, actuators, dry tests as they are."""
         names = ("displacement", "force", "acceleration", "temperature", "speed")
         return replace(self, **{name: getattr(self, name).scaled(factor) for name in names})
+
+
+#: What random streams are for; a change in one leaves all others as they were.
+PURPOSES = ("physics", "noise", "mains", "glitches", "dry", "faults", "campaign")
+
+
+def stream(seed: int, run: str, purpose: str) -> np.random.Generator:
+    """Generator for one run (by its id) and purpose; the same for the same arguments, on every machine."""
+    return np.random.default_rng([seed, crc32(run.encode()), PURPOSES.index(purpose)])

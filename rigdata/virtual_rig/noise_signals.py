@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len
 
-from rigdata.virtual_rig.chance import stream
 from rigdata.virtual_rig.instruments import Sensor
-from rigdata.virtual_rig.noise import ChannelNoise, Noise
+from rigdata.virtual_rig.noise import ChannelNoise, Noise, stream
 
 FloatArray = NDArray[np.float64]
 

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from rigdata.operating_point import OperatingPoint
-from rigdata.virtual_rig.chance import stream
 from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.motion import Line, RunPhysics, SteadyMotion
-from rigdata.virtual_rig.noise import Noise
+from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import PlannedRun
 from rigdata.virtual_rig.truth import ComplexArray, RigTruth, VirtualRigError, load_vector
 

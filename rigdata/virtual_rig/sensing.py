@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.virtual_rig.chance import stream
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import RunPhysics
-from rigdata.virtual_rig.noise import Noise
+from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.noise_signals import channel_noise
 from rigdata.virtual_rig.truth import FloatArray
 

@@ -11,9 +11,9 @@ import pytest
 from scipy.io import savemat
 
 from rigdata.problem import RigDataError
-from rigdata.readers import mat5_elements
-from rigdata.readers.foreign import read_foreign
-from rigdata.readers.mat5_elements import check_mat5
+from rigdata.readers.formats import mat5_elements
+from rigdata.readers.formats.foreign import read_foreign
+from rigdata.readers.formats.mat5_elements import check_mat5
 
 TIME = np.arange(120) / 100.0
 

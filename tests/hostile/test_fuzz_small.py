@@ -1,4 +1,4 @@
-"""A few hundred cases of the fuzzer (tests/benchmarks/fuzz_readers.py) per reader: only documented errors."""
+"""A few hundred cases of the fuzzer (tests/studies/fuzz_readers.py) per reader: only documented errors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[1] / "studies"
 CASES = {
     "manifest": 100, "bearing": 100, "pivots": 150, "effects": 150, "csv": 40, "hdf5": 40, "mat": 150, "parquet": 60,
     "tdms": 60, "uff": 60, "mat73": 60, "asc": 60, "mf4": 5,

@@ -13,7 +13,7 @@ import pytest
 import rigdata
 from rigdata.problem import RigDataError
 from tests.command_line import tpjb
-from tpjb_ident.tables import safe_for_spreadsheets, write_table
+from tpjb_ident.runtime.tables import safe_for_spreadsheets, write_table
 
 TAGS = "<script>alert(1)</script><img src=x onerror=alert(2)><svg onload=alert(3)>"
 NAMES = ["<script>x</script>", '"><img src=x onerror=y>', "=1+1", "\u202eabc", "\x1b[31mred", "javascript:alert(1)"]

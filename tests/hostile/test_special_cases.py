@@ -17,7 +17,7 @@ from model.pivots import load_pivots
 from model.units import UnitError
 from rigdata.manifest import parse_manifest
 from rigdata.problem import RigDataError
-from rigdata.readers.foreign import FORMATS, read_foreign
+from rigdata.readers.formats.foreign import FORMATS, read_foreign
 
 pytestmark = pytest.mark.slow
 HEAD = 'schema = "tpjb-rig/1"\nid = "t"\nbearing = "b.toml"\n[acquisition]\nsample_rate = "10 Hz"\n'

@@ -14,8 +14,8 @@ from model.toml_text import MAX_DEPTH, parse_toml
 from model.units import UnitError, parse_quantity
 from rigdata.manifest import parse_manifest
 from rigdata.problem import RigDataError
-from tpjb_ident.cli.errors import BadInputError
-from tpjb_ident.cli.quantities import parse_values
+from tpjb_ident.cli.common.quantities import parse_values
+from tpjb_ident.errors import BadInputError
 
 BOMBS = {
     "dotted key": "a." * 16_000 + "a = 1",

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from rigdata.problem import RigDataError
-from rigdata.readers import walled
-from rigdata.readers.foreign import read_foreign
+from rigdata.readers.formats import walled
+from rigdata.readers.formats.foreign import read_foreign
 from rigdata.readers.series import Series
 
 DAMAGED = Path(__file__).parent / "damaged"
@@ -39,7 +39,7 @@ def test_what_a_library_prints_is_no_part_of_the_answer(tmp_path, monkeypatch, c
         print("a channel looks odd")  # asammdf says such things of files that it can read
         return [Series("X1A", "V", np.arange(3.0), None, "")]
 
-    monkeypatch.setitem(sys.modules, "rigdata.readers.talks", SimpleNamespace(read_walled_in=read_walled_in))
+    monkeypatch.setitem(sys.modules, "rigdata.readers.formats.talks", SimpleNamespace(read_walled_in=read_walled_in))
     monkeypatch.setattr(walled, "_limit_memory", lambda path: None)
     walled.main("talks", tmp_path)
     head, _, body = capsysbinary.readouterr().out.partition(b"\n")

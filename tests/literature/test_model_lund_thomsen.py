@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from model.film import solve_film
-from model.film_mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film.reynolds import solve_film
 
 # L/D, S, eps, attitude [deg], then Kxx, Kxy, Kyx, Kyy, Bxx, Bxy, Byy (K = k C/W, B = c omega C/W); Byx = Bxy
 ROWS = [

@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing, Oil, Pad, Pivot
-from model.film import solve_film
-from model.film_mesh import film_grid, film_work
+from model.film.mesh import film_grid, film_work
+from model.film.reynolds import solve_film
 from model.predict import Prediction, predict
 
 CLEARANCE, DIAMETER, REVS = 1e-4, 0.1, 20.0

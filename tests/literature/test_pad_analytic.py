@@ -11,11 +11,11 @@ from scipy.integrate import quad
 
 from model.bearing import BABBITT, STEEL, Bearing, Material
 from model.bearing_file import load_bearing
-from model.block_cholesky import BlockCholesky, factor_rows
-from model.pad_elasticity import ElasticSector
-from model.pad_line import Line
-from model.pad_mesh import MeshDensity, PivotFace, SectorMesh
-from model.pad_solid import PadSolid, pad_solid
+from model.pad.block_cholesky import BlockCholesky, factor_rows
+from model.pad.elasticity import ElasticSector
+from model.pad.line import Line
+from model.pad.mesh import MeshDensity, PivotFace, SectorMesh
+from model.pad.solid import PadSolid, pad_solid
 
 BEARINGS = Path(__file__).parents[2] / "model" / "bearings"
 U_R, U_THETA, U_Z = range(3)

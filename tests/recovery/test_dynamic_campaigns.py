@@ -15,8 +15,8 @@ import pytest
 
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
+from tpjb_ident.dynamic.corrections.mains_angles import Problem
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
-from tpjb_ident.dynamic.mains_angles import Problem
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 DIRECT = [0, 3, 4, 7]

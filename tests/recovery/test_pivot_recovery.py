@@ -15,7 +15,7 @@ import pytest
 from rigdata.campaign import load_campaign
 from rigdata.problem import RigDataError
 from rigdata.virtual_rig import ClearanceSweep, DryTest, Fault, Instruments, Noise
-from tests.benchmarks.pivot_cases import (
+from tests.studies.pivot_cases import (
     ANGLES,
     LOADS,
     PROGRAMMES,
@@ -26,8 +26,8 @@ from tests.benchmarks.pivot_cases import (
     refusal_cases,
     true_onset,
 )
-from tpjb_ident.clearance import measure_clearance
-from tpjb_ident.locus import measure_locus
+from tpjb_ident.clearance.locus import measure_locus
+from tpjb_ident.clearance.measure import measure_clearance
 from tpjb_ident.pivot import PivotSettings, fit_pivots
 
 SAMPLES = Path(__file__).resolve().parents[2].parent / "shared" / "samples"

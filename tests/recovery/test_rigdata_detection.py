@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-import rigdata
 from rigdata.problem import Problem
 from rigdata.virtual_rig import Fault, Noise
 from tests.good_campaigns import RUN, stiff_rig, written
+from tpjb_ident.check.campaign import check_campaign
 
 pytestmark = pytest.mark.slow
 
 
 def check(folder, *faults: Fault, seed: int = 1, noise: Noise | None = None, layout: str = "hdf5") -> list[Problem]:
     path = written(folder / ("c.h5" if layout == "hdf5" else "c"), stiff_rig(seed, *faults, noise=noise), layout)
-    return rigdata.check_campaign(path)
+    return check_campaign(path)
 
 
 @pytest.mark.parametrize("seed", range(4))

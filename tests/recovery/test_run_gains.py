@@ -12,6 +12,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Fault, Noise
 from rigdata.virtual_rig.truth import load_vector
 from tests.good_campaigns import DAMPING, PLAN, RUN, STIFFNESS, directions, stiff_rig, written
+from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
 
 SHORT = replace(PLAN, locus=(), dry=())
@@ -19,7 +20,7 @@ MISS = Noise.like_samples().set_point
 
 
 def found(path) -> list[tuple[str | None, str]]:
-    return [(p.run, p.place) for p in rigdata.check_campaign(path) if p.severity != "note"]
+    return [(p.run, p.place) for p in check_campaign(path) if p.severity != "note"]
 
 
 @pytest.mark.slow
@@ -32,7 +33,7 @@ def test_small_gains_are_named_at_their_run_and_channel(tmp_path, channel, gain,
     for seed in (71, 72, 73):
         fault = Fault("scaled", RUN, channel, value=gain)
         path = written(tmp_path / f"{seed}.h5", stiff_rig(seed, fault, plan=SHORT))
-        told = rigdata.check_campaign(path)
+        told = check_campaign(path)
         assert {p.run for p in told} <= {RUN}
         places += [p for p in told if p.place == f"channel {channel}" or f"{channel} read" in p.what]
     assert len(places) >= least
@@ -76,7 +77,7 @@ def test_identify_says_nothing_of_gains_where_channels_are_not_in_pairs(tmp_path
     path = written(tmp_path / "c.h5", stiff_rig(4, Fault("scaled", RUN, "X1A", value=1.05), plan=SHORT))
     campaign = rigdata.load_campaign(path)
     channels = {n: replace(c, axis=0.1) if n == "L1H" else c for n, c in campaign.channels.items()}
-    from tpjb_ident.dynamic.run_gains import channel_pairs
+    from tpjb_ident.dynamic.results.run_gains import channel_pairs
 
     assert channel_pairs(campaign) is not None
     assert channel_pairs(replace(campaign, channels={n: c for n, c in channels.items() if n != "X1A"})) is None

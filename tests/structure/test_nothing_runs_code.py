@@ -21,9 +21,9 @@ ATTRIBUTES = {
 }  # fmt: skip
 #: file: what it may do, and why.
 ALLOWED = {
-    "rigdata/readers/walled.py": {"subprocess"},  # this interpreter, to read files that crash libraries
+    "rigdata/readers/formats/walled.py": {"subprocess"},  # this interpreter, to read files that crash libraries
     "tpjb_ident/compare/warm_up.py": {"subprocess"},  # this interpreter, to load libraries
-    "tpjb_ident/executors.py": {"pickle"},  # what its own processes send each other, never a file
+    "tpjb_ident/runtime/executors.py": {"pickle"},  # what its own processes send each other, never a file
 }
 
 

@@ -78,7 +78,7 @@ def test_a_breach_is_seen(path, source):
     ("path", "source"),
     [
         ("tpjb_ident/compare/x.py", "from model.predict import predict"),
-        ("tpjb_ident/cli/x.py", "from tpjb_ident.cli.errors import BadInput"),
+        ("tpjb_ident/cli/x.py", "from tpjb_ident.cli.common.errors import guarded"),
         ("tpjb_ident/report/x.py", "from matplotlib.figure import Figure"),
     ],
 )

@@ -6,23 +6,22 @@ from typing import Annotated
 
 import typer
 
-from tpjb_ident.cli.check import check
-from tpjb_ident.cli.compare import compare
-from tpjb_ident.cli.demo import demo
-from tpjb_ident.cli.diagnose import diagnose
-from tpjb_ident.cli.evaluate import evaluate
-from tpjb_ident.cli.export import export
-from tpjb_ident.cli.identify import identify
-from tpjb_ident.cli.init import init
-from tpjb_ident.cli.locus import locus
-from tpjb_ident.cli.look import show
-from tpjb_ident.cli.pivot import pivot
-from tpjb_ident.cli.plan import plan
-from tpjb_ident.cli.predict import predict
-from tpjb_ident.cli.simulate import simulate
-from tpjb_ident.cli.spoken import add_command
-from tpjb_ident.cli.verify import verify
-from tpjb_ident.cli.view import view
+from tpjb_ident.cli.commands.check import check
+from tpjb_ident.cli.commands.compare import compare
+from tpjb_ident.cli.commands.demo import demo
+from tpjb_ident.cli.commands.diagnose import diagnose
+from tpjb_ident.cli.commands.export import export
+from tpjb_ident.cli.commands.identify import identify
+from tpjb_ident.cli.commands.init import init
+from tpjb_ident.cli.commands.locus import locus
+from tpjb_ident.cli.commands.pivot import pivot
+from tpjb_ident.cli.commands.plan import plan
+from tpjb_ident.cli.commands.predict import predict
+from tpjb_ident.cli.commands.show import show
+from tpjb_ident.cli.commands.simulate import simulate
+from tpjb_ident.cli.commands.verify import verify
+from tpjb_ident.cli.commands.view import view
+from tpjb_ident.cli.common.common_options import add_command
 
 # plain help: the markup renderer costs more start-up time than all the rest together
 app = typer.Typer(
@@ -51,7 +50,7 @@ def _common(
 
 
 COMMANDS = (
-    init, show, check, identify, pivot, locus, predict, compare, diagnose, plan, evaluate, simulate, demo, export, view,
+    init, show, check, identify, pivot, locus, predict, compare, diagnose, plan, simulate, demo, export, view,
     verify,
 )  # fmt: skip
 for command in COMMANDS:

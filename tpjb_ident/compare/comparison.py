@@ -19,9 +19,9 @@ from model.bearing import Bearing  # noqa: E402  (only once it is known to be ou
 from model.effects import Effect  # noqa: E402
 
 if TYPE_CHECKING:
-    from tpjb_ident.clearance import ClearancePolygon
-    from tpjb_ident.dynamic.identification import Identification
-    from tpjb_ident.locus import Locus
+    from tpjb_ident.clearance.locus import Locus
+    from tpjb_ident.clearance.measure import ClearancePolygon
+    from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.pivot import PivotCurve
 
 #: Pivot models that are compared, in the order of the tables.
@@ -106,9 +106,8 @@ class Comparison:
         return next(v for v in self.variants if v.name == name)
 
     def __str__(self) -> str:
-        from tpjb_ident.compare.summary import summary_sentences
-
-        return "\n".join(summary_sentences(self))
+        names = ", ".join(v.name for v in self.variants)
+        return f"Comparison of {self.campaign.id}: {len(self.identification.points)} points with {names} pivots"
 
 
 def compare_campaign(

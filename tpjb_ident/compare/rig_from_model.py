@@ -19,7 +19,7 @@ from tpjb_ident.model_guard import check_model
 check_model()
 
 from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
-from model.dynamics import bearing_impedance  # noqa: E402
+from model.dynamics.reduction import bearing_impedance  # noqa: E402
 from model.effects import Effect, apply_effects  # noqa: E402
 from model.pivots import pivot_laws  # noqa: E402
 from model.predict import Prediction, predict_setup  # noqa: E402

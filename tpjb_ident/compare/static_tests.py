@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from rigdata.problem import RigDataError
-from tpjb_ident.dynamic.conditions import Condition
+from tpjb_ident.conditions import Condition
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from model.bearing import Bearing
     from rigdata.campaign import Campaign
-    from tpjb_ident.clearance import ClearancePolygon
-    from tpjb_ident.locus import Locus
+    from tpjb_ident.clearance.locus import Locus
+    from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.pivot import PivotCurve
 
 
@@ -54,7 +54,7 @@ def measure_static(campaign: Campaign, bearing: Bearing, with_pivots: bool = Tru
     RigDataError
         Half of the dry runs or of the locus runs, or more, cannot be used: that is no accident of single records.
     """
-    from tpjb_ident.locus import measure_locus
+    from tpjb_ident.clearance.locus import measure_locus
     from tpjb_ident.pivot import PivotSettings, fit_pivots
 
     angles = [pad.pivot_angle for pad in bearing.pads]
@@ -71,7 +71,7 @@ def _clearance(
     campaign: Campaign, angles: Sequence[float], curves: tuple[PivotCurve, ...]
 ) -> tuple[ClearancePolygon | None, list[Condition]]:
     """Polygon of the coldest sweep that can be used; what is wrong with those before it."""
-    from tpjb_ident.clearance import coldest_run, measure_run
+    from tpjb_ident.clearance.measure import coldest_run, measure_run
 
     runs = list(campaign.of_kind("clearance"))
     left: list[Condition] = []

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tpjb_ident.compare.pivot_formula import printed_formula
+from tpjb_ident.compare.positions import locus_distance
 from tpjb_ident.compare.tables import DIRECT, comparison_frame
-from tpjb_ident.report.numbers import percent, signed
+from tpjb_ident.rounding import percent, signed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -136,8 +137,6 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
 
 
 def _locus_sentence(comparison: Comparison) -> list[str]:
-    from tpjb_ident.compare.positions import locus_distance
-
     distances = {v.name: locus_distance(comparison, v) for v in comparison.variants}
     known = {name: d for name, d in distances.items() if math.isfinite(d)}
     if not known:

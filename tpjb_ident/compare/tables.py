@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tpjb_ident.compare.predictions import PointPrediction, coefficient_names, point_columns
-from tpjb_ident.dynamic.identification import coefficient_columns
+from tpjb_ident.dynamic.results.identification import coefficient_columns
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.compare.comparison import Comparison, Variant
-    from tpjb_ident.dynamic.point_result import PointResult
+    from tpjb_ident.dynamic.results.point_result import PointResult
 
 NAMES = (*coefficient_names("k"), *coefficient_names("c"))
 DIRECT = tuple(name for name in NAMES if name[1:3] in ("xx", "yy"))

@@ -10,10 +10,10 @@ from tpjb_ident.compare.comparison import ComparisonError
 from tpjb_ident.compare.measured_pivots import measured_laws
 from tpjb_ident.compare.static_tests import measure_static
 from tpjb_ident.diagnose.diagnose import Diagnosis, diagnose
-from tpjb_ident.diagnose.housing import with_housing
-from tpjb_ident.diagnose.nuisance import Certificates
-from tpjb_ident.diagnose.observe import observe
-from tpjb_ident.diagnose.settings import DiagnoseSettings
+from tpjb_ident.diagnose.forward.nuisance import Certificates
+from tpjb_ident.diagnose.observations.housing import with_housing
+from tpjb_ident.diagnose.observations.observe import observe
+from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
 
 from model.effects import Effect, apply_effects  # isort: skip
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
     from model.bearing import Bearing
     from rigdata.campaign import Campaign
-    from tpjb_ident.clearance import ClearancePolygon
-    from tpjb_ident.diagnose.memory import Memory
-    from tpjb_ident.dynamic.identification import Identification
-    from tpjb_ident.locus import Locus
+    from tpjb_ident.clearance.locus import Locus
+    from tpjb_ident.clearance.measure import ClearancePolygon
+    from tpjb_ident.diagnose.forward.memory import Memory
+    from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.pivot import PivotCurve
 
 

@@ -6,20 +6,20 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from model.setup import Setup
-from tpjb_ident.diagnose.candidates import candidates
-from tpjb_ident.diagnose.closure import closure
-from tpjb_ident.diagnose.decide import close_rivals, decide
-from tpjb_ident.diagnose.forward import Forward, ForwardModel
-from tpjb_ident.diagnose.laws import frequency_laws, sensor_map_test
-from tpjb_ident.diagnose.memory import Memory
-from tpjb_ident.diagnose.next_test import options_for, rank_designs, say, suggested
-from tpjb_ident.diagnose.nuisance import nuisances
-from tpjb_ident.diagnose.observe import Observations
-from tpjb_ident.diagnose.problem import Problem, loosened
-from tpjb_ident.diagnose.search import Progress, Search, search
-from tpjb_ident.diagnose.settings import DiagnoseSettings
-from tpjb_ident.diagnose.verdict import Verdict
-from tpjb_ident.diagnose.workers import workers
+from tpjb_ident.diagnose.forward.candidates import candidates
+from tpjb_ident.diagnose.forward.forward import Forward, ForwardModel
+from tpjb_ident.diagnose.forward.memory import Memory
+from tpjb_ident.diagnose.forward.nuisance import nuisances
+from tpjb_ident.diagnose.forward.workers import workers
+from tpjb_ident.diagnose.next_test.rank import options_for, rank_designs, say, suggested
+from tpjb_ident.diagnose.observations.observe import Observations
+from tpjb_ident.diagnose.search.laws import frequency_laws, sensor_map_test
+from tpjb_ident.diagnose.search.problem import Problem, loosened
+from tpjb_ident.diagnose.search.search import Progress, Search, search
+from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+from tpjb_ident.diagnose.verdict.closure import closure
+from tpjb_ident.diagnose.verdict.decide import close_rivals, decide
+from tpjb_ident.diagnose.verdict.verdict import Verdict
 
 #: Of equilibria while models are compared: far below any tolerance, and a third faster than the default.
 ACCURACY = 1e-5

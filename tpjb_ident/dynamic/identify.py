@@ -8,29 +8,30 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from tpjb_ident.dynamic.amplitude import amplitude_slope
-from tpjb_ident.dynamic.arrays import FloatArray
-from tpjb_ident.dynamic.calibration_uncertainty import GainDraws, apparent_change, gain_draws
-from tpjb_ident.dynamic.conditions import Condition, merged
-from tpjb_ident.dynamic.corrections import Correction, find_corrections
-from tpjb_ident.dynamic.estimate import REJECTED_WEIGHT, estimate_table
-from tpjb_ident.dynamic.identification import Identification
-from tpjb_ident.dynamic.left_out import lost_points, named_at_points, named_runs
-from tpjb_ident.dynamic.nominal_drive import nominal_drive
-from tpjb_ident.dynamic.phasor_table import phasor_table
-from tpjb_ident.dynamic.point_data import PointData
-from tpjb_ident.dynamic.point_result import PointResult
-from tpjb_ident.dynamic.point_source import point_sources
-from tpjb_ident.dynamic.probe_scale import with_probe_doubts
-from tpjb_ident.dynamic.quality import amplitude, coherence, directional_pattern, flags, rejected_windows
-from tpjb_ident.dynamic.rlm import RlmSettings
-from tpjb_ident.dynamic.run_gains import channel_pairs, with_gain_doubts
-from tpjb_ident.dynamic.run_jobs import Progress, all_runs
-from tpjb_ident.dynamic.run_phasors import PhasorSettings
-from tpjb_ident.dynamic.run_shelf import RunShelf
-from tpjb_ident.dynamic.run_store import RunStore
-from tpjb_ident.dynamic.stiffness import DynamicStiffness
-from tpjb_ident.executors import Workers
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change, gain_draws
+from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
+from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table
+from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
+from tpjb_ident.dynamic.estimators.rlm import RlmSettings
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
+from tpjb_ident.dynamic.results.amplitude import amplitude_slope
+from tpjb_ident.dynamic.results.identification import Identification
+from tpjb_ident.dynamic.results.left_out_runs import lost_points, named_at_points
+from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.dynamic.results.probe_scale import with_probe_doubts
+from tpjb_ident.dynamic.results.quality import amplitude, coherence, directional_pattern, flags, rejected_windows
+from tpjb_ident.dynamic.results.run_gains import channel_pairs, with_gain_doubts
+from tpjb_ident.dynamic.runs.left_out import named_runs
+from tpjb_ident.dynamic.runs.nominal_drive import nominal_drive
+from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.dynamic.runs.point_source import point_sources
+from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
+from tpjb_ident.dynamic.runs.run_shelf import RunShelf
+from tpjb_ident.dynamic.runs.run_store import RunStore
+from tpjb_ident.runtime.executors import Workers
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ def identify(
     settings : IdentifySettings, optional
     progress : callable, optional
         Called as progress(text, done, total).
-    workers : tpjb_ident.executors.Workers, optional
+    workers : tpjb_ident.runtime.executors.Workers, optional
         Processes or machines over which the reading of runs is spread; the numbers are the same.
     store : RunStore, optional
         Keeps finished runs, so that another call after a kill goes on where this one stopped.

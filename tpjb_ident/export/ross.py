@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tpjb_ident.export.points import FloatArray, StaticPoint
-from tpjb_ident.tables import printable, write_text
+from tpjb_ident.runtime.tables import printable, write_text
 
 
 def ross_text(point: StaticPoint, source: str) -> str:

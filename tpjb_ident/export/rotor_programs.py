@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from tpjb_ident.export.points import ENTRIES, FloatArray, StaticPoint
-from tpjb_ident.tables import printable, write_text
+from tpjb_ident.runtime.tables import printable, write_text
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tpjb_ident.export.points import COLUMNS, ExportError, StaticPoint
-from tpjb_ident.tables import printable, safe_for_spreadsheets, write_atomic
+from tpjb_ident.runtime.tables import printable, safe_for_spreadsheets, write_atomic
 
 if TYPE_CHECKING:
     import pandas as pd

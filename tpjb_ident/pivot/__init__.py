@@ -5,7 +5,7 @@ from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.pivot.hysteresis import Hysteresis
 from tpjb_ident.pivot.pads_table import pads_table
 from tpjb_ident.pivot.pivots_toml import pivots_text, write_pivots
-from tpjb_ident.pivot.settings import PivotSettings
+from tpjb_ident.pivot.records.settings import PivotSettings
 from tpjb_ident.pivot.table import pivot_table
 
 __all__ = [

@@ -13,12 +13,12 @@ from scipy import special
 
 from tpjb_ident.pivot.contact import contact_onset, contact_onset_se
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
-from tpjb_ident.pivot.dry_record import DryRecord
 from tpjb_ident.pivot.hysteresis import Hysteresis, measure_loop
-from tpjb_ident.pivot.law_fit import FRICTION, OFFSET, LawFit
-from tpjb_ident.pivot.noise import NoiseModel
-from tpjb_ident.pivot.projection import Direction
-from tpjb_ident.pivot.settings import PivotSettings
+from tpjb_ident.pivot.laws.law_fit import FRICTION, OFFSET, LawFit
+from tpjb_ident.pivot.records.dry_record import DryRecord
+from tpjb_ident.pivot.records.projection import Direction
+from tpjb_ident.pivot.records.settings import PivotSettings
+from tpjb_ident.slow_records.noise import NoiseModel
 
 if TYPE_CHECKING:
     from rigdata.calibration import Channel

@@ -12,11 +12,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tpjb_ident.pivot.dry_record import DryRecord
-from tpjb_ident.pivot.law_fit import FitData, LawFit, fit_law
-from tpjb_ident.pivot.laws import Law
-from tpjb_ident.pivot.noise import NoiseModel
-from tpjb_ident.pivot.settings import PivotSettings
+from tpjb_ident.pivot.laws.law_fit import FitData, LawFit, fit_law
+from tpjb_ident.pivot.laws.laws import Law
+from tpjb_ident.pivot.records.dry_record import DryRecord
+from tpjb_ident.pivot.records.settings import PivotSettings
+from tpjb_ident.slow_records.noise import NoiseModel
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tpjb_ident.pivot.law_fit import LawFit
+from tpjb_ident.pivot.laws.law_fit import LawFit
 
 FloatArray = NDArray[np.float64]
 

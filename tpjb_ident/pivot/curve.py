@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import optimize, special
 
 from tpjb_ident.pivot.hysteresis import Hysteresis
-from tpjb_ident.pivot.law_fit import FRICTION, OFFSET, SCALE, LawFit
-from tpjb_ident.pivot.projection import Direction
+from tpjb_ident.pivot.laws.law_fit import FRICTION, OFFSET, SCALE, LawFit
+from tpjb_ident.pivot.records.projection import Direction
 
 EXTRAPOLATION_SPREAD = 0.04  # of ln(stiffness) per e-fold of load beyond the points: no law is quite the pivot's own
 

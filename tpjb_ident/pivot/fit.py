@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.pivot.assemble import Choice, assemble_curve
 from tpjb_ident.pivot.bad_holds import bad_blocks
-from tpjb_ident.pivot.choice import keep_likely, posterior_weights
 from tpjb_ident.pivot.curve import PivotCurve
-from tpjb_ident.pivot.dry_record import DryRecord, read_dry_run
-from tpjb_ident.pivot.law_fit import FitData, LawFit, ShapePrior, fit_law
-from tpjb_ident.pivot.laws import Bilinear, HertzLine, HertzPoint, Law, Linear, PointInSeries, Power
-from tpjb_ident.pivot.noise import NoiseModel
-from tpjb_ident.pivot.noise_of_records import noise_about_curve, noise_within_holds
-from tpjb_ident.pivot.projection import Direction
-from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement
-from tpjb_ident.pivot.settings import PivotSettings
-from tpjb_ident.pivot.shape_sharing import with_shared_shape
-from tpjb_ident.pivot.spline_law import SplineLaw
+from tpjb_ident.pivot.laws.choice import keep_likely, posterior_weights
+from tpjb_ident.pivot.laws.law_fit import FitData, LawFit, ShapePrior, fit_law
+from tpjb_ident.pivot.laws.laws import Bilinear, HertzLine, HertzPoint, Law, Linear, PointInSeries, Power
+from tpjb_ident.pivot.laws.shape_sharing import with_shared_shape
+from tpjb_ident.pivot.laws.spline_law import SplineLaw
+from tpjb_ident.pivot.records.dry_record import DryRecord, read_dry_run
+from tpjb_ident.pivot.records.noise_of_records import noise_about_curve, noise_within_holds
+from tpjb_ident.pivot.records.projection import Direction
+from tpjb_ident.pivot.records.refusals import check_directions, check_pickup, check_placement
+from tpjb_ident.pivot.records.settings import PivotSettings
+from tpjb_ident.slow_records.noise import NoiseModel
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign

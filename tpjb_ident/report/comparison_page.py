@@ -22,12 +22,12 @@ from tpjb_ident.report.comparison_tables import (
     predicted_table,
 )
 from tpjb_ident.report.figure import Panel, save_panels
-from tpjb_ident.report.numbers import percent
 from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.report.pivot_panels import pivot_panels
-from tpjb_ident.report.plots.look import VARIANT_LABEL
+from tpjb_ident.report.plots.style import VARIANT_LABEL
 from tpjb_ident.report.position_panels import position_panels
-from tpjb_ident.tables import write_text
+from tpjb_ident.rounding import percent
+from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison

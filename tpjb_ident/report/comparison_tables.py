@@ -9,17 +9,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tpjb_ident.report.numbers import fixed, percent, signed, with_interval
+from tpjb_ident.report.condition_words import meaning
 from tpjb_ident.report.page import Table
-from tpjb_ident.report.plots.look import VARIANT_LABEL
-from tpjb_ident.report.words import meaning
+from tpjb_ident.report.plots.style import VARIANT_LABEL
+from tpjb_ident.rounding import fixed, percent, signed, with_interval
 
 if TYPE_CHECKING:
-    from tpjb_ident.clearance import ClearancePolygon
+    from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.compare.pivot_formula import Formula
-    from tpjb_ident.dynamic.identification import Identification
-    from tpjb_ident.dynamic.point_result import PointResult
+    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.dynamic.results.point_result import PointResult
     from tpjb_ident.pivot import PivotCurve
 
 ENTRIES = ("xx", "xy", "yx", "yy")

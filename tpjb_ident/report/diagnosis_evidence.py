@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tpjb_ident.report.page import Section, Table
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnose.verdict import Verdict
+    from tpjb_ident.diagnose.verdict.verdict import Verdict
 
 
 def evidence_sections(verdict: Verdict) -> list[Section]:

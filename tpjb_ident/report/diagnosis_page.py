@@ -11,12 +11,12 @@ from tpjb_ident.report.diagnosis_panels import GROUP, diagnosis_panels
 from tpjb_ident.report.diagnosis_words import effect_rows, verdict_sentences
 from tpjb_ident.report.figure import save_panels
 from tpjb_ident.report.page import Page, Section, Table, render_page
-from tpjb_ident.tables import write_text
+from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from tpjb_ident.diagnose.campaign import CampaignDiagnosis
-    from tpjb_ident.diagnose.verdict import Verdict
+    from tpjb_ident.diagnose.verdict.verdict import Verdict
 
 
 def write_diagnosis_report(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnose.verdict import Verdict
+    from tpjb_ident.diagnose.verdict.verdict import Verdict
 
 
 def verdict_sentences(name: str, verdict: Verdict) -> list[str]:

@@ -17,8 +17,8 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from tpjb_ident.report.hover import mark_lines, with_titles
-from tpjb_ident.report.plots.look import LIGHT
-from tpjb_ident.tables import write_atomic, write_text
+from tpjb_ident.report.plots.style import LIGHT
+from tpjb_ident.runtime.tables import write_atomic, write_text
 
 PNG_DPI = 160
 _FONT = re.compile(r"font: (?:(italic|oblique) )?(?:(bold|\d+) )?([\d.]+)px [^;\"]*")

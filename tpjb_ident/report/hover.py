@@ -16,7 +16,7 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from tpjb_ident.tables import printable
+from tpjb_ident.runtime.tables import printable
 
 _USE = re.compile(r'<use xlink:href="#[^"]*" x="([-\d.]+)" y="([-\d.]+)"([^>]*)/>')
 _POINTS_PER_INCH = 72.0

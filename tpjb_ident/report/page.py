@@ -12,9 +12,9 @@ from pathlib import Path
 import jinja2
 import markupsafe
 
-from tpjb_ident.provenance import versions
 from tpjb_ident.report.figure import Panel, inline_svg, is_wide
-from tpjb_ident.tables import printable
+from tpjb_ident.runtime.provenance import versions
+from tpjb_ident.runtime.tables import printable
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from tpjb_ident.report.figure import panel, save_panels
 from tpjb_ident.report.plots.isolability_map import isolability
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnose.plan import CampaignPlan
+    from tpjb_ident.diagnose.plan.plan import CampaignPlan
 
 GROUP = "Isolability"
 

@@ -12,8 +12,8 @@ from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.plots.fig14_clearance_and_locus import clearance_and_locus
 
 if TYPE_CHECKING:
-    from tpjb_ident.clearance import ClearancePolygon
-    from tpjb_ident.locus import Locus
+    from tpjb_ident.clearance.locus import Locus
+    from tpjb_ident.clearance.measure import ClearancePolygon
 
 FloatArray = NDArray[np.float64]
 GROUP = "Clearance and shaft centre locus"

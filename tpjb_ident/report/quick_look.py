@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tpjb_ident.report.figure import Panel, save_panels
-from tpjb_ident.report.plots.look import FONT_SIZE, LIGHT
-from tpjb_ident.tables import printable
+from tpjb_ident.report.plots.style import FONT_SIZE, LIGHT
+from tpjb_ident.runtime.tables import printable
 
 if TYPE_CHECKING:
     from rigdata.readers.series import Series

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tpjb_ident.view.look import BLUE, GREY, INK, ORANGE, new_plot
 from tpjb_ident.view.session import Curve, Session
+from tpjb_ident.view.style import BLUE, GREY, INK, ORANGE, new_plot
 
 if TYPE_CHECKING:
-    from tpjb_ident.dynamic.point_result import PointResult
+    from tpjb_ident.dynamic.results.point_result import PointResult
 
 #: Frequencies of the curves [Hz].
 LINES = np.linspace(5.0, 80.0, 31)

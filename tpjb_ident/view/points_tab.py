@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tpjb_ident.tables import printable
-from tpjb_ident.view.look import BLUE, RED, new_plot
+from tpjb_ident.runtime.tables import printable
+from tpjb_ident.view.style import BLUE, RED, new_plot
 
 if TYPE_CHECKING:
-    from tpjb_ident.dynamic.identification import Identification
-    from tpjb_ident.dynamic.point_result import PointResult
+    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.dynamic.results.point_result import PointResult
 
 
 def points_tab(found: Identification) -> Any:

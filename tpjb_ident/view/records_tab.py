@@ -8,7 +8,7 @@ import numpy as np
 
 from rigdata.problem import RigDataError
 from rigdata.survey.spectrum import amplitude_spectrum, strongest
-from tpjb_ident.view.look import BLUE, INK, new_plot
+from tpjb_ident.view.style import BLUE, INK, new_plot
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
@@ -102,6 +102,6 @@ def thinned(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def _escaped(text: str) -> str:
     import html
 
-    from tpjb_ident.tables import printable
+    from tpjb_ident.runtime.tables import printable
 
     return html.escape(printable(text))

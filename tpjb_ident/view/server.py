@@ -6,7 +6,7 @@ import html
 from collections.abc import Callable
 from typing import Any
 
-from tpjb_ident.tables import printable
+from tpjb_ident.runtime.tables import printable
 from tpjb_ident.view.session import Session
 
 #: The only address that is ever listened on.

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from rigdata.campaign import Campaign
-    from tpjb_ident.dynamic.identification import Identification
+    from tpjb_ident.dynamic.results.identification import Identification
 
 FloatArray = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.tables import printable
+from tpjb_ident.runtime.tables import printable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -11,12 +11,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tpjb_ident.report.plots.case_dots import case_gaps
-    from tpjb_ident.report.plots.closure_boxes import closures
     from tpjb_ident.report.plots.coherence_lines import coherence_spectrum
     from tpjb_ident.report.plots.coherence_points import coherence
-    from tpjb_ident.report.plots.confusion_map import confusion
-    from tpjb_ident.report.plots.coverage_dots import interval_coverage
     from tpjb_ident.report.plots.fig02_pad_deformation import pad_deformation
     from tpjb_ident.report.plots.fig10_pad_projection import pad_projection
     from tpjb_ident.report.plots.fig11_load_deflection import load_deflection
@@ -28,64 +24,44 @@ if TYPE_CHECKING:
     from tpjb_ident.report.plots.gap_bars import gap
     from tpjb_ident.report.plots.gap_beside_controls import gap_controls
     from tpjb_ident.report.plots.isolability_map import isolability
-    from tpjb_ident.report.plots.next_test_dots import next_tests
-    from tpjb_ident.report.plots.outcome_bars import outcomes
-    from tpjb_ident.report.plots.p_values_line import p_values
-    from tpjb_ident.report.plots.power_curves import power
     from tpjb_ident.report.plots.residual_heat import residual_map
     from tpjb_ident.report.plots.residual_lines import residual_series
     from tpjb_ident.report.plots.weights_of_windows import window_weights
 
 #: In which file each picture is drawn. Files and functions have different names: a submodule would hide its function.
 _FILES = {
-    "case_gaps": "case_dots",
     "clearance_and_locus": "fig14_clearance_and_locus",
-    "closures": "closure_boxes",
     "coefficient": "fig17_coefficient",
     "coherence": "coherence_points",
     "coherence_spectrum": "coherence_lines",
-    "confusion": "confusion_map",
     "direct_coefficients": "fig15_direct_coefficients",
     "gap": "gap_bars",
     "gap_controls": "gap_beside_controls",
-    "interval_coverage": "coverage_dots",
     "isolability": "isolability_map",
     "load_deflection": "fig11_load_deflection",
-    "next_tests": "next_test_dots",
-    "outcomes": "outcome_bars",
-    "p_values": "p_values_line",
     "pad_deformation": "fig02_pad_deformation",
     "pad_projection": "fig10_pad_projection",
     "pivot_stiffness": "fig12_pivot_stiffness",
     "pivots_of_bearings": "fig13_pivots_of_bearings",
-    "power": "power_curves",
     "residual_map": "residual_heat",
     "residual_series": "residual_lines",
     "window_weights": "weights_of_windows",
 }
 
 __all__ = [
-    "case_gaps",
     "clearance_and_locus",
-    "closures",
     "coefficient",
     "coherence",
     "coherence_spectrum",
-    "confusion",
     "direct_coefficients",
     "gap",
     "gap_controls",
-    "interval_coverage",
     "isolability",
     "load_deflection",
-    "next_tests",
-    "outcomes",
-    "p_values",
     "pad_deformation",
     "pad_projection",
     "pivot_stiffness",
     "pivots_of_bearings",
-    "power",
     "residual_map",
     "residual_series",
     "window_weights",

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tpjb_ident.report.plots.look import FONT_SIZE, LIGHT, add_legend, new_picture
+from tpjb_ident.report.plots.style import FONT_SIZE, LIGHT, add_legend, new_picture
 
 if TYPE_CHECKING:
     from rigdata.run import Run

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.look import FONT_SIZE, LIGHT, add_legend, label, new_pictures, shrink
 from tpjb_ident.report.plots.series import as_table
+from tpjb_ident.report.plots.style import FONT_SIZE, LIGHT, add_legend, label, new_pictures, shrink
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tpjb_ident.dynamic.identification import Identification
+    from tpjb_ident.dynamic.results.identification import Identification
 
 FLAGGED = 0.9
 SMALLEST = 1e-7

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from tpjb_ident.report.plots.look import FONT_SIZE, LIGHT, add_legend, label, new_pictures, style_of_pad
+from tpjb_ident.report.plots.style import FONT_SIZE, LIGHT, add_legend, label, new_pictures, style_of_pad
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve

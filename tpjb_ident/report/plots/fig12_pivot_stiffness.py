@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from tpjb_ident.report.plots.look import LIGHT, add_legend, mark_extrapolated, new_picture, style_of_pad
+from tpjb_ident.report.plots.style import LIGHT, add_legend, mark_extrapolated, new_picture, style_of_pad
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve

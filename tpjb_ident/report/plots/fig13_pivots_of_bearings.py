@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tpjb_ident.report.plots.fig12_pivot_stiffness import LOWEST, POINTS, Formula
-from tpjb_ident.report.plots.look import LIGHT, add_legend, new_picture
+from tpjb_ident.report.plots.style import LIGHT, add_legend, new_picture
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
-from tpjb_ident.polygon import corners
-from tpjb_ident.report.plots.look import (
+from tpjb_ident.clearance.polygon import corners
+from tpjb_ident.report.plots.style import (
     FONT_SIZE,
     LIGHT,
     VARIANT_LABEL,
@@ -22,8 +22,8 @@ from tpjb_ident.report.plots.look import (
 )
 
 if TYPE_CHECKING:
-    from tpjb_ident.clearance import ClearancePolygon
-    from tpjb_ident.locus import Locus
+    from tpjb_ident.clearance.locus import Locus
+    from tpjb_ident.clearance.measure import ClearancePolygon
 
 FloatArray = NDArray[np.float64]
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.look import LIGHT, add_legend, new_picture
 from tpjb_ident.report.plots.series import AXES, UNITS, as_table, longest_series
+from tpjb_ident.report.plots.style import LIGHT, add_legend, new_picture
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tpjb_ident.dynamic.identification import Identification
+    from tpjb_ident.dynamic.results.identification import Identification
 
 COLOURS = ("blue", "red", "green", "purple")
 #: Marker, line and fill of the entry: full lines for the loaded direction.

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.look import LIGHT, VARIANT_LABEL, VARIANT_STYLE, add_legend, new_picture
 from tpjb_ident.report.plots.series import AXES, DIRECT, UNITS, longest_series
+from tpjb_ident.report.plots.style import LIGHT, VARIANT_LABEL, VARIANT_STYLE, add_legend, new_picture
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.look import CHARACTER, LEFT, LIGHT, add_legend, new_picture, shrink
+from tpjb_ident.report.plots.style import CHARACTER, LEFT, LIGHT, add_legend, new_picture, shrink
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnose.diagnose import Diagnosis
-    from tpjb_ident.diagnose.verdict import Verdict
+    from tpjb_ident.diagnose.verdict.verdict import Verdict
 
 
 def gap(

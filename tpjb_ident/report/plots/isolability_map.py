@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
-from tpjb_ident.report.plots.look import (
+from tpjb_ident.report.plots.style import (
     CHARACTER,
     FONT_SIZE,
     LIGHT,
@@ -22,7 +22,7 @@ from tpjb_ident.report.plots.look import (
 )
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnose.plan import CampaignPlan
+    from tpjb_ident.diagnose.plan.plan import CampaignPlan
 
 CELL = 0.3  # [inches]
 TALL = 2.0  # the colour bar needs it [inches]
@@ -41,7 +41,7 @@ def isolability(
     Parameters
     ----------
     plan : CampaignPlan or (k, k) array_like
-        As `tpjb_ident.diagnose.plan.plan` makes it, or its matrix.
+        As `tpjb_ident.diagnose.plan.plan.plan` makes it, or its matrix.
     names : sequence of str, optional
         Of the k effects; default: the plan's own.
     title : str, optional

@@ -48,7 +48,7 @@ def residual_frame(source: Diagnosis | Comparison | pd.DataFrame) -> pd.DataFram
 def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
     import pandas as pd
 
-    from tpjb_ident.diagnose.gap import residuals
+    from tpjb_ident.diagnose.observations.gap import residuals
 
     rows = []
     for model, fit in (("before", diagnosis.found.baseline), ("after", diagnosis.found.model)):

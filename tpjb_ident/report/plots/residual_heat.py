@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.look import (
+from tpjb_ident.report.plots.residual_frames import ENTRIES, residual_frame
+from tpjb_ident.report.plots.style import (
     DIVERGING,
     FONT_SIZE,
     LIGHT,
@@ -19,7 +20,6 @@ from tpjb_ident.report.plots.look import (
     new_pictures,
     shrink,
 )
-from tpjb_ident.report.plots.residual_frames import ENTRIES, residual_frame
 
 if TYPE_CHECKING:
     import pandas as pd

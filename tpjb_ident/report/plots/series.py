@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tpjb_ident.dynamic.identification import Identification
+    from tpjb_ident.dynamic.results.identification import Identification
 
 #: Suffix in the tables, divisor and unit of the axis, and name, of stiffness and damping.
 UNITS = {"k": ("N_per_m", 1e6, "MN/m", "stiffness"), "c": ("Ns_per_m", 1e3, "kN s/m", "damping")}
@@ -22,7 +22,7 @@ STATIC = ["static_load_direction_deg", "shaft_speed_Hz"]
 
 def as_table(source: Identification | pd.DataFrame) -> pd.DataFrame:
     """Table of coefficients of whatever was given."""
-    from tpjb_ident.dynamic.identification import Identification
+    from tpjb_ident.dynamic.results.identification import Identification
 
     return source.to_frame() if isinstance(source, Identification) else source
 

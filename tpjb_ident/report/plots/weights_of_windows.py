@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.look import FONT_SIZE, LIGHT, add_legend, new_picture
+from tpjb_ident.report.plots.style import FONT_SIZE, LIGHT, add_legend, new_picture
 
 if TYPE_CHECKING:
-    from tpjb_ident.dynamic.point_result import PointResult
-    from tpjb_ident.dynamic.stiffness import DynamicStiffness
+    from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+    from tpjb_ident.dynamic.results.point_result import PointResult
 
 REJECTED = 0.3
 NAMED = 6  # rejected windows that are named in the picture

@@ -1,0 +1,85 @@
+"""How the inner loops are compiled, and kept on disk without going stale.
+
+numba keeps machine code per source file. A loop that was inlined into another file's loop changes without that file
+noticing: after an edit or an upgrade the old code would go on running, without a word. Here every compiled function is
+stamped with the sources of all of them.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from numba import njit
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+#: Files with compiled functions, relative to the package; a test holds the list complete.
+KERNELS = (
+    "compilation.py",
+    "film/cavitation.py",
+    "film/cavitation_matrix.py",
+    "film/cavitation_slopes.py",
+    "film/energy.py",
+    "film/matrix.py",
+    "film/oil_state.py",
+    "film/reynolds.py",
+    "film/slopes.py",
+    "statics/first_position.py",
+    "statics/newton_step.py",
+)
+#: Sums may be reordered, but NaN and infinity keep their meaning.
+OPTIONS: dict[str, Any] = {
+    "error_model": "numpy",
+    "fastmath": {"contract", "reassoc", "arcp", "nsz"},
+    "nogil": True,
+}
+#: Where nothing can be written: a read-only installation and a user without a home, as services and containers have.
+_NO_PLACE = (
+    "there is no folder to keep the model's machine code in, so every process compiles it again, which takes half a "
+    "minute: set NUMBA_CACHE_DIR to a folder that can be written"
+)
+
+
+def _stamp() -> str:
+    digest = hashlib.sha256()
+    for name in KERNELS:
+        digest.update((Path(__file__).parent / name).read_bytes())
+    return digest.hexdigest()
+
+
+STAMP = _stamp()
+
+
+@functools.cache  # once, not for every loop
+def _tell(what: str) -> None:
+    warnings.warn(what, RuntimeWarning, stacklevel=3)
+
+
+def compiled(function: Function) -> Function:
+    """Compile with numba, cached on disk under the stamp of all kernels.
+
+    Warns
+    -----
+    RuntimeWarning
+        Neither the sources' folder nor the user's own can be written: every process compiles anew.
+    """
+    dispatcher: Any
+    try:
+        dispatcher = njit(cache=True, **OPTIONS)(function)
+    except RuntimeError as error:
+        if "cannot cache" not in str(error):
+            raise
+        _tell(_NO_PLACE)
+        dispatcher = njit(**OPTIONS)(function)
+    store = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    if store is not None and hasattr(store, "_source_stamp"):
+        store._source_stamp = STAMP
+    else:  # a numba whose cache is built otherwise: compile in every process rather than trust it
+        dispatcher = njit(**OPTIONS)(function)
+    kept: Function = dispatcher
+    return kept

@@ -1,0 +1,1 @@
+"""Dynamic coefficients: the pads' matrices and their reduction at the excitation frequency."""

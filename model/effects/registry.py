@@ -1,0 +1,58 @@
+"""Which effects there are: one file each beside this one, and those that a user registers."""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import importlib
+import pkgutil
+from pathlib import Path
+
+from model.effects.kind import EffectError, EffectKind
+
+_registered: dict[str, EffectKind] = {}
+
+
+@functools.cache
+def _bundled() -> dict[str, EffectKind]:
+    kinds: dict[str, EffectKind] = {}
+    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+        kind = getattr(importlib.import_module(f"model.effects.{module.name}"), "KIND", None)
+        if isinstance(kind, EffectKind):
+            kinds[kind.name] = kind
+    return kinds
+
+
+def known_effects() -> dict[str, EffectKind]:
+    """Every effect by name: the bundled ones and those registered."""
+    return {**_bundled(), **_registered}
+
+
+def kind_of(name: str) -> EffectKind:
+    """Look an effect up.
+
+    Raises
+    ------
+    EffectError
+        Not known; names the nearest known one.
+    """
+    kinds = known_effects()
+    if name not in kinds:
+        near = difflib.get_close_matches(str(name), kinds, n=1)
+        hint = f"Did you mean {near[0]!r}?" if near else f"Known effects: {', '.join(sorted(kinds))}."
+        raise EffectError(f"effect {name!r} is not known. {hint}")
+    return kinds[name]
+
+
+def register(kind: EffectKind) -> EffectKind:
+    """Add an effect of your own to the library.
+
+    Raises
+    ------
+    EffectError
+        The name is taken by a bundled effect.
+    """
+    if kind.name in _bundled():
+        raise EffectError(f"effect {kind.name!r} is bundled; give yours another name.")
+    _registered[kind.name] = kind
+    return kind

@@ -1,0 +1,1 @@
+"""The oil film of one pad: Reynolds, rupture, perturbation, energy."""

@@ -1,0 +1,280 @@
+"""Mass-conserving cavitation, Jakobsson-Floberg-Olsson (JFO), as an option beside Swift-Stieber.
+
+Where a film is full it has a pressure; where it is ruptured it has a filling theta < 1, which the journal drags on.
+With m = rho h theta, and U the surface speed,
+
+    div(rho h^3 / (12 mu) grad p) = U/2 dm/dx + dm/dt,    p >= 0,   1 - theta >= 0,   p (1 - theta) = 0.
+
+On the control volumes of `model.film.reynolds` the Couette flow through a face is that of the full film times the
+filling of
+the volume upstream. One unknown per node, x = p where wet and x = theta - 1 where ruptured, makes this a piecewise
+linear problem F(x) = 0 whose pieces are M-matrices: it has one solution, found by block principal pivoting (all
+nodes on the wrong side change sides at once; should that not help for long, one at a time, which must end).
+
+A film that does not rupture is the film of `model.film.reynolds`, to the last bit: this file asks it first. Where a
+film
+ruptures and does not form again, both agree in pressure; they differ behind a diverging inlet and where a film forms
+again, because Swift-Stieber makes up oil there.
+
+B. Jakobsson, L. Floberg, Trans. Chalmers Univ. 190 (1957); K.-O. Olsson, ibid. 308 (1965); M. Giacopini et al., ASME
+J. Tribology 132 (2010) 041702 (complementarity); L. Portugal, J. Judice, L. Vicente, Math. Comp. 63 (1994) 625
+(block principal pivoting).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.compilation import compiled
+from model.film.cavitation_matrix import (
+    FaceFlows,
+    assemble_columns,
+    face_flows,
+    factorise_columns,
+    substitute_columns,
+)
+from model.film.cavitation_slopes import jfo_slopes
+from model.film.matrix import assemble, factorise
+from model.film.mesh import FilmGrid, FilmWork
+from model.film.reynolds import FilmForces, solve_film
+
+BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
+
+MAX_STEPS = 4000
+#: How many steps in a row may fail to lower the number of nodes on the wrong side before they change one at a time.
+PATIENCE = 8
+
+
+def solve_film_jfo(
+    grid: FilmGrid,
+    work: FilmWork,
+    wedge: tuple[float, float, float],
+    speed: float,
+    sharp: bool,
+    filling: float,
+) -> FilmForces:
+    """Pressure of one film and its derivatives, mass conserved where it is ruptured.
+
+    Parameters
+    ----------
+    grid, work, wedge, speed, sharp
+        As `model.film.reynolds.solve_film` takes them; ``work.ruptured[0]`` is set where the leading edge is not
+        full behind itself.
+    filling : float
+        Share of the gap that is full where the film enters.
+
+    Returns
+    -------
+    FilmForces
+
+    Notes
+    -----
+    Stiffness is the derivative of the steady solution, the fronts and the filling moving along. Damping is exact to
+    first order in the frequency: the mass that is stored is that of rho h theta, with the change of theta that goes
+    with the stiffness, so that what the fronts sweep is counted. Where the film is ruptured `work.flow_x` is that of
+    the full film: heat and flow shrink alike there.
+    """
+    forces = solve_film(grid, work, wedge, speed, sharp)
+    if forces.steps < 0:
+        return forces
+    steps, force, stiffness, damping = _conserve(grid, work, wedge, speed, sharp, filling)
+    if steps == 0:
+        return forces
+    return FilmForces(force, stiffness, damping, forces.min_film, steps)
+
+
+#: Grid, work, (Cp, a, b), surface speed, sharp: pressure and derivatives of one film.
+FilmSolver = Callable[[FilmGrid, FilmWork, tuple[float, float, float], float, bool], FilmForces]
+
+
+def film_solver(cavitation: str) -> FilmSolver:
+    """The solver of a film that is flooded where it enters, by what happens where it ruptures."""
+    return _flooded_jfo if cavitation == "jfo" else solve_film
+
+
+def _flooded_jfo(
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool
+) -> FilmForces:
+    return solve_film_jfo(grid, work, wedge, speed, sharp, 1.0)
+
+
+@compiled
+def _conserve(
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool, filling: float
+) -> tuple[int, FloatArray, FloatArray, FloatArray]:
+    """Go on from Swift and Stieber's film: steps (0: it was right; -2: not settled), force, stiffness, damping."""
+    force, stiffness, damping = np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2))
+    faces = face_flows(grid, work, wedge, speed, filling)
+    if not _any_ruptured(work.ruptured) and _starved(work, faces) == 0:
+        return 0, force, stiffness, damping
+    x = np.empty((work.unknown.shape[0], 1))
+    band = np.empty((work.unknown.shape[0], 2 * (work.band.shape[1] - 1) + 1))
+    steps = _pivot(grid, work, faces, (band, x))
+    _read(work, x, grid.first)
+    if steps > 0:
+        weight, slopes = jfo_slopes(grid, work, faces, x, sharp)
+        _leave_behind(grid, work, faces, slopes)
+        _integrate(grid, work, weight, slopes, (force, stiffness, damping))
+    return steps, force, stiffness, damping
+
+
+@compiled
+def _any_ruptured(ruptured: BoolArray) -> bool:
+    for i in range(1, ruptured.shape[0]):
+        for j in range(ruptured.shape[1]):
+            if ruptured[i, j]:
+                return True
+    return False
+
+
+@compiled
+def _pivot(grid: FilmGrid, work: FilmWork, faces: FaceFlows, space: tuple[FloatArray, FloatArray]) -> int:
+    """Solve F(x) = 0 by block principal pivoting; returns the number of factorisations, -2 if it did not settle."""
+    band, x = space
+    ruptured, first = work.ruptured, grid.first
+    fewest, patience = ruptured.size + 1, PATIENCE
+    for step in range(1, MAX_STEPS + 1):
+        assemble_columns(band, faces, ruptured, first)
+        factorise_columns(band)
+        _drag(faces, ruptured, first, x)
+        substitute_columns(band, x)
+        wrong = _misplaced(x, ruptured, first)
+        _read(work, x, first)
+        changed = _starved(work, faces)
+        if wrong + changed == 0:
+            return step
+        if wrong + changed < fewest:
+            fewest, patience = wrong + changed, PATIENCE
+        else:
+            patience -= 1
+        if changed == 0 or patience >= 0:
+            _change_sides(x, ruptured, first, patience < 0)
+    return -2
+
+
+@compiled
+def _starved(work: FilmWork, faces: FaceFlows) -> int:
+    """Mark where the gap behind the leading edge takes more than the supply; returns how many marks changed.
+
+    The flow is the lesser of what is supplied and what a full gap would take against the pressure behind.
+    """
+    changed = 0
+    for j in range(len(faces.supply)):
+        asked = faces.couette[0, j] - faces.along[0, j] * work.pressure[1, j]
+        lacking = asked > faces.supply[j]
+        if lacking != work.ruptured[0, j]:
+            work.ruptured[0, j] = lacking
+            changed += 1
+    return changed
+
+
+@compiled
+def _drag(faces: FaceFlows, ruptured: BoolArray, first: int, x: FloatArray) -> None:
+    """Right-hand side: what the journal drags into each control volume of a full film less what it drags out."""
+    couette = faces.couette
+    width = faces.across.shape[1] - first
+    for i in range(1, couette.shape[0]):
+        for j in range(first, faces.across.shape[1]):
+            into = faces.supply[j] if i == 1 and ruptured[0, j] else couette[i - 1, j]
+            x[(i - 1) * width + j - first, 0] = into - couette[i, j]
+
+
+@compiled
+def _misplaced(x: FloatArray, ruptured: BoolArray, first: int) -> int:
+    """Wet nodes that pull and ruptured nodes that are more than full."""
+    nt, nz = ruptured.shape[0] - 1, ruptured.shape[1] - 1
+    count = 0
+    for i in range(1, nt):
+        for j in range(first, nz):
+            value = x[(i - 1) * (nz - first) + j - first, 0]
+            if value > 0.0 if ruptured[i, j] else value < 0.0:
+                count += 1
+    return count
+
+
+@compiled
+def _change_sides(x: FloatArray, ruptured: BoolArray, first: int, single: bool) -> None:
+    """Move the nodes that are on the wrong side, or of them the last one only (Murty's rule: this cannot cycle)."""
+    nt, nz = ruptured.shape[0] - 1, ruptured.shape[1] - 1
+    for i in range(nt - 1, 0, -1):
+        for j in range(nz - 1, first - 1, -1):
+            value = x[(i - 1) * (nz - first) + j - first, 0]
+            if value > 0.0 if ruptured[i, j] else value < 0.0:
+                ruptured[i, j] = not ruptured[i, j]
+                if single:
+                    return
+
+
+@compiled
+def _read(work: FilmWork, x: FloatArray, first: int) -> None:
+    """Pressure at the nodes and at the unknowns; zero where ruptured."""
+    nt, nz = work.pressure.shape[0] - 1, work.pressure.shape[1] - 1
+    for i in range(1, nt):
+        for j in range(first, nz):
+            k = (i - 1) * (nz - first) + j - first
+            work.unknown[k] = 0.0 if work.ruptured[i, j] else x[k, 0]
+            work.pressure[i, j] = work.unknown[k]
+
+
+@compiled
+def _leave_behind(grid: FilmGrid, work: FilmWork, faces: FaceFlows, slopes: FloatArray) -> None:
+    """Factor and slopes of the film that is full now, for those who go on with them (heat, pads that bend)."""
+    assemble(work.band, faces.along, faces.across, work.ruptured, grid.first)
+    factorise(work.band)
+    nt, nz = work.pressure.shape[0] - 1, work.pressure.shape[1] - 1
+    for i in range(1, nt):
+        for j in range(grid.first, nz):
+            k = (i - 1) * (nz - grid.first) + j - grid.first
+            for m in range(4):
+                work.slopes[k, m] = 0.0 if work.ruptured[i, j] else slopes[k, m]
+
+
+@compiled
+def _integrate(
+    grid: FilmGrid,
+    work: FilmWork,
+    weight: FloatArray,
+    slopes: FloatArray,
+    totals: tuple[FloatArray, FloatArray, FloatArray],
+) -> None:
+    force, stiffness, damping = totals
+    nt, nz = work.pressure.shape[0] - 1, work.pressure.shape[1] - 1
+    for i in range(1, nt):
+        for j in range(grid.first, nz):
+            k = (i - 1) * (nz - grid.first) + j - grid.first
+            if work.ruptured[i, j]:
+                continue
+            for n in range(2):
+                direction = grid.cos[i] if n == 0 else grid.sin[i]
+                force[n] += direction * grid.area[i, j] * work.unknown[k]
+                for m in range(2):
+                    stiffness[n, m] += direction * weight[i, j] * slopes[k, m]
+                    damping[n, m] += direction * weight[i, j] * slopes[k, m + 2]
+
+
+def fluid_fraction(
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, filling: float = 1.0
+) -> FloatArray:
+    """Filling theta of a film that `solve_film_jfo` has solved.
+
+    Returns
+    -------
+    (nt + 1, nz + 1) ndarray
+        1 where the film is full and at the edges; where it is ruptured, the share of the gap that oil fills.
+    """
+    faces = face_flows(grid, work, wedge, speed, filling)
+    p, ruptured = work.pressure, work.ruptured
+    theta = np.ones_like(p)
+    theta[0] = np.where(ruptured[0], filling, 1.0)
+    into = np.minimum(faces.supply, faces.couette[0] - faces.along[0] * p[1])
+    for i in range(1, p.shape[0] - 1):
+        into = into + faces.along[i] * p[i + 1]
+        into[:-1] += faces.across[i] * p[i, 1:]
+        into[1:] += faces.across[i] * p[i, :-1]
+        theta[i] = np.where(ruptured[i], into / faces.couette[i], 1.0)
+        into = faces.couette[i] * theta[i] + faces.along[i] * p[i]
+    return theta

@@ -1,0 +1,126 @@
+"""The matrix of a film that conserves mass where it is ruptured: one column per node, of pressure or of filling.
+
+Row by row the matrix says what flows out of a control volume less what flows in. The column of a wet node is that of
+its pressure; the column of a ruptured node is that of its filling, which the journal drags downstream only. Either
+has non-positive entries beside the diagonal and sums to zero or more, so that every mixture is an M-matrix: it is
+factorised without pivoting. Not symmetric: banded L U.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.compilation import compiled
+from model.film.mesh import FilmGrid, FilmWork
+from model.film.reynolds import conductances
+
+BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
+
+
+class FaceFlows(NamedTuple):
+    """What the faces of the control volumes conduct and carry.
+
+    Attributes
+    ----------
+    along, across : (nt, nz + 1), (nt + 1, nz) ndarray
+        Conductance rho h^3 / (12 mu) times length over distance [kg/s/Pa].
+    couette : (nt, nz + 1) ndarray
+        What the journal drags through a face along the arc that is full [kg/s].
+    height : (nt, nz + 1) ndarray
+        Film thickness at those faces [m].
+    supply : (nz + 1,) ndarray
+        What the journal drags over the leading edge at most [kg/s]: a gap that opens there is not filled.
+    """
+
+    along: FloatArray
+    across: FloatArray
+    couette: FloatArray
+    height: FloatArray
+    supply: FloatArray
+
+
+@compiled
+def face_flows(
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, filling: float
+) -> FaceFlows:
+    """Conductances and drag of a film that is full everywhere but for its supply: `filling` of the gap there."""
+    along, across = conductances(grid, work, wedge[0], wedge[1], wedge[2])
+    couette, height = np.empty_like(along), np.empty_like(along)
+    for i in range(along.shape[0]):
+        base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
+        for j in range(along.shape[1]):
+            height[i, j] = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
+            density = 0.5 * (work.density[i, j] + work.density[i + 1, j])
+            couette[i, j] = 0.5 * speed * height[i, j] * density * grid.height[j]
+    supply = np.empty(along.shape[1])
+    for j in range(len(supply)):
+        supply[j] = 0.5 * filling * speed * work.thickness[0, j] * work.density[0, j] * grid.height[j]
+    return FaceFlows(along, across, couette, height, supply)
+
+
+@compiled
+def assemble_columns(band: FloatArray, faces: FaceFlows, ruptured: BoolArray, first: int) -> None:
+    """Fill the band: entry (row, column) stands at ``band[row, width + column - row]``."""
+    gx, gz, couette = faces.along, faces.across, faces.couette
+    nt, nz = gx.shape[0], gz.shape[1]
+    width = nz - first
+    band[:, :] = 0.0
+    for i in range(1, nt):
+        for j in range(first, nz):
+            k = (i - 1) * width + j - first
+            if ruptured[i, j]:
+                band[k, width] = couette[i, j]
+                if i + 1 < nt:
+                    band[k + width, 0] = -couette[i, j]
+                continue
+            band[k, width] = gx[i, j] + gz[i, j]
+            if i > 1 or not ruptured[0, j]:  # what is supplied to a gap that opens does not ask for the pressure
+                band[k, width] += gx[i - 1, j]
+            if i > 1:
+                band[k - width, 2 * width] = -gx[i - 1, j]
+            if i + 1 < nt:
+                band[k + width, 0] = -gx[i, j]
+            if j + 1 < nz:
+                band[k + 1, width - 1] -= gz[i, j]
+            if j > 0:
+                band[k, width] += gz[i, j - 1]
+                if j > first:
+                    band[k - 1, width + 1] -= gz[i, j - 1]
+
+
+@compiled
+def factorise_columns(band: FloatArray) -> None:
+    """L U in place, without pivoting."""
+    n, width = band.shape[0], band.shape[1] // 2
+    for k in range(n):
+        pivot = 1.0 / band[k, width]
+        for r in range(1, min(width, n - 1 - k) + 1):
+            factor = band[k + r, width - r] * pivot
+            if factor != 0.0:
+                band[k + r, width - r] = factor
+                for s in range(1, width + 1):
+                    band[k + r, width - r + s] -= factor * band[k, width + s]
+
+
+@compiled
+def substitute_columns(band: FloatArray, x: FloatArray) -> None:
+    """Solve for the right-hand sides (n, m) in place."""
+    n, width, count = band.shape[0], band.shape[1] // 2, x.shape[1]
+    for k in range(n):
+        for r in range(1, min(width, n - 1 - k) + 1):
+            factor = band[k + r, width - r]
+            if factor != 0.0:
+                for m in range(count):
+                    x[k + r, m] -= factor * x[k, m]
+    for k in range(n - 1, -1, -1):
+        for s in range(1, min(width, n - 1 - k) + 1):
+            factor = band[k, width + s]
+            if factor != 0.0:
+                for m in range(count):
+                    x[k, m] -= factor * x[k + s, m]
+        for m in range(count):
+            x[k, m] /= band[k, width]

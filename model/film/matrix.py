@@ -1,0 +1,106 @@
+"""The banded symmetric matrix of one film, L D L^T in place: the price of a film solution is this factorisation."""
+
+from __future__ import annotations
+
+from model.compilation import compiled
+from model.film.mesh import BoolArray, FloatArray
+
+
+@compiled
+def assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArray, first: int) -> None:
+    """Lower band of the matrix: row k holds its diagonal and the entries below it; ruptured nodes stand alone."""
+    nt, nz = gx.shape[0], gz.shape[1]
+    width = nz - first
+    for k in range(band.shape[0]):
+        for r in range(band.shape[1]):
+            band[k, r] = 0.0
+    for i in range(1, nt):
+        for j in range(first, nz):
+            k = (i - 1) * width + j - first
+            if ruptured[i, j]:
+                band[k, 0] = 1.0
+                continue
+            diagonal = gx[i - 1, j] + gx[i, j] + gz[i, j]
+            if j > 0:
+                diagonal += gz[i, j - 1]
+            band[k, 0] = diagonal
+            if j + 1 < nz and not ruptured[i, j + 1]:
+                band[k, 1] -= gz[i, j]
+            if i + 1 < nt and not ruptured[i + 1, j]:
+                band[k, width] -= gx[i, j]
+
+
+@compiled
+def factorise(band: FloatArray) -> None:
+    """L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k]."""
+    n, width = band.shape[0], band.shape[1] - 1
+    for k in range(n):
+        pivot = band[k, 0]
+        for r in range(1, min(width, n - 1 - k) + 1):
+            factor = band[k, r] / pivot
+            if factor != 0.0:
+                for s in range(r, width + 1):
+                    band[k + r, s - r] -= factor * band[k, s]
+        for r in range(1, width + 1):
+            band[k, r] /= pivot
+
+
+@compiled
+def substitute(band: FloatArray, x: FloatArray) -> None:
+    """Solve for one right-hand side in place, with the factor from `factorise`."""
+    n, width = band.shape[0], band.shape[1] - 1
+    for k in range(n):
+        for r in range(1, min(width, n - 1 - k) + 1):
+            x[k + r] -= band[k, r] * x[k]
+    for k in range(n - 1, -1, -1):
+        total = x[k] / band[k, 0]
+        for r in range(1, min(width, n - 1 - k) + 1):
+            total -= band[k, r] * x[k + r]
+        x[k] = total
+
+
+@compiled
+def substitute_four(band: FloatArray, x: FloatArray) -> None:
+    """`substitute` for the four derivatives side by side (n, 4): the inner loop fills a vector register."""
+    n, width = band.shape[0], band.shape[1] - 1
+    for k in range(n):
+        for r in range(1, min(width, n - 1 - k) + 1):
+            factor = band[k, r]
+            for m in range(4):
+                x[k + r, m] -= factor * x[k, m]
+    for k in range(n - 1, -1, -1):
+        pivot = band[k, 0]
+        for m in range(4):
+            x[k, m] /= pivot
+        for r in range(1, min(width, n - 1 - k) + 1):
+            factor = band[k, r]
+            for m in range(4):
+                x[k, m] -= factor * x[k + r, m]
+
+
+@compiled
+def add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
+    """Add to the diagonal, mesh shape (nt + 1, nz + 1), before factorising."""
+    nt, nz = diagonal.shape[0] - 1, diagonal.shape[1] - 1
+    for i in range(1, nt):
+        for j in range(first, nz):
+            band[(i - 1) * (nz - first) + j - first, 0] += diagonal[i, j]
+
+
+@compiled
+def substitute_many(band: FloatArray, x: FloatArray) -> None:
+    """`substitute` for any number of right-hand sides, (n, m)."""
+    n, width, columns = band.shape[0], band.shape[1] - 1, x.shape[1]
+    for k in range(n):
+        for r in range(1, min(width, n - 1 - k) + 1):
+            factor = band[k, r]
+            for m in range(columns):
+                x[k + r, m] -= factor * x[k, m]
+    for k in range(n - 1, -1, -1):
+        pivot = 1.0 / band[k, 0]
+        for m in range(columns):
+            x[k, m] *= pivot
+        for r in range(1, min(width, n - 1 - k) + 1):
+            factor = band[k, r]
+            for m in range(columns):
+                x[k, m] -= factor * x[k + r, m]

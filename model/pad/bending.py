@@ -1,0 +1,208 @@
+"""Pads that bend: the solid's deformation follows the film's pressure and temperature.
+
+A thin film is softer than its pad: followed one step behind, the deformation overshoots and swings for ever. The few
+shapes in which a pad gives way most therefore take part in the Newton step: with h = ... + sum_m c_m phi_m and the
+pad's answer c = B p, the film's derivatives by c, (a, b) close the loop pad by pad, and leave an effective force and
+stiffness for the journal. What remains, and what heat does, contracts by itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.bearing import Bearing, Pad
+from model.film.mesh import FilmGrid, FilmWork
+from model.film.reynolds import FilmForces, conductances
+from model.film.slopes import shape_slopes
+from model.pad.mesh import PadGeometry
+from model.pad.solid import solid_of
+
+FloatArray = NDArray[np.float64]
+
+#: Stations on the dry arc ahead of a film that starts late.
+DRY_STATIONS = 8
+#: Shapes that take part in the Newton step.
+SHAPES = 8
+
+
+@dataclass(frozen=True, eq=False)
+class PadGive:
+    """How a pad's face moves outward under its film; n = (nt + 1)(nz + 1) film nodes, raveled.
+
+    Attributes
+    ----------
+    compliance : (n, n) ndarray
+        Deformation by pressure [m/Pa].
+    warmth : (c, n) ndarray
+        Temperatures of the pad's coarser nodes by those of the film.
+    expansion : (n, c) ndarray
+        Deformation by them [m/K].
+    flux : (n, c) ndarray
+        Heat flux density into the pad by them [W/m^2/K].
+    shapes : (nt + 1, nz + 1, m) ndarray
+        In which the pad gives way most.
+    amplitudes : (m, n) ndarray
+        Amplitudes of the shapes in a deformation.
+    response : (m, unknowns) ndarray
+        Amplitudes by the pressure at the film's unknown nodes.
+    frame : (2, unknowns) ndarray
+        Radial and tangential force by that pressure [m^2].
+    """
+
+    compliance: FloatArray
+    warmth: FloatArray
+    expansion: FloatArray
+    flux: FloatArray
+    shapes: FloatArray
+    amplitudes: FloatArray
+    response: FloatArray
+    frame: FloatArray
+
+
+@dataclass(frozen=True)
+class BendingStep:
+    """One pad's part of a Newton step.
+
+    Attributes
+    ----------
+    forces : FilmForces
+        Force and stiffness with the pad giving way: what the journal and the pivot feel.
+    mismatch : (nt + 1, nz + 1) ndarray
+        Wanted less present deformation, without the shapes [m].
+    amplitude : (m,) ndarray
+        Change of the shapes' amplitudes at rest ...
+    by_approach : (m, 2) ndarray
+        ... and per (a, b).
+    share : float
+        Largest mismatch over the least film thickness.
+    """
+
+    forces: FilmForces
+    mismatch: FloatArray
+    amplitude: FloatArray
+    by_approach: FloatArray
+    share: float
+
+
+def pad_give(pad: Pad, bearing: Bearing, grid: FilmGrid) -> PadGive:
+    """Matrices of a pad for its film's mesh; the same object for pads of the same shape."""
+    geometry = PadGeometry.of(pad, bearing)
+    return _pad_give(geometry, grid.angle.tobytes(), grid.z.tobytes(), grid.area.tobytes())
+
+
+@lru_cache(maxsize=8)
+def _pad_give(geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes) -> PadGive:
+    angle, z, area = (np.frombuffer(raw, dtype=float) for raw in (angles, zs, areas))
+    ahead = 0
+    if angle[0] - geometry.leading > 1e-9:  # a starved film: the dry arc ahead of it carries nothing
+        ahead = DRY_STATIONS
+        angle = np.concatenate([np.linspace(geometry.leading, angle[0], ahead + 1)[:-1], angle])
+    solid = solid_of(geometry, angle, z)
+    wet = slice(ahead * len(z), None)
+    compliance = np.ascontiguousarray(solid.compliance[wet, wet])
+    warmth, expansion, flux = solid.thermal_factors
+    shapes = _softest_shapes(compliance, area)
+    amplitudes = (shapes * area[:, None]).T
+    angle = angle[ahead:]
+    inner = np.zeros((len(angle), len(z)), dtype=bool)
+    inner[1:-1, 0 if abs(z[0]) < 1e-9 * z[-1] else 1 : -1] = True
+    unknown = inner.ravel()
+    frame = area * np.repeat(np.stack([np.cos(angle), np.sin(angle)]), len(z), axis=1)
+    return PadGive(
+        compliance=compliance,
+        warmth=np.ascontiguousarray(warmth[:, wet]),
+        expansion=np.ascontiguousarray(expansion[wet]),
+        flux=np.ascontiguousarray(flux[wet]),
+        shapes=shapes.reshape(-1, len(z), SHAPES),
+        amplitudes=amplitudes,
+        response=np.ascontiguousarray((amplitudes @ compliance)[:, unknown]),
+        frame=np.ascontiguousarray(frame[:, unknown]),
+    )
+
+
+def _softest_shapes(compliance: FloatArray, area: FloatArray) -> FloatArray:
+    """Leading eigenshapes of the compliance, orthonormal by area, (n, SHAPES); by subspace iteration."""
+    root = np.sqrt(area)
+    start = np.random.default_rng(0).standard_normal((len(area), SHAPES + 4))
+    basis = np.linalg.qr(start)[0]
+    for _ in range(4):
+        basis = np.linalg.qr(root[:, None] * (compliance @ (basis / root[:, None])))[0]
+    return np.asarray(basis[:, :SHAPES] / root[:, None])
+
+
+def wanted_shapes(
+    gives: list[PadGive], pressures: list[FloatArray], rises: list[FloatArray], factor: float
+) -> list[FloatArray]:
+    """Deformation that every film asks of its pad, Eq. (6)-(8) [m]; pads of one shape are done in one product.
+
+    Parameters
+    ----------
+    gives : list of PadGive
+    pressures, rises : list of (nt + 1, nz + 1) ndarray
+        Pressure [Pa] and temperature above supply [K].
+    factor : float
+        On the computed deformation.
+    """
+    wanted: list[FloatArray] = [np.empty(0)] * len(gives)
+    for give in {id(g): g for g in gives}.values():
+        same = [k for k, g in enumerate(gives) if g is give]
+        pressure = np.column_stack([pressures[k].ravel() for k in same])
+        rise = np.column_stack([rises[k].ravel() for k in same])
+        shape = factor * (give.compliance @ pressure + give.expansion @ (give.warmth @ rise))
+        for column, k in enumerate(same):
+            wanted[k] = shape[:, column].reshape(pressures[k].shape)
+    return wanted
+
+
+def bending_step(
+    give: PadGive,
+    grid: FilmGrid,
+    work: FilmWork,
+    wedge: tuple[float, float, float],
+    forces: FilmForces,
+    change: FloatArray,
+    factor: float,
+) -> BendingStep:
+    """Close the loop of pressure and deformation for one pad.
+
+    Parameters
+    ----------
+    give : PadGive
+    grid, work
+        The film, solved at the present deformation.
+    wedge : tuple of float
+        Cp, a, b [m].
+    forces : FilmForces
+        Of the pad as it is.
+    change : (nt + 1, nz + 1) ndarray
+        Deformation asked for less the present one [m].
+    factor : float
+        On the computed deformation.
+    """
+    slopes = shape_slopes(grid, work, conductances(grid, work, *wedge), give.shapes)
+    response = factor * give.response
+    asked = give.amplitudes @ change.ravel()
+    right = np.empty((SHAPES, 3))
+    right[:, 0] = asked
+    right[:, 1:] = response @ work.slopes[:, :2]
+    answer = np.asarray(np.linalg.solve(_UNIT - response @ slopes, right), dtype=float)
+    felt = (give.frame @ slopes) @ answer
+    return BendingStep(
+        forces=forces._replace(force=forces.force + felt[:, 0], stiffness=forces.stiffness + felt[:, 1:]),
+        mismatch=change - give.shapes @ asked,
+        amplitude=answer[:, 0],
+        by_approach=answer[:, 1:],
+        share=float(np.abs(change).max()) / forces.min_film,
+    )
+
+
+_UNIT = np.eye(SHAPES)
+
+
+def change_of_shape(give: PadGive, step: BendingStep, da: float, db: float) -> FloatArray:
+    """Change of the deformation that belongs to a move (da, db) of the film [m]."""
+    return step.mismatch + give.shapes @ (step.amplitude + step.by_approach @ np.array([da, db]))

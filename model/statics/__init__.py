@@ -1,0 +1,1 @@
+"""Static equilibrium of journal, pads and pivots."""

@@ -1,0 +1,107 @@
+"""Where the journal stands on tabulated isothermal films: the first guess of the equilibrium."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.compilation import compiled
+from model.film.loaded_attitude import Branch
+
+FloatArray = NDArray[np.float64]
+#: Share of the load that may be missing.
+GOOD_ENOUGH = 0.002
+
+
+def first_position(load: FloatArray, normals: FloatArray, gaps: FloatArray, branches: list[Branch]) -> FloatArray:
+    """Journal position that balances a load on tabulated isothermal films.
+
+    Parameters
+    ----------
+    load : (2,) ndarray
+        [N]
+    normals : (n_pads, 2) ndarray
+        Unit vectors at the pivots.
+    gaps : (n_pads,) ndarray
+        Cp - Cb [m].
+    branches : list of Branch
+
+    Returns
+    -------
+    (2,) ndarray
+        [m]
+    """
+    longest = max(len(b.reach) for b in branches)
+    curves = np.full((len(branches), 2, longest), math.nan)
+    for row, branch in zip(curves, branches, strict=True):
+        row[0, : len(branch.reach)] = branch.reach
+        row[1, : len(branch.load)] = branch.load
+    lengths = np.array([len(b.reach) for b in branches])
+    room = min(float(b.approach[-1]) - g for b, g in zip(branches, gaps, strict=True))
+    return _first_position(np.asarray(load, float), np.column_stack([normals, gaps]), curves, lengths, room)
+
+
+@compiled
+def _first_position(
+    load: FloatArray, pads: FloatArray, curves: FloatArray, lengths: NDArray[np.int64], room: float
+) -> FloatArray:
+    size = math.hypot(load[0], load[1])
+    position = np.zeros(2)
+    if size == 0.0:
+        return position
+    x, y = load[0] / size * 0.4 * room, load[1] / size * 0.4 * room
+    fx, fy = _missing(x, y, load, pads, curves, lengths)
+    error = math.hypot(fx, fy)
+    step = 1e-4 * room
+    for _ in range(60):
+        if error < GOOD_ENOUGH * size:
+            break
+        ax, ay = _missing(x + step, y, load, pads, curves, lengths)
+        bx, by = _missing(x - step, y, load, pads, curves, lengths)
+        cx, cy = _missing(x, y + step, load, pads, curves, lengths)
+        dx, dy = _missing(x, y - step, load, pads, curves, lengths)
+        jxx, jyx = (bx - ax) / (2 * step), (by - ay) / (2 * step)
+        jxy, jyy = (dx - cx) / (2 * step), (dy - cy) / (2 * step)
+        det = jxx * jyy - jxy * jyx
+        if abs(det) <= 1e-9 * (jxx**2 + jxy**2 + jyx**2 + jyy**2):
+            # nothing carries in some direction: go where the load pushes
+            mx, my = 0.1 * room * fx / error, 0.1 * room * fy / error
+        else:
+            mx, my = (fx * jyy - jxy * fy) / det, (jxx * fy - jyx * fx) / det
+            share = min(1.0, 0.2 * room / max(math.hypot(mx, my), 1e-30))
+            mx, my = share * mx, share * my
+        for halving in range(8):  # a pad that takes up or sheds its load on the way bends the force sharply
+            tx, ty = x + mx * 0.5**halving, y + my * 0.5**halving
+            gx, gy = _missing(tx, ty, load, pads, curves, lengths)
+            left = math.hypot(gx, gy)
+            if left < error or halving == 7:
+                x, y, fx, fy, error = tx, ty, gx, gy, left
+                break
+    position[0], position[1] = x, y
+    return position
+
+
+@compiled
+def _missing(
+    x: float, y: float, load: FloatArray, pads: FloatArray, curves: FloatArray, lengths: NDArray[np.int64]
+) -> tuple[float, float]:
+    """Part of the load that the tabulated films do not carry at a position."""
+    fx, fy = load[0], load[1]
+    for m in range(pads.shape[0]):
+        reach = pads[m, 2] + pads[m, 0] * x + pads[m, 1] * y
+        if reach < curves[m, 0, 0]:
+            continue
+        low, high = 0, lengths[m] - 1  # beyond the end: the last slope
+        while high - low > 1:
+            middle = (low + high) // 2
+            if curves[m, 0, middle] < reach:
+                low = middle
+            else:
+                high = middle
+        slope = (curves[m, 1, high] - curves[m, 1, low]) / (curves[m, 0, high] - curves[m, 0, low])
+        carried = curves[m, 1, low] + slope * (reach - curves[m, 0, low])
+        fx -= pads[m, 0] * carried
+        fy -= pads[m, 1] * carried
+    return fx, fy

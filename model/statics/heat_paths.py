@@ -1,0 +1,245 @@
+"""Where the film's heat goes besides downstream: into the pads, through the journal, on to the next pad.
+
+The baseline is adiabatic, as the paper's model. Three options couple the films' temperatures:
+
+- `conduction`: a pad's face has its film's temperature; what the pad conducts to its back and edges, the film loses.
+- `isothermal_journal`: a turning journal has one temperature; it takes up heat where the film is hotter and gives it
+  back where it is colder, and keeps none. A film with a parabolic temperature profile over its thickness, flat at the
+  pad, passes q = 3 k / h (T_mean - T_journal).
+- `carryover`: a pad drinks a share of what leaves the pad before it.
+
+For given flows all of them are linear: every film's temperature is that of fresh oil at zero, plus its answer to its
+inlet, plus its answer to the journal. So the inlets and the journal follow from one small system, however much of the
+heat goes round. What a pad conducts depends on all of its film; that is solved by a few Krylov steps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.film.energy import dissipation, march
+from model.pad.bending import PadGive
+from model.setup import Setup
+from model.statics.pad_film import PadFilm
+
+FloatArray = NDArray[np.float64]
+
+#: q h / k (T_mean - T_wall) of a parabolic profile, flat at the other wall.
+NUSSELT = 3.0
+#: Conduction is solved to this share in every step of the equilibrium; what is left contracts with the rest.
+CONDUCTION_TOLERANCE = 0.01
+KRYLOV_STEPS = 12
+#: Kelvins beyond which a film is no film: squares would overflow.
+BOUNDLESS = 1e30
+
+
+def couples_heat(setup: Setup) -> bool:
+    """Whether the films' temperatures depend on more than their own inlets."""
+    return setup.thermal != "isothermal" and bool(
+        setup.carryover or setup.options.conduction or setup.options.isothermal_journal
+    )
+
+
+def settle_temperatures(
+    setup: Setup, films: list[PadFilm], surface_speed: float, journal: float, limits: tuple[float, float]
+) -> tuple[float, float, float]:
+    """Temperatures of all films for their present flows; writes them, and the inlets.
+
+    Parameters
+    ----------
+    setup : Setup
+    films : list of PadFilm
+        Solved for pressure.
+    surface_speed : float
+        [m/s]
+    journal : float
+        The journal's temperature so far [degC]; NaN for none.
+    limits : tuple of float
+        Relaxation, and the largest change of a temperature in one step [K].
+
+    Returns
+    -------
+    change : float
+        Largest change asked for [K].
+    limited : float
+        See `model.film.energy.solve_energy`.
+    journal : float
+        The journal's temperature [degC]; NaN if it takes no part.
+    """
+    order = sorted(films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
+    heat = FilmHeat(setup, surface_speed, journal if math.isfinite(journal) else setup.inlet_temperature)
+    parts = [heat.answers(film) for film in order]
+    inlets, journal = _balance(setup, order, parts)
+    change = 0.0
+    for film, part, inlet in zip(order, parts, inlets.tolist(), strict=True):
+        film.inlet = inlet
+        film.temperature_change = 0.0
+        if part is None:
+            continue
+        fresh, by_inlet, by_journal = part
+        asked = fresh + inlet * by_inlet + journal * by_journal - film.work.temperature
+        film.temperature_change = float(np.abs(asked).max())
+        film.work.temperature[:] += limits[0] * min(1.0, limits[1] / max(film.temperature_change, 1e-30)) * asked
+        change = float(np.maximum(change, film.temperature_change))  # a NaN is not to be lost
+    return change, heat.limited, journal if setup.options.isothermal_journal else math.nan
+
+
+@dataclass
+class FilmHeat:
+    """The energy equation of one film after the other, with its pad and journal.
+
+    Attributes
+    ----------
+    setup : Setup
+    surface_speed : float
+        [m/s]
+    journal : float
+        The journal's temperature so far [degC].
+    limited : float
+        The largest share of a flow that had to be limited so far, see `model.film.energy.solve_energy`.
+    """
+
+    setup: Setup
+    surface_speed: float
+    journal: float
+    limited: float = 0.0
+
+    def answers(self, film: PadFilm) -> FloatArray | None:
+        """Temperature of a film with all else at zero, per kelvin of its inlet, and per kelvin of the journal.
+
+        Shape (3, nt + 1, nz + 1); None if the film carries nothing.
+        """
+        if film.forces is None:
+            return None
+        work = film.work
+        work.exchange[:] = _journal_exchange(self.setup, film)
+        fields = np.zeros((3, *work.temperature.shape))
+        sources = np.zeros_like(fields)
+        fields[1, 0] = 1.0
+        sources[0] = dissipation(film.grid, work, self.surface_speed)
+        sources[2] = work.exchange
+        give = film.give
+        if not self.setup.options.conduction or give is None:
+            self._march(film, fields, sources)
+            return fields
+        if not np.abs(work.temperature).max() < BOUNDLESS:
+            return np.full_like(fields, math.nan)
+        # what the pad takes at the present temperature is known; its answer to the change is solved for
+        station = film.grid.dx * film.grid.height[None, :]
+        present, supply = work.temperature, self.setup.inlet_temperature
+        sources[0] -= (give.flux @ (give.warmth @ (present - supply).ravel())).reshape(present.shape) * station
+        self._march(film, fields, sources)
+        if not np.abs(fields).max() < BOUNDLESS:
+            return fields
+        # as a correction, which vanishes at the equilibrium, and with it what the Krylov steps leave unsolved
+        missing = fields[0] + film.inlet * fields[1] + self.journal * fields[2] - present
+        for m in (1, 2):
+            fields[m] = self._with_pad(film, fields[m], give, station)
+        correction = self._with_pad(film, missing, give, station)
+        fields[0] = present + correction - film.inlet * fields[1] - self.journal * fields[2]
+        return fields
+
+    def _with_pad(self, film: PadFilm, alone: FloatArray, give: PadGive, station: FloatArray) -> FloatArray:
+        """Temperature with the heat that the pad takes from it, given the one without: (I + A^-1 F) T = T_alone."""
+        if not alone.any():
+            return alone
+        shape = alone.shape
+
+        def coupled(t: FloatArray) -> FloatArray:
+            fields = np.zeros((1, *shape))
+            taken = (give.flux @ (give.warmth @ t)).reshape(shape) * station
+            self._march(film, fields, -taken[None])
+            return np.asarray(t - fields[0].ravel())
+
+        return np.asarray(minimal_residual(coupled, alone.ravel(), CONDUCTION_TOLERANCE)).reshape(shape)
+
+    def _march(self, film: PadFilm, fields: FloatArray, sources: FloatArray) -> None:
+        oil = self.setup.bearing.oil
+        heat = (oil.specific_heat, oil.conductivity)
+        limited = march(film.grid, film.work, self.surface_speed, heat, fields, sources)
+        self.limited = max(self.limited, limited)
+
+
+def minimal_residual(apply: Callable[[FloatArray], FloatArray], right: FloatArray, tolerance: float) -> FloatArray:
+    """Solve apply(x) = right by GMRES, in at most `KRYLOV_STEPS` steps, to a share `tolerance` of the right-hand side.
+
+    NaN where `apply` grows beyond `BOUNDLESS`.
+
+    Notes
+    -----
+    Y. Saad, M. H. Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856.
+    """
+    size = float(np.linalg.norm(right))
+    basis, images = [right / size], []
+    for _ in range(KRYLOV_STEPS):
+        image = apply(basis[-1])
+        if not np.abs(image).max() < BOUNDLESS:
+            return np.full_like(right, math.nan)
+        images.append(image)
+        columns = np.column_stack(images)
+        weights = np.linalg.lstsq(columns, right, rcond=None)[0]
+        if np.linalg.norm(columns @ weights - right) < tolerance * size:
+            break
+        new = image.copy()
+        for old in basis:
+            new -= (old @ new) * old
+        length = float(np.linalg.norm(new))
+        if not length > 1e-12 * size:
+            break
+        basis.append(new / length)
+    return np.asarray(np.column_stack(basis[: len(images)]) @ weights)
+
+
+def _journal_exchange(setup: Setup, film: PadFilm) -> FloatArray:
+    """What a kelvin of film temperature over the journal's passes into it, per station [W/K]."""
+    if not setup.options.isothermal_journal:
+        return np.zeros_like(film.work.thickness)
+    station = film.grid.dx * film.grid.height[None, :]
+    return np.asarray(NUSSELT * setup.bearing.oil.conductivity / film.work.thickness * station)
+
+
+def _balance(setup: Setup, order: list[PadFilm], parts: list[FloatArray | None]) -> tuple[FloatArray, float]:
+    """Inlet temperature of every pad, and the journal's that keeps no heat [degC]."""
+    n, supply, share = len(order), setup.inlet_temperature, setup.carryover
+    matrix, right = np.eye(n + 1), np.full(n + 1, supply)
+    kept = np.zeros(3)  # what the journal takes up: by fresh oil, by its own temperature
+    by_inlet = np.zeros(n)
+    for k, (film, part) in enumerate(zip(order, parts, strict=True)):
+        outlet = [0.0, 1.0, 0.0]  # an idle pad passes its inlet on
+        if part is not None:
+            outlet = _outlet(film, part)
+            if setup.options.isothermal_journal:
+                weight = film.work.exchange.copy()  # all of it is the journal's, see `FilmHeat.answers`
+                weight[[0, -1]] *= 0.5
+                taken = np.tensordot(part, weight, 2)
+                kept += np.array([taken[0], 0.0, taken[2] - weight.sum()])
+                by_inlet[k] = taken[1]
+        after = (k + 1) % n
+        right[after] = supply * (1.0 - share) + share * outlet[0]
+        matrix[after, k] -= share * outlet[1]
+        matrix[after, n] -= share * outlet[2]
+    if setup.options.isothermal_journal and kept[2] != 0.0:
+        scale = -kept[2]
+        matrix[n, :n], matrix[n, n], right[n] = -by_inlet / scale, 1.0, kept[0] / scale
+    answer = np.linalg.solve(matrix, right)
+    return answer[:n], float(answer[n])
+
+
+def outlet_temperature(film: PadFilm) -> float:
+    """Flow-weighted temperature at the trailing edge [degC]; an idle pad passes its inlet temperature on."""
+    if film.idle:
+        return film.inlet
+    return _outlet(film, film.work.temperature[None])[0]
+
+
+def _outlet(film: PadFilm, fields: FloatArray) -> list[float]:
+    """Flow-weighted value of every field at the trailing edge."""
+    flow = film.work.flow_x[-1]
+    total = float(flow.sum())
+    values: list[float] = (fields[:, -1] @ flow / total).tolist()
+    return values

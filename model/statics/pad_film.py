@@ -1,0 +1,178 @@
+"""One pad with its film: mesh, arrays, geometry; one step of its pressure, heat and deformation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.bearing import Oil, Pad
+from model.film.cavitation import FilmSolver, film_solver
+from model.film.energy import heat_step
+from model.film.loaded_attitude import Branch
+from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film.oil_state import set_viscosity
+from model.film.reynolds import FilmForces, solve_film
+from model.film.slopes import warmer_pressure
+from model.pad.bending import BendingStep, PadGive, pad_give
+from model.setup import Setup
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass
+class PadFilm:
+    """State of one pad while an equilibrium is sought.
+
+    Attributes
+    ----------
+    number : int
+        From 1.
+    pad : Pad
+    normal, tangent : (2,) ndarray
+        Unit vectors at the pivot.
+    gap : float
+        Cp - Cb: preload times Cp, plus running changes [m].
+    pivot_radius : float
+        R_P [m].
+    grid, work
+        Mesh and arrays.
+    inlet : float
+        Temperature of the oil that enters [degC].
+    tilt, deflection : float
+        t [rad], eta [m].
+    idle : bool
+        No loaded attitude: carries nothing.
+    forces : FilmForces or None
+        At the temperature that the pressure was solved with.
+    foreseen : FilmForces or None
+        At the temperature found since, to first order: what a Newton step should go by.
+    warming : (unknowns,) ndarray
+        The change of pressure from the one to the other [Pa].
+    bent : (nt + 1, nz + 1) ndarray
+        The pad's deformation, part of `work.extra` [m].
+    give : PadGive or None
+        How the pad gives way; None for a rigid one.
+    step : BendingStep or None
+        Its part of the present Newton step.
+    solver : callable
+        Solves the film's pressure, with or without its mass conserved.
+    """
+
+    number: int
+    pad: Pad
+    normal: FloatArray
+    tangent: FloatArray
+    gap: float
+    pivot_radius: float
+    grid: FilmGrid
+    work: FilmWork
+    inlet: float
+    bent: FloatArray
+    warming: FloatArray
+    give: PadGive | None = None
+    step: BendingStep | None = None
+    tilt: float = 0.0
+    deflection: float = 0.0
+    idle: bool = False
+    forces: FilmForces | None = None
+    foreseen: FilmForces | None = None
+    branch: Branch | None = None
+    flips: int = 0
+    held: int = 0
+    temperature_change: float = field(default=math.inf)
+    solver: FilmSolver = solve_film
+
+    @property
+    def lost(self) -> bool:
+        """Whether the film closed, so that it has no pressure."""
+        return not self.idle and self.forces is not None and self.forces.steps < 0
+
+    def reach(self, position: FloatArray) -> float:
+        """Approach a of the film if the pivot did not give way [m]."""
+        return self.gap + float(self.normal @ position)
+
+    def approach(self, position: FloatArray) -> tuple[float, float]:
+        """(a, b) of the film for a journal position and the pad's present tilt and deflection [m]."""
+        a = self.reach(position) - self.deflection
+        b = float(self.tangent @ position) + self.pivot_radius * self.tilt
+        return a, b
+
+    def solve(self, position: FloatArray, surface_speed: float, oil: Oil) -> None:
+        """Solve the film's pressure for a journal position, at its present temperature and shape."""
+        a, b = self.approach(position)
+        set_viscosity(self.work, oil_constants(oil))
+        wedge = (self.pad.pad_clearance, a, b)
+        self.forces = self.foreseen = self.solver(self.grid, self.work, wedge, surface_speed, False)
+
+    def warm(self, surface_speed: float, oil: Oil, limits: tuple[float, float]) -> float:
+        """Move the temperature towards what the pressure makes it, by `limits`: relaxation, and largest step [K].
+
+        Returns
+        -------
+        float
+            See `model.film.energy.solve_energy`.
+        """
+        assert self.forces is not None
+        change, limited, radial, tangential = heat_step(
+            self.grid, self.work, surface_speed, oil_constants(oil), (oil.specific_heat, oil.conductivity),
+            (self.inlet, *limits), self.warming,
+        )  # fmt: skip
+        self.temperature_change = change
+        self.foreseen = self.forces._replace(force=self.forces.force + np.array([radial, tangential]))
+        return limited
+
+    def foresee(self, surface_speed: float, oil: Oil) -> None:
+        """Say what a temperature that was found otherwise will do to the pressure; see `foreseen`."""
+        assert self.forces is not None
+        change = warmer_pressure(self.grid, self.work, surface_speed, oil_constants(oil), self.warming)
+        self.foreseen = self.forces._replace(force=self.forces.force + change)
+
+    def foreseen_pressure(self) -> FloatArray:
+        """Pressure at the new temperature, (nt + 1, nz + 1) [Pa]."""
+        pressure = self.work.pressure.copy()
+        inner = pressure[1:-1, self.grid.first : -1]
+        inner += self.warming.reshape(inner.shape)
+        return pressure
+
+
+def pad_films(setup: Setup) -> list[PadFilm]:
+    """Lay out every pad's film."""
+    bearing = setup.bearing
+    symmetric = setup.misalignment[0] == 0.0
+    angle, toward = setup.misalignment
+    films = []
+    solver = film_solver(setup.options.cavitation)
+    for number, pad in enumerate(bearing.pads, start=1):
+        start = pad.leading_edge + setup.starvation * pad.arc
+        shape = (setup.mesh.along, setup.mesh.across * (1 if symmetric else 2))
+        grid = film_grid(start, pad.leading_edge + pad.arc, bearing.journal_radius, bearing.length, shape, symmetric)
+        work = film_work(grid, setup.inlet_temperature)
+        if not symmetric:
+            # the axis leans by `angle` towards `toward`: at z the journal stands z * angle further that way
+            work.extra[:, :] = -np.outer(np.cos(grid.angle + pad.pivot_angle - toward), grid.z * angle)
+        films.append(
+            PadFilm(
+                number=number,
+                pad=pad,
+                normal=np.array([math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)]),
+                tangent=np.array([-math.sin(pad.pivot_angle), math.cos(pad.pivot_angle)]),
+                gap=pad.pad_clearance - pad.assembled_clearance - setup.clearance_change,
+                pivot_radius=bearing.pivot_radius(pad),
+                grid=grid,
+                work=work,
+                inlet=setup.inlet_temperature,
+                bent=np.zeros_like(work.extra),
+                warming=np.zeros_like(work.unknown),
+                give=pad_give(pad, bearing, grid) if setup.flexible_pads or setup.options.conduction else None,
+                solver=solver,
+            )
+        )
+    return films
+
+
+def oil_constants(oil: Oil) -> tuple[float, float, float, float]:
+    """What the compiled viscosity and density need: mu_40, kappa, rho_40, alpha_v."""
+    return oil.viscosity_40, oil.viscosity_exponent, oil.density_40, oil.thermal_expansion

@@ -1,0 +1,34 @@
+"""Power lost to the shear of the films."""
+
+from __future__ import annotations
+
+import math
+
+from model.statics.equilibrium import Equilibrium
+
+
+def power_loss(equilibrium: Equilibrium, surface_speed: float) -> float:
+    """Work the journal does on all films [W]: wall shear mu U / h + h/2 dp/dx, times U, over the full film.
+
+    Where the film is ruptured only its striated share shears; that share is h_rupture / h, taken from the film
+    thickness at the line's rupture. NaN where a film is lost.
+    """
+    total = 0.0
+    for film in equilibrium.films:
+        if film.idle:
+            continue
+        work, grid = film.work, film.grid
+        if not work.thickness.min() > 0:  # a lost film, of a prediction that did not converge
+            return math.nan
+        couette = work.viscosity * surface_speed**2 / work.thickness
+        share = work.thickness * 0 + 1.0
+        for j in range(share.shape[1]):
+            for i in range(1, share.shape[0]):
+                if work.ruptured[i, j]:
+                    share[i, j] = share[i - 1, j] * min(1.0, work.thickness[i - 1, j] / work.thickness[i, j])
+        total += float((grid.area * couette * share).sum())
+        slope = (work.pressure[1:] - work.pressure[:-1]) / grid.dx
+        middle = 0.5 * (work.thickness[1:] + work.thickness[:-1])
+        weight = 0.5 * (grid.area[1:] + grid.area[:-1])
+        total += float((0.5 * surface_speed * middle * slope * weight).sum())
+    return total

@@ -1,0 +1,1 @@
+"""Formats of other loggers, each read by its own library."""

@@ -1,0 +1,111 @@
+"""MATLAB files: version 5 to 7.2 by scipy, 7.3 (HDF5) by h5py; vectors and structures of vectors become channels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigdata.problem import Problem, RigDataError
+from rigdata.readers.formats.mat5_elements import check_mat5
+from rigdata.readers.series import Series, equidistant
+from rigdata.readers.time_names import is_time
+
+_RATES = ("fs", "sample_rate", "samplerate", "sample_rate_hz", "abtastrate")
+_SHORTEST = 8
+_DEEPEST = 4
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def read_series(path: Path) -> list[Series]:
+    """Read every numeric vector.
+
+    A variable or structure field with at least eight numbers is a channel, the columns of a matrix are channels
+    ``name_1``, ``name_2``, ..; one named like a time (``t``, ``time``, ``Zeit``) is the clock, a scalar ``fs`` or
+    ``sample_rate`` [Hz] stands in for it.
+
+    Parameters
+    ----------
+    path : Path
+        ``.mat``
+    """
+    vectors, scalars = {}, {}
+    for name, value in _flattened(_load(path), "", 0):
+        if value.size == 1:
+            scalars[name] = float(value.reshape(-1)[0])
+        elif value.size >= _SHORTEST:
+            vectors.update(_columns(name, value))
+    clock = next((n for n in vectors if is_time(n.rpartition(".")[2])), None)
+    time = None if clock is None else vectors.pop(clock)
+    rate = next((v for n, v in scalars.items() if n.rpartition(".")[2].lower() in _RATES and v > 0), None)
+    found = []
+    for name, values in vectors.items():
+        own = time if time is not None and len(time) == len(values) else None
+        if own is None and rate is not None:
+            own = equidistant(len(values), 1.0 / rate)
+        found.append(Series(name, "", values, own))
+    return found
+
+
+def _load(path: Path) -> dict[str, Any]:
+    # a 7.3 file is HDF5 behind 512 bytes of MATLAB's own text
+    with path.open("rb") as stream:
+        stream.seek(512)
+        newer = stream.read(8) == _HDF5
+        stream.seek(0)
+        newer = newer or stream.read(8) == _HDF5
+    if newer:
+        return _load_hdf5(path)
+    from scipy.io import loadmat
+
+    check_mat5(path)
+    return {k: v for k, v in loadmat(path, simplify_cells=True).items() if not k.startswith("__")}
+
+
+def _load_hdf5(path: Path) -> dict[str, Any]:
+    import h5py
+
+    with h5py.File(path, "r", locking="best-effort") as file:
+        return _group(file, path, 0)
+
+
+def _group(group: Any, path: Path, depth: int) -> dict[str, Any]:
+    """Datasets and groups by name; links out of the file and MATLAB's own store of references are left alone."""
+    import h5py
+
+    found: dict[str, Any] = {}
+    for name in group:
+        if name.startswith("#") or depth > _DEEPEST:
+            continue
+        if isinstance(group.get(name, getlink=True), (h5py.ExternalLink, h5py.SoftLink)):
+            problem = Problem("error", path.name, f"dataset {name}", "is a link", "Store the data in this file")
+            raise RigDataError(problem)
+        item = group[name]
+        if isinstance(item, h5py.Group):
+            found[name] = _group(item, path, depth + 1)
+        elif item.dtype.kind in "fiu" and not (item.is_virtual or item.external or _is_text(item)):
+            found[name] = np.asarray(item[()], dtype=float).T  # MATLAB writes columns first
+    return found
+
+
+def _is_text(item: Any) -> bool:
+    return item.attrs.get("MATLAB_class") in (b"char", "char")
+
+
+def _flattened(value: Any, name: str, depth: int) -> Iterator[tuple[str, np.ndarray]]:
+    if isinstance(value, dict):
+        if depth <= _DEEPEST:
+            for key, inner in value.items():
+                yield from _flattened(inner, f"{name}.{key}" if name else key, depth + 1)
+        return
+    array = np.asarray(value)
+    if array.dtype.kind in "fiu" and array.size and array.ndim <= 2:
+        yield name, array.astype(float)
+
+
+def _columns(name: str, value: np.ndarray) -> dict[str, np.ndarray]:
+    if value.ndim == 1 or 1 in value.shape:
+        return {name: np.ascontiguousarray(value).reshape(-1)}
+    return {f"{name}_{i + 1}": np.ascontiguousarray(value[:, i]) for i in range(value.shape[1])}

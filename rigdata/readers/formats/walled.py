@@ -1,0 +1,123 @@
+"""Libraries that crash, hang or eat memory on a damaged file read it in a process of their own.
+
+asammdf 8.8 dies by SIGSEGV, follows circles of addresses without end, and unpacks gigabytes from kilobytes when a few
+bytes of an MDF 4 file are wrong (found by fuzzing). No `except` in this process can help against that.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rigdata.problem import Problem, RigDataError
+from rigdata.readers.series import Series
+
+#: Seconds that any file may take, and bytes per second more.
+SECONDS, BYTES_PER_SECOND = 60.0, 2e6
+#: Memory beyond what numpy has mapped that any file may take, and multiples of the file's size more [bytes].
+MEMORY, MULTIPLES = 2**30, 64
+_AGAIN = "Export or copy it again from the logger"
+
+
+def read_walled(module: str, path: Path) -> list[Series]:
+    """Let ``rigdata.readers.<module>.read_walled_in(path)`` read a file in a child process.
+
+    Parameters
+    ----------
+    module : str
+    path : Path
+
+    Raises
+    ------
+    RigDataError
+        The child died, took longer or more memory than the file's size warrants, or could not read the file.
+    """
+    seconds = SECONDS + path.stat().st_size / BYTES_PER_SECOND
+    # The child must find the same rigdata as this process, wherever that came from.
+    home = str(Path(__file__).parents[3])
+    around = {**os.environ, "PYTHONPATH": os.pathsep.join([home, os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)}
+    command = [sys.executable, "-m", "rigdata.readers.formats.walled", module, str(path)]
+    try:
+        # asammdf mends a copy of a measurement that was cut short, and a child that dies cannot clear it away.
+        with tempfile.TemporaryDirectory(prefix="tpjb-", ignore_cleanup_errors=True) as scratch:
+            around |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), scratch)
+            # What a library prints about a broken file is no message for people; its exception comes with the answer.
+            done = subprocess.run(
+                command, stdin=subprocess.DEVNULL, capture_output=True, timeout=seconds, env=around, check=False
+            )
+    except subprocess.TimeoutExpired as error:
+        raise _refuse(f"took longer than {seconds:.0f} s to read, far beyond its size", _AGAIN) from error
+    head, _, body = done.stdout.partition(b"\n")
+    if done.returncode != 0 or not head:
+        raise _refuse(f"made its library crash (exit status {done.returncode}): it is damaged", _AGAIN)
+    said = json.loads(head)
+    if isinstance(said, dict):
+        raise _refuse(str(said["error"]), _AGAIN)
+    return _unpack(said, body)
+
+
+def _refuse(what: str, cure: str) -> RigDataError:
+    return RigDataError(Problem("error", "", "", what, cure))
+
+
+def _unpack(heads: list[list[str]], body: bytes) -> list[Series]:
+    numbers, at, found = np.frombuffer(body, dtype=float), 0, []
+    for name, unit, group, length, timed in heads:
+        n = int(length)
+        values, at = numbers[at : at + n], at + n
+        time = numbers[at : at + n] if timed else None
+        at += n if timed else 0
+        found.append(Series(name, unit, values, time, group))
+    return found
+
+
+def _answer(found: Sequence[Series]) -> None:
+    heads = [[s.name, s.unit, s.group, len(s), s.time is not None] for s in found]
+    out = sys.stdout.buffer
+    out.write(json.dumps(heads).encode() + b"\n")
+    for one in found:
+        for numbers in (one.values, one.time):
+            if numbers is not None:
+                out.write(np.ascontiguousarray(numbers, dtype=float).data)
+    out.flush()
+
+
+def _limit_memory(path: Path) -> None:
+    """Allow some times the file's size beyond what is mapped by now (not on Windows)."""
+    with contextlib.suppress(ImportError):
+        import resource
+
+        with contextlib.suppress(OSError):  # no /proc: macOS does not heed this limit either
+            mapped = int(Path("/proc/self/statm").read_text("ascii").split()[0]) * resource.getpagesize()
+            limit = mapped + MEMORY + MULTIPLES * path.stat().st_size
+            resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
+
+
+def main(module: str, path: Path) -> None:
+    """Read a file and write its channels to the standard output: one line of JSON, then the numbers."""
+    reader = importlib.import_module(f"rigdata.readers.formats.{module}")
+    _limit_memory(path)
+    try:
+        with contextlib.redirect_stdout(sys.stderr):  # asammdf prints what it finds; the answer would begin with that
+            found = reader.read_walled_in(path)
+    except MemoryError:
+        error = "claims more data than its size can hold"
+    except Exception as problem:  # whatever another library raises on a broken file: it is the file's fault here
+        error = f"cannot be read ({type(problem).__name__}: {str(problem)[:120]})"
+    else:
+        _answer(found)
+        return
+    print(json.dumps({"error": error}))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], Path(sys.argv[2]))

@@ -1,0 +1,1 @@
+"""Runs in an HDF5 campaign, read without leaving the file."""

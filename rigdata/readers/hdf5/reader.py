@@ -1,0 +1,393 @@
+"""Runs in an HDF5 campaign: one group per run, one 1-D dataset per channel, read slice by slice."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigdata.calibration import Channel
+from rigdata.problem import Problem, RigDataError
+from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, FloatArray, rate_of_time, undescribed
+from rigdata.readers.hdf5.content_hash import group_hash, is_plain
+from rigdata.readers.hdf5.heaps import broken_heap, too_long_text
+from rigdata.readers.hdf5.links import has_link, resolve
+
+#: Filters that the HDF5 library brings along; any other would load foreign code.
+_FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}
+_MAX_CHUNK = 256 * 2**20
+_MAX_TEXT = 8 * 2**20
+#: Class of texts in HDF5's types (H5T_STRING), and bytes of an attribute that is one number.
+_STRING, _MOST_NUMBER = 3, 64
+#: Members of a group that are looked at, and faults that are listed.
+_MAX_MEMBERS, _LISTED = 4096, 20
+#: Attribute of a run's group.
+_RATE = "sample_rate_hz"
+#: Key under which an open group is kept; no dataset can have this name.
+_GROUP = "/"
+#: Bytes of unpacked chunks that the library keeps per dataset.
+_LEAST_CACHE, _MOST_CACHE = 2**20, 2**25
+
+
+def _refuse(file: str, place: str, what: str, cure: str, run: str | None = None) -> RigDataError:
+    return RigDataError(Problem("error", file, place, what, cure, run))
+
+
+@contextmanager
+def open_readonly(path: Path, file: str, run: str | None = None, cache: int | None = None) -> Iterator[Any]:
+    """Open an HDF5 file for reading; turn what h5py raises on a broken file into `RigDataError`.
+
+    `cache` is the number of bytes of unpacked chunks that the library keeps per dataset.
+    """
+    import h5py
+
+    with _faults_told(file, run), h5py.File(path, "r", locking="best-effort", rdcc_nbytes=cache) as handle:
+        yield handle
+
+
+@contextmanager
+def _faults_told(file: str, run: str | None) -> Iterator[None]:
+    """Turn what h5py raises on a broken file into `RigDataError`."""
+    try:
+        yield
+    except RigDataError:
+        raise
+    except FileNotFoundError as error:
+        raise _refuse(file, "", "the file is not there", "Check the path", run) from error
+    except BlockingIOError as error:  # HDF5's file lock
+        what = "the file is being written by another program"
+        raise _refuse(file, "", what, "Wait until the export has ended, or copy it first", run) from error
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError) as error:
+        what = f"the file cannot be read as HDF5 ({_first_line(error)})"
+        raise _refuse(file, "", what, "Copy it again from the rig, or check it with h5dump", run) from error
+
+
+def _chunk_bytes(group: Any, name: str) -> int:
+    """Bytes of a stored chunk; zero of what is no chunked dataset, or leads out of the file."""
+    import h5py
+
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        return 0
+    member = group[name]
+    chunk = member.chunks if isinstance(member, h5py.Dataset) else None
+    return 0 if chunk is None else int(np.prod(chunk)) * member.dtype.itemsize
+
+
+def _first_line(error: BaseException) -> str:
+    text = str(error).splitlines()[0] if str(error) else type(error).__name__
+    return text[:160]
+
+
+def read_texts(path: Path, file: str) -> tuple[str, str]:
+    """Read the manifest and the bearing text from the root attributes.
+
+    Parameters
+    ----------
+    path : Path
+        HDF5 file.
+    file : str
+        Its display name.
+
+    Returns
+    -------
+    manifest, bearing : str
+        `bearing` is "" where the attribute is absent.
+
+    Raises
+    ------
+    RigDataError
+        No HDF5 file, no manifest, or no text.
+    """
+    try:
+        heap = broken_heap(path)
+    except OSError as error:
+        raise _refuse(file, "", f"cannot be read ({error.strerror or error})", "Check the path") from error
+    if heap is not None:
+        what = "the file is damaged: its store of texts cannot be walked"
+        raise _refuse(file, f"byte {heap}", what, "Copy the file again from the rig")
+    with open_readonly(path, file) as handle:
+        if "manifest" not in handle.attrs:
+            raise _refuse(file, "root attribute manifest", "is missing", "Store campaign.toml's text there")
+        damaged = too_long_text(path, ("manifest", "bearing"), handle.userblock_size)
+        if damaged is not None:
+            what = "claims a text longer than the file"
+            raise _refuse(file, f"root attribute {damaged}", what, "Copy the file again from the rig")
+        manifest = _text_attribute(handle, "manifest", file)
+        bearing = _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
+    return manifest, bearing
+
+
+def _text_attribute(handle: Any, name: str, file: str) -> str:
+    place = f"root attribute {name}"
+    stored = handle.attrs.get_id(name)
+    if stored.get_storage_size() > _MAX_TEXT or stored.get_type().get_class() != _STRING:
+        raise _refuse(file, place, "is not a text, or far too long", "Store it as one UTF-8 string")
+    value = handle.attrs[name]
+    value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
+    if isinstance(value, bytes):
+        try:
+            value = value.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise _refuse(file, place, "is not UTF-8 text", "Store it as one UTF-8 string") from error
+    if not isinstance(value, str) or len(value) > _MAX_TEXT:
+        raise _refuse(file, place, "is not a text, or far too long", "Store it as one UTF-8 string")
+    return value
+
+
+@dataclass(frozen=True)
+class _Facts:
+    """What every request needs, kept until the file changes."""
+
+    signature: tuple[int, int]
+    length: int
+    rate: float | None
+    has_time: bool
+    members: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Hdf5Reader:
+    """One run's group in an HDF5 file; the file is opened for every request and closed again.
+
+    Attributes
+    ----------
+    path : Path
+    run : str
+        Group name below ``/runs``.
+    base : str
+        Display name of the file.
+    stated_rate : float or None
+        From the manifest [Hz]; the attribute ``sample_rate_hz`` wins over it.
+    described : frozenset of str
+        Names of all channels of the manifest.
+    clock : Channel or None
+        The manifest's time channel; not every file has its dataset.
+    """
+
+    path: Path
+    run: str
+    base: str
+    stated_rate: float | None = None
+    described: frozenset[str] = field(default=frozenset(), repr=False)
+    clock: Channel | None = field(default=None, repr=False)
+    facts: dict[str, _Facts] = field(default_factory=dict, repr=False, compare=False)
+    held: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def file(self) -> str:
+        """Display name of file and group."""
+        return f"{self.base}:/runs/{self.run}"
+
+    def _error(self, place: str, what: str, cure: str) -> RigDataError:
+        return _refuse(self.file, place, what, cure, self.run)
+
+    @contextmanager
+    def _group(self, cache: int | None = None) -> Iterator[Any]:
+        import h5py
+
+        if _GROUP in self.held:
+            with _faults_told(self.base, self.run):
+                yield self.held[_GROUP]
+            return
+        with open_readonly(self.path, self.base, self.run, cache) as handle:
+            group = resolve(handle, f"runs/{self.run}", self.base, self.run)
+            if group is None:
+                raise self._error("", "the group is missing", "Delete the run from the manifest, or add the group")
+            if not isinstance(group, h5py.Group):
+                raise self._error("", "is not a group", "Store one dataset per channel in a group")
+            yield group
+
+    @contextmanager
+    def kept_open(self) -> Iterator[None]:
+        """Keep the file open while the block runs, so that many small requests cost little.
+
+        The library's cache then holds a whole stored chunk of every dataset: slices that are no multiples of the
+        chunks would else be unpacked again and again.
+        """
+        if _GROUP in self.held:  # by whoever called
+            yield
+            return
+        opened = ExitStack()
+        self.held[_GROUP] = opened.enter_context(self._group(self._cache_bytes()))
+        try:
+            yield
+        finally:  # closed without the block's own errors, which are no faults of the file
+            self.held.clear()
+            opened.close()
+
+    def _cache_bytes(self) -> int:
+        """Two stored chunks of the largest of a few datasets; they are stored alike as a rule."""
+        if self._known().length * 8 <= _LEAST_CACHE:
+            return _LEAST_CACHE
+        with self._group() as group:
+            largest = max(_chunk_bytes(group, name) for name in self._known().members[:4])
+        return min(max(2 * largest, _LEAST_CACHE), _MOST_CACHE)
+
+    def counted(self) -> bool:
+        """Whether times are counted from the rate, not read from the file."""
+        return self.clock is None or not self._known().has_time
+
+    def _dataset(self, group: Any, name: str) -> Any:
+        if name in self.held:
+            return self.held[name]
+        dataset = self._checked_dataset(group, name)
+        if _GROUP in self.held:
+            self.held[name] = dataset
+        return dataset
+
+    def _checked_dataset(self, group: Any, name: str) -> Any:
+        import h5py
+
+        place = f"dataset {name}"
+        dataset = resolve(group, name, self.file, self.run)
+        if dataset is None:
+            raise self._error(place, "channel is missing in the file", f"It holds: {_names(group)}")
+        if not isinstance(dataset, h5py.Dataset):
+            raise self._error(place, "is not a dataset", "Store one 1-D dataset per channel")
+        if dataset.dtype.kind not in "fiu" or dataset.ndim != 1:
+            what = f"has type {dataset.dtype} and shape {dataset.shape}, not 1-D numbers"
+            raise self._error(place, what, "Store one 1-D dataset of numbers per channel")
+        if dataset.shape[0] > MAX_SAMPLES:
+            raise self._error(place, f"claims {dataset.shape[0]} samples", "Split the run")
+        self._storage(dataset, place)
+        return dataset
+
+    def _storage(self, dataset: Any, place: str) -> None:
+        """Refuse data that lies outside the file, or needs foreign code or vast memory to unpack."""
+        if dataset.is_virtual or dataset.external:
+            raise self._error(place, "holds its data in another file", "Copy the data into this file")
+        creation = dataset.id.get_create_plist()
+        for index in range(creation.get_nfilters()):
+            code = creation.get_filter(index)[0]
+            if code not in _FILTERS:
+                raise self._error(place, f"needs HDF5 filter {code}, which is not a built-in one", "Use gzip")
+        chunk = dataset.chunks
+        if chunk is not None and chunk[0] * dataset.dtype.itemsize > _MAX_CHUNK:
+            raise self._error(place, f"has chunks of {chunk[0]} samples", "Use chunks below 100 MB")
+
+    def names(self) -> tuple[str, ...]:
+        """Names of all members of the group."""
+        with self._group() as group:
+            return tuple(group.keys())
+
+    def _known(self, opened: Any = None) -> _Facts:
+        """Give the facts, from the group that the caller has `opened` if any must be read."""
+        try:
+            state = self.path.stat()
+        except OSError as error:
+            raise self._error("", "the file is not there", "Check the path") from error
+        signature = (state.st_size, state.st_mtime_ns)
+        facts = self.facts.get("")
+        if facts is None or facts.signature != signature:
+            with nullcontext(opened) if opened is not None else self._group() as group:
+                rate = self._checked_rate(group.attrs)
+                clock = self.clock is not None and has_link(group, self.clock.name)
+                members = tuple(itertools.islice(group, _MAX_MEMBERS))
+                facts = _Facts(signature, self._length(group), rate, clock, members)
+            self.facts[""] = facts
+        return facts
+
+    def _length(self, group: Any) -> int:
+        """Length that most channels have; one that differs is refused when it is asked for."""
+        lengths: dict[int, int] = {}
+        problems: list[Problem] = []
+        for name in itertools.islice(group, _MAX_MEMBERS):
+            try:
+                length = int(self._dataset(group, name).shape[0])
+            except RigDataError as error:  # told again when that channel is asked for
+                problems.extend(error.problems)
+            else:
+                lengths[length] = lengths.get(length, 0) + 1
+        if not lengths and problems:
+            raise RigDataError(problems[:_LISTED])
+        if not lengths:
+            raise self._error("", "the group holds no dataset of numbers", "Store one dataset per channel")
+        return max(lengths, key=lambda n: (lengths[n], n))
+
+    def _checked_rate(self, attributes: Any) -> float | None:
+        if _RATE not in attributes:
+            return None
+        place, cure = f"attribute {_RATE}", "Store one positive number, in Hz"
+        if not is_plain(attributes.get_id(_RATE), _MOST_NUMBER):
+            raise self._error(place, "is not a number", cure)
+        try:
+            rate = float(np.asarray(attributes[_RATE]).reshape(()))
+        except (ValueError, TypeError) as error:
+            raise self._error(place, "is not a number", cure) from error
+        if not 0.0 < rate < 1e12:
+            raise self._error(place, f"is {rate}", cure)
+        return rate
+
+    def length(self) -> int:
+        """Count the samples per channel, as most of them have."""
+        return self._known().length
+
+    def rate(self) -> float:
+        """Give the sample rate [Hz]: the attribute, else of the time dataset, else the manifest's."""
+        facts = self._known()
+        if facts.rate is not None:
+            return facts.rate
+        if facts.has_time:
+            rate = rate_of_time(self.time(0, min(facts.length, 100_000)))
+            if rate > 0:
+                return rate
+        if self.stated_rate is None:
+            cure = "Add the group attribute sample_rate_hz, or [acquisition] sample_rate"
+            raise self._error("attribute sample_rate_hz", "there is no sample rate", cure)
+        return self.stated_rate
+
+    def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings; only the chunks of the slice are read."""
+        if stop - start > MAX_REQUEST:
+            raise self._error("", f"{stop - start} samples asked for at once", "Read the run in slices")
+        with self._group() as group:
+            length = self._known(group).length
+            columns = []
+            for name in names:
+                dataset = self._dataset(group, name)
+                if dataset.shape[0] != length:
+                    what = f"has {dataset.shape[0]} samples, the others {length}"
+                    raise self._error(f"dataset {name}", what, "Store all channels of a run with one length")
+                columns.append(self._samples(dataset, name, start, stop))
+            return columns
+
+    def _samples(self, dataset: Any, name: str, start: int, stop: int) -> FloatArray:
+        try:
+            with np.errstate(invalid="ignore"):  # a signalling NaN is a missing value as well
+                return np.asarray(dataset[start:stop], dtype=np.float64)
+        except (OSError, RuntimeError) as error:  # what a filter says of damaged bytes
+            what = f"the stored samples are damaged ({_first_line(error)})"
+            raise self._error(f"dataset {name}", what, "Copy the file again from the rig") from error
+
+    def stored_hash(self) -> str:
+        """SHA-256 of the run as it is stored: its datasets' packed bytes and its attributes."""
+        with self._group() as group:
+            usable = []
+            for name in self._known().members:
+                try:
+                    self._dataset(group, name)
+                except RigDataError:  # told when that channel is asked for; no result can come from it
+                    continue
+                usable.append(name)
+            return group_hash(self.path, group, tuple(usable))
+
+    def time(self, start: int, stop: int) -> FloatArray:
+        """Seconds: the time dataset where there is one, else counted from the rate."""
+        if self.clock is not None and self._known().has_time:
+            return self.clock.to_si(self.read([self.clock.name], start, stop)[0])
+        return np.arange(start, stop) / self.rate()
+
+    def problems(self) -> tuple[Problem, ...]:
+        """Tell which datasets nobody describes."""
+        extra = [n for n in self._known().members if n not in self.described]
+        return undescribed(extra, "datasets", self.file, self.run)
+
+
+def _names(group: Any) -> str:
+    names = [str(n)[:40] for _, n in zip(range(20), group)]
+    return ", ".join(names) or "nothing"

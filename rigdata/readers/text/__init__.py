@@ -1,0 +1,1 @@
+"""Text exports: CSV in any dialect, catman ASCII."""

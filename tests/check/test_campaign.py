@@ -1,0 +1,235 @@
+"""The parts of `check_campaign`, each on data whose fault is known."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigdata.calibration import Channel
+from rigdata.channel_statistics import ChannelStatistics
+from rigdata.operating_point import OperatingPoint
+from rigdata.problem import Problem
+from rigdata.run import Run
+from tpjb_ident.check.campaign import check_campaign
+from tpjb_ident.check.findings import Finding, Reporter, merge
+from tpjb_ident.check.lines import fit_lines, strongest_line
+from tpjb_ident.check.response import definiteness, mirrored
+from tpjb_ident.check.wiring import guess_wiring, name_fault, repairs
+
+SAMPLES = Path(__file__).parents[2].parent / "shared" / "samples"
+PROBES = (
+    Channel("A", "displacement", axis=math.radians(45)),
+    Channel("B", "displacement", axis=math.radians(135)),
+)
+
+
+def seen(*blocks) -> ChannelStatistics:
+    statistics = ChannelStatistics()
+    for block in blocks:
+        statistics.add(np.asarray(block, dtype=float))
+    return statistics
+
+
+@given(
+    st.lists(st.sampled_from([0.0, 1.0, 2.0, math.nan, 1e300]), min_size=1, max_size=60),
+    st.lists(st.integers(0, 60), max_size=4),
+)
+@settings(max_examples=60, deadline=None)
+def test_statistics_do_not_depend_on_the_blocks(values, cuts):
+    whole = seen(values)
+    pieces = seen(*[values[a:b] for a, b in zip([0, *sorted(cuts)], [*sorted(cuts), len(values)])])
+    for name in ("samples", "missing", "low", "high", "repeats"):
+        assert getattr(whole, name) == getattr(pieces, name), name
+    if whole.longest_flat > 1:
+        assert (whole.longest_flat, whole.flat_start) == (pieces.longest_flat, pieces.flat_start)
+
+
+def test_longest_flat_stretch_is_counted():
+    statistics = seen([1.0, 2.0, 2.0], [2.0, 2.0, 3.0, 3.0])
+    assert (statistics.longest_flat, statistics.flat_start, statistics.repeats) == (4, 1, 4)
+
+
+def sine(n=2000, noise=0.0, step=3e-4):
+    rng = np.random.default_rng(4)
+    wave = 0.1 * np.sin(2 * np.pi * 25 * np.arange(n) / 1000.3) + noise * rng.normal(size=n)
+    return np.round(wave / step) * step
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-2])
+def test_sines_do_not_look_clipped_and_clipped_ones_do(noise):
+    wave = sine(noise=noise)
+    assert seen(wave).clipped_share() == 0.0
+    assert seen(np.clip(wave, -0.08, np.inf)).clipped_share() > 0.15
+    assert seen(np.clip(wave, -np.inf, 0.095)).clipped_share() > 0.05
+
+
+def test_coarse_converters_repeat_readings_without_being_stuck():
+    rng = np.random.default_rng(1)
+    coarse = np.round(8.0 + 0.4 * rng.normal(size=5000))
+    statistics = seen(coarse)
+    assert statistics.longest_flat < 10 * statistics.expected_flat()
+    coarse[1000:2500] = coarse[1000]
+    statistics = seen(coarse)
+    assert statistics.longest_flat >= 1500 > 10 * statistics.expected_flat()
+
+
+def test_lines_are_fitted_through_glitches_and_gaps():
+    rng = np.random.default_rng(2)
+    time = np.arange(2000) / 1000
+    wave = 3.0 + 0.5 * np.cos(2 * np.pi * 25 * time + 0.3) + 0.2 * np.sin(2 * np.pi * 22 * time)
+    values = np.stack([wave, wave], axis=1) + 0.01 * rng.normal(size=(2000, 2))
+    values[300:340, 0] += 5.0
+    values[900:1000, 0] = np.nan
+    values[:, 1] = np.nan
+    lines = fit_lines(time, values, [25.0, 22.0, 44.0])
+    assert lines.mean[0] == pytest.approx(3.0, abs=2e-3)
+    assert lines.phasor[0] == pytest.approx(0.5 * np.exp(0.3j), abs=2e-3)
+    assert lines.glitches[0] == pytest.approx(40, abs=1)
+    assert lines.floor[0] < 2e-3
+    assert np.isnan(lines.mean[1])
+    assert np.isnan(lines.phasor[1])
+
+
+def test_strongest_line():
+    time = np.arange(2000) / 1000
+    values = np.sin(2 * np.pi * 25 * time) + 5 * np.sin(2 * np.pi * 22 * time)
+    assert strongest_line(time, values, [22.0]) == pytest.approx(25.0, abs=0.6)
+    assert math.isnan(strongest_line(time[:5], values[:5], []))
+    assert math.isnan(strongest_line(time, np.full(2000, np.nan), []))
+
+
+@pytest.mark.parametrize("index", range(4))
+def test_wiring_faults_are_named(index):
+    words, fault = list(repairs(PROBES))[index]
+    stiffness = np.array([[3.0, 0.2], [-0.3, 4.5]])
+    # H' = H inv(M): what the readings after the fault make of the stiffness; every fault is its own repair.
+    measured = stiffness @ np.linalg.inv(mirrored(PROBES, fault))
+    assert definiteness(measured) < 0.05
+    hint = name_fault(PROBES, lambda repair: definiteness(measured @ np.linalg.inv(mirrored(PROBES, repair))))
+    assert hint == f"; as if {words}"
+
+
+def test_wiring_guess_from_one_direction():
+    load = np.array([0.0, -1.0])
+    readings = np.array([np.cos(c.axis) * load[0] + np.sin(c.axis) * load[1] for c in PROBES])
+    wrong = readings * [-1.0, 1.0]
+    assert "A had the wrong sign" in guess_wiring(PROBES, wrong, load)
+    assert guess_wiring(PROBES[:1], wrong[:1], load) == ""
+
+
+def make_run(name: str, kind: str = "dynamic") -> Run:
+    class Reader:
+        file = f"runs/{name}.csv"
+
+    return Run(name, kind, OperatingPoint(5000.0), None, None, "up", {}, frozenset(), Reader())
+
+
+def test_what_many_runs_share_is_told_once():
+    runs = [make_run(f"d-{i}") for i in range(9)] + [make_run("c-1", "clearance")]
+    findings = []
+    for run in runs[:4]:
+        report = Reporter(run)
+        report.say("dead X", "error", "channel X", "is dead", "Check it")
+        findings += report.found
+    findings.append(Finding(Problem("note", "f", "p", "other", "cure", "d-1"), "other"))
+    merged = merge(findings, "c.h5", runs)
+    assert [(p.run, p.file) for p in merged] == [(None, "c.h5"), ("d-1", "f")]
+    assert "in 4 runs (d-0, d-1, d-2, d-3)" in merged[0].what
+    assert len(merge(findings[:2], "c.h5", runs)) == 2
+
+
+def tiny(tmp_path, *faults, **truth):
+    """A campaign of nine short runs from the virtual rig, with faults."""
+    from rigdata.virtual_rig import (
+        ClearanceSweep,
+        DryTest,
+        Fault,
+        RigPlan,
+        RigTruth,
+        Timing,
+        VirtualRig,
+        operating_points,
+        write_campaign,
+    )
+
+    plan = RigPlan(
+        dynamic=operating_points([(5000.0, 25.0)]),
+        directions=tuple(math.radians(36.0 * i) for i in range(5)),
+        dry=tuple(DryTest(p, levels=(1000.0, 3000.0), hold=0.3) for p in (1, 2, 3)),
+        clearance=(ClearanceSweep(seconds=6.0),),
+        timing=Timing(dynamic_seconds=1.0),
+    )
+    k, c = np.array([[3.0e8, 2e7], [-3e7, 4.5e8]]), np.array([[5e5, 2e4], [1e4, 7e5]])
+    rig = VirtualRig(RigTruth.constant(k, c), plan, faults=tuple(Fault(**f) for f in faults), seed=7, **truth)
+    write_campaign(tmp_path / "c.h5", rig)
+    return check_campaign(tmp_path / "c.h5")
+
+
+def test_a_good_campaign_has_no_problem_and_progress_is_told(tmp_path):
+    assert tiny(tmp_path) == []
+    told = []
+    check_campaign(tmp_path / "c.h5", progress=lambda done, total: told.append((done, total)))
+    assert told == [(i + 1, 9) for i in range(9)]
+
+
+def test_noise_free_data_are_not_dead(tmp_path):
+    from rigdata.virtual_rig import Noise
+
+    assert {p.severity for p in tiny(tmp_path, noise=Noise.none())} == {"note"}
+
+
+def test_every_problem_is_reported_not_just_the_first(tmp_path):
+    found = tiny(
+        tmp_path,
+        {"kind": "dead", "run": "d-05000-25-02", "channel": "X1A"},
+        {"kind": "wrong_load", "run": "d-05000-25-03", "value": 1.6},
+        {"kind": "missing_channel", "run": "p-2-up", "channel": "L1H"},
+        {"kind": "missing_file", "run": "c-1"},
+    )
+    assert {p.run for p in found if p.severity == "error"} == {"d-05000-25-02", "d-05000-25-03", "p-2-up", "c-1"}
+    assert [p.severity for p in found] == sorted((p.severity for p in found), key=["error", "warning", "note"].index)
+    assert all(p.what and p.cure and p.file for p in found)
+
+
+def test_shared_records_and_leftovers(tmp_path):
+    import h5py
+
+    tiny(tmp_path)
+    with h5py.File(tmp_path / "c.h5", "r+") as file:
+        file["runs"].copy("d-05000-25-02", "forgotten")
+        file["runs/c-1/extra"] = np.zeros(5)
+    found = {p.what.split(" ")[-1]: p for p in check_campaign(tmp_path / "c.h5")}
+    assert [p.severity for p in found.values()].count("error") == 0
+    assert "1 groups are named by no run (forgotten)" in [p.what for p in found.values()]
+    assert "1 datasets are not described: extra" in [p.what for p in found.values()]
+
+
+def test_a_problem_prints_itself_with_place_and_cure():
+    problem = Problem("error", "runs/a.csv", "line 3, column 2 (X1A)", "'x' is not a number", "Mend it")
+    assert str(problem) == "runs/a.csv, line 3, column 2 (X1A): 'x' is not a number. Mend it"
+    assert str(dataclasses.replace(problem, place="")).startswith("runs/a.csv: ")
+
+
+@pytest.mark.slow
+@pytest.mark.samples
+@pytest.mark.parametrize(
+    "name",
+    [
+        "rocker-baseline",
+        "rocker-measured-pivots.h5",
+        "spherical-baseline.h5",
+        "effect-a.h5",
+        "effect-b.h5",
+        "effect-c.h5",
+    ],
+)
+def test_sample_campaigns_raise_no_alarm(name):
+    if not (SAMPLES / name).exists():
+        pytest.skip("no ../shared/samples beside this checkout")
+    assert [p for p in check_campaign(SAMPLES / name) if p.severity != "note"] == []

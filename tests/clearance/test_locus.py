@@ -1,0 +1,146 @@
+"""Locus runs of the virtual rig: mean positions from the bearing centre, repeats, set points, the polygon as a wall."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigdata.campaign import load_campaign
+from rigdata.operating_point import OperatingPoint
+from rigdata.problem import RigDataError
+from rigdata.virtual_rig import (
+    ClearanceSweep,
+    Fault,
+    Instruments,
+    Noise,
+    RigPlan,
+    RigTruth,
+    VirtualRig,
+    locus_points,
+    write_campaign,
+)
+from tpjb_ident.clearance.locus import measure_locus
+from tpjb_ident.clearance.measure import measure_clearance
+
+ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
+K = np.diag([1.2e8, 1.0e8])
+SWEEP = (ClearanceSweep(),)
+
+
+def made(path, locus, faults=(), noise=None, k=K, clearance=SWEEP):
+    truth = RigTruth.constant(k, np.diag([4e5, 6e5]), pivot_stiffness=6e8)
+    rig = VirtualRig(
+        truth,
+        RigPlan(locus=locus, clearance=clearance),
+        instruments=Instruments.like_paper(seed=2),
+        noise=noise or Noise.like_samples(),
+        faults=faults,
+        seed=9,
+    )
+    write_campaign(path, rig)
+    return load_campaign(path)
+
+
+def true_position(direction, load=5000.0, k=K):
+    return np.linalg.solve(k, load * np.array([np.cos(direction), np.sin(direction)]))
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("locus") / "c.h5", locus_points(6))
+
+
+@pytest.fixture(scope="module")
+def raw(campaign):
+    """Positions without a polygon."""
+    return measure_locus(campaign)
+
+
+@pytest.fixture(scope="module")
+def polygon(campaign):
+    return measure_clearance(campaign, ANGLES)
+
+
+def test_positions_from_the_bearing_centre(campaign, polygon):
+    found = measure_locus(campaign, polygon)
+    assert len(found.points) == 6
+    for point in found.points:
+        # where the load really stood: the set point is missed by 0.3 % and 0.2 deg
+        error = point.position - true_position(point.load_direction, point.load)
+        assert np.all(np.abs(error) < 4.5 * np.sqrt(np.diag(point.covariance)))
+        assert np.abs(error).max() < 1e-6
+    assert any(s.startswith("drift-unknown") for s in found.status)
+    frame = found.to_frame()
+    needed = ["static_load_direction_deg", "x_m", "y_m", "x_m_se", "y_m_se"]
+    assert set(needed) <= set(frame.columns)
+    assert frame.static_load_direction_deg.iloc[0] == pytest.approx(-90.0)
+    assert "6 positions" in str(found)
+
+
+def test_without_a_polygon_positions_are_raw_and_say_so(campaign, polygon, raw):
+    assert raw.centre.tolist() == [0.0, 0.0]
+    assert any(s.startswith("no-centre") for s in raw.status)
+    both = measure_locus(campaign, polygon)
+    shift = raw.points[2].position - both.points[2].position
+    assert shift == pytest.approx(both.centre)
+
+
+def test_a_repeated_direction_shows_the_drift(campaign):
+    # the last run done again as the first one, with the shaft found 4 um further on: a campaign of seven runs
+    runs = campaign.of_kind("locus")
+
+    class Repeated:
+        def of_kind(self, kind):
+            return (*runs, moved(runs[0])) if kind == "locus" else ()
+
+    found = measure_locus(Repeated())
+    assert found.drift * 6 == pytest.approx([4e-6, -2e-6], abs=0.3e-6)
+    positions = {p.run: p.position for p in found.points}
+    assert positions["again"] == pytest.approx(positions[runs[0].id], abs=0.3e-6)
+    # what the correction itself is unsure of grows from run to run
+    se = {p.run: np.sqrt(p.covariance[0, 0]) for p in found.points}
+    assert se["again"] > 1.2 * se[runs[0].id]
+
+
+def moved(run):
+    class Moved:
+        id, file, kind, point, channels = "again", run.file, "locus", run.point, run.channels
+        sample_rate = run.sample_rate
+
+        def record(self, name):
+            return run.record(name)
+
+        def vector(self, quantity):
+            record = run.vector(quantity)
+            if quantity == "displacement":
+                record.values[:] += [4e-6, -2e-6]
+            return record
+
+    return Moved()
+
+
+def test_loads_off_their_set_point_are_named(tmp_path):
+    heavier = Fault("wrong_load", run="l-*-02", value=1.2)
+    source = made(tmp_path / "c.h5", locus_points(4), faults=(heavier,), clearance=())
+    found = measure_locus(source)
+    status = next(s for s in found.status if s.startswith("load-off-set-point"))
+    assert "-02" in status
+    assert "-01" not in status
+
+
+def test_a_position_behind_the_wall_is_named(tmp_path):
+    source = made(tmp_path / "c.h5", locus_points(4), k=0.2 * K)
+    found = measure_locus(source, measure_clearance(source, ANGLES))
+    assert any(s.startswith("outside-polygon") for s in found.status)
+
+
+def test_no_locus_is_an_error(tmp_path):
+    source = made(tmp_path / "c.h5", ())
+    with pytest.raises(RigDataError, match="no runs of kind locus"):
+        measure_locus(source)
+
+
+def test_operating_points_survive(raw):
+    point = raw.points[0].point
+    assert isinstance(point, OperatingPoint)
+    assert point.static_load == 5000.0

@@ -1,0 +1,53 @@
+"""Centre and corners of a clearance polygon: what the convention does with pads that stand off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tpjb_ident.clearance.polygon import corners, find_centre, normals
+
+ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
+SMALL = np.eye(5) * (1e-8) ** 2
+MICRO = st.floats(-50e-6, 50e-6)
+
+
+@settings(max_examples=30)
+@given(x=MICRO, y=MICRO, offset=st.floats(2e-6, 30e-6), pad=st.integers(0, 4), sign=st.sampled_from([-1, 1]))
+def test_one_pad_off_is_found_exactly(x, y, offset, pad, sign):
+    clearance = np.full(5, 80e-6)
+    clearance[pad] += sign * offset
+    found = find_centre(ANGLES, clearance + normals(ANGLES) @ [x, y], SMALL)
+    # square within the measurement error: a few hundredths of a micrometre remain
+    assert found.position == pytest.approx([x, y], abs=8e-8)
+    assert found.clearance == pytest.approx(80e-6, abs=8e-8)
+
+
+def test_least_squares_spreads_one_pad_over_all():
+    clearance = np.full(5, 80e-6)
+    clearance[0] += 10e-6
+    found = find_centre(ANGLES, clearance, SMALL, rule="least-squares")
+    seen = clearance - normals(ANGLES) @ found.position - 80e-6
+    assert seen == pytest.approx(np.array([6.0, -1.236, 3.236, 3.236, -1.236]) * 1e-6, abs=2e-9)
+
+
+def test_differences_within_the_error_are_averaged():
+    clearance = 80e-6 + np.array([1.0, -0.5, 0.2, -0.9, 0.4]) * 1e-8
+    one = find_centre(ANGLES, clearance, SMALL)
+    other = find_centre(ANGLES, clearance, SMALL, rule="least-squares")
+    assert one.position == pytest.approx(other.position, abs=1e-12)
+
+
+@pytest.mark.parametrize("angles", [ANGLES[:2], np.zeros(5)])
+def test_pads_that_do_not_surround_the_shaft_are_refused(angles):
+    with pytest.raises(ValueError, match="around the shaft"):
+        find_centre(angles, np.full(len(angles), 80e-6), np.eye(len(angles)) * 1e-16)
+
+
+def test_corners_of_a_regular_pentagon():
+    found = corners(ANGLES, np.full(5, 80e-6))
+    assert np.hypot(*found.T) == pytest.approx(80e-6 / np.cos(np.pi / 5), rel=1e-12)
+    between = np.degrees(np.arctan2(found[:, 1], found[:, 0])) % 360
+    assert between == pytest.approx([306.0, 18.0, 90.0, 162.0, 234.0])

@@ -1,0 +1,265 @@
+"""The commands as a user calls them: results, messages, exit codes."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.command_line import tpjb
+
+COMMANDS = ("check", "identify", "pivot", "locus", "predict", "compare", "diagnose", "plan", "verify",
+            "simulate", "demo", "export")  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def identified(small_campaign, tmp_path_factory):
+    out = tmp_path_factory.mktemp("identify") / "out"
+    result = tpjb("identify", small_campaign, "--out", out)
+    return result, out
+
+
+def test_help_lists_every_command():
+    result = tpjb("--help")
+    assert result.exit_code == 0
+    listed = [line.split()[0] for line in result.stdout.partition("Commands:")[2].splitlines() if line.strip()]
+    assert set(COMMANDS) <= set(listed)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(command):
+    result = tpjb(command, "--help")
+    assert result.exit_code == 0
+    assert "--out" in result.stdout
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys; sys.argv = ['tpjb', '--help']\n"
+        "from tpjb_ident.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "print([m for m in ('numpy', 'pandas', 'matplotlib', 'pint', 'numba', 'h5py') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.slow
+def test_help_is_quick():
+    """Design figure 0.3 s; asserted against Python's own start-up, so that a busy machine does not decide."""
+
+    def best(*command):
+        times = []
+        for _ in range(5):
+            began = time.perf_counter()
+            subprocess.run([sys.executable, *command], capture_output=True, check=True)
+            times.append(time.perf_counter() - began)
+        return min(times)
+
+    assert best("-m", "tpjb_ident", "--help") < 20 * best("-c", "pass")
+
+
+def test_version():
+    assert tpjb("--version").stdout.startswith("tpjb-ident 0.")
+
+
+def test_check_writes_its_findings(small_campaign, tmp_path):
+    result = tpjb("check", small_campaign, "--out", tmp_path / "out")
+    found = json.loads((tmp_path / "out" / "check.json").read_text(encoding="utf-8"))
+    assert result.exit_code == 0, result.output
+    assert found["ok"] is True
+    assert found["runs"] == {"dynamic": 6, "dry_pivot": 0, "locus": 3, "clearance": 1}
+    assert found["counts"]["error"] == 0
+
+
+def test_check_lists_every_error_and_exits_2(small_campaign, tmp_path):
+    import h5py
+
+    broken = tmp_path / "broken.h5"
+    shutil.copy(small_campaign, broken)
+    with h5py.File(broken, "r+") as file:
+        del file["runs/d-02500-25-01/X1A"]
+        del file["runs/d-05000-25-02/L1H"]
+    result = tpjb("check", broken, "--out", tmp_path / "out")
+    problems = json.loads((tmp_path / "out" / "check.json").read_text(encoding="utf-8"))["problems"]
+    errors = {(p["run"], p["severity"]) for p in problems}
+    assert result.exit_code == 2
+    assert {("d-02500-25-01", "error"), ("d-05000-25-02", "error")} <= errors
+    assert "X1A" in result.stdout
+    assert "L1H" in result.stdout
+
+
+def test_identify_finds_what_was_put_in(identified):
+    result, out = identified
+    assert result.exit_code == 0, result.output
+    frame = pd.read_csv(out / "coefficients.csv")
+    assert frame["static_load_N"].tolist() == [2500.0, 5000.0]
+    assert np.allclose(frame["kxx_N_per_m"], 1.0e8, rtol=0.01)
+    assert np.allclose(frame["cyy_Ns_per_m"], 7e5, rtol=0.01)
+    assert (frame["kyy_N_per_m_lo"] < 2.0e8).all()
+    assert (frame["kyy_N_per_m_hi"] > 2.0e8).all()
+    parquet = pd.read_parquet(out / "coefficients.parquet")
+    assert parquet["kxx_N_per_m"].tolist() == frame["kxx_N_per_m"].tolist()
+    assert "rlm:huber" in set(pd.read_csv(out / "estimators.csv")["method"])
+
+
+def test_identify_leaves_a_record_of_what_it_did(identified, small_campaign):
+    _, out = identified
+    entry = json.loads((out / "run.json").read_text(encoding="utf-8"))["commands"]["identify"]
+    assert entry["settings"]["method"] == "mm-eiv"
+    digest = subprocess.run(["sha256sum", small_campaign], capture_output=True, text=True, check=False).stdout.split()
+    assert not digest or digest[0] in entry["inputs_sha256"].values()
+    assert set(entry["outputs"]) == {f"{t}.{e}" for t in ("coefficients", "estimators", "windows", "frequency_fits")
+                                     for e in ("csv", "parquet")}  # fmt: skip
+
+
+def test_one_direction_is_no_answer_and_exits_3(small_campaign, tmp_path):
+    import h5py
+
+    narrow = tmp_path / "narrow.h5"
+    shutil.copy(small_campaign, narrow)
+    with h5py.File(narrow, "r+") as file:
+        head, *runs = file.attrs["manifest"].split("[[runs]]")
+        kept = [r for r in runs if 'kind = "dynamic"' in r and 'excitation_direction = "0 deg"' in r]
+        assert len(kept) == 2
+        file.attrs["manifest"] = "[[runs]]".join([head, *kept])
+    result = tpjb("identify", narrow, "--out", tmp_path / "out")
+    assert result.exit_code == 3
+    assert "not to be trusted" in result.stderr
+    assert (tmp_path / "out" / "coefficients.csv").exists()
+
+
+def test_locus_and_clearance(small_campaign, tmp_path):
+    result = tpjb("locus", small_campaign, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    clearance = pd.read_csv(tmp_path / "out" / "clearance.csv")
+    assert clearance["clearance_pushed_m"].notna().all()
+    assert (clearance["clearance_m"] - 80e-6).abs().max() < 2e-6
+    assert len(pd.read_csv(tmp_path / "out" / "locus.csv")) == 3
+
+
+def test_predict_every_combination(rocker_file, tmp_path):
+    result = tpjb("predict", rocker_file, "--load", "2.5, 5 kN", "--excitation", "20, 25 Hz", "--pivots", "6e8 N/m",
+                  "--thermal", "isothermal", "--out", tmp_path / "out")  # fmt: skip
+    assert result.exit_code == 0, result.output
+    frame = pd.read_csv(tmp_path / "out" / "prediction.csv")
+    assert list(zip(frame["static_load_N"], frame["excitation_Hz"], strict=True)) == [
+        (2500.0, 20.0), (2500.0, 25.0), (5000.0, 20.0), (5000.0, 25.0)
+    ]  # fmt: skip
+    # what each pad deflects is its load over the spring that was asked for
+    assert np.allclose(frame["pad1_deflection_m"], frame["pad1_load_N"] / 6e8, rtol=1e-6)
+    assert frame["converged"].all()
+
+
+def test_predict_takes_an_effects_file(rocker_file, tmp_path):
+    effects = tmp_path / "e.toml"
+    effects.write_text('[[effects]]\nname = "probe_gain"\nfactor = 1.25\n')
+    plain = tpjb("predict", rocker_file, "--thermal", "isothermal", "--out", tmp_path / "a")
+    wrong = tpjb("predict", rocker_file, "--thermal", "isothermal", "--effects", effects, "--out", tmp_path / "b")
+    assert (plain.exit_code, wrong.exit_code) == (0, 0)
+    a, b = (pd.read_csv(tmp_path / name / "prediction.csv")["kyy_N_per_m"][0] for name in "ab")
+    assert b == pytest.approx(a / 1.25, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_compare_writes_a_report(small_campaign, tmp_path):
+    out = tmp_path / "out"
+    result = tpjb(
+        "compare", small_campaign, "--pivots", "rigid, kirk, measured", "--thermal", "isothermal", "--out", out
+    )
+    assert result.exit_code == 0, result.output
+    frame = pd.read_csv(out / "comparison.csv")
+    assert frame.groupby("pivots").size().to_dict() == {"kirk": 2, "rigid": 2}
+    ratio = frame["kxx_N_per_m_predicted"] / frame["kxx_N_per_m"]
+    assert np.allclose(frame["kxx_N_per_m_ratio"], ratio)
+    assert "Measured pivots are left out" in result.stdout
+    assert (out / "report.html").exists()
+    assert (out / "figures" / "kxx-over-load.svg").exists()
+    assert (out / "figures" / "kxx-over-load.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize("form", ["ross", "csv", "mat"])
+def test_export_from_results(identified, tmp_path, form):
+    _, out = identified
+    result = tpjb("export", out, "--to", form, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert len(list((tmp_path / "out").iterdir())) >= 2
+
+
+@pytest.mark.slow
+def test_simulate_is_repeatable_and_readable(rocker_file, tmp_path):
+    arguments = ("simulate", rocker_file, "--plan", "short", "--load", "3 kN", "--thermal", "isothermal", "--seed", "5")
+    for name in "ab":
+        result = tpjb(*arguments, "--out", tmp_path / name)
+        assert result.exit_code == 0, result.output
+    a, b = (tmp_path / name / "campaign.h5" for name in "ab")
+    assert a.read_bytes() == b.read_bytes()
+    assert json.loads((tmp_path / "a" / "truth.json").read_text())["seed"] == 5
+    assert tpjb("check", tmp_path / "a", "--out", tmp_path / "c").exit_code == 0
+
+
+BAD = [
+    (("check", "nowhere.h5"), "no such file or folder"),
+    (("identify", "nowhere.h5"), "no such file or folder"),
+    (("identify", "{campaign}", "--method", "mm-eif"), "Did you mean 'mm-eiv'"),
+    (("identify", "{campaign}", "--norm", "huber"), "belongs to --method rlm"),
+    (("identify", "{campaign}", "--method", "rlm", "--norm", "hubr"), "Did you mean 'huber'"),
+    (("pivot", "{campaign}"), "dry"),
+    (("predict", "nowhere.toml"), "no such file"),
+    (("predict", "{bearing}", "--pivots", "krik"), "Did you mean 'kirk'"),
+    (("predict", "{bearing}", "--pivots", "-5 N/m"), "--pivots"),
+    (("predict", "{bearing}", "--thermal", "adiabatc"), "Did you mean 'adiabatic'"),
+    (("predict", "{bearing}", "--load", "-5 kN"), "must be positive"),
+    (("predict", "{bearing}", "--speed", "0 Hz"), "must be positive"),
+    (("predict", "{bearing}", "--excitation", "1e9 Hz"), "excitation must be"),
+    (("predict", "{bearing}", "--speed", "1e300 Hz"), "excitation must be"),
+    (("predict", "{bearing}", "--load", "1..9:0.001 kN", "--speed", "1..90:0.1 Hz"), "operating points"),
+    (("predict", "{bearing}", "--effects", "nowhere.toml"), "no such file"),
+    (("compare", "{campaign}", "--pivots", "kirck"), "Did you mean 'kirk'"),
+    (("compare", "{campaign}", "--bearing", "nowhere.toml"), "no such file"),
+    (("simulate", "{bearing}", "--plan", "long"), "is not known"),
+    (("simulate", "{bearing}", "--fault", "dead chanel=X1A"), "Did you mean channel="),
+    (("simulate", "{bearing}", "--fault", "dead channel=X9"), "no channel matches"),
+    (("simulate", "{bearing}", "--fault", "glitch channel=X1A value=big"), "not a number"),
+    (("simulate", "{bearing}", "--format", "xlsx"), "xlsx"),
+    (("export", "{campaign}", "--to", "exel"), "is not known"),
+    (("export", "nowhere", "--to", "csv"), "no such file"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "says"), BAD, ids=[" ".join(a)[:60] for a, _ in BAD])
+def test_bad_input_is_one_message_and_exit_2(arguments, says, small_campaign, rocker_file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    before = small_campaign.read_bytes()
+    filled = [a.format(campaign=small_campaign, bearing=rocker_file) for a in arguments]
+    result = tpjb(*filled, "--out", tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    assert says in result.stderr
+    assert "Traceback" not in result.output
+    assert list(tmp_path.iterdir()) == []
+    assert small_campaign.read_bytes() == before
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes in the file system")
+@pytest.mark.parametrize("command", ["identify", "check", "predict", "simulate", "export"])
+def test_a_pipe_is_refused_not_waited_for(command, tmp_path):
+    pipe = tmp_path / "pipe.h5"
+    os.mkfifo(pipe)
+    extra = ("--to", "csv") if command == "export" else ()
+    result = tpjb(command, pipe, *extra, "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "a pipe" in result.stderr
+
+
+def test_unknown_commands_and_options_get_a_hint():
+    assert "predict" in tpjb("predct").stderr
+    result = tpjb("predict", "x.toml", "--lod", "1 kN")
+    assert result.exit_code == 2
+    assert "--load" in result.stderr

@@ -1,0 +1,235 @@
+"""What all commands share: --json, --quiet, examples, completion, hints; and the commands init and show."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import shlex
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.command_line import tpjb
+from tpjb_ident.cli.app import app
+from tpjb_ident.cli.common.examples import EXAMPLES
+from tpjb_ident.cli.common.sparkline import BARS, sparkline
+
+
+@pytest.fixture(scope="module")
+def told_as_json(small_campaign, tmp_path_factory):
+    return tpjb("locus", small_campaign, "--out", tmp_path_factory.mktemp("json") / "o", "--json")
+
+
+@functools.cache
+def help_of(command):
+    return tpjb(command, "--help").stdout
+
+
+def commands():
+    return {info.name for info in app.registered_commands}
+
+
+def test_json_is_one_document_with_the_results_in_it(told_as_json):
+    assert told_as_json.exit_code == 0
+    document = json.loads(told_as_json.stdout)
+    assert document["schema"] == "tpjb-command/1"
+    assert (document["command"], document["exit_code"]) == ("locus", 0)
+    assert "locus.csv" in document["outputs"]
+    rows = document["data"]["locus"]
+    assert len(rows) == 3
+    assert abs(rows[0]["x_m"]) < 1e-3
+    assert document["tables"]
+    assert document["said"]
+
+
+def test_json_of_a_failure_names_it_and_keeps_the_exit_code(tmp_path):
+    result = tpjb("identify", tmp_path / "nothing.h5", "--json")
+    assert result.exit_code == 2
+    document = json.loads(result.stdout)
+    assert document["exit_code"] == 2
+    assert document["remarks"][-1]["kind"] == "error"
+    assert "no such file" in document["remarks"][-1]["text"]
+    assert "no such file" in result.stderr
+
+
+def test_json_holds_no_nan(told_as_json):
+    def refuse(constant):
+        raise AssertionError(constant)
+
+    json.loads(told_as_json.stdout, parse_constant=refuse)
+
+
+def test_quiet_says_nothing_when_all_is_well_and_errors_when_not(small_campaign, tmp_path):
+    result = tpjb("locus", small_campaign, "--out", tmp_path / "o", "--quiet")
+    assert result.exit_code == 0
+    assert result.stdout == ""
+    assert "doing" not in result.stderr
+    assert (tmp_path / "o" / "locus.csv").exists()
+    assert "no such file" in tpjb("locus", tmp_path / "x.h5", "-q").stderr
+
+
+@pytest.mark.parametrize("command", sorted(info.name for info in app.registered_commands))
+def test_every_command_takes_the_common_options_and_shows_examples(command):
+    text = help_of(command)
+    for option in ("--json", "--quiet", "--out"):
+        assert option in text
+    for example in EXAMPLES[command]:
+        assert example in text.replace("\n    ", "\n")
+
+
+def test_examples_are_of_commands_that_exist_and_their_options_too():
+    assert set(EXAMPLES) >= commands()
+    for name in commands():
+        shown = help_of(name)
+        for line in EXAMPLES[name]:
+            first, second, *rest = shlex.split(line.partition(" > ")[0])
+            assert (first, second) == ("tpjb", name)
+            for word in rest:
+                if word.startswith("--"):
+                    assert word in shown, line
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("identfy", "identify"), ("digagnose", "diagnose"), ("compear", "compare"), ("shwo", "show")]
+)
+def test_a_mistyped_command_is_answered_with_the_nearest(typed, meant):
+    result = tpjb(typed)
+    assert result.exit_code == 2
+    assert meant in result.stderr
+
+
+def test_a_mistyped_option_is_answered_with_the_nearest():
+    result = tpjb("identify", "x.h5", "--metod", "ols")
+    assert result.exit_code == 2
+    assert "--method" in result.stderr
+
+
+def asked_by_shell(what: str, **environment: str) -> str:
+    """What the program says to a shell that asks for completion, in this process."""
+    result = CliRunner().invoke(app, [], env={"_TPJB_COMPLETE": what, **environment}, prog_name="tpjb")
+    return result.stdout
+
+
+def words_typed(words: str) -> dict[str, str]:
+    return {"COMP_WORDS": words, "COMP_CWORD": str(len(words.split(" ")) - 1)}
+
+
+def complete(words: str) -> list[str]:
+    return asked_by_shell("complete_bash", **words_typed(words)).split()
+
+
+def test_the_shell_completes_commands_options_and_values():
+    # once as the shell itself does it
+    environment = {**os.environ, "_TPJB_COMPLETE": "complete_bash", **words_typed("tpjb iden")}
+    code = "from tpjb_ident.cli import main; main()"
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert done.stdout.split() == complete("tpjb iden") == ["identify"]
+    assert "--method" in complete("tpjb identify --me")
+    assert complete("tpjb identify --method mm") == ["mm-eiv", "mm"]
+    assert complete("tpjb predict --thermal te") == ["tehd"]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_scripts_can_be_shown(shell):
+    assert "_TPJB_COMPLETE" in asked_by_shell(f"source_{shell}")
+
+
+# init
+
+
+@pytest.fixture
+def folder(tmp_path):
+    time = np.arange(2000) / 1000.0
+    rows = ["Time [s];X1 [V];F1 [N]"]
+    rows += [f"{t:.3f};{np.sin(157 * t):.5f};{2000 * np.cos(157 * t):.2f}" for t in time]
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "test-5kN.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return tmp_path / "a"
+
+
+def test_init_writes_a_draft_that_check_can_work_on(folder):
+    result = tpjb("init", folder)
+    assert result.exit_code == 0, result.stderr
+    text = (folder / "campaign.toml").read_text(encoding="utf-8")
+    assert 'static_load = "5 kN"' in text
+    assert 'excitation_frequency = "24.99 Hz"' in text
+    assert "??" in text
+    checked = tpjb("check", folder, "--out", folder.parent / "o")
+    assert checked.exit_code == 2
+    assert "sensitivity" in checked.stdout
+
+
+def test_init_never_replaces_a_manifest(folder):
+    (folder / "campaign.toml").write_text("mine", encoding="utf-8")
+    result = tpjb("init", folder)
+    assert result.exit_code == 2
+    assert "stays as it is" in result.stderr
+    assert (folder / "campaign.toml").read_text(encoding="utf-8") == "mine"
+
+
+def test_init_with_out_leaves_the_records_folder_alone(folder, tmp_path):
+    before = sorted(p.name for p in folder.iterdir())
+    assert tpjb("init", folder, "--out", tmp_path / "draft").exit_code == 0
+    assert sorted(p.name for p in folder.iterdir()) == before
+    assert (tmp_path / "draft" / "campaign.toml").exists()
+
+
+def test_init_leaves_out_what_it_cannot_read_and_says_so(folder):
+    (folder / "letter.txt").write_text("Dear Sir,\n", encoding="utf-8")
+    result = tpjb("init", folder)
+    assert result.exit_code == 0
+    assert "letter.txt" in result.stderr
+
+
+def test_init_of_nothing(tmp_path):
+    assert "holds no records" in tpjb("init", tmp_path).stderr
+    assert "is no folder" in tpjb("init", tmp_path / "x").stderr
+
+
+# show
+
+
+def test_show_lists_runs_and_channels(small_campaign):
+    assert "d-02500-25-01" in tpjb("show", small_campaign).stdout
+    shown = tpjb("show", small_campaign, "--run", "d-02500-25-01").stdout
+    assert "X1A" in shown
+    assert "25" in shown
+    assert any(bar in shown for bar in BARS[1:])
+
+
+def test_show_answers_a_wrong_run_with_the_nearest(small_campaign):
+    result = tpjb("show", small_campaign, "--run", "d-2500-25-01")
+    assert result.exit_code == 2
+    assert "Did you mean 'd-02500-25-01'" in result.stderr
+
+
+@pytest.mark.slow
+def test_show_of_a_lone_file_draws_a_picture(folder, tmp_path):
+    result = tpjb("show", folder / "test-5kN.csv", "--picture", "--out", tmp_path / "o")
+    assert result.exit_code == 0, result.stderr
+    assert (tmp_path / "o" / "figures" / "quick-look.png").stat().st_size > 5000
+    assert (tmp_path / "o" / "channels.csv").exists()
+
+
+def test_show_writes_nothing_unless_asked(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    assert tpjb("show", folder / "test-5kN.csv").exit_code == 0
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("values", [[], [0.0, 0.0], [float("nan")], [1.0], [1.0, 1e-9, float("inf")]])
+def test_a_sparkline_of_anything(values):
+    assert len(sparkline(values)) == len(values)
+
+
+def test_a_sparkline_keeps_peaks_when_cells_are_few():
+    values = [1.0] * 500
+    values[250] = 1000.0
+    drawn = sparkline(values, width=10)
+    assert drawn.index("█") == 5
+    assert sparkline(values, width=10, plain=True)[5] == "@"

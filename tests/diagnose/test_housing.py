@@ -1,0 +1,20 @@
+"""The stiffness under the housing, from records of a virtual rig that knows it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigdata.campaign import load_campaign
+from rigdata.virtual_rig import Instruments, RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
+from tpjb_ident.diagnose.observations.housing import cell_stiffness
+
+
+@pytest.mark.parametrize("stiffness", [(4e8, 6e8), (1.5e9, 8e8)])
+def test_cell_stiffness_is_read_from_the_records(tmp_path, stiffness):
+    plan = RigPlan(dynamic=operating_points([(5000.0, 40.0)]))
+    instruments = replace(Instruments.like_paper(5, 3), cell_stiffness=stiffness)
+    truth = RigTruth.constant(k=np.diag([2e8, 4e8]), c=np.diag([4e5, 6e5]))
+    write_campaign(tmp_path / "c.h5", VirtualRig(truth=truth, instruments=instruments, plan=plan, seed=3))
+    found = cell_stiffness(load_campaign(tmp_path / "c.h5"))
+    assert found == pytest.approx(stiffness, rel=0.03)

@@ -1,0 +1,155 @@
+"""From the phasors of all runs to a campaign's coefficients: a campaign on a shelf of its own, made by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rigdata.calibration import Channel
+from rigdata.operating_point import OperatingPoint
+from tests.dynamic.test_load_direction import OMEGA, WINDOWS, law
+from tests.dynamic.test_load_direction import run as run_at
+from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
+from tpjb_ident.dynamic.identify import IdentifySettings, assemble
+from tpjb_ident.dynamic.runs.left_out import LeftOut
+from tpjb_ident.dynamic.runs.run_result import RunResult
+from tpjb_ident.dynamic.runs.run_shelf import digest
+
+LOADS = (3000.0, 8000.0)
+CHANNELS = [
+    Channel("X1", "displacement", axis=math.radians(45.0), uncertainty=0.01),
+    Channel("X2", "displacement", axis=math.radians(135.0), uncertainty=0.01),
+    Channel("LH", "force", axis=0.0, uncertainty=0.005),
+    Channel("LV", "force", axis=math.pi / 2, uncertainty=0.005),
+]
+
+
+class Shelf:
+    """Finished runs, all in memory."""
+
+    def __init__(self, runs, left_out=()):
+        self._runs, self.left_out = runs, left_out
+        self.digests = [digest(RunResult(run, {1: 300.0 + k * k, 2: 310.0})) for k, run in enumerate(runs)]
+        self.places = list(range(len(runs)))
+
+    def take(self, place):
+        return self._runs[place]
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Five directions at either load; load and direction miss their set points by a little."""
+    rng = np.random.default_rng(1)
+    return [
+        run_at(f"{load:g}-{k}", k * math.pi / 5, load, 0.003 * rng.standard_normal(), rng, noise=0.1)
+        for load in LOADS
+        for k in range(5)
+    ]
+
+
+def found(runs, left_out=(), channels=CHANNELS, progress=None, **settings):
+    campaign = SimpleNamespace(id="c", channels={c.name: c for c in channels}, of_kind=lambda kind: [])
+    chosen = IdentifySettings(**{"methods": ("ols",), "n_calibration": 200} | settings)
+    return assemble(campaign, Shelf(runs, left_out), chosen, progress or (lambda text, done, total: None))
+
+
+@pytest.fixture(scope="module")
+def result(runs):
+    return found(runs)
+
+
+def test_every_point_has_its_coefficients_and_all_their_errors(result):
+    assert [p.point.static_load for p in result.points] == list(LOADS)
+    for p in result.points:
+        true = law(p.point.static_load, 0.0)
+        np.testing.assert_allclose(p.stiffness.h, true, atol=2e-3 * np.abs(true).max())
+        assert list(p.by_method) == ["ols", "mm-eiv"]
+        assert p.stiffness is p.by_method["mm-eiv"]
+        assert p.load_miss.size.shape == (5,)
+        assert p.temperatures[2] == 310.0
+        assert p.stiffness.weights.shape == (5 * WINDOWS, 2)
+        for est in p.by_method.values():
+            np.testing.assert_array_equal(est.systematic, p.stiffness.systematic)
+    assert [p.temperatures[1] for p in result.points] == [306.0, 351.0]
+    assert (result.campaign, result.method, result.conditions) == ("c", "mm-eiv", ())
+
+
+def test_the_systematic_part_is_that_of_the_gains_and_common_to_all_points(result):
+    """One per cent of either probe at 45 degrees, half a per cent of a cell: sqrt(0.5 + 0.25) per cent of kyy."""
+    joint = result.systematic
+    assert joint.shape == (16, 16)
+    for k, p in enumerate(result.points):
+        part = joint[8 * k : 8 * k + 8, 8 * k : 8 * k + 8]
+        np.testing.assert_allclose(p.stiffness.systematic, part, atol=1e-3 * np.abs(part).max())
+        share = math.sqrt(part[3, 3]) / p.stiffness.k[1, 1]
+        assert share == pytest.approx(math.sqrt(0.75) / 100, rel=0.15)
+    assert joint[3, 11] / math.sqrt(joint[3, 3] * joint[11, 11]) > 0.99
+
+
+def test_weights_may_be_kept_as_verdicts(runs, result):
+    few = found(runs, keep_weights=False)
+    for a, b in zip(few.points, result.points, strict=True):
+        verdict = a.stiffness.weights
+        assert verdict.dtype == bool
+        np.testing.assert_array_equal(verdict[:, 0], b.stiffness.weights.min(axis=1) >= REJECTED_WEIGHT)
+        np.testing.assert_array_equal(a.stiffness.h, b.stiffness.h)
+
+
+def test_without_corrections_the_misses_are_told_and_nothing_is_taken_off(runs, result):
+    plain = found(runs, correct=False)
+    for a, b in zip(plain.points, result.points, strict=True):
+        np.testing.assert_array_equal(a.load_miss.size, b.load_miss.size)
+        true = law(a.point.static_load, 0.0)
+        off = [np.abs(p.stiffness.h - true)[[0, 1], [1, 0]].max() for p in (a, b)]
+        assert off[1] < 0.5 * off[0]
+
+
+def test_progress_and_what_is_missing_are_told(runs):
+    said = []
+    lost = LeftOut("gone", OperatingPoint(5e3, -math.pi / 2, 138.0, OMEGA), ValueError("torn\nand more"))
+    bare = [*CHANNELS[:3], Channel("LV", "force", axis=math.pi / 2)]
+    made = found(runs[:5], (lost,), bare, lambda *one: said.append(one))
+    assert said == [("estimating", 0, 1), ("estimating", 1, 1)]
+    assert made.conditions == ("calibration-uncertainty-unstated", "runs-left-out", "point-lost")
+    assert "for LV:" in made.conditions[0].detail
+    assert "1 of 6 dynamic runs take no part: gone (torn)" in made.conditions[1].detail
+
+
+@pytest.mark.parametrize("method", ["iv", "mm", "rlm:tukey"])
+def test_the_default_method_may_be_any(runs, method):
+    made = found(runs[:5], method=method, methods=("mm-eiv",))
+    (p,) = made.points
+    assert list(p.by_method) == ["mm-eiv", method]
+    assert p.stiffness.method == method
+    assert made.method == method
+    np.testing.assert_allclose(p.stiffness.h, law(LOADS[0], 0.0), atol=0.01 * np.abs(p.stiffness.h).max())
+
+
+def test_whatever_the_method_loads_are_brought_to_their_set_points(runs, result):
+    for p, other in zip(found(runs, method="iv").points, result.points, strict=True):
+        true = law(p.point.static_load, 0.0)
+        np.testing.assert_allclose(p.stiffness.h, true, atol=2e-3 * np.abs(true).max())
+        assert p.load_miss.size.tolist() == other.load_miss.size.tolist()
+
+
+def test_windows_that_are_rejected_in_one_direction_are_pointed_out(runs):
+    spoilt = runs[2].cell_force.phasors.copy()
+    spoilt[:3] += 300.0 * np.exp(2j * np.arange(3))[:, None, None]
+    odd = replace(runs[2], cell_force=replace(runs[2].cell_force, phasors=spoilt))
+    (p,) = found([*runs[:2], odd, *runs[3:5]]).points
+    (told,) = [c for c in p.quality if c == "directional-rejection"]
+    assert "gather in 3000-2 at 72 deg (" in told.detail
+    assert {w.run for w in p.rejected} == {"3000-2"}
+    assert p.outlier_fraction == len(p.rejected) / 30
+
+
+def test_a_single_run_has_no_coefficients_and_no_error_of_its_place(runs):
+    (p,) = found(runs[:1]).points
+    assert np.isnan(p.stiffness.h).all()
+    assert np.isnan(p.position_se).all()
+    assert "fewer-than-two-directions" in p.quality
+    assert p.n_records == 1

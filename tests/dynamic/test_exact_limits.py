@@ -1,0 +1,287 @@
+"""Exact limits and published values of the estimators' parts: constants, errors in variables, covariance, RLM, MM."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tests.dynamic.phasor_cases import H, complex_normal
+from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats, eiv_fit, repeats
+from tpjb_ident.dynamic.estimators.mm import mm_fit
+from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
+from tpjb_ident.dynamic.estimators.r_matrix import real_rows
+from tpjb_ident.dynamic.estimators.rlm import ComplexInputError, RlmSettings, rlm_fit, solve_rlm
+from tpjb_ident.dynamic.estimators.robust_constants import (
+    bisquare_weight,
+    efficiency_constant,
+    half_shrinkage,
+    trimming_limits,
+    trimming_weight,
+)
+from tpjb_ident.dynamic.estimators.uncertainty import (
+    DirectionMeans,
+    complex_to_real_covariance,
+    direction_covariances,
+    direction_effect,
+    homoscedastic,
+    information,
+    mixed_dof,
+)
+
+
+def test_bisquare_constant_is_the_published_one():
+    """4.685 for 95 % efficiency of a real residual (Holland and Welsch 1977); 3.444 for 85 %."""
+    assert efficiency_constant(1) == pytest.approx(4.685, abs=5e-4)
+    assert efficiency_constant(1, 0.85) == pytest.approx(3.444, abs=1e-3)
+
+
+def test_bisquare_weight_at_its_edges():
+    np.testing.assert_allclose(bisquare_weight(np.array([0.0, 1.0, 2.0, 3.0]), 2.0), [1.0, 0.5625, 0.0, 0.0])
+
+
+def test_half_of_two_dimensions_is_one_less_ln_two():
+    """Chi-square with two degrees of freedom is exponential: 1 - ln 2 for the inner half; all of it is one."""
+    assert half_shrinkage(2, 0.5) == pytest.approx(1 - np.log(2), rel=1e-12)
+    assert half_shrinkage(4, 1 - 1e-12) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_trimming_limits_are_quantiles_and_the_shrinkage_that_of_draws():
+    lower, upper, shrinkage = trimming_limits(2)
+    assert lower == pytest.approx(-2 * np.log(0.01))
+    assert upper == pytest.approx(-2 * np.log(1e-4))
+    u2 = np.random.default_rng(1).chisquare(2, 400_000)
+    w = trimming_weight(u2, lower, upper)
+    assert shrinkage == pytest.approx((w * u2).sum() / (2 * w.sum()), rel=5e-3)
+    assert 0.93 < shrinkage < 1.0
+
+
+def test_trimming_weight_is_symmetric_about_the_middle():
+    at = np.array([0.0, 2.0, 2.5, 3.0, 3.5, 4.0, 9.0])
+    weight = trimming_weight(at, 2.0, 4.0)
+    np.testing.assert_allclose(weight[[0, 1, 3, 5, 6]], [1.0, 1.0, 0.5, 0.0, 0.0])
+    assert weight[2] + weight[4] == pytest.approx(1.0)
+
+
+def means_of(seed: int, noise: np.ndarray, g: int = 6, count: float = 50.0) -> Repeats:
+    """Means of g directions with noise of covariance `noise` on one window's (X, Y, Fx, Fy)."""
+    rng = np.random.default_rng(seed)
+    D = complex_normal(rng, g, 2)
+    z = np.concatenate([D, D @ H.T], axis=1)
+    z = z + complex_normal(rng, g, 4) @ np.linalg.cholesky(noise).T / np.sqrt(count)
+    return Repeats(DirectionMeans(z[:, :2], z[:, 2:], np.full(g, count)), noise, count * g - g, np.ones(int(count * g)))
+
+
+def test_without_noise_on_displacements_errors_in_variables_are_least_squares():
+    noise = np.diag([1e-14, 1e-14, 1e-2, 1e-2]).astype(complex)
+    given = means_of(2, noise)
+    plain = np.linalg.lstsq(given.means.D, given.means.F, rcond=None)[0].T
+    np.testing.assert_allclose(eiv_fit(given).h, plain, rtol=0, atol=1e-9)
+
+
+def test_without_noise_on_forces_they_are_the_inverse_regression():
+    noise = np.diag([1e-2, 1e-2, 1e-14, 1e-14]).astype(complex)
+    given = means_of(3, noise)
+    inverse = np.linalg.lstsq(given.means.F, given.means.D, rcond=None)[0].T
+    np.testing.assert_allclose(eiv_fit(given).h, np.linalg.inv(inverse), rtol=0, atol=1e-8)
+
+
+def test_exchanging_cause_and_effect_inverts_h():
+    mix = complex_normal(np.random.default_rng(4), 4, 4)
+    noise = 1e-3 * (mix @ mix.conj().T + np.eye(4))
+    given = means_of(5, noise)
+    back = [2, 3, 0, 1]
+    turned = dataclasses.replace(
+        given,
+        means=DirectionMeans(given.means.F, given.means.D, given.means.count),
+        noise=noise[np.ix_(back, back)],
+    )
+    np.testing.assert_allclose(eiv_fit(turned).h, np.linalg.inv(eiv_fit(given).h), rtol=0, atol=1e-10)
+
+
+def test_attenuation_is_noise_over_noise_and_signal():
+    """Unit signal in both directions, noise power p on one window: a regression loses p / (1 + p) of it."""
+    D = np.array([[1, 0], [0, 1], [1, 0], [0, 1]], dtype=complex) * np.sqrt(2)
+    power, count = 0.25, 1e9
+    noise = np.diag([power, power, power, power]).astype(complex)
+    given = Repeats(DirectionMeans(D, D @ H.T, np.full(4, count)), noise, 4 * count, np.ones(4))
+    np.testing.assert_allclose(eiv_fit(given).attenuation, power / (1 + power), rtol=1e-6)
+
+
+def test_stated_covariance_of_errors_in_variables_is_that_of_draws():
+    noise = 4e-4 * np.array([[1, 0.3j, 0, 0], [-0.3j, 1, 0, 0], [0, 0, 2, 0.5], [0, 0, 0.5, 3]], dtype=complex)
+    rng = np.random.default_rng(6)
+    D = complex_normal(rng, 6, 2)
+    exact, count = np.concatenate([D, D @ H.T], axis=1), np.full(6, 20.0)
+    root = np.linalg.cholesky(noise) / np.sqrt(20.0)
+    found, stated = [], []
+    for _ in range(300):
+        z = exact + complex_normal(rng, 6, 4) @ root.T
+        fit = eiv_fit(Repeats(DirectionMeans(z[:, :2], z[:, 2:], count), noise, 114.0, np.ones(120)))
+        found.append(np.concatenate([fit.h.real.ravel(), fit.h.imag.ravel()]))
+        if fit.chi_square < 1:  # directions agree as their repeats say: nothing is added for them
+            stated.append(np.diag(fit.covariance))
+    assert len(stated) > 100
+    np.testing.assert_allclose(np.mean(stated, axis=0), np.var(found, axis=0), rtol=0.35)
+
+
+def windows(seed: int, noise: np.ndarray, g: int = 6, n: int = 300):
+    rng = np.random.default_rng(seed)
+    D = np.repeat(complex_normal(rng, g, 2), n, axis=0)
+    z = np.concatenate([D, D @ H.T], axis=1) + complex_normal(rng, g * n, 4) @ np.linalg.cholesky(noise).T
+    return phasor_table(z[:, :2], z[:, 2:], np.repeat(np.arange(g), n)), z
+
+
+def test_pooled_noise_of_repeats_is_that_of_the_draws():
+    noise = 1e-3 * np.array([[1, 0.4, 0, 0], [0.4, 1, 0, 0], [0, 0, 2, 0.5j], [0, 0, -0.5j, 1]], dtype=complex)
+    table, _ = windows(7, noise)
+    state = repeats(table, np.ones(len(table)))
+    assert state is not None
+    size = np.sqrt(np.diag(state.noise).real)
+    relative = np.sqrt(np.diag(noise).real)
+    np.testing.assert_allclose(state.noise / np.outer(size, size), noise / np.outer(relative, relative), atol=0.06)
+    assert state.spare == pytest.approx(state.weights.sum() - 6, rel=1e-9)
+    assert state.wandering == 0
+    mean = np.array([table.D[table.direction == d].mean(axis=0) for d in range(6)])
+    np.testing.assert_allclose(state.means.D, mean, atol=5e-3 * np.abs(mean).max())
+
+
+def test_too_few_repeats_give_no_noise():
+    table, _ = windows(8, 1e-3 * np.eye(4, dtype=complex), g=3, n=3)
+    assert repeats(table, np.ones(len(table))) is None
+
+
+def test_covariance_of_real_and_imaginary_parts():
+    rng = np.random.default_rng(9)
+    root = complex_normal(rng, 2, 2)
+    hermitian = root @ root.conj().T
+    draws = complex_normal(rng, 100_000, 2) @ root.T
+    real = np.cov(np.concatenate([draws.real, draws.imag], axis=1).T)
+    np.testing.assert_allclose(complex_to_real_covariance(hermitian), real, atol=0.02 * np.abs(hermitian).max())
+    # a real quantity has pseudo-covariance equal to its covariance: nothing is left for the imaginary part
+    only = complex_to_real_covariance(np.eye(2, dtype=complex), np.eye(2, dtype=complex))
+    np.testing.assert_array_equal(only, np.diag([1.0, 1.0, 0.0, 0.0]))
+
+
+def test_information_is_a_sum_of_kronecker_products():
+    rng = np.random.default_rng(10)
+    D, star, inverse = complex_normal(rng, 3, 2), complex_normal(rng, 3, 2), complex_normal(rng, 3, 2, 2)
+    whole = sum(np.kron(inverse[g], np.outer(star[g].conj(), D[g])) for g in range(3))
+    np.testing.assert_allclose(information(D, star, inverse), whole)
+
+
+def test_degrees_of_freedom_in_the_limits():
+    between, one = np.full(8, 4.0), np.ones(8)
+    np.testing.assert_allclose(mixed_dof(one, one, 30.0, between), 30.0)
+    np.testing.assert_allclose(mixed_dof(one, 0 * one, 30.0, between), 4.0)
+    np.testing.assert_allclose(mixed_dof(2 * one, one, 4.0, between), 8.0)
+    np.testing.assert_allclose(mixed_dof(0 * one, 0 * one, 30.0, between), 30.0)
+    np.testing.assert_allclose(mixed_dof(one, one, 0.2, between), 1.0)
+
+
+def test_direction_effect_is_nothing_without_cause_and_found_where_it_is():
+    rng = np.random.default_rng(11)
+    D, noise = complex_normal(rng, 40, 2), 1e-4 * np.eye(2, dtype=complex)
+    means = DirectionMeans(D, D @ H.T, np.full(40, 10.0))
+    T, chi = direction_effect(0 * D, means, noise)
+    assert chi == 0.0
+    assert not T.any()
+    two = DirectionMeans(D[:2], D[:2], np.full(2, 10.0))
+    assert np.isnan(direction_effect(0 * D[:2], two, noise)[1])
+    size = np.linalg.norm(D, axis=1)[:, None]
+    effect = np.array([[4.0, 1.0j], [-1.0j, 2.0]]) * 1e-2
+    off = size * (complex_normal(rng, 40, 2) @ np.linalg.cholesky(effect).T)
+    hat = D @ np.linalg.lstsq(D, off, rcond=None)[0]
+    T, chi = direction_effect(off - hat, means, noise)
+    assert chi > 100
+    np.testing.assert_allclose(T, effect, atol=0.4 * 4e-2)
+    np.testing.assert_allclose(T, T.conj().T)
+    V = direction_covariances(means, noise, T)
+    np.testing.assert_allclose(V[3], noise / 10 + T * size[3] ** 2)
+
+
+def test_covariance_without_repeats_is_that_of_least_squares():
+    rng = np.random.default_rng(12)
+    D = complex_normal(rng, 12, 2)
+    F = D @ H.T + 0.1 * complex_normal(rng, 12, 2)
+    residual = F - D @ np.linalg.lstsq(D, F, rcond=None)[0]
+    covariance, dof = homoscedastic(D, residual, np.ones(12))
+    np.testing.assert_array_equal(dof, 20.0)
+    for axis in range(2):
+        design, _ = real_rows(D, F[:, axis])
+        s2 = (np.abs(residual[:, axis]) ** 2).sum() / 20
+        own = s2 * np.linalg.inv(design.T @ design)
+        rows = np.array([2 * axis, 2 * axis + 1, 4 + 2 * axis, 5 + 2 * axis])
+        np.testing.assert_allclose(covariance[np.ix_(rows, rows)], own, atol=1e-12)
+
+
+def test_either_complex_argument_is_refused_by_rlm():
+    design, response = np.eye(4)[:, :2], np.arange(4.0)
+    for a, b in ((design + 0j, response), (design, response + 0j)):
+        with pytest.raises(ComplexInputError):
+            solve_rlm(a, b)
+    with pytest.raises(ValueError, match="did you mean 'huber'"):
+        solve_rlm(design, response, RlmSettings(norm="hubr"))
+    with pytest.raises(ValueError, match="unknown scale 'iqr'"):
+        solve_rlm(design, response, RlmSettings(scale="iqr"))
+
+
+def test_rlm_scales_are_those_of_the_normal_law():
+    """All three estimate the standard deviation of normal errors; MASS and MAD differ by 0.67448975 / 0.6745."""
+    rng = np.random.default_rng(13)
+    design = np.column_stack([np.ones(2000), rng.standard_normal(2000)])
+    response = design @ [1.0, 2.0] + 0.5 * rng.standard_normal(2000)
+    found = {s: solve_rlm(design, response, RlmSettings(scale=s)).scale for s in ("mad", "mass", "huber")}
+    for scale in found.values():
+        assert scale == pytest.approx(0.5, rel=0.05)
+    assert found["mass"] / found["mad"] == pytest.approx(0.6744897501960817 / 0.6745, rel=1e-6)
+    assert found["huber"] != pytest.approx(found["mad"], rel=1e-6)
+
+
+def test_rlm_of_two_axes_keeps_places_weights_and_freedom():
+    rng = np.random.default_rng(14)
+    D = complex_normal(rng, 9, 2)
+    F = D @ H.T + 0.05 * complex_normal(rng, 9, 2)
+    F[4, 0] += 3j
+    fit = rlm_fit(D, F)
+    assert fit.weights[4, 0] < 0.3
+    assert fit.weights[4, 1] > 0.5
+    np.testing.assert_array_equal(fit.dof, 14.0)
+    design, response = real_rows(D, F[:, 1])
+    own = solve_rlm(design, response)
+    rows = np.array([2, 3, 6, 7])
+    np.testing.assert_array_equal(fit.covariance[np.ix_(rows, rows)], own.covariance)
+    np.testing.assert_array_equal(fit.covariance[np.ix_(rows, [0, 1, 4, 5])], 0.0)
+    np.testing.assert_array_equal(fit.h[1], own.params[:2] + 1j * own.params[2:])
+
+
+def test_few_windows_are_plain_least_squares_with_its_scatter():
+    rng = np.random.default_rng(15)
+    X = complex_normal(rng, 7, 2)
+    Y = X @ H.T + 0.1 * complex_normal(rng, 7, 2)
+    fit = mm_fit(X, Y, np.arange(7))
+    plain = np.linalg.lstsq(X, Y, rcond=None)[0]
+    residual = Y - X @ plain
+    assert "no-robust-start" in fit.conditions
+    np.testing.assert_allclose(fit.coefficients, plain.T)
+    np.testing.assert_allclose(fit.scatter, residual.T @ residual.conj() / 5)
+    np.testing.assert_array_equal(fit.weights, 1.0)
+    np.testing.assert_array_equal(fit.distance2, 4.0)
+
+
+def test_mm_solves_its_own_estimating_equation():
+    """At the answer the weighted residuals are orthogonal to the regressors, and distances are those of the scatter."""
+    rng = np.random.default_rng(16)
+    X = complex_normal(rng, 60, 2)
+    Y = X @ H.T + 0.1 * complex_normal(rng, 60, 2)
+    Y[:15] += 5.0
+    fit = mm_fit(X, Y, np.repeat(np.arange(6), 10))
+    residual = Y - X @ fit.coefficients.T
+    equation = (fit.weights[:, None] * residual).T @ X.conj()
+    np.testing.assert_allclose(equation, 0.0, atol=1e-9)
+    own = 2 * np.einsum("na,ab,nb->n", residual.conj(), np.linalg.inv(fit.scatter), residual).real
+    np.testing.assert_allclose(fit.distance2, own, rtol=1e-8)
+    np.testing.assert_allclose(fit.weights, bisquare_weight(np.sqrt(own), efficiency_constant(4)), atol=1e-9)
+    np.testing.assert_array_equal(fit.weights[:15], 0.0)
+    assert fit.conditions == ()

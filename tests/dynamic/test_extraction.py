@@ -1,0 +1,328 @@
+"""From samples to windows' phasors: channels read together, chunks, clocks, delays, glitches; exact lines."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rigdata.calibration import Channel
+from rigdata.operating_point import OperatingPoint
+from rigdata.problem import RigDataError
+from rigdata.run import Run
+from tpjb_ident.dynamic.records import extraction
+from tpjb_ident.dynamic.records.extraction import MAX_JITTER, extract
+from tpjb_ident.dynamic.records.lines import known_lines
+from tpjb_ident.dynamic.records.phasors import LineFitter, fit_uneven
+from tpjb_ident.dynamic.records.run_data import PhasorSettings
+from tpjb_ident.dynamic.records.stretches import open_stretches
+from tpjb_ident.dynamic.records.windows import WindowSettings
+
+RATE = 1000.0
+#: No whole number of cycles in a second, so that a wrong origin of time shows.
+DRIVEN = 33.7
+POINT = OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22.0, 2 * math.pi * DRIVEN)
+
+
+@dataclass
+class Reader:
+    """Channels in memory; counts what is asked of it."""
+
+    data: dict
+    stamps: np.ndarray | None = None
+    file: str = "memory"
+    asked: list = field(default_factory=list)
+
+    def names(self):
+        return tuple(self.data)
+
+    def length(self):
+        return len(next(iter(self.data.values())))
+
+    def rate(self):
+        return RATE
+
+    def read(self, names, start, stop):
+        self.asked.append(tuple(names))
+        return [self.data[name][start:stop] for name in names]
+
+    def time(self, start, stop):
+        return (np.arange(self.length()) / RATE if self.stamps is None else self.stamps)[start:stop]
+
+    def counted(self):
+        return self.stamps is None
+
+
+def run_of(data, channels, stamps=None):
+    described = {c.name: c for c in channels}
+    return Run("r", "dynamic", POINT, 0.3, None, "up", described, frozenset(), Reader(data, stamps))
+
+
+def probes(axes, zero=0.0, polarity=1):
+    return [Channel(f"X{k}", "displacement", "um", 1e-6 * (k + 1), zero * k, polarity if k else 1, math.radians(a))
+            for k, a in enumerate(axes)]  # fmt: skip
+
+
+def readings(count, n=50, seed=1):
+    return {f"X{k}": np.random.default_rng([seed, k]).standard_normal(n) for k in range(count)}
+
+
+@pytest.mark.parametrize("axes", [(45.0, 135.0), (0.0, 90.0), (90.0, 0.0), (10.0, 70.0), (0.0, 3.0), (180.0, 90.0)])
+@pytest.mark.parametrize(("zero", "polarity"), [(0.0, 1), (2e-3, -1), (1.0, 1)])
+def test_two_channels_become_rows_in_one_request(axes, zero, polarity):
+    tach = Channel("K", "speed", "Hz", 2 * math.pi)
+    cells = [Channel(name, "force", axis=axis) for name, axis in (("LH", 0.0), ("LV", math.pi / 2))]
+    data = readings(2) | {"K": np.full(50, 22.0), "LH": np.ones(50), "LV": np.ones(50)}
+    run = run_of(data, [*probes(axes, zero, polarity), tach, *cells])
+    expected = run.vector("displacement", 7, 30).values.T
+    run.reader.asked.clear()
+    with open_stretches(run, ("displacement",)) as stretches:
+        found = stretches.read(7, 30)
+    assert run.reader.asked == [("X0", "X1", "K")]
+    np.testing.assert_allclose(found.rows["displacement"], expected, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.speed, 2 * math.pi * 22.0)
+    assert found.time is None
+
+
+@pytest.mark.parametrize("bad", [np.nan, 3e38, -3e38, np.inf])
+@pytest.mark.parametrize("name", ["X0", "X1"])
+def test_a_reading_that_is_none_is_none(bad, name):
+    data = readings(2)
+    data[name][20] = bad
+    run = run_of(data, probes((45.0, 135.0)), stamps=0.5 + np.arange(50) / RATE)
+    with open_stretches(run, ("displacement",)) as stretches:
+        found = stretches.read(10, 40)
+        sound = stretches.read(30, 40)
+        none = stretches.read(5, 5)
+    np.testing.assert_array_equal(found.rows["displacement"], run.vector("displacement", 10, 40).values.T)
+    assert np.isnan(found.rows["displacement"][:, 10]).all()
+    np.testing.assert_allclose(sound.rows["displacement"], run.vector("displacement", 30, 40).values.T, rtol=1e-12)
+    assert none.rows["displacement"].shape == (2, 0)
+    np.testing.assert_array_equal(found.time, 0.5 + np.arange(10, 40) / RATE)
+    assert found.speed is None
+
+
+def test_three_channels_and_those_without_an_axis_are_left_to_the_run():
+    run = run_of(readings(3), probes((45.0, 135.0, 80.0)))
+    with open_stretches(run, ("displacement",)) as stretches:
+        rows = stretches.read(0, 50).rows["displacement"]
+    np.testing.assert_array_equal(rows, run.vector("displacement").values.T)
+    other = Channel("T", "displacement", "um", 1e-6)
+    two = run_of(readings(2) | {"T": np.zeros(50)}, [*probes((45.0, 135.0)), other])
+    with open_stretches(two, ("displacement",)) as stretches:
+        rows = stretches.read(0, 50).rows["displacement"]
+    np.testing.assert_allclose(rows, two.vector("displacement").values.T, rtol=1e-12)
+    for axes in ((45.0, 47.5), (45.0, 225.0)):
+        with (
+            open_stretches(run_of(readings(2), probes(axes)), ("displacement",)) as stretches,
+            pytest.raises(RigDataError, match="all measure along one line"),
+        ):
+            stretches.read(0, 50)
+
+
+LINES = known_lines((DRIVEN,), 22.0, RATE)
+Z = {"displacement": 1e-6 * np.array([1.0 + 0.5j, -0.4j]), "force": np.array([300.0j, 200.0 - 80.0j])}
+RUNOUT = 2e-6 * np.array([1.0, 1.0j])
+
+
+class Held:
+    """A run in memory: the excitation, runout of a shaft whose phase is given, a steady load."""
+
+    id, point, excitation_direction, sample_rate = "r", POINT, 0.3, RATE
+
+    def __init__(self, seconds=4.0, stamps=None, turns=None, late=0.0, quantities=("displacement", "force")):
+        self.length = round(seconds * RATE)
+        self.stamps = np.arange(self.length) / RATE if stamps is None else stamps
+        self.channels = {q: SimpleNamespace(quantity=q) for q in quantities}
+        t = np.nan_to_num(self.stamps)
+        shaft = np.exp(2j * math.pi * (22.0 * t if turns is None else turns))
+        self.data = {}
+        for quantity in quantities:
+            z = Z.get(quantity, np.array([0.02, 0.01j]))
+            own = t - (late if quantity == "force" else 0.0)
+            wave = np.outer(np.exp(2j * math.pi * DRIVEN * own), z).real
+            wave += np.outer(shaft, RUNOUT).real * (quantity == "displacement")
+            self.data[quantity] = wave + (1e-4 if quantity == "displacement" else 700.0)
+
+    def vector(self, quantity, start=None, stop=None):
+        return SimpleNamespace(values=self.data[quantity][start:stop], time=self.stamps[start:stop])
+
+    def speed(self, start=None, stop=None):
+        return SimpleNamespace(values=np.full(self.length, 2 * math.pi * 22.1)[start:stop])
+
+
+FIXED = PhasorSettings(windows=WindowSettings(length=0.4))
+
+
+def taken(run, follow=None, settings=FIXED):
+    return extract(run, 30.0, settings, LINES, follow)
+
+
+def exact(result, quantity="displacement", but=(), tolerance=1e-9):
+    """Whether windows have the excitation's own phasor."""
+    block = result.displacement if quantity == "displacement" else result.cell_force
+    windows = np.delete(np.arange(len(block.phasors)), list(but))
+    off = block.phasors[windows, 0] - Z[quantity]
+    np.testing.assert_allclose(off / np.abs(Z[quantity]).max(), 0.0, atol=tolerance)
+
+
+@pytest.mark.parametrize("chunk", [1, 400, 1000, 2**15])
+def test_windows_are_the_same_in_chunks_of_any_length(monkeypatch, chunk):
+    monkeypatch.setattr(extraction, "CHUNK", chunk)
+    found = taken(Held())
+    exact(found)
+    exact(found, "force")
+    np.testing.assert_allclose(found.start, 0.4 * np.arange(10))
+    np.testing.assert_allclose(found.speeds, 22.1)
+    np.testing.assert_allclose(found.cell_force.mean, 700.0, rtol=1e-9)
+    np.testing.assert_array_equal(found.displacement.lost, 0.0)
+    assert (found.length, found.run, found.direction, found.acceleration) == (0.4, "r", 0.3, None)
+    more = taken(Held(quantities=("displacement", "force", "acceleration")))
+    np.testing.assert_allclose(more.acceleration.phasors[:, 0], np.tile([0.02, 0.01j], (10, 1)), atol=1e-10)
+
+
+def test_a_run_on_file_without_a_clock_counts_its_samples():
+    held = Held()
+    described = [Channel(f"{q[0]}{a}", q, axis=a * math.pi / 2) for q in ("displacement", "force") for a in (0, 1)]
+    data = {c.name: held.data[c.quantity][:, int(c.name[1])] for c in described}
+    found = taken(run_of(data, described))
+    exact(found)
+    exact(found, "force")
+    np.testing.assert_allclose(found.start, 0.4 * np.arange(10))
+    assert np.isnan(found.speeds).all()
+
+
+def test_a_channel_recorded_late_is_put_back():
+    late = 3e-3
+    settings = PhasorSettings(windows=FIXED.windows, delays={"force": late})
+    found = taken(Held(late=late), settings=settings)
+    exact(found, "force")
+    exact(found)
+    plain = taken(Held(late=late))
+    turned = np.exp(-2j * math.pi * DRIVEN * late) * Z["force"]
+    np.testing.assert_allclose(plain.cell_force.phasors[:, 0], np.tile(turned, (10, 1)), rtol=1e-9)
+    np.testing.assert_allclose(found.cell_force.mean, plain.cell_force.mean)
+
+
+def test_a_clock_may_start_anywhere_and_stray_within_a_window():
+    even = np.arange(4000) / RATE
+    later = taken(Held(stamps=5.0 + even))
+    exact(later)
+    np.testing.assert_allclose(later.start, 5.0 + 0.4 * np.arange(10))
+    rng = np.random.default_rng(2)
+    astray = even.copy()
+    astray[800:1200] += rng.uniform(-0.3, 0.3, 400) / RATE
+    astray[801:805] = np.sort(astray[801:805])
+    exact(taken(Held(stamps=astray)), tolerance=1e-6)
+    # what strays by less than a fiftieth of a sample is taken for even: all but the first of a window come late here
+    for share, own in ((0.9, False), (1.1, True)):
+        little = even.copy()
+        little[801:1200] += share * MAX_JITTER / RATE
+        error = np.abs(taken(Held(stamps=little)).displacement.phasors[2, 0] - Z["displacement"]).max()
+        late = 2 * math.pi * DRIVEN * share * MAX_JITTER / RATE * np.abs(Z["displacement"]).max()
+        assert error == pytest.approx(0.0 if own else late, abs=0.02 * late)
+
+
+def test_stamps_that_are_missing_leave_their_samples_out():
+    stamps = np.arange(4000) / RATE
+    stamps[[400, 850, 900, 1190]] = np.nan
+    stamps[1200:1600] = np.nan
+    stamps[1210:1225] = np.arange(1210, 1225) / RATE
+    found = taken(Held(stamps=stamps))
+    exact(found, but=(2, 3))
+    np.testing.assert_allclose(found.displacement.phasors[2, 0], Z["displacement"], atol=1e-12)
+    np.testing.assert_allclose(found.start, 0.4 * np.arange(10))
+
+
+def test_a_shaft_that_creeps_is_followed_window_by_window():
+    """Speeds of 22 to 22.9 Hz, steady within a window, the phase running on."""
+    speeds = 22.0 + 0.1 * np.arange(10)
+    turns = np.concatenate([[0.0], np.cumsum(np.repeat(speeds, 400) / RATE)[:-1]])
+    run = Held(turns=turns)
+    followed = taken(run, speeds)
+    exact(followed)
+    plain = taken(run)
+    assert np.abs(plain.displacement.phasors[-1, 0] - Z["displacement"]).max() > 0.02e-6
+    # where the speed is not known the run's own is taken; as in the first window
+    holes = np.where(np.arange(10) == 9, np.nan, speeds)
+    some = taken(run, holes)
+    exact(some, but=(9,))
+    np.testing.assert_allclose(some.displacement.phasors[9], plain.displacement.phasors[9], atol=1e-15)
+    np.testing.assert_allclose(some.displacement.phasors[0], plain.displacement.phasors[0], atol=1e-14)
+
+
+def test_following_keeps_to_windows_of_their_own_clock():
+    stamps = np.arange(4000) / RATE
+    stamps[500] += 0.4 / RATE
+    found = taken(Held(stamps=stamps), np.full(10, 22.0))
+    exact(found)
+
+
+def test_a_long_disturbance_is_told_by_the_other_windows(monkeypatch):
+    """A fifth of one window moves by itself, at the excitation's own frequency: with chunks of one window too."""
+    for chunk in (400, 2**15):
+        monkeypatch.setattr(extraction, "CHUNK", chunk)
+        run = Held()
+        run.data["displacement"] += 2e-8 * np.random.default_rng(3).standard_normal((4000, 2))
+        part = slice(1300, 1380)
+        run.data["displacement"][part] += 4e-6 * np.cos(2 * math.pi * DRIVEN * run.stamps[part])[:, None]
+        found = taken(run)
+        exact(found, tolerance=0.02)
+        assert found.displacement.lost[3] > 0.15
+        assert found.displacement.lost[[0, 1, 2, 4, 5, 6, 7, 8, 9]].max() < 0.05
+
+
+FREQUENCIES = np.array([25.3, 22.0])
+
+
+def pieces(length, n=6, noise=0.01, unit=1.0, seed=4):
+    rng = np.random.default_rng(seed)
+    t = np.arange(n * length) / RATE
+    z = unit * np.array([1.0 + 0.5j, 20.0j])
+    rows = np.stack([(a * np.exp(2j * math.pi * 25.3 * t)).real for a in z]) + 700.0 * unit
+    rows = rows + noise * np.abs(z)[:, None] * rng.standard_normal(rows.shape)
+    return rows.reshape(2, n, length), z, np.arange(n) * length / RATE
+
+
+@pytest.mark.parametrize("length", [400, 1024])
+@pytest.mark.parametrize("unit", [1.0, 1e-6])
+def test_a_fifth_of_a_window_may_be_wrong_whatever_the_units(length, unit):
+    """In short windows and in long ones, for quantities of micrometres and of newtons, and axes that differ."""
+    rows, z, start = pieces(length, unit=unit)
+    rows[0, 2, 100 : 100 + length // 5] += 3.0 * unit
+    rows[1, 4, 7] += 300.0 * unit
+    fitter = LineFitter(length, RATE, FREQUENCIES)
+    found = fitter.fit(rows, start)
+    np.testing.assert_allclose(found.phasors[:, 0] / z, 1.0, atol=0.01)
+    assert found.lost[2] == pytest.approx(0.2, abs=0.03)
+    assert found.lost[4] == pytest.approx(7 / length, abs=3 / length)
+    np.testing.assert_array_equal(found.lost[[0, 1, 3, 5]], 0.0)
+    np.testing.assert_allclose(found.mean / unit, 700.0, atol=0.1)
+    np.testing.assert_allclose(found.noise / (0.01 * np.abs(z)), 1.0, atol=0.45)
+
+
+@pytest.mark.parametrize(("missing", "told"), [(200, True), (201, False)])
+def test_half_of_a_window_may_be_missing(missing, told):
+    rows, z, start = pieces(400, noise=0.0)
+    rows[0, 1, :missing] = np.nan
+    found = LineFitter(400, RATE, FREQUENCIES).fit(rows, start)
+    assert np.isfinite(found.phasors[1]).all() == told
+    assert found.lost[1] == pytest.approx(missing / 400)
+    np.testing.assert_allclose(np.delete(found.phasors, 1, axis=0)[:, 0], np.tile(z, (5, 1)), atol=1e-10)
+
+
+def test_a_window_of_its_own_clock_has_its_mean_and_noise():
+    rng = np.random.default_rng(5)
+    t = 3.0 + np.sort(rng.uniform(0.0, 0.5, 500))
+    z = np.array([2.0 - 1.0j, 0.5j])
+    values = np.outer(np.exp(2j * math.pi * 25.3 * t), z).real + [700.0, -30.0] + 0.01 * rng.standard_normal((500, 2))
+    values[40, 0] = np.nan
+    found = fit_uneven(values, t, FREQUENCIES, 1.0)
+    # phasors count from the origin, two seconds before the first sample
+    np.testing.assert_allclose(found.phasors[0, 0], z * np.exp(2j * math.pi * 25.3 * 1.0), atol=5e-3)
+    np.testing.assert_allclose(found.mean[0], [700.0, -30.0], atol=5e-3)
+    np.testing.assert_allclose(found.noise[0], 0.01, rtol=0.2)
+    assert found.lost[0] == pytest.approx(1 / 500)

@@ -1,0 +1,267 @@
+"""Figures and flags of a point with values that can be written down: coherence, orbits, reasons, patterns, signs."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import binom, chi2
+
+from tests.dynamic.phasor_cases import H, complex_normal
+from tpjb_ident.dynamic.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.identify import IdentifySettings, directions_differ, disagreement, identify_point
+from tpjb_ident.dynamic.results.quality import (
+    MAX_AMPLITUDE,
+    amplitude,
+    coherence,
+    directional_pattern,
+    flags,
+    rejected_windows,
+)
+from tpjb_ident.dynamic.runs.point_data import PointData
+
+
+def run(name, direction=0.5, n=4, lost=None, acceleration="yes"):
+    lost_d, lost_f = lost or (np.zeros(n), np.zeros(n))
+    mean = np.tile([3.0, -4.0], (n, 1))
+    return SimpleNamespace(
+        run=name, direction=direction, start=10.0 + 0.5 * np.arange(n), acceleration=acceleration, conditions=(),
+        displacement=SimpleNamespace(lost=lost_d, mean=mean), cell_force=SimpleNamespace(lost=lost_f, mean=2 * mean),
+    )  # fmt: skip
+
+
+def data_of(D, runs=None, per_run=4, h=H):
+    D = np.asarray(D, dtype=complex)
+    index = np.repeat(np.arange(len(D) // per_run), per_run)
+    runs = runs or tuple(run(f"r{k}", n=per_run) for k in range(len(D) // per_run))
+    point = SimpleNamespace(excitation=160.0, static_load=5.0, static_load_direction=-math.pi / 2)
+    return PointData(point, tuple(runs), (0,) * len(runs), D, D @ h.T, 0 * D, index)
+
+
+def stiff(h=H, error=1e-3, **more):
+    spread = error**2 * np.eye(8)
+    return DynamicStiffness(
+        np.asarray(h, dtype=complex), 160.0, spread, np.full(8, np.inf), "mm", np.ones((4, 2)), **more
+    )
+
+
+def test_coherence_is_the_explained_share_of_the_worse_axis():
+    D = np.array([[1.0, 0.0], [0.0, 1.0j], [1.0, 1.0], [5.0, 5.0]])
+    F = D @ H.T
+    off = np.array([[0.3j, 0.0], [0.0, 0.1], [0.2, 0.4], [9.0, 9.0]])
+    weights = np.array([1.0, 0.5, 0.25, 0.0])
+    total = (weights[:, None] * np.abs(F + off) ** 2).sum(axis=0)
+    left = (weights[:, None] * np.abs(off) ** 2).sum(axis=0)
+    assert coherence(D, F + off, H, weights) == pytest.approx(np.min(1 - left / total))
+    assert coherence(D, F, H, weights) == pytest.approx(1.0)
+    F[3], D[3, 1] = np.nan, np.nan
+    assert coherence(D, F, H, np.ones(4)) == pytest.approx(1.0)
+    assert math.isnan(coherence(D, F, H, np.zeros(4)))
+    assert math.isnan(coherence(D, F, np.full((2, 2), np.nan), np.ones(4)))
+
+
+@pytest.mark.parametrize(
+    ("z", "largest"),
+    [((3.0, 0.0), 3.0), ((3.0, 4.0), 5.0), ((3.0j, 4.0j), 5.0), ((3.0, 4.0j), 4.0), ((2.0, -2.0j), 2.0)],
+)
+def test_the_amplitude_is_the_major_half_axis_of_the_orbit(z, largest):
+    """A straight line has the root of the sum of squares, a circle its radius; the phase does not matter."""
+    D = np.concatenate([np.tile(np.array(z) * np.exp(0.4j), (4, 1)), 0.1 * np.ones((4, 2))])
+    assert amplitude(data_of(D), np.ones(8)) == pytest.approx(largest)
+    # the largest mean of a run: windows without weight or phasor do not enter
+    D[0], D[1, 0] = 100.0, np.nan
+    weights = np.r_[0.0, np.ones(7)]
+    assert amplitude(data_of(D), weights) == pytest.approx(largest)
+    assert amplitude(data_of(D), np.r_[np.zeros(4), np.ones(4)]) == pytest.approx(0.1 * math.sqrt(2.0))
+    weighted = np.array([[1.0, 0.0], [5.0, 0.0], [1.0, 0.0], [1.0, 0.0]])
+    assert amplitude(data_of(weighted), np.array([0.5, 0.25, 0.5, 0.5])) == pytest.approx((1.5 + 1.25) / 1.75)
+
+
+def test_every_rejected_window_has_its_reason():
+    D = np.tile([[1.0, 0.5j]], (16, 1))
+    lost = np.array([0.0, 0.51, 0.0, 0.49]), np.array([0.0, 0.0, 0.72, 0.0])
+    runs = (run("a", lost=lost), run("b", None), run("c", 1.0), run("d", 2.0))
+    data = data_of(D, runs)
+    data.D[6] *= 1.5
+    data.F[7, 0] += 2.0 * np.linalg.norm(data.F[4])
+    data.D[12, 1] = np.nan
+    weights = np.ones(16)
+    weights[[1, 2, 6, 7, 8, 9, 10, 11, 12]] = REJECTED_WEIGHT - 0.01
+    weights[3] = REJECTED_WEIGHT
+    found = rejected_windows(data, H, weights)
+    assert [(v.run, v.time) for v in found] == [
+        ("a", 10.5), ("a", 11.0), ("b", 11.0), ("b", 11.5), *(("c", 10.0 + 0.5 * k) for k in range(4)), ("d", 10.0),
+    ]  # fmt: skip
+    assert [v.reason for v in found] == [
+        "51 % of the displacement samples missing or glitched",
+        "72 % of the force samples missing or glitched",
+        "displacement phasor 50.0 % away from its repeats",
+        "force phasor 200.0 % away from its repeats",
+        *["whole run disagrees with the other directions"] * 4,
+        "missing values",
+    ]
+    assert [v.direction for v in found[:2]] == [0.5, 0.5]
+    assert math.isnan(found[2].direction)
+    assert found[0].weight == REJECTED_WEIGHT - 0.01
+    none = rejected_windows(data, np.full((2, 2), np.nan), weights)
+    assert {v.reason for v in none[2:8]} == {"the point has no answer"}
+    assert rejected_windows(data, H, np.ones(16)) == ()
+
+
+def flagged(data=None, est=None, figure=1.0, size=1e-6, clearance=None):
+    return flags(data or data_of(np.ones((8, 2))), est or stiff(), figure, size, clearance)
+
+
+def test_flags_are_raised_beyond_their_limits_only():
+    assert flagged() == ()
+    assert flagged(figure=MIN_COHERENCE) == ()
+    low = flagged(figure=MIN_COHERENCE - 1e-3)
+    assert low == ("low-coherence",)
+    assert "coherence 0.899 < 0.9" in low[0].detail
+    assert flagged(figure=math.nan) == ("low-coherence",)
+    assert flagged(size=MAX_AMPLITUDE * 1e-4 * 1.0001, clearance=1e-4) == ("large-amplitude",)
+    assert "amplitude 8.0 % of the clearance" in flagged(size=8e-6, clearance=1e-4)[0].detail
+    assert flagged(size=MAX_AMPLITUDE * 1e-4 * 0.9999, clearance=1e-4) == ()
+    assert flagged(size=1.0, clearance=0.0) == ()
+    lost = stiff(np.full((2, 2), np.nan))
+    bare = data_of(np.ones((8, 2)), (run("a", acceleration=None), run("b", acceleration=None)))
+    assert flagged(bare) == ("inertia-not-corrected",)
+    assert flagged(bare, lost, figure=math.nan) == ()
+
+
+@pytest.mark.parametrize(("missing", "named"), [(4, ()), (5, ("windows-missing",))])
+def test_a_tenth_of_the_windows_may_be_missing(missing, named):
+    D = np.ones((40, 2), dtype=complex)
+    D[2 : 2 + missing * 7 : 7, 1] = np.nan
+    found = flagged(data_of(D))
+    assert found == named
+    assert "".join(c.detail for c in found) == (f"{missing} of 40 windows gave no phasors" if named else "")
+
+
+def test_runs_without_any_window_are_named():
+    D = np.ones((16, 2), dtype=complex)
+    data = data_of(D)
+    data.D[4:8] = np.nan
+    data.F[12:16, 0] = np.nan
+    (found,) = flagged(data)
+    assert found == "run-without-data"
+    assert found.detail == "no usable window in r1, r3"
+
+
+def fed(h, error=1e-3):
+    return "negative-damping" in flagged(est=stiff(h, error))
+
+
+def test_a_film_feeds_the_motion_where_the_dissipated_power_can_be_negative():
+    """The power of a motion d is omega / 2 of d^H (h - h^H) / 2i d, for real d that of the damping's symmetric part."""
+    damping = np.diag([1.0, 1.0])
+    assert not fed(1j * damping)
+    assert not fed(5.0 * np.eye(2) + 1j * damping)
+    assert fed(1j * np.diag([1.0, -0.1]))
+    # coupled damping beyond the direct ones; gyroscopic forces do no work
+    assert fed(1j * np.array([[1.0, 1.2], [1.2, 1.0]]))
+    assert not fed(1j * np.array([[1.0, 0.8], [0.8, 1.0]]))
+    assert not fed(1j * np.array([[1.0, 1.2], [-1.2, 1.0]]))
+    # a symmetric stiffness does none either; an antisymmetric one feeds a circular orbit
+    assert not fed(np.array([[0.0, 3.0], [3.0, 0.0]]) + 1j * damping)
+    assert fed(np.array([[0.0, 1.1], [-1.1, 0.0]]) + 1j * damping)
+    assert not fed(np.array([[0.0, 0.9], [-0.9, 0.0]]) + 1j * damping)
+    for factor, named in ((2.9, False), (3.1, True)):
+        assert fed(1j * np.diag([1.0, -factor * 0.1]), 0.1) is named
+
+
+def pattern(hits, n=10, runs=6, missing=0):
+    D = np.ones((n * runs, 2), dtype=complex)
+    weights = np.ones(n * runs)
+    for k, count in enumerate(hits):
+        weights[n * k : n * k + count] = REJECTED_WEIGHT - 0.01
+    data = data_of(D, per_run=n, runs=tuple(run(f"r{k}", 0.5 if k else None, n=n) for k in range(runs)))
+    if missing:
+        data.D[-missing:] = np.nan
+        weights[-missing:] = 0.0
+    return directional_pattern(data, weights)
+
+
+def test_rejected_windows_that_gather_are_named_with_their_run():
+    (_, _) = found = pattern([0, 6, 0, 0, 0, 0]), pattern([5, 0, 0, 0, 0, 0])
+    assert found[0] == "directional-rejection"
+    assert "gather in r1 at 29 deg (6 of 10): look" in found[0].detail
+    assert "gather in r0 (5 of 10): look" in found[1].detail
+    assert pattern([0] * 6) is None
+    assert pattern([2, 2, 2, 2, 2, 2]) is None
+    # what gave no phasor at all is no rejection, and no part of a run
+    assert pattern([6, 0, 0, 0, 0, 0], missing=10) is not None
+    assert pattern([0, 0, 0, 0, 0, 0], missing=10) is None
+
+
+@pytest.mark.parametrize(("hits", "n", "named"), [(2, 4, False), (3, 4, True), (4, 10, False), (5, 10, True)])
+def test_three_windows_and_more_than_two_fifths_make_a_pattern(hits, n, named):
+    assert (pattern([hits, 0, 0, 0, 0, 0], n=n) is not None) is named
+
+
+@pytest.mark.parametrize("others", [2, 3, 4])
+def test_a_pattern_is_what_chance_gives_less_than_once_in_a_thousand(others):
+    """Against the share rejected in the other runs (half a window more, since that may be none)."""
+    for hits in (7, 8, 9, 10):
+        share = (5 * others + 0.5) / (5 * 10 + 1.0)
+        chance = float(binom.sf(hits - 1, 10, share))
+        assert (pattern([hits, *[others] * 5]) is not None) is (chance < 1e-3)
+
+
+def test_runs_differ_where_the_summed_chi_square_says_so():
+    """Sum of reduced chi-squares times their degrees of freedom, at one in ten thousand."""
+    limit = float(chi2.isf(1e-4, 16 + 8))
+
+    def first(total):
+        a, b = 0.7 * total / 16, 0.3 * total / 8
+        nothing = stiff(chi_square=math.nan, spare_equations=16), stiff(chi_square=99.0, spare_equations=0)
+        return [stiff(chi_square=a, spare_equations=16), stiff(chi_square=b, spare_equations=8), *nothing]
+
+    assert directions_differ(first(1.01 * limit))
+    assert not directions_differ(first(0.99 * limit))
+    assert not directions_differ([])
+    assert not directions_differ(first(1.0)[2:])
+
+
+def test_methods_disagree_beyond_both_intervals():
+    """Their half widths added as squares; the worst entry is told."""
+    best = stiff(error=3e-3)
+    room = 1.959963984540054 * math.hypot(3e-3, 4e-3)
+    for factor, named in ((0.99, False), (1.5, True)):
+        off = np.array([[0.0, 0.0], [0.2 * factor * room, 1j * factor * room]])
+        found = disagreement({"mm": stiff(H + off, 4e-3), "best": best}, "best")
+        assert found == (("methods-disagree",) if named else ())
+    assert found[0].detail == "mm (1.5 times the interval) away from best"
+    lost = stiff(np.full((2, 2), np.nan))
+    assert disagreement({"mm": lost, "best": best}, "best") == ()
+    assert disagreement({"mm": best, "best": lost}, "best") == ()
+
+
+def test_a_point_gathers_what_its_runs_say():
+    rng = np.random.default_rng(4)
+    D = np.repeat(complex_normal(rng, 5, 2), 6, axis=0) + 1e-3 * complex_normal(rng, 30, 2)
+    runs = tuple(run(f"r{k}", 0.3 * k, n=6) for k in range(5))
+    for k, one in enumerate(runs):
+        one.cell_force.mean[:] = [0.0, -5.0 - 0.1 * k]
+        one.displacement.mean[:] = [1.0 * k, -2.0 * k]
+    data = data_of(D, runs, per_run=6)
+    temperatures = {"r0": {1: 300.0, 2: 310.0}, "r1": {1: 302.0}, "r9": {1: 900.0}}
+    settings = IdentifySettings(methods=("ols", "mm", "iv"), clearance=1e3)
+    found = identify_point(data, temperatures, settings)
+    assert list(found.by_method) == ["ols", "mm", "iv", "mm-eiv"]
+    assert found.stiffness is found.by_method["mm-eiv"]
+    assert all(est.method == name for name, est in found.by_method.items())
+    np.testing.assert_allclose(found.stiffness.h, H, atol=1e-2)
+    assert found.static_load_measured == pytest.approx(5.2)
+    np.testing.assert_allclose(found.position, [2.0, -4.0])
+    np.testing.assert_allclose(found.position_se, np.std([0, 1, 2, 3, 4], ddof=1) / math.sqrt(5) * np.array([1, 2]))
+    assert found.temperatures == {1: 301.0, 2: 310.0}
+    assert (found.n_records, found.n_windows) == (5, 30)
+    assert found.runs == ("r0", "r1", "r2", "r3", "r4")
+    assert found.coherence > 0.999
+    assert found.amplitude == pytest.approx(max(amplitude(data, np.ones(30)), 0.0), rel=1e-2)
+    assert found.outlier_fraction == len(found.rejected) / 30
+    assert found.inertia_corrected

@@ -1,0 +1,392 @@
+"""Models over frequency, lines, windows, amplitude and calibration: answers that can be written down beforehand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+from scipy.stats import t as student_t
+
+from tpjb_ident.dynamic.corrections.calibration_uncertainty import apparent_change, gain_draws
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.records.lines import Line, LineSet, LineSettings, known_lines
+from tpjb_ident.dynamic.records.windows import WindowSettings, line_design, plan_windows, variance_inflation
+from tpjb_ident.dynamic.results.amplitude import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
+from tpjb_ident.dynamic.results.frequency_fit import REFUSED, fit_over_frequency, fits_per_load
+
+K = np.array([[2.0e8, 1e7], [-3e7, 4.0e8]])
+C = np.array([[4e5, 2e4], [-1e4, 6e5]])
+M = np.array([[30.0, 4.0], [-2.0, 50.0]])
+OMEGAS = 2 * np.pi * np.array([15.0, 25.0, 40.0, 60.0])
+
+
+def estimate(omega, mass=0.0, off=0.0, error=1e6, covariance=None):
+    h = K - mass * omega**2 * M + 1j * omega * C + off
+    spread = error**2 * np.eye(8) if covariance is None else covariance
+    return DynamicStiffness(h, float(omega), spread, np.full(8, np.inf), "mm-eiv", np.ones((4, 2)))
+
+
+def test_stiffness_and_damping_that_are_there_are_found_exactly():
+    fit = fit_over_frequency([estimate(w) for w in OMEGAS], "K-C")
+    np.testing.assert_allclose(fit.K, K, rtol=1e-9)
+    np.testing.assert_allclose(fit.C, C, rtol=1e-9)
+    np.testing.assert_array_equal(fit.M, 0.0)
+    assert fit.chi_square < 1e-3
+    assert fit.misfit < 1e-9
+    assert (fit.dof, fit.n_frequencies) == (24, 4)
+    assert fit.omega_range == (OMEGAS[0], OMEGAS[-1])
+    np.testing.assert_allclose(fit.h(100.0), K + 100j * C, rtol=1e-9)
+    # equal errors: K is a mean, C a slope through the origin
+    expected = np.repeat([1e6**2 / 4, 1e6**2 / np.sum(OMEGAS**2)], 4)
+    np.testing.assert_allclose(np.diag(fit.covariance), expected, rtol=1e-9)
+    np.testing.assert_allclose(fit.covariance - np.diag(np.diag(fit.covariance)), 0.0, atol=1e-3)
+    np.testing.assert_allclose(fit.standard_error, np.sqrt(expected), rtol=1e-9)
+
+
+def test_a_mass_is_found_and_its_want_refused():
+    given = [estimate(w, mass=1.0, error=1e5) for w in OMEGAS]
+    fit = fit_over_frequency(given, "K-C-M")
+    np.testing.assert_allclose(fit.M, M, rtol=1e-6)
+    np.testing.assert_allclose(fit.K, K, rtol=1e-9)
+    np.testing.assert_allclose(fit.h(200.0), K - 200.0**2 * M + 200j * C, rtol=1e-8)
+    assert fit.dof == 20
+    assert not fit.refused
+    without = fit_over_frequency(given, "K-C")
+    assert without.refused
+    worst = max(np.linalg.norm(without.h(e.omega) - e.h) / np.linalg.norm(e.h) for e in given)
+    assert without.misfit == pytest.approx(worst)
+    assert without.probability == pytest.approx(float(chi2.sf(without.chi_square, 24)))
+    inflated = np.sqrt(np.diag(without.covariance) * without.chi_square / 24)
+    np.testing.assert_allclose(without.standard_error, inflated, rtol=1e-12)
+
+
+def test_chi_square_is_the_weighted_sum_of_what_is_left():
+    rng = np.random.default_rng(3)
+    root = rng.standard_normal((8, 8))
+    spread = 1e10 * (root @ root.T + np.eye(8))
+    given = [estimate(w, off=1e6 * (rng.standard_normal((2, 2)) + 1j), covariance=(k + 1) * spread)
+             for k, w in enumerate(OMEGAS)]  # fmt: skip
+    for model in ("K-C", "K-C-M"):
+        fit = fit_over_frequency(given, model)
+        left = 0.0
+        for est in given:
+            miss = est.h - fit.h(est.omega)
+            vector = np.concatenate([miss.real.ravel(), miss.imag.ravel()])
+            left += vector @ np.linalg.solve(est.covariance, vector)
+        assert fit.chi_square == pytest.approx(left, rel=1e-6)
+        turned = fit_over_frequency(given[::-1], model)
+        np.testing.assert_allclose(turned.K, fit.K, rtol=1e-9)
+
+
+def test_one_frequency_is_its_own_answer():
+    fit = fit_over_frequency([estimate(OMEGAS[1])], "K-C")
+    np.testing.assert_allclose(fit.C, C, rtol=1e-9)
+    assert fit.dof == 0
+    assert math.isnan(fit.probability)
+    assert not fit.refused
+    np.testing.assert_allclose(fit.standard_error, np.sqrt(np.diag(fit.covariance)))
+    # two estimates at one frequency: the second model still needs another
+    twice = [estimate(OMEGAS[1]), estimate(OMEGAS[1])]
+    assert fit_over_frequency(twice, "K-C").dof == 8
+    with pytest.raises(ValueError, match="K-C-M needs 2 frequencies with an answer, got 1"):
+        fit_over_frequency(twice, "K-C-M")
+    with pytest.raises(ValueError, match="K-C needs 1 frequencies with an answer, got 0"):
+        fit_over_frequency([replace(twice[0], h=np.full((2, 2), np.nan + 0j))], "K-C")
+    with pytest.raises(ValueError, match="unknown model 'K'"):
+        fit_over_frequency(twice, "K")
+
+
+def test_estimates_without_an_interval_are_left_out():
+    lost = replace(estimate(OMEGAS[2], off=1e9), covariance=np.full((8, 8), np.nan))
+    fit = fit_over_frequency([estimate(OMEGAS[0]), lost, estimate(OMEGAS[3])], "K-C")
+    np.testing.assert_allclose(fit.K, K, rtol=1e-9)
+    assert fit.n_frequencies == 2
+
+
+def point(stiffness, load=5000.0, direction=-90.0, speed=22.0):
+    where = SimpleNamespace(static_load=load, static_load_direction_deg=direction, shaft_speed_hz=speed)
+    return SimpleNamespace(point=where, stiffness=stiffness)
+
+
+@pytest.mark.parametrize(("mass", "wild", "supported"), [(0.0, 0.0, "K-C"), (1.0, 0.0, "K-C-M"), (0.0, 3e7, "raw H")])
+def test_the_simplest_model_that_is_not_refused_is_supported(mass, wild, supported):
+    off = wild * np.array([1, -1, 1, -1])
+    points = tuple(point(estimate(w, mass, o, error=1e5)) for w, o in zip(OMEGAS, off, strict=True))
+    (found,) = fits_per_load(points)
+    assert found.supported == supported
+    assert set(found.fits) == {"K-C", "K-C-M"}
+    assert found.points == points
+
+
+def test_loads_directions_and_speeds_are_fitted_apart():
+    two = OMEGAS[:2]
+    places = ((5e3, -90, 22), (6e3, -90, 22), (5e3, -60, 22), (5e3, -90, 33))
+    points = [point(estimate(w), *place) for w in two for place in places]
+    points.append(point(estimate(two[0]), load=7e3))  # alone at its load
+    points += [point(estimate(two[0]), load=8e3), point(replace(estimate(two[1]), h=np.full((2, 2), np.nan)), load=8e3)]
+    found = fits_per_load(tuple(points))
+    assert [len(f.points) for f in found] == [2, 2, 2, 2]
+    assert 0.0 < REFUSED < 0.05
+
+
+def lines_of(found):
+    return [(line.name, line.frequency) for line in found.nuisance]
+
+
+def test_every_kind_of_line_has_its_place_and_order():
+    settings = LineSettings(mains=60.0, shaft_harmonics=3, drive_harmonics=3, mains_harmonics=2)
+    found = known_lines((33.0, 25.0), 10.0, 1000.0, settings, extra=(71.3,))
+    assert [e.frequency for e in found.excitation] == [25.0, 33.0]
+    assert lines_of(found) == [
+        ("1X", 10.0), ("2X", 20.0), ("3X", 30.0), ("mains", 60.0), ("mains 2", 120.0),
+        ("harmonic 2", 50.0), ("harmonic 3", 75.0), ("harmonic 2", 66.0), ("harmonic 3", 99.0), ("found", 71.3),
+    ]  # fmt: skip
+    np.testing.assert_array_equal(found.frequencies[:3], [25.0, 33.0, 10.0])
+    moved = found.at_speed(11.0)
+    assert lines_of(moved)[:3] == [("1X", 11.0), ("2X", 22.0), ("3X", 33.0)]
+    assert lines_of(moved)[3:] == lines_of(found)[3:]
+    assert (found.speed, moved.speed) == (10.0, 11.0)
+    assert known_lines((25.0, 25.0), 0.0, 1000.0, LineSettings(mains=0.0)).frequencies.tolist() == [25.0, 50.0]
+
+
+@pytest.mark.parametrize(("speed", "struck"), [(24.93, True), (24.91, False), (25.08, True), (25.09, False)])
+def test_a_shaft_within_its_wander_strikes_the_excitation(speed, struck):
+    found = known_lines((25.0,), speed, 1000.0)
+    assert (found.conditions == ("1X on excitation line",)) is struck
+    assert ("1X" in [name for name, _ in lines_of(found)]) is (not struck)
+
+
+@pytest.mark.parametrize(
+    ("speed", "names"), [(12.45, ["1X"]), (12.41, ["1X", "2X"]), (12.57, ["1X"]), (12.6, ["1X", "2X"])]
+)
+def test_a_second_harmonic_wanders_twice_as_far(speed, names):
+    found = known_lines((25.0,), speed, 1000.0, LineSettings(mains=0.0, drive_harmonics=1))
+    assert [name for name, _ in lines_of(found)] == names
+
+
+def test_lines_closer_than_either_wanders_are_one():
+    settings = LineSettings(drive_harmonics=1)
+    assert [n for n, _ in lines_of(known_lines((30.0,), 49.9, 1000.0, settings))] == ["1X", "2X"]
+    assert [n for n, _ in lines_of(known_lines((30.0,), 49.8, 1000.0, settings))] == ["1X", "2X", "mains"]
+
+
+@pytest.mark.parametrize("frequencies", [(), (0.0,), (-5.0,), (450.0,), (25.0, 460.0)])
+def test_excitations_outside_the_band_are_refused(frequencies):
+    with pytest.raises(ValueError, match="between 0 and 450 Hz"):
+        known_lines(frequencies, 22.0, 1000.0)
+    assert known_lines((449.0,), 22.0, 1000.0).excitation[0].frequency == 449.0
+    assert "harmonic 2" not in [n for n, _ in lines_of(known_lines((230.0,), 22.0, 1000.0))]
+
+
+def test_columns_are_phasors_and_a_straight_drift():
+    time = 3.0 + np.arange(400) / 1000.0
+    design = line_design(time, np.array([20.0, 35.0]))
+    z = np.array([1.0 - 2.0j, 0.5j])
+    wave = sum((a * np.exp(2j * np.pi * f * time)).real for a, f in zip(z, (20.0, 35.0), strict=True))
+    coefficients = np.array([z[0].real, z[0].imag, z[1].real, z[1].imag, 7.0, -3.0])
+    np.testing.assert_allclose(design @ coefficients, wave + 7.0 - 3.0 * np.linspace(-1, 1, 400), atol=1e-12)
+    assert line_design(time, np.array([20.0]), drift_order=0).shape == (400, 3)
+    assert np.isfinite(line_design(time[:1], np.array([20.0]))).all()
+
+
+def test_inflation_is_the_variance_of_a_phasor_over_that_of_the_line_alone():
+    """One line over whole cycles: one; a neighbour half a beat away: from the Gram matrix of both."""
+    assert variance_inflation(np.array([20.0]), 1, 1.0, 1000.0) == pytest.approx(1.0, abs=0.02)
+    frequencies, length = np.array([20.0, 21.3, 33.0]), 0.5
+    design = line_design(np.arange(500) / 1000.0, frequencies)
+    covariance = np.linalg.inv(design.T @ design) * 500 / 2
+    by_hand = np.diag(covariance)[:2].max()
+    assert variance_inflation(frequencies, 1, length, 1000.0) == pytest.approx(by_hand, rel=0.03)
+    every = np.diag(covariance)[:4].max()
+    assert variance_inflation(frequencies, 2, length, 1000.0) == pytest.approx(every, rel=0.03)
+    # as many samples as unknowns tell nothing
+    assert variance_inflation(np.array([20.0, 33.0]), 1, 0.006, 1000.0) == math.inf
+
+
+LINES = known_lines((25.0,), 22.0, 1000.0)
+
+
+def test_windows_are_as_long_as_asked_or_as_many_as_wished():
+    fixed = WindowSettings(length=0.8)
+    assert plan_windows(5000, 1000.0, LINES, fixed) == (800, 6)
+    assert plan_windows(4800, 1000.0, LINES, fixed) == (800, 6)
+    assert plan_windows(40_000, 1000.0, LINES, WindowSettings(target_count=8)) == (5000, 8)
+    length, count = plan_windows(3000, 1000.0, LINES, WindowSettings(max_inflation=1.05))
+    other, more = plan_windows(3000, 1000.0, LINES, WindowSettings(max_inflation=2.0))
+    assert length > other
+    assert count < more
+    alone = LineSet((Line("excitation", 25.0),), ())
+    assert plan_windows(3000, 1000.0, alone, WindowSettings(min_cycles=10.0, target_count=100))[0] >= 400
+    assert plan_windows(3000, 1000.0, alone, WindowSettings(min_cycles=4.0, target_count=100))[0] < 250
+
+
+H = K + 1j * OMEGAS[1] * C
+
+
+def shaken(factors, direction, stiffening=0.0, off=None):
+    """Runs of one direction, each `factors` times as hard; h changes with the logarithm of the amplitude."""
+    axis = np.array([math.cos(direction), math.sin(direction)])
+    runs, D, F = [], [], []
+    for k, factor in enumerate(factors):
+        moved = 1e-5 * factor * axis * np.exp(0.3j)
+        change = stiffening * math.log2(np.linalg.norm(moved) / 1e-5) + (0.0 if off is None else off[k])
+        runs.append(SimpleNamespace(direction=direction))
+        D.append(moved)
+        F.append((1 + change) * H @ moved)
+    return runs, D, F
+
+
+def data_of(*groups):
+    runs = [run for g in groups for run in g[0]]
+    D, F = (np.array([row for g in groups for row in g[k]]) for k in (1, 2))
+    repeated = np.repeat(np.arange(len(runs)), 3)
+    return SimpleNamespace(runs=runs, D=D[repeated], F=F[repeated], run_index=repeated)
+
+
+def test_a_stiffening_with_amplitude_is_found_exactly_and_units_do_not_matter():
+    data = data_of(shaken((1.0, 2.0), 0.2, 0.05), shaken((0.5, 1.0, 3.0), 1.1, 0.05))
+    found = amplitude_slope(data, H, np.ones(15))
+    assert found.stiffening == pytest.approx(0.05, rel=1e-9)
+    assert found.standard_error < 1e-9
+    assert found.runs == 5
+    data.D, data.F = 1e3 * data.D, 1e-2 * data.F
+    assert amplitude_slope(data, 1e-5 * H, np.ones(15)).stiffening == pytest.approx(0.05, rel=1e-9)
+
+
+def test_what_a_direction_is_off_as_a_whole_is_no_amplitude_effect():
+    data = data_of(shaken((1.0, 2.0), 0.2, 0.05, (0.2, 0.2)), shaken((1.0, 2.0, 4.0), 1.1, 0.05, (-0.1, -0.1, -0.1)))
+    assert amplitude_slope(data, H, np.ones(15)).stiffening == pytest.approx(0.05, rel=1e-6)
+    # opposite directions are one
+    both = data_of(shaken((1.0,), 0.2, 0.05), shaken((2.0,), 0.2 + math.pi, 0.05), shaken((1.0, 2.0, 4.0), 1.1, 0.05))
+    assert amplitude_slope(both, H, np.ones(15)).runs == 5
+
+
+def test_its_error_is_that_of_a_slope_within_directions():
+    off = np.array([0.01, -0.01, 0.02, -0.03, 0.01])
+    factors = (1.0, 2.0, 4.0, 8.0, 16.0)
+    found = amplitude_slope(data_of(shaken(factors, 0.4, 0.0, off)), H, np.ones(15))
+    x = np.log2(factors) - 2.0
+    slope = x @ off / (x @ x)
+    left = off - off.mean() - slope * x
+    assert found.stiffening == pytest.approx(slope, rel=1e-9)
+    assert found.standard_error == pytest.approx(math.sqrt(left @ left / 3 / (x @ x)), rel=1e-9)
+
+
+@pytest.mark.parametrize(("ratio", "told"), [(MIN_RATIO * 1.01, True), (MIN_RATIO * 0.99, False)])
+def test_amplitudes_must_differ_to_tell_anything(ratio, told):
+    data = data_of(shaken((1.0, ratio), 0.2), shaken((1.0, ratio), 1.1))
+    assert (amplitude_slope(data, H, np.ones(12)) is not None) is told
+
+
+def test_too_few_runs_and_windows_without_weight_tell_nothing():
+    assert amplitude_slope(data_of(shaken((1.0, 2.0), 0.2)), H, np.ones(6)) is None
+    data = data_of(shaken((1.0, 2.0, 4.0), 0.2, 0.05), shaken((1.0, 2.0), 1.1, 0.05))
+    weights = np.where(data.run_index == 1, 0.0, 1.0)
+    assert amplitude_slope(data, H, weights).runs == 4
+    spoilt = np.where(np.arange(15) % 3 == 0, 0.0, 1.0)
+    data.F = data.F + 1e4 * (spoilt == 0)[:, None]
+    assert amplitude_slope(data, H, spoilt).stiffening == pytest.approx(0.05, rel=1e-9)
+    data.runs[0].direction = None
+    assert amplitude_slope(data, H, spoilt).runs == 4
+    assert amplitude_slope(data, np.full((2, 2), np.nan), spoilt) is None
+
+
+def test_a_slope_is_pointed_out_beyond_chance_and_one_per_cent():
+    limit = float(student_t.isf(SIGNIFICANCE / 2, 4))
+    assert AmplitudeSlope(0.0101 + limit * 0.01, 0.01, 6).significant
+    assert not AmplitudeSlope(0.99 * limit * 0.01, 0.01, 6).significant
+    assert AmplitudeSlope(-1.01 * limit * 0.01, 0.01, 6).significant
+    assert not AmplitudeSlope(0.99 * NOTABLE, 1e-9, 6).significant
+    assert AmplitudeSlope(1.01 * NOTABLE, 1e-9, 2).significant
+    assert AmplitudeSlope(0.001, 1e-9, 6).condition() == ()
+    (said,) = AmplitudeSlope(-0.123, 0.004, 6).condition()
+    assert said == "nonlinear-amplitude"
+    assert "-12.3 %" in said.detail
+    assert "0.4 %" in said.detail
+
+
+def channel(name, quantity, axis, uncertainty):
+    return SimpleNamespace(name=name, quantity=quantity, axis=axis, uncertainty=uncertainty)
+
+
+AXES = (math.radians(45.0), math.radians(135.0))
+
+
+def channels(displacement=0.0, force=0.0, acceleration=0.0, axes=AXES):
+    sizes = {"displacement": displacement, "force": force, "acceleration": acceleration}
+    named = {f"{q}{k}": channel(f"{q}{k}", q, a, s) for q, s in sizes.items() for k, a in enumerate(axes)}
+    return named | {"T": channel("T", "temperature", None, 0.1), "raw": channel("raw", "force", None, 0.5)}
+
+
+def test_draws_of_gains_have_their_spread_along_the_channels():
+    draws = gain_draws(channels(0.01, 0.03), 4000, 1)
+    u = np.array([math.cos(AXES[0]), math.sin(AXES[0])])
+    v = np.array([-u[1], u[0]])
+    for gains, size in ((draws.displacement, 0.01), (draws.force, 0.03)):
+        assert gains.shape == (4000, 2, 2)
+        np.testing.assert_allclose(gains.mean(axis=0), np.eye(2), atol=1e-12)
+        along, aside = gains @ u - u, gains @ v - v
+        assert np.std(along @ u) == pytest.approx(size, rel=0.05)
+        assert np.std(aside @ v) == pytest.approx(size, rel=0.05)
+        np.testing.assert_allclose(along @ v, 0.0, atol=1e-12)
+        assert abs(np.corrcoef(along @ u, aside @ v)[0, 1]) < 0.06
+    np.testing.assert_allclose(draws.acceleration, np.broadcast_to(np.eye(2), (4000, 2, 2)), atol=1e-12)
+    assert draws.unstated == ()
+    np.testing.assert_array_equal(gain_draws(channels(0.01, 0.03), 4000, 1).force, draws.force)
+
+
+def test_channels_without_a_stated_uncertainty_are_named():
+    draws = gain_draws(channels(None, 0.01, None), 10, 1)
+    assert draws.unstated == ("displacement0", "displacement1")
+    np.testing.assert_allclose(draws.displacement, np.broadcast_to(np.eye(2), (10, 2, 2)), atol=1e-12)
+    single = gain_draws(channels(0.01, 0.01, axes=AXES[:1]), 6, 1)
+    np.testing.assert_array_equal(single.force, np.broadcast_to(np.eye(2), (6, 2, 2)))
+    assert len(gain_draws(channels(0.01), 1, 1).force) == 2
+
+
+def measured(inertia=0.0, with_accelerometers=True):
+    rng = np.random.default_rng(5)
+    D = 1e-5 * (rng.standard_normal((12, 2)) + 1j * rng.standard_normal((12, 2)))
+    run = SimpleNamespace(housing_mass=30.0, acceleration=object() if with_accelerometers else None)
+    return SimpleNamespace(D=D, A=(inertia * D) / 30.0, runs=(run,))
+
+
+def stiff():
+    return DynamicStiffness(H, float(OMEGAS[1]), np.eye(8), np.full(8, np.inf), "ols", np.ones((12, 2)))
+
+
+@pytest.mark.parametrize("quantity", ["displacement", "force", "acceleration"])
+def test_a_gain_changes_its_own_part_of_h(quantity):
+    """Probes: h G^-1; cells: G (h - inertia) + inertia; accelerometers: their share only."""
+    inertia = 2e7
+    draws = gain_draws(channels(**{quantity: 0.05}), 6, 3)
+    found = apparent_change(measured(inertia), stiff(), draws)
+    gains = getattr(draws, quantity)
+    part = inertia * np.eye(2)
+    expected = {
+        "displacement": H @ np.linalg.inv(gains) - H,
+        "force": gains @ (H - part) - (H - part),
+        "acceleration": gains @ part - part,
+    }[quantity].reshape(6, 4)
+    np.testing.assert_allclose(found, np.concatenate([expected.real, expected.imag], axis=1), atol=1e-3)
+
+
+def test_without_accelerometers_the_cells_gain_is_that_of_h():
+    draws = gain_draws(channels(force=0.05), 4, 3)
+    found = apparent_change(measured(with_accelerometers=False), stiff(), draws)
+    expected = (draws.force @ H - H).reshape(4, 4)
+    np.testing.assert_allclose(found[:, :4], expected.real, atol=1e-3)
+    lost = replace(stiff(), h=np.full((2, 2), np.nan))
+    nothing = apparent_change(measured(), lost, draws)
+    assert nothing.shape == found.shape == (4, 8)
+    assert np.isnan(nothing).all()
+    # windows without weight say nothing of the inertia
+    data, weights = measured(2e7), np.ones((12, 2))
+    data.A[3] += 1.0
+    weights[3, 1] = 0.0
+    again = apparent_change(data, replace(stiff(), weights=weights), draws)
+    np.testing.assert_allclose(again, apparent_change(measured(2e7), stiff(), draws), atol=1e-3)

@@ -1,0 +1,158 @@
+"""What a load that points aside does to coefficients and to positions, from phasors and loci made by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigdata.operating_point import OperatingPoint
+from tpjb_ident.clearance.locus import Locus, LocusPoint
+from tpjb_ident.diagnose.observations.load_scatter import moved_by_miss
+from tpjb_ident.dynamic.corrections.load_direction import direction_slopes, run_ratios, turned_back
+from tpjb_ident.dynamic.corrections.static_load import load_misses
+from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
+from tpjb_ident.dynamic.records.lines import known_lines
+from tpjb_ident.dynamic.records.phasors import PhasorBlock
+from tpjb_ident.dynamic.records.run_data import RunPhasors
+from tpjb_ident.dynamic.runs.point_data import gather
+
+OMEGA = 2 * np.pi * 25.0
+WINDOWS = 6
+#: Change of the cross-coupled coefficients per radian, relative to the direct ones.
+SK, SC = -0.9, -0.3
+
+
+def law(load: float, turn: float):
+    k, c = 2.0e8 * (load / 5e3) ** 0.7, 8.0e7
+    return np.array(
+        [[0.85 * k + 1j * c, turn * (SK * k + 1j * SC * c)], [turn * (SK * k + 1j * SC * c), 1.15 * k + 1j * c]]
+    )
+
+
+def run(name, direction, load, turn, rng, noise):
+    """A run whose load points `turn` [rad] aside."""
+    spread = rng.standard_normal((WINDOWS, 4)) + 1j * rng.standard_normal((WINDOWS, 4))
+    phase = np.exp(2j * np.pi * rng.random())
+    F = 500.0 * phase * np.array([np.cos(direction), np.sin(direction)]) + noise * spread[:, :2]
+    D = np.linalg.solve(law(load, turn), F.T).T + 1e-9 * noise * spread[:, 2:]
+    mean = np.tile(load * np.array([np.sin(turn), -np.cos(turn)]), (WINDOWS, 1))
+    point = OperatingPoint(load, -np.pi / 2, 2 * np.pi * 22, OMEGA)
+
+    def block(z):
+        return PhasorBlock(z[:, None, :], mean, np.full((WINDOWS, 2), 1e-9), np.zeros(WINDOWS))
+
+    start, lines = 0.25 * np.arange(WINDOWS), known_lines((25.0,), 22.0, 1000.0)
+    speeds = np.full(WINDOWS, 22.0)
+    return RunPhasors(name, point, direction, lines, start, 0.25, block(D), block(F), None, 30.0, speeds)
+
+
+def campaign(seed, turn=0.0035, loads=(2500.0, 3750.0, 5000.0, 6250.0, 7500.0, 8750.0), noise=0.1):
+    rng = np.random.default_rng(seed)
+    runs = [
+        run(f"{load:g}-{i}", i * np.pi / 6, load, turn * rng.standard_normal(), rng, noise)
+        for load in loads
+        for i in range(6)
+    ]
+    points = gather(runs)
+    misses, _ = load_misses(points)
+    return points, misses, [estimate(p) for p in points]
+
+
+def estimate(data):
+    return estimate_dynamic_stiffness(data.D, data.F, OMEGA, data.run_index)
+
+
+def turns_of(points, misses, first, trusted=None):
+    trusted = trusted or [True] * len(points)
+    ratios = [run_ratios(*one) for one in zip(points, misses, first, trusted, strict=True)]
+    return direction_slopes([(-90.0, 22.0)] * len(points), ratios)
+
+
+def test_the_slope_is_found_and_takes_the_scatter_off():
+    points, misses, first = campaign(1)
+    turns = turns_of(points, misses, first)
+    for p, miss, turn, before in zip(points, misses, turns, first, strict=True):
+        k, c = 2.0e8 * (p.point.static_load / 5e3) ** 0.7, 8.0e7
+        true = SK * k + 1j * SC * c
+        assert abs(turn.slope[0, 1] - true) < 0.25 * abs(true)
+        assert abs(turn.slope[1, 0] - true) < 0.25 * abs(true)
+        after = estimate(replace(p, F=p.F - turned_back(p, miss, turn)))
+        assert np.abs(after.h - law(p.point.static_load, 0.0)).max() < 0.0015 * k
+        # a fifth of the width at the most, where noise is small beside the misses
+        assert after.half_width(systematic=False)[1] < 0.5 * before.half_width(systematic=False)[1]
+
+
+@pytest.mark.slow
+def test_what_its_own_uncertainty_leaves_covers_what_is_left():
+    """Over many campaigns the error of H that a wrong slope makes is as large as `left` says."""
+    z = []
+    for seed in range(40):
+        points, misses, first = campaign([7, seed], loads=(3000.0, 5000.0, 8000.0), noise=2.0)
+        for p, miss, turn in zip(points, misses, turns_of(points, misses, first), strict=True):
+            k, c = 2.0e8 * (p.point.static_load / 5e3) ** 0.7, 8.0e7
+            true = np.array([[0, SK * k + 1j * SC * c], [SK * k + 1j * SC * c, 0]])
+            shape = np.array([p.D[p.run_index == r].mean(axis=0) for r in range(6)])
+            error = (turn.slope - true) @ (np.linalg.pinv(shape) @ (miss.sideways[:, None] * shape)).T
+            z.append(np.concatenate([error.real.ravel(), error.imag.ravel()]) / np.sqrt(np.diag(turn.left)))
+    spread = float(np.sqrt(np.mean(np.square(z))))
+    assert 0.6 < spread < 1.3
+
+
+def test_loads_that_point_where_they_should_change_nothing():
+    points, misses, first = campaign(3, turn=0.0)
+    for p, miss, turn in zip(points, misses, turns_of(points, misses, first), strict=True):
+        assert np.abs(turned_back(p, miss, turn)).max() < 1e-6
+        assert np.abs(turn.left).max() < 1.0
+
+
+def test_forces_that_mains_struck_teach_nothing_but_are_put_right():
+    points, misses, first = campaign(4)
+    spoiled = replace(points[0], F=points[0].F * (1 + 0.3 * np.exp(1j * np.arange(len(points[0].F)))[:, None]))
+    with_it = turns_of([spoiled, *points[1:]], misses, first, [False, *[True] * 5])
+    without = turns_of(points[1:], misses[1:], first[1:])
+    k = 2.0e8 * (2500.0 / 5e3) ** 0.7
+    assert with_it[0] is not None
+    assert abs(with_it[0].slope[0, 1] - (SK * k + 1j * SC * 8e7)) < 0.4 * abs(SK * k)
+    np.testing.assert_allclose(with_it[3].slope[0, 1], without[2].slope[0, 1], rtol=0.1)
+    assert turns_of([spoiled], misses[:1], first[:1], [False]) == [None]
+
+
+def test_two_runs_cannot_tell_a_slope_and_a_load_far_aside_is_no_miss():
+    points, misses, first = campaign(5, loads=(5000.0,))
+    assert run_ratios(points[0], replace(misses[0], sideways=np.full(6, 0.2)), first[0]) is None
+    keep = points[0].run_index < 2
+    few = replace(
+        points[0],
+        runs=points[0].runs[:2],
+        D=points[0].D[keep],
+        F=points[0].F[keep],
+        run_index=points[0].run_index[keep],
+    )
+    assert run_ratios(few, misses[0], first[0]) is None
+    assert direction_slopes([(0.0, 1.0)], [None]) == [None]
+
+
+class _Known:
+    """An identification that knows no point: load misses then move a position round only."""
+
+    points = ()
+
+
+def round_locus(angles, centre):
+    points = []
+    for a in angles:
+        place = 60e-6 * np.array([math.cos(a + 0.3), math.sin(a + 0.3)]) + centre
+        points.append(LocusPoint("r", OperatingPoint(5e3, a, 138.0, 0.0), 5e3, a, place, np.eye(2) * 1e-16))
+    return Locus(tuple(points), np.zeros(2), np.zeros(2))
+
+
+@pytest.mark.parametrize("count", [20, 6, 4])
+def test_a_round_locus_turns_with_the_load_wherever_its_centre(count):
+    locus = round_locus(2 * np.pi * np.arange(count) / count, np.array([3e-4, -1e-4]))
+    for p, moved in zip(locus.points, moved_by_miss(locus, _Known()), strict=True):
+        a = p.point.static_load_direction + 0.3
+        np.testing.assert_allclose(moved[:, 1], 60e-6 * np.array([-math.sin(a), math.cos(a)]), atol=1e-10)
+        assert np.all(moved[:, 0] == 0.0)

@@ -1,0 +1,161 @@
+"""Long records: read once, block by block, with the same phasors as the plain way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigdata.campaign import load_campaign
+from rigdata.virtual_rig import Timing, write_campaign
+from tests.dynamic.test_identify import rig
+from tests.studies.bench_phasors import HeldRun
+from tpjb_ident.dynamic.records.extraction import extract
+from tpjb_ident.dynamic.records.line_tuning import retuned
+from tpjb_ident.dynamic.records.lines import known_lines
+from tpjb_ident.dynamic.records.phasors import LineFitter
+from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
+from tpjb_ident.dynamic.records.short_record import SHORT, ShortRecord
+from tpjb_ident.dynamic.records.stretches import open_stretches
+from tpjb_ident.dynamic.records.wave_blocks import BLOCK, WaveBlocks
+from tpjb_ident.dynamic.records.windows import WindowSettings, line_design
+
+FREQUENCIES = np.array([25.0, 22.0, 44.0, 50.0])
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    path = tmp_path_factory.mktemp("rig") / "c.h5"
+    timing = Timing(dynamic_rate=5000.0, dynamic_seconds=8.0)
+    write_campaign(path, rig([(5000.0, 25.0)], seed=4, timing=timing, directions=(0.3,)))
+    return load_campaign(path).of_kind("dynamic")[0]
+
+
+@pytest.mark.parametrize("length", [2 * BLOCK, 5 * BLOCK + 17, 6 * BLOCK - 1])
+def test_blocks_are_the_plain_columns(length):
+    rng = np.random.default_rng(length)
+    rows, coefficients = rng.standard_normal((3, length)), rng.standard_normal((3, 10))
+    design = line_design(np.arange(length) / 1000.0, FREQUENCIES)
+    blocks = WaveBlocks(length, 1000.0, FREQUENCIES)
+    np.testing.assert_allclose(blocks.project(rows), rows @ design, rtol=0, atol=1e-11 * length)
+    expected = rows - coefficients @ design.T
+    blocks.subtract(rows, coefficients)
+    np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-11)
+
+
+def test_stretches_are_what_the_run_says(run):
+    with open_stretches(run, ("displacement", "force")) as stretches:
+        for start, stop in ((0, 1000), (7777, 9000), (run.length - 5, run.length)):
+            stretch = stretches.read(start, stop)
+            for quantity, rows in stretch.rows.items():
+                expected = run.vector(quantity, start, stop).values.T
+                np.testing.assert_allclose(rows, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
+            np.testing.assert_array_equal(stretch.speed, run.speed(start, stop).values)
+            assert stretch.time is None  # this file has no clock of its own
+
+
+def test_missing_values_and_overflows_are_those_of_the_run(run, tmp_path):
+    import shutil
+
+    import h5py
+
+    path = tmp_path / "gaps.h5"
+    shutil.copy(run.reader.path, path)
+    with h5py.File(path, "r+") as file:
+        file[f"runs/{run.id}/X1A"][100:110] = np.nan
+        file[f"runs/{run.id}/L1H"][150] = 3e38
+    broken = load_campaign(path).of_kind("dynamic")[0]
+    with open_stretches(broken, ("displacement", "force")) as stretches:
+        rows = stretches.read(0, 300).rows
+    assert np.flatnonzero(np.isnan(rows["displacement"]).any(axis=0)).tolist() == list(range(100, 110))
+    assert np.flatnonzero(np.isnan(rows["force"]).any(axis=0)).tolist() == [150]
+
+
+def test_a_kept_file_serves_many_requests_and_lets_go(run):
+    reader = run.reader
+    with reader.kept_open():
+        parts = [reader.read(["X1A"], i, i + 500)[0] for i in range(0, 5000, 500)]
+    np.testing.assert_array_equal(np.concatenate(parts), reader.read(["X1A"], 0, 5000)[0])
+    assert reader.held == {}
+    with pytest.raises(KeyError, match="mine"), reader.kept_open():
+        raise KeyError("mine")  # no fault of the file
+    assert reader.held == {}
+
+
+@pytest.mark.slow
+def test_a_long_run_is_read_once_and_says_the_same():
+    """Beyond SHORT samples lines are looked for in the beginning; the shaft is off its set point here."""
+
+    class Counted(HeldRun):
+        samples = 0
+
+        def vector(self, quantity, start=None, stop=None):
+            record = super().vector(quantity, start, stop)
+            Counted.samples += len(record)
+            return record
+
+        def speed(self, start=None, stop=None):
+            return None
+
+    long = Counted(
+        "a", 5, sample_rate=10_000.0, seconds=40.0, point=replace(HeldRun.point, shaft_speed=2 * np.pi * 22.01)
+    )
+    assert long.length > 2 * SHORT
+    windows = WindowSettings(length=2.0)
+    settings = PhasorSettings(windows=windows)
+    once = run_phasors(long, 30.0, settings)
+    # three quantities once, and the beginning for a look
+    assert Counted.samples < 3 * long.length + 3 * SHORT + 2**16
+    plain = extract(ShortRecord(long), 30.0, settings, known_lines((25.0,), 22.0, long.sample_rate))
+    size = np.abs(plain.displacement.phasors[:, 0]).max()
+    np.testing.assert_allclose(once.displacement.phasors[:, 0], plain.displacement.phasors[:, 0], atol=2e-4 * size)
+    assert once.lines.frequencies[1] == pytest.approx(22.0, abs=1e-4)
+
+
+def test_frequencies_are_put_right_without_reading_again(run):
+    exact = known_lines((25.0,), 22.0, run.sample_rate)
+    settings = PhasorSettings(windows=WindowSettings(length=1.0))
+    right = extract(ShortRecord(run), 30.0, settings, exact)
+    off = extract(ShortRecord(run), 30.0, settings, known_lines((25.002,), 22.0, run.sample_rate))
+    size = np.abs(right.displacement.phasors[:, 0]).max()
+    assert np.abs(off.displacement.phasors[:, 0] - right.displacement.phasors[:, 0]).max() > 0.05 * size
+    mended = retuned(off, exact)
+    np.testing.assert_allclose(
+        mended.displacement.phasors[:, 0], right.displacement.phasors[:, 0], rtol=0, atol=1e-3 * size
+    )
+    assert retuned(off, known_lines((24.9,), 22.0, run.sample_rate)) is None
+
+
+def test_a_few_outliers_of_a_long_window_are_left_out_as_by_the_robust_fit():
+    length = 8192
+    fitter = LineFitter(length, 5000.0, FREQUENCIES)
+    rng = np.random.default_rng(3)
+    time = np.arange(length) / 5000.0
+    rows = np.stack([np.cos(2 * np.pi * 25 * time), np.sin(2 * np.pi * 25 * time)]) + 0.01 * rng.standard_normal(
+        (2, length)
+    )
+    spoiled = rows.copy()
+    spoiled[0, 4000:4004] += 0.2
+    block = fitter.fit(spoiled[:, None], np.zeros(1))
+    keep = np.r_[0:3997, 4007:length]
+    exact = np.linalg.lstsq(fitter.design[keep], rows[0, keep], rcond=None)[0]
+    assert block.lost[0] == pytest.approx(10 / length)
+    assert abs(block.phasors[0, 0, 0] - (exact[0] + 1j * exact[1])) < 1e-9
+
+
+def test_a_glitch_that_fills_a_window_is_seen_against_the_other_chunks():
+    """A chunk of one long window has nothing to compare its noise with; the run has."""
+
+    class Glitched(HeldRun):
+        def __post_init__(self):
+            super().__post_init__()
+            part = slice(80_000, 100_000)
+            self.data["displacement"][part, 0] += 3e-6 * np.sin(2 * np.pi * 25.0 * self.time[part])
+
+    settings = PhasorSettings(windows=WindowSettings(length=4.0), find_lines=False)
+    lines = known_lines((25.0,), 22.0, 10_000.0)
+    glitched, sound = (extract(kind("a", 2, seconds=20.0), 30.0, settings, lines) for kind in (Glitched, HeldRun))
+    hit, clean = (r.displacement.phasors[:, 0, 0] for r in (glitched, sound))
+    assert glitched.displacement.lost[2] > 0.3
+    assert np.abs(hit - clean)[2] < 0.02 * np.abs(clean[2]) or np.isnan(hit[2])

@@ -1,0 +1,154 @@
+"""Joint line fit: phasors, their sign, glitches, gaps, and lines close together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tpjb_ident.dynamic.records.lines import LineSettings, known_lines
+from tpjb_ident.dynamic.records.oil_force import oil_force
+from tpjb_ident.dynamic.records.phasors import LineFitter, fit_uneven
+from tpjb_ident.dynamic.records.windows import (
+    RecordTooShortError,
+    WindowSettings,
+    plan_windows,
+    shortest_window,
+    variance_inflation,
+)
+
+RATE = 1000.0
+TRUE = {25.0: (3.0 - 1.0j, 0.5 + 2.0j), 22.0: (1.0j, 2.0), 44.0: (0.3, 0.1j), 50.0: (0.2 + 0.2j, -0.1)}
+
+
+def record(n: int, noise: float = 0.0, seed: int = 0) -> np.ndarray:
+    t = np.arange(n) / RATE
+    rng = np.random.default_rng(seed)
+    values = np.empty((n, 2))
+    for axis in range(2):
+        wave = sum((z[axis] * np.exp(2j * np.pi * f * t)).real for f, z in TRUE.items())
+        values[:, axis] = wave + 700.0 + 4.0 * t + noise * rng.standard_normal(n)
+    return values
+
+
+def fit(values: np.ndarray, length: int):
+    count = len(values) // length
+    fitter = LineFitter(length, RATE, np.array(list(TRUE)))
+    return fitter.fit(values[: count * length].T.reshape(2, count, length), np.arange(count) * length / RATE)
+
+
+def test_exact_lines_are_found_in_every_window_with_the_phase_of_the_run():
+    block = fit(record(1000), 250)
+    for i, z in enumerate(TRUE.values()):
+        np.testing.assert_allclose(block.phasors[:, i], np.tile(z, (4, 1)), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(block.mean[:, 0], 700 + 4 * (np.arange(4) + 0.4995 - 0.0) * 0.25, atol=2e-3)
+
+
+def test_phasors_have_the_sign_of_a_positive_damper():
+    omega, k, c = 2 * np.pi * 25, 2e8, 4e5
+    t = np.arange(500) / RATE
+    x = 1e-6 * np.cos(omega * t + 0.7)
+    velocity = -1e-6 * omega * np.sin(omega * t + 0.7)
+    fitter = LineFitter(500, RATE, np.array([25.0]))
+    d = fitter.fit(np.stack([x, x])[:, None], np.zeros(1)).phasors[0, 0, 0]
+    f = fitter.fit(np.stack([k * x + c * velocity] * 2)[:, None], np.zeros(1)).phasors[0, 0, 0]
+    assert (f / d).imag / omega == pytest.approx(c, rel=1e-9)
+
+
+@pytest.mark.parametrize("samples", [3, 20, 50])
+@pytest.mark.parametrize("size", [8.0, 300.0])
+def test_a_glitch_in_one_channel_does_no_harm(samples: int, size: float):
+    clean, values = record(2000, noise=0.1, seed=1), record(2000, noise=0.1, seed=1)
+    values[310 : 310 + samples, 1] += size * np.hanning(samples + 2)[1:-1]
+    reference, block = fit(clean, 250), fit(values, 250)
+    # the noise of a phasor is 0.1 sqrt(2/250) = 0.009; a window with a quarter less data a little more
+    np.testing.assert_allclose(block.phasors, reference.phasors, atol=0.02)
+    assert block.lost[1] > 0
+    assert block.lost[[0, 2, 3, 4, 5, 6, 7]].max() == 0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_leaving_out_few_samples_gives_what_the_long_robust_way_gives(seed: int, monkeypatch: pytest.MonkeyPatch):
+    rng = np.random.default_rng(seed)
+    values = record(8000, 0.02, seed)
+    for at in rng.integers(0, 7800, 4):  # bursts and needles, up to 9 % of a window
+        values[at : at + rng.integers(1, 90), rng.integers(2)] += rng.choice((-1, 1)) * 10 ** rng.uniform(-0.7, 3)
+    quick = fit(values, 4000)
+    monkeypatch.setattr(LineFitter, "_without_few", lambda *_: None)
+    robust = fit(values, 4000)
+    assert (quick.lost < 0.1).all()
+    assert np.abs(quick.phasors - robust.phasors).max() < 2e-4  # the noise of a phasor is 4e-4
+    assert np.abs(quick.lost - robust.lost).max() < 3e-3
+    monkeypatch.undo()
+    clean = fit(record(8000, 0.02, seed), 4000)
+    assert np.abs(quick.phasors - clean.phasors).max() < 2e-3
+
+
+def test_missing_samples_are_left_out_and_too_many_give_no_phasor():
+    values = record(1000)
+    values[10:60, 0] = np.nan
+    values[500:650] = np.nan
+    block = fit(values, 250)
+    np.testing.assert_allclose(block.phasors[0, 0], TRUE[25.0], atol=1e-9)
+    assert block.lost[0] == pytest.approx(50 / 250)
+    assert np.isnan(block.phasors[2]).all()
+    assert np.isfinite(block.phasors[[0, 1, 3]]).all()
+
+
+def test_uneven_times_are_fitted_where_they_are():
+    rng = np.random.default_rng(3)
+    t = np.sort(np.arange(400) / RATE + rng.uniform(-3e-4, 3e-4, 400)) + 0.2
+    keep = np.ones(400, dtype=bool)
+    keep[100:140] = False
+    values = np.stack(
+        [sum((z[a] * np.exp(2j * np.pi * f * t)).real for f, z in TRUE.items()) for a in range(2)], axis=1
+    )
+    block = fit_uneven(values[keep], t[keep], np.array(list(TRUE)), 0.0)
+    np.testing.assert_allclose(block.phasors[0, 0], TRUE[25.0], atol=1e-9)
+
+
+def test_lines_that_coincide_are_merged_or_reported():
+    lines = known_lines((25.0,), 22.0, RATE)
+    assert [line.name for line in lines.nuisance] == ["1X", "2X", "mains"]  # 2 x 25 Hz is the mains line
+    struck = known_lines((50.0,), 22.0, RATE)
+    assert struck.conditions == ("mains on excitation line",)
+    assert "move the excitation" in struck.conditions[0].detail
+    assert known_lines((50.0,), 22.0, RATE, LineSettings(mains=60.0)).conditions == ()
+    with pytest.raises(ValueError, match="between 0 and 450 Hz"):
+        known_lines((600.0,), 22.0, RATE)
+
+
+def test_window_length_follows_from_the_variance_that_is_accepted():
+    lines = known_lines((25.0,), 22.0, RATE)
+    settings = WindowSettings()
+    shortest = shortest_window(lines, RATE, settings)
+    assert 0.1 < shortest < 0.5
+    assert variance_inflation(lines.frequencies, 1, shortest, RATE) <= settings.max_inflation
+    length, count = plan_windows(2000, RATE, lines, settings)
+    assert count == int(2.0 / shortest)
+    assert length * count <= 2000
+    # a long record is cut into the wished number, not into the shortest possible windows
+    assert plan_windows(60_000, RATE, lines, settings) == (3000, 20)
+
+
+def test_a_record_too_short_is_refused_with_the_length_it_takes():
+    close = known_lines((22.4,), 22.0, RATE)
+    with pytest.raises(RecordTooShortError, match="takes at least") as caught:
+        plan_windows(1000, RATE, close, WindowSettings())
+    needed = caught.value.needed
+    assert needed > 1.0
+    length, _ = plan_windows(int(needed * RATE * 1.05), RATE, close, WindowSettings())
+    assert length / RATE >= needed * 0.999
+    with pytest.raises(RecordTooShortError, match="cannot tell the lines apart"):
+        plan_windows(60_000, RATE, close, WindowSettings(length=0.3))
+
+
+def test_inflation_of_orthogonal_lines_is_one_and_of_one_line_twice_is_infinite():
+    assert variance_inflation(np.array([25.0, 20.0]), 1, 1.0, RATE) == pytest.approx(1.0, abs=2e-2)
+    assert np.isinf(variance_inflation(np.array([25.0, 25.0]), 1, 1.0, RATE))
+
+
+def test_inertia_is_added_to_the_cell_force():
+    f = oil_force(np.array([[100.0 + 0j, 0.0]]), np.array([[-0.5 + 0j, 2.0]]), 30.0)
+    np.testing.assert_allclose(f, [[85.0, 60.0]])
+    with pytest.raises(ValueError, match="housing mass"):
+        oil_force(np.zeros((1, 2), complex), np.zeros((1, 2), complex), float("nan"))

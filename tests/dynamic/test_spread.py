@@ -1,0 +1,582 @@
+"""Where the interval of H comes from, and who is heard: exact limits of covariances, fits of means and readmission."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from tests.dynamic.phasor_cases import H, complex_normal
+from tpjb_ident.dynamic.estimators.drive_phase import LOCKED, aligned
+from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats, eiv_fit, repeats
+from tpjb_ident.dynamic.estimators.mm import mm_fit
+from tpjb_ident.dynamic.estimators.phasor_table import displacement_condition, phasor_table
+from tpjb_ident.dynamic.estimators.trimmed_start import (
+    Regression,
+    distance2,
+    evenly_chosen,
+    products,
+    robust_start,
+    scatter,
+)
+from tpjb_ident.dynamic.estimators.uncertainty import (
+    CLEAR,
+    DirectionMeans,
+    complex_to_real_covariance,
+    direction_effect,
+    information,
+    spread_of,
+    with_repeats,
+)
+from tpjb_ident.dynamic.estimators.whole_directions import readmitted
+
+
+def hermitian(rng, n):
+    root = complex_normal(rng, n, n)
+    return root @ root.conj().T + 0.3 * np.eye(n)
+
+
+def balanced_scores(g):
+    """Scores of g directions, all eight parts of one size, that sum to zero: signs of a Hadamard matrix."""
+    signs = np.array([[1]])
+    while len(signs) < g:
+        signs = np.block([[signs, signs], [signs, -signs]])
+    columns = signs[:, 1:9].astype(float)
+    return columns[:, :4] + 1j * columns[:, 4:]
+
+
+def test_leaving_directions_out_gives_the_variance_of_a_mean():
+    """Equal parts of the equations: H is a mean over directions, its variance the sample's over g."""
+    g = 16
+    score = 0.01 * balanced_scores(g)
+    parts = np.broadcast_to(np.eye(4, dtype=complex), (g, 4, 4))
+    repeat = 1e-14 * np.eye(4, dtype=complex)
+    found = spread_of(score, parts, repeat, 2.0, 100.0, known_effect=True)
+    expected = 0.01**2 / (g * (g - 1)) * g * np.eye(8)
+    np.testing.assert_allclose(found.covariance, expected, rtol=1e-6, atol=1e-12)
+    # all directions say the same of the variance: as many degrees of freedom as a mean has
+    np.testing.assert_allclose(found.dof, g - 1, rtol=1e-6)
+
+
+def test_repeat_noise_is_what_remains_where_directions_agree_better_than_it():
+    g = 16
+    parts = np.broadcast_to(np.eye(4, dtype=complex), (g, 4, 4))
+    repeat = hermitian(np.random.default_rng(1), 4)
+    known = complex_to_real_covariance(repeat)
+    small = spread_of(1e-6 * balanced_scores(g), parts, repeat, 3.0, 40.0, known_effect=True)
+    np.testing.assert_allclose(small.covariance, known, rtol=1e-9)
+    np.testing.assert_allclose(small.dof, 40.0, rtol=1e-6)
+    for chi_square in (0.3, 1.0, np.nan):
+        calm = spread_of(100 * balanced_scores(g), parts, repeat, chi_square, 40.0)
+        np.testing.assert_array_equal(calm.covariance, known)
+        np.testing.assert_array_equal(calm.dof, 40.0)
+    two = spread_of(balanced_scores(16)[:2], parts[:2], repeat, 9.0, 0.2, known_effect=True)
+    np.testing.assert_array_equal(two.covariance, known)
+    np.testing.assert_array_equal(two.dof, 1.0)
+
+
+def test_what_directions_add_grows_with_the_doubt_and_is_whole_at_its_95_per_cent():
+    g = 16
+    parts = np.broadcast_to(np.eye(4, dtype=complex), (g, 4, 4))
+    repeat = 1e-5 * hermitian(np.random.default_rng(2), 4)
+    known = complex_to_real_covariance(repeat)
+    sure = chi2.ppf(0.95, 4 * (g - 2)) / (4 * (g - 2))
+
+    def added(chi_square, known_effect=False):
+        score = 0.3 * balanced_scores(g)
+        return spread_of(score, parts, repeat, chi_square, 40.0, known_effect).covariance - known
+
+    whole = added(sure)
+    np.testing.assert_allclose(added(1 + 0.25 * (sure - 1)), 0.25 * whole, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(added(3 * sure), whole, rtol=1e-9)
+    np.testing.assert_allclose(added(0.5, known_effect=True), whole, rtol=1e-9)
+    assert np.linalg.eigvalsh(whole).min() > -1e-12
+
+
+def exact_repeats(seed, g=6, n=10, scale=0.05):
+    """Windows whose direction means lie exactly on F = H D: all scatter is repeat noise."""
+    rng = np.random.default_rng(seed)
+    D = complex_normal(rng, g, 2)
+    off = scale * complex_normal(rng, g, n, 2)
+    off = off - off.mean(axis=1, keepdims=True)
+    F = (D @ H.T)[:, None, :] + off
+    return phasor_table(np.repeat(D, n, axis=0), F.reshape(-1, 2), np.repeat(np.arange(g), n))
+
+
+def test_covariance_of_equal_repeats_is_noise_times_inverse_gram():
+    table = exact_repeats(3)
+    h = H / table.h_scale
+    residual = table.F - table.D @ h.T
+    noise = residual.T @ residual.conj() / (60 - 6)
+    inverse = np.linalg.inv(table.D.conj().T @ table.D)
+    covariance, dof, chi_square = with_repeats(table, h, np.ones(60))
+    np.testing.assert_allclose(covariance, complex_to_real_covariance(np.kron(noise, inverse)), rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(dof, 2 * 54)
+    assert chi_square < 1e-20
+    doubled = with_repeats(table, h, np.ones(60), correction=2.0)
+    np.testing.assert_allclose(doubled[0], 2 * covariance, rtol=1e-12)
+    # a weight of one half on every window: half as many windows
+    half = with_repeats(table, h, np.full(60, 0.5))
+    np.testing.assert_allclose(half[0], 2 * covariance * 54 / 60 * (0.5 * 60) / (30 - 6), rtol=1e-9)
+    np.testing.assert_allclose(half[1], 2 * (30 - 6))
+
+
+def test_windows_without_weight_and_their_direction_count_for_nothing():
+    table = exact_repeats(4)
+    h = H / table.h_scale
+    weights = (table.direction != 2).astype(float)
+    some = table.direction != 2
+    spoilt = dataclasses.replace(table, F=table.F + 50.0 * ~some[:, None])
+    left = with_repeats(spoilt, h, weights)
+    direction = np.unique(table.direction[some], return_inverse=True)[1]
+    without = dataclasses.replace(table, D=table.D[some], F=table.F[some], direction=direction)
+    for a, b in zip(left[:2], with_repeats(without, h, np.ones(50))[:2], strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("n", "told"), [(1, False), (2, False), (3, True)])
+def test_four_spare_repeats_are_needed(n, told):
+    """Three directions with 1, 2 and 3 windows: 0, 3 and 6 beyond one per direction."""
+    table = exact_repeats(5, g=3, n=n)
+    assert (with_repeats(table, H / table.h_scale, np.ones(3 * n)) is not None) is told
+
+
+@pytest.mark.parametrize(("factor", "found"), [(0.98, False), (1.02, True)])
+def test_an_effect_takes_part_once_it_is_beyond_doubt(factor, found):
+    rng = np.random.default_rng(6)
+    g, count = 8, 10.0
+    D = complex_normal(rng, g, 2)
+    noise = hermitian(rng, 2)
+    limit = chi2.isf(CLEAR, 4 * (g - 2)) / (4 * (g - 2))
+    off = complex_normal(rng, g, 2)
+    whitened = np.linalg.solve(np.linalg.cholesky(noise), off.T)
+    size = np.sqrt(count * (np.abs(whitened) ** 2).sum() / (2 * (g - 2)))
+    off = off * np.sqrt(factor * limit) / size
+    T, chi_square = direction_effect(off, DirectionMeans(D, D @ H.T, np.full(g, count)), noise)
+    assert chi_square == pytest.approx(factor * limit)
+    assert bool(T.any()) is found
+
+
+def test_the_size_of_an_effect_is_unbiased():
+    """Mean of what is found over many draws, noise and fit included, is what was put in."""
+    rng = np.random.default_rng(7)
+    g = 12
+    D, count = complex_normal(rng, g, 2), rng.uniform(5, 20, g)
+    noise, effect = 1e-3 * hermitian(rng, 2), 0.02 * hermitian(rng, 2)
+    power = np.linalg.norm(D, axis=1)[:, None]
+    found = []
+    for _ in range(400):
+        off = power * (complex_normal(rng, g, 2) @ np.linalg.cholesky(effect).T)
+        off = off + complex_normal(rng, g, 2) @ np.linalg.cholesky(noise).T / np.sqrt(count)[:, None]
+        weighted = np.sqrt(count)[:, None]
+        fitted = np.linalg.lstsq(weighted * D, weighted * off, rcond=None)[0]
+        T, _ = direction_effect(off - D @ fitted, DirectionMeans(D, D @ H.T, count), noise)
+        found.append(T)
+    np.testing.assert_allclose(np.mean(found, axis=0), effect, atol=0.12 * np.abs(effect).max())
+
+
+def noisy_means(seed, noise, effect=0.0, g=8, count=None):
+    rng = np.random.default_rng(seed)
+    count = np.full(g, 20.0) if count is None else count
+    D = complex_normal(rng, g, 2)
+    F = D @ H.T + effect * np.linalg.norm(D, axis=1)[:, None] * complex_normal(rng, g, 2)
+    z = np.concatenate([D, F], axis=1)
+    z = z + complex_normal(rng, g, 4) @ np.linalg.cholesky(noise).T / np.sqrt(count)[:, None]
+    return Repeats(DirectionMeans(z[:, :2], z[:, 2:], count), noise, float(count.sum() - g), np.ones(int(count.sum())))
+
+
+NOISE = 1e-3 * hermitian(np.random.default_rng(20), 4)
+
+
+@pytest.mark.parametrize("effect", [0.0, 0.5])
+def test_errors_in_variables_follow_any_linear_change_of_axes(effect):
+    """D -> A D and F -> B F with their noise: H -> B H A^-1, its covariance with it, chi-square as it was."""
+    given = noisy_means(8, NOISE, effect)
+    rng = np.random.default_rng(9)
+    turn = np.linalg.qr(complex_normal(rng, 2, 2))[0]  # keeps |D|, of which a direction effect is a multiple
+    B = complex_normal(rng, 2, 2)
+    both = np.block([[turn, np.zeros((2, 2))], [np.zeros((2, 2)), B]])
+    means = DirectionMeans(given.means.D @ turn.T, given.means.F @ B.T, given.means.count)
+    changed = dataclasses.replace(given, means=means, noise=both @ given.noise @ both.conj().T)
+    a, b = eiv_fit(given), eiv_fit(changed)
+    np.testing.assert_allclose(b.h, B @ a.h @ np.linalg.inv(turn), rtol=1e-9, atol=1e-10)
+    assert b.chi_square == pytest.approx(a.chi_square, rel=1e-6)
+    np.testing.assert_allclose(b.attenuation, a.attenuation, rtol=1e-6)
+    scaled = DirectionMeans(1e3 * given.means.D, 1e-2 * given.means.F, given.means.count)
+    size = np.diag([1e3, 1e3, 1e-2, 1e-2])
+    c = eiv_fit(dataclasses.replace(given, means=scaled, noise=size @ given.noise @ size))
+    np.testing.assert_allclose(c.h, 1e-5 * a.h, rtol=1e-9)
+    np.testing.assert_allclose(c.covariance, 1e-10 * a.covariance, rtol=1e-6, atol=1e-20)
+    np.testing.assert_allclose(c.dof, a.dof, rtol=1e-6)
+
+
+def test_with_direction_effects_the_stated_equation_is_solved():
+    """sum V^-1 (F - H D) D*^H = 0, V = repeat noise / n + T |D|^2, D* the displacement that the residual leaves."""
+    given = noisy_means(10, NOISE, effect=0.5, count=np.array([5.0, 9.0, 20.0, 40.0, 7.0, 30.0, 12.0, 25.0]))
+    fit, means = eiv_fit(given), given.means
+    assert fit.chi_square > 5
+
+    def equation(h, T):
+        A = np.concatenate([-h, np.eye(2)], axis=1)
+        total = np.zeros((2, 2), dtype=complex)
+        for D, F, count in zip(means.D, means.F, means.count, strict=True):
+            V = A @ given.noise @ A.conj().T / count + T * np.linalg.norm(D) ** 2
+            answer = np.linalg.solve(V, F - h @ D)
+            true = D - given.noise[:2] @ A.conj().T @ answer / count
+            total += np.outer(answer, true.conj())
+        return total
+
+    # the effect's size comes from the closed fit: no effect, the same means
+    from tpjb_ident.dynamic.estimators.errors_in_variables import _closed_form, _residual_noise
+
+    first = _closed_form(means, given.noise)
+    T, chi_square = direction_effect(means.F - means.D @ first.T, means, _residual_noise(first, given.noise))
+    assert chi_square == fit.chi_square
+    size = np.abs(equation(fit.h + 0.01, T)).max()
+    np.testing.assert_allclose(equation(fit.h, T), 0.0, atol=1e-8 * size)
+    assert not np.allclose(fit.h, first, atol=1e-4)
+
+
+def test_a_direction_may_be_told_in_two_halves():
+    """As long as directions agree as repeats do, ten windows of one direction are five and five."""
+    given = noisy_means(11, NOISE)
+    means = given.means
+    halves = DirectionMeans(np.r_[means.D, means.D], np.r_[means.F, means.F], np.r_[means.count, means.count] / 2)
+    a, b = eiv_fit(given), eiv_fit(dataclasses.replace(given, means=halves))
+    assert a.chi_square < 1.5
+    np.testing.assert_allclose(b.h, a.h, rtol=0, atol=1e-10)
+
+
+def test_known_differences_of_directions_widen_the_interval_only():
+    given = noisy_means(12, NOISE)
+    calm, wide = eiv_fit(given), eiv_fit(given, directions_differ=True)
+    np.testing.assert_array_equal(calm.h, wide.h)
+    assert (np.diag(wide.covariance) >= np.diag(calm.covariance) * (1 - 1e-9)).all()
+    assert calm.chi_square < 1.2
+    assert np.trace(wide.covariance) > 1.02 * np.trace(calm.covariance)
+    assert (wide.dof <= calm.dof).all()
+
+
+def windows(seed, g=6, n=40, noise=NOISE):
+    rng = np.random.default_rng(seed)
+    D = np.repeat(complex_normal(rng, g, 2), n, axis=0)
+    z = np.concatenate([D, D @ H.T], axis=1) + complex_normal(rng, g * n, 4) @ np.linalg.cholesky(noise).T
+    return phasor_table(z[:, :2], z[:, 2:], np.repeat(np.arange(g), n))
+
+
+def test_windows_far_from_their_direction_are_left_out_of_means_and_noise():
+    table = windows(13)
+    clean = repeats(table, np.ones(240))
+    far = np.zeros(240, dtype=bool)
+    far[[0, 1, 60, 100, 230]] = True
+    spoilt = dataclasses.replace(table, F=table.F + 40.0 * far[:, None] * (1 + 1j))
+    found = repeats(spoilt, np.where(far, 0.0, 1.0))
+    np.testing.assert_array_equal(found.weights[far], 0.0)
+    np.testing.assert_allclose(found.noise, repeats(table, np.where(far, 0.0, 1.0)).noise, rtol=0.05, atol=2e-5)
+    np.testing.assert_allclose(found.means.F, clean.means.F, atol=0.03)
+    assert found.spare == pytest.approx(found.weights.sum() - 6)
+    # a sound window that was given no weight is taken back by its own distance
+    back = repeats(table, np.where(np.arange(240) == 5, 0.0, 1.0))
+    assert back.weights[5] == clean.weights[5]
+    # below a fifth a window does not take part in the first look
+    np.testing.assert_array_equal(repeats(table, np.full(240, 0.19)) is None, True)
+    np.testing.assert_allclose(repeats(table, np.full(240, 0.21)).noise, clean.noise)
+
+
+@pytest.mark.parametrize(("g", "n", "told"), [(2, 5, True), (2, 4, False), (8, 2, True), (7, 2, False)])
+def test_eight_spare_repeats_make_a_noise_of_four_components(g, n, told):
+    table = windows(14, g, n)
+    weights = np.ones(g * n)
+    state = repeats(table, weights, rounds=0)
+    assert (state is not None) is told
+
+
+def test_a_wandering_drive_is_turned_to_one_phase():
+    table = windows(15, noise=1e-6 * np.eye(4))
+    rng = np.random.default_rng(1)
+    turn = np.exp(2j * np.pi * rng.random(240)) ** (table.direction >= 4)
+    z = np.concatenate([table.D, table.F], axis=1)
+    turned, count = aligned(z * turn[:, None], table.direction, np.ones(240))
+    assert count == 2
+    np.testing.assert_array_equal(turned[table.direction < 4], z[table.direction < 4])
+    for d in (4, 5):
+        mine = turned[table.direction == d]
+        assert np.abs(mine.sum(axis=0)).max() > 0.999 * np.abs(mine).sum(axis=0).max()
+        first = z[table.direction == d][0]
+        assert abs(np.vdot(mine[0], first)) == pytest.approx(np.linalg.norm(first) ** 2, rel=1e-9)
+    same, none = aligned(z, table.direction, np.ones(240))
+    assert none == 0
+    assert same is z
+    locked = np.exp(1j * np.arccos(LOCKED + 0.01) * np.where(np.arange(240) % 2, 1, -1))
+    assert aligned(z * locked[:, None], table.direction, np.ones(240))[1] == 0
+    loose = np.exp(1j * np.arccos(LOCKED - 0.01) * np.where(np.arange(240) % 2, 1, -1))
+    assert aligned(z * loose[:, None], table.direction, np.ones(240))[1] == 6
+    two = np.repeat(np.arange(120), 2)
+    assert aligned(z * loose[:, None], two, np.ones(240))[1] == 0
+
+
+def test_condition_is_the_ratio_of_the_axes():
+    assert displacement_condition(np.array([[3.0, 0.0], [0.0, 1.0j]])) == pytest.approx(3.0)
+    assert displacement_condition(np.array([[3.0, 0.0], [0.0, 1.0j]]), np.array([1.0, 9.0])) == pytest.approx(1.0)
+    assert displacement_condition(np.array([[3.0, 1.0]])) == np.inf
+    assert displacement_condition(np.array([[3.0, 1.0], [6.0, 2.0]])) == np.inf
+
+
+@pytest.mark.parametrize("q", [1, 2, 3])
+def test_sums_over_windows_are_those_of_matrices(q):
+    """Fits, scatters and distances of many weightings at once, each as a plain formula says."""
+    rng = np.random.default_rng(q)
+    X, Y = complex_normal(rng, 20, 2), complex_normal(rng, 20, q)
+    weights = rng.uniform(0, 1, (3, 20))
+    regression = Regression(X, Y)
+    fits = regression.fit(weights)
+    terms = regression.terms(fits)
+    found = scatter(terms, weights, q)
+    far = distance2(terms, found)
+    for k in range(3):
+        root = np.sqrt(weights[k])[:, None]
+        np.testing.assert_allclose(fits[k], np.linalg.lstsq(root * X, root * Y, rcond=None)[0].T, rtol=1e-9)
+        residual = Y - X @ fits[k].T
+        np.testing.assert_allclose(regression.residual(fits[k]), residual)
+        own = (weights[k][:, None] * residual).T @ residual.conj() / weights[k].sum()
+        np.testing.assert_allclose(found[k], own, rtol=1e-9, atol=1e-14)
+        by_hand = 2 * np.einsum("na,ab,nb->n", residual.conj(), np.linalg.inv(own), residual).real
+        np.testing.assert_allclose(far[k], by_hand, rtol=1e-7)
+    np.testing.assert_allclose(scatter(products(Y.T), np.ones(20), q), Y.T @ Y.conj() / 20, atol=1e-14)
+
+
+def test_a_share_of_every_direction_is_looked_at():
+    direction = np.random.default_rng(2).permutation(np.repeat(np.arange(5), [400, 200, 100, 50, 50]))
+    chosen = evenly_chosen(direction, 80)
+    assert len(np.unique(chosen)) == 80
+    assert (np.diff(chosen) > 0).all()
+    np.testing.assert_allclose(np.bincount(direction[chosen]), [40, 20, 10, 5, 5], atol=1)
+    for d in range(5):
+        places = np.flatnonzero(direction == d)
+        rank = np.searchsorted(places, chosen[direction[chosen] == d]) / len(places)
+        assert np.ptp(rank) > 0.7
+    np.testing.assert_array_equal(evenly_chosen(direction[:80], 80), np.arange(80))
+
+
+@pytest.mark.parametrize("share", [0.3, 0.45])
+def test_bad_windows_with_one_and_the_same_disturbance_do_not_win(share):
+    rng = np.random.default_rng(17)
+    label = np.repeat(np.arange(8), 15)
+    X = complex_normal(rng, 8, 2)[label] + 0.02 * complex_normal(rng, 120, 2)
+    Y = X @ H.T + 0.02 * complex_normal(rng, 120, 2)
+    bad = rng.permutation(120) < share * 120
+    Y[bad] += 3.0 - 2.0j
+    fit = mm_fit(X, Y, label)
+    np.testing.assert_allclose(fit.coefficients, H, atol=0.04)
+    assert (fit.weights[bad] == 0.0).all()
+    assert np.mean(fit.weights[~bad] > 0.3) > 0.95
+    start = robust_start(Regression(X, Y), label, 1)
+    assert not start.exact
+    good = (Y - X @ H.T)[~bad]
+    np.testing.assert_allclose(np.trace(start.scatter).real, np.mean(np.abs(good) ** 2) * 2, rtol=0.35)
+
+
+def test_other_starts_lead_to_the_same_answer():
+    rng = np.random.default_rng(18)
+    label = np.repeat(np.arange(6), 12)
+    X = complex_normal(rng, 72, 2)
+    Y = X @ H.T + 0.05 * complex_normal(rng, 72, 2)
+    Y[:20] += complex_normal(rng, 20, 2) * 4
+    fits = [mm_fit(X, Y, label, seed).coefficients for seed in range(5)]
+    for fit in fits[1:]:
+        np.testing.assert_allclose(fit, fits[0], atol=2e-3)
+
+
+def rejected(table, directions):
+    return np.where(np.isin(table.direction, directions), 0.0, 1.0)
+
+
+def moved(table, direction, by):
+    return dataclasses.replace(table, F=table.F + by * (table.direction == direction)[:, None])
+
+
+def test_a_sound_direction_that_was_rejected_is_taken_back():
+    table = windows(19, g=7, n=12)
+    weights = readmitted(table, rejected(table, [3]))
+    assert (weights[table.direction == 3] == 1.0).mean() > 0.9
+    np.testing.assert_array_equal(weights[table.direction != 3], 1.0)
+
+
+def test_one_that_lies_elsewhere_stays_out_unless_nobody_can_say():
+    table = moved(windows(19, g=7, n=12), 3, 0.5)
+    np.testing.assert_array_equal(readmitted(table, rejected(table, [3])), rejected(table, [3]))
+    few = moved(windows(19, g=4, n=12), 3, 0.5)
+    assert (readmitted(few, rejected(few, [3]))[few.direction == 3] == 1.0).all()
+
+
+def test_windows_that_disagree_among_themselves_are_not_taken_back():
+    table = windows(19, g=7, n=12)
+    scattered = table.F + 3.0 * (table.direction == 3)[:, None] * complex_normal(np.random.default_rng(3), 84, 2)
+    torn = dataclasses.replace(table, F=scattered)
+    np.testing.assert_array_equal(readmitted(torn, rejected(torn, [3])), rejected(torn, [3]))
+    # three windows out of twelve that disagree do not matter, and are not taken back
+    odd = np.flatnonzero(table.direction == 3)[:3]
+    F = table.F.copy()
+    F[odd] += 4.0j
+    mostly = readmitted(dataclasses.replace(table, F=F), rejected(table, [3]))
+    np.testing.assert_array_equal(mostly[odd], 0.0)
+    assert mostly[table.direction == 3].sum() >= 8
+
+
+def test_directions_that_were_heard_in_part_or_are_too_short_are_left_as_they_are():
+    table = windows(19, g=7, n=12)
+    third = rejected(table, [3])
+    third[np.flatnonzero(table.direction == 3)[:3]] = 1.0
+    assert readmitted(table, third) is third
+    short = windows(19, g=7, n=2)
+    assert readmitted(short, rejected(short, [3])) is not None
+    np.testing.assert_array_equal(readmitted(short, rejected(short, [3])), rejected(short, [3]))
+
+
+def test_information_of_unit_weights_is_the_gram_matrix():
+    D = complex_normal(np.random.default_rng(5), 9, 2)
+    inverse = np.broadcast_to(np.eye(2, dtype=complex), (9, 2, 2))
+    np.testing.assert_allclose(information(D, D, inverse), np.kron(np.eye(2), D.conj().T @ D), atol=1e-12)
+
+
+@pytest.mark.parametrize(("q", "enough"), [(1, 8), (2, 8), (3, 10), (4, 12)])
+def test_a_robust_fit_takes_two_windows_more_than_twice_what_a_core_must_hold(q, enough):
+    rng = np.random.default_rng(q)
+    X = complex_normal(rng, enough, 2)
+    Y = X @ complex_normal(rng, q, 2).T + 0.05 * complex_normal(rng, enough, q)
+    label = np.arange(enough) % 4
+    few = mm_fit(X[:-1], Y[:-1], label[:-1])
+    assert few.conditions == ("no-robust-start",)
+    assert few.iterations == 0
+    assert "no-robust-start" not in mm_fit(X, Y, label).conditions
+    two = mm_fit(X[:2], Y[:2], label[:2])
+    np.testing.assert_allclose(two.scatter, 0.0, atol=1e-20)
+
+
+def test_exact_windows_are_told_by_the_usual_force_not_by_the_wildest():
+    rng = np.random.default_rng(21)
+    X = complex_normal(rng, 40, 2)
+    Y = X @ H.T
+    Y[:10] += 2.6e-9
+    Y[10] *= 30.0
+    fit = mm_fit(X, Y, np.arange(40) % 5)
+    np.testing.assert_array_equal(fit.weights, np.arange(40) > 10)
+    np.testing.assert_array_equal(np.isinf(fit.distance2), np.arange(40) <= 10)
+    np.testing.assert_allclose(fit.coefficients, H, atol=1e-9)
+    assert fit.conditions == ("zero-scale",)
+    assert "29 of 40 windows" in fit.conditions[0].detail
+    assert fit.iterations == 0
+
+
+def test_a_fit_that_is_not_left_to_settle_says_so():
+    rng = np.random.default_rng(22)
+    X = complex_normal(rng, 40, 2)
+    Y = X @ H.T + 0.1 * complex_normal(rng, 40, 2)
+    label = np.arange(40) % 5
+    endless = mm_fit(X, Y, label, tolerance=-1.0)
+    assert endless.iterations == 200
+    assert endless.conditions == ("iteration-limit",)
+    fine, rough = mm_fit(X, Y, label), mm_fit(X, Y, label, tolerance=1e-3)
+    assert 1 <= rough.iterations < fine.iterations < 100
+    np.testing.assert_allclose(rough.coefficients, fine.coefficients, atol=2e-3)
+    np.testing.assert_allclose(endless.coefficients, fine.coefficients, atol=1e-11)
+    assert fine.conditions == ()
+
+
+@pytest.mark.parametrize(("spoilt", "heard"), [(4, True), (5, False)])
+def test_six_tenths_of_a_direction_must_agree(spoilt, heard):
+    table = windows(19, g=7, n=12)
+    F = table.F.copy()
+    odd = np.flatnonzero(table.direction == 3)[:spoilt]
+    F[odd] += 4.0 * np.exp(2j * np.pi * np.arange(spoilt) / spoilt)[:, None]
+    weights = readmitted(dataclasses.replace(table, F=F), rejected(table, [3]))
+    assert bool(weights[table.direction == 3].sum() >= 7) is heard
+
+
+@pytest.mark.parametrize("discord", [0.0, 0.3])
+@pytest.mark.parametrize(("factor", "heard"), [(0.97, True), (1.03, False)])
+def test_how_far_off_a_direction_may_lie(discord, factor, heard):
+    """An F test at one in ten thousand: twice the others' noise of a mean, as far as they themselves disagree."""
+    from scipy.stats import f as fisher_f
+
+    table = exact_repeats(23, g=7, n=12)
+    rng = np.random.default_rng(24)
+    noise_D = 1e-3 * complex_normal(rng, 7, 12, 2)
+    D = table.D + (noise_D - noise_D.mean(axis=1, keepdims=True)).reshape(-1, 2)
+    F = table.F + 0.1 * discord * complex_normal(rng, 7, 2)[table.direction]
+    table = dataclasses.replace(table, D=D, F=F)
+    weights = rejected(table, [3])
+    others = repeats(table, weights)
+    fit = eiv_fit(others)
+    assert (fit.chi_square > 1.5) is (discord > 0)
+    mine = table.direction == 3
+    A = np.concatenate([-fit.h, np.eye(2)], axis=1)
+    spread = 2.0 * max(fit.chi_square, 1.0) * (A @ others.noise @ A.conj().T) / 12
+    limit = float(fisher_f.isf(1e-4, 4, 4.0 * (6 - 2)))
+    aim = np.array([1.0, 0.5j])
+    reach = np.sqrt(2.0 * limit / (aim.conj() @ np.linalg.solve(spread, aim)).real)
+    exact = fit.h @ D[mine].mean(axis=0) - F[mine].mean(axis=0)
+    placed = dataclasses.replace(table, F=F + np.outer(mine, exact + factor * reach * aim))
+    found = readmitted(placed, weights)
+    assert bool(found[mine].sum() > 8) is heard
+
+
+def test_chi_square_of_directions_is_against_the_noise_within_them():
+    table = exact_repeats(25)
+    h = H / table.h_scale
+    off = 0.02 * complex_normal(np.random.default_rng(26), 6, 2)
+    moved_table = dataclasses.replace(table, F=table.F + off[table.direction])
+    within = table.F - table.D @ h.T
+    noise = within.T @ within.conj() / 54
+    by_hand = 10 * np.einsum("ga,ab,gb->", off.conj(), np.linalg.inv(noise), off).real / (2 * 4)
+    assert with_repeats(moved_table, h, np.ones(60))[2] == pytest.approx(by_hand, rel=1e-9)
+
+
+def test_where_directions_agree_the_interval_is_that_of_generalised_least_squares():
+    """Little noise of any shape: covariance (sum V^-1 (x) D* D)^-1, V of F - H D."""
+    noise = 1e-6 * hermitian(np.random.default_rng(27), 4)
+    count = np.array([5.0, 9.0, 20.0, 40.0, 7.0, 30.0, 12.0, 25.0])
+    given = next(m for m in (noisy_means(s, noise, count=count) for s in range(40)) if eiv_fit(m).chi_square < 0.9)
+    fit, means = eiv_fit(given), given.means
+    A = np.concatenate([-fit.h, np.eye(2)], axis=1)
+    V = (A @ noise @ A.conj().T)[None] / count[:, None, None]
+    expected = complex_to_real_covariance(np.linalg.inv(information(means.D, means.D, np.linalg.inv(V))))
+    size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    np.testing.assert_allclose(fit.covariance / size, expected / size, atol=5e-3)
+    np.testing.assert_array_equal(fit.dof, 2 * given.spare)
+
+
+def test_a_tight_core_in_every_direction_is_heard_against_a_scattered_majority():
+    rng = np.random.default_rng(28)
+    label = np.repeat(np.arange(6), 20)
+    X = complex_normal(rng, 6, 2)[label] + 0.02 * complex_normal(rng, 120, 2)
+    Y = X @ H.T + 0.01 * complex_normal(rng, 120, 2)
+    bad = np.arange(120) % 20 >= 9  # eleven of twenty in every direction
+    Y[bad] += 5.0 * complex_normal(rng, bad.sum(), 2)
+    start = robust_start(Regression(X, Y), label, 1)
+    np.testing.assert_allclose(start.coefficients, H, atol=0.03)
+    assert np.trace(start.scatter).real < 10 * 2 * 0.01**2
+
+
+def test_one_step_is_counted_as_one():
+    rng = np.random.default_rng(22)
+    X = complex_normal(rng, 40, 2)
+    Y = X @ H.T + 0.1 * complex_normal(rng, 40, 2)
+    assert mm_fit(X, Y, np.arange(40) % 5, tolerance=1e9).iterations == 1
+
+
+def test_who_is_looked_at_once_more_and_who_can_judge():
+    """A fifth of the windows accepted is not rejected; six of ten that agree suffice; four others can tell."""
+    table = windows(19, g=7, n=10)
+    fifth = rejected(table, [3])
+    fifth[np.flatnonzero(table.direction == 3)[:2]] = 1.0
+    assert readmitted(table, fifth) is fifth
+    faint = np.where(table.direction == 3, 0.3, 1.0)
+    assert readmitted(table, faint) is faint
+    F = table.F.copy()
+    F[np.flatnonzero(table.direction == 3)[:4]] += 4.0 * np.exp(0.5j * np.pi * np.arange(4))[:, None]
+    assert readmitted(dataclasses.replace(table, F=F), rejected(table, [3]))[table.direction == 3].sum() == 6
+    five = moved(windows(19, g=5, n=12), 3, 2.0)
+    np.testing.assert_array_equal(readmitted(five, rejected(five, [3])), rejected(five, [3]))

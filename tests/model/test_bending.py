@@ -1,0 +1,86 @@
+"""Pads that give way: the Newton step knows how the film answers, and ends where the solid says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
+from model.effects import Effect
+from model.film.reynolds import conductances, solve_film
+from model.film.slopes import shape_slopes
+from model.pad.bending import wanted_shapes
+from model.predict import predict
+
+SPEED = 2 * math.pi * 22
+
+
+@pytest.fixture(scope="module", params=["rocker", "spherical"])
+def bearing(request) -> Bearing:
+    return load_bearing(f"model/bearings/{request.param}.toml")
+
+
+@pytest.mark.parametrize("load", [2500.0, 8750.0])
+def test_deformation_is_what_pressure_and_heat_ask_for(bearing, load):
+    p = predict(bearing, load, speed=SPEED, thermal="tehd")
+    assert p.converged
+    assert p.equilibrium.iterations <= 18  # followed one step behind, it swings for ever
+    films = p.equilibrium.films
+    gives = [f.give for f in films if f.give is not None]
+    wanted = wanted_shapes(gives, [f.work.pressure for f in films], [f.work.temperature - 40.0 for f in films], 1.0)
+    for film, shape in zip(films, wanted, strict=True):
+        np.testing.assert_allclose(film.bent, shape, atol=1e-5 * film.work.thickness.min())
+    assert np.ptp(films[0].bent) > 1e-6
+
+
+def test_pads_of_one_shape_share_their_matrices(bearing):
+    films = predict(bearing, 5000.0, speed=SPEED, thermal="tehd").equilibrium.films
+    assert len({id(f.give) for f in films}) == 1
+
+
+def test_pressure_slopes_by_shape_are_finite_differences(bearing):
+    p = predict(bearing, 5000.0, speed=SPEED, thermal="tehd")
+    film = p.equilibrium.films[0]
+    assert film.give is not None
+    grid, work = film.grid, film.work
+    wedge = (film.pad.pad_clearance, *film.approach(p.equilibrium.position))
+    surface = SPEED * bearing.journal_radius
+
+    def pressure(amplitudes: np.ndarray) -> np.ndarray:
+        work.extra[:] = film.bent + film.give.shapes @ amplitudes
+        assert solve_film(grid, work, wedge, surface, False).steps > 0
+        return work.unknown.copy()
+
+    size = 1e-9 / np.abs(film.give.shapes).max()
+    pressure(np.zeros(film.give.shapes.shape[2]))
+    slopes = shape_slopes(grid, work, conductances(grid, work, *wedge), film.give.shapes)
+    for m in range(slopes.shape[1]):
+        step = np.zeros(slopes.shape[1])
+        step[m] = size
+        differences = (pressure(step) - pressure(-step)) / (2 * size)
+        np.testing.assert_allclose(slopes[:, m], differences, atol=0.01 * np.abs(differences).max())
+
+
+def test_shapes_are_orthonormal_by_area(bearing):
+    film = predict(bearing, 5000.0, speed=SPEED, thermal="tehd").equilibrium.films[0]
+    assert film.give is not None
+    count = film.give.shapes.shape[2]
+    np.testing.assert_allclose(film.give.amplitudes @ film.give.shapes.reshape(-1, count), np.eye(count), atol=1e-10)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_softer_and_stiffer_pads_converge(bearing, factor):
+    p = predict(bearing, 5000.0, speed=SPEED, effects=[Effect("pad_bending", compliance_factor=factor)])
+    assert p.converged
+    assert p.equilibrium.iterations <= 18
+
+
+@pytest.mark.slow
+def test_starved_and_misaligned_films_bend_too(bearing):
+    for effect in (Effect("starvation", arc_fraction=0.15), Effect("misalignment", angle=1e-4, direction=-1.2)):
+        p = predict(bearing, 5000.0, speed=SPEED, thermal="tehd", effects=[effect])
+        assert p.converged, (effect, p.status)
+        assert p.equilibrium.iterations <= 25

@@ -1,0 +1,91 @@
+"""The bearing with mass-conserving cavitation: bearings of pads that tilt freely do not notice."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
+from model.film.cavitation import film_solver, fluid_fraction
+from model.film.reynolds import solve_film
+from model.frequency_model import reduced
+from model.options import Options
+from model.predict import Prediction, predict
+
+SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
+EXCITATION = 2 * math.pi * np.array([10.0, 25.0, 50.0])
+
+
+@pytest.fixture(scope="module")
+def rocker(rocker_file) -> Bearing:
+    return load_bearing(rocker_file)
+
+
+@pytest.fixture(scope="module")
+def spherical(rocker_file) -> Bearing:
+    return load_bearing(rocker_file.with_name("spherical.toml"))
+
+
+def run(bearing: Bearing, load: float = 5000.0, direction: float = DOWN, **more: object) -> Prediction:
+    options = Options(cavitation="jfo")
+    return predict(bearing, load, direction, SPEED, EXCITATION, options=options, **({"mesh": (40, 4)} | more))
+
+
+@pytest.mark.parametrize("load", [2500.0, 8750.0])
+@pytest.mark.parametrize("thermal", ["isothermal", "adiabatic"])
+def test_the_papers_bearings_do_not_notice(rocker, spherical, thermal, load):
+    # their films rupture towards the trailing edge, if at all, and do not form again
+    for bearing in (rocker, spherical):
+        with_mass = run(bearing, load, thermal=thermal)
+        without = predict(bearing, load, DOWN, SPEED, EXCITATION, thermal=thermal, mesh=(40, 4))
+        np.testing.assert_allclose(with_mass.h, without.h, rtol=1e-9, atol=1e-9 * np.abs(without.h).max())
+    assert any(f.work.ruptured[1:].any() for f in with_mass.equilibrium.films) is (load > 5000.0)
+
+
+def test_what_lies_behind_the_rupture_is_known(spherical):
+    p = run(spherical, 8750.0)
+    film = p.equilibrium.films[0]
+    assert film.solver is film_solver("jfo")
+    assert film_solver("swift-stieber") is solve_film
+    wedge = (film.pad.pad_clearance, *film.approach(p.bearing_position))
+    theta = fluid_fraction(film.grid, film.work, wedge, SPEED * spherical.journal_radius)
+    ruptured = film.work.ruptured.copy()
+    ruptured[0] = False
+    assert ruptured.any()
+    assert (theta[~ruptured] == 1.0).all()
+    assert 0.5 < theta[ruptured].min() < theta[ruptured].max() < 1.0
+
+
+def test_slope_of_the_static_locus_is_the_stiffness_at_rest(spherical):
+    # isothermal: viscosity does not change along the locus
+    def at(load: float) -> Prediction:
+        return run(spherical, load, thermal="isothermal", mesh=(80, 6))
+
+    step = 100.0
+    slope = 2 * step / (at(8750.0 - step).position[1] - at(8750.0 + step).position[1])
+    stiffness, _ = reduced(at(8750.0), 0.0)
+    assert slope == pytest.approx(1.0 / np.linalg.inv(stiffness)[1, 1], rel=2e-3)
+
+
+def test_bending_pads_and_warm_starts(rocker):
+    first = run(rocker, 8000.0, thermal="tehd", mesh=(32, 4))
+    warm = run(rocker, 8750.0, thermal="tehd", mesh=(32, 4), start=first)
+    cold = run(rocker, 8750.0, thermal="tehd", mesh=(32, 4))
+    assert warm.converged
+    assert cold.converged
+    np.testing.assert_allclose(warm.h, cold.h, rtol=1e-4, atol=1e-4 * np.abs(cold.h).max())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"cavitation": "elrod"}, "swift-stieber, jfo"),
+        ({"cavitation": None}, "swift-stieber, jfo"),
+    ],
+)
+def test_impossible_options_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        Options(**arguments)

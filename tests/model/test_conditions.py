@@ -1,0 +1,131 @@
+"""Named conditions: every status can happen, and says so by name; nothing fails without a word."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
+from model.effects import Effect
+from model.pivots import pivot_laws
+from model.predict import Prediction, predict
+from model.setup import Setup
+from model.statics.conditions import overloaded_pads, unsupported
+
+SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
+
+
+@pytest.fixture(scope="module")
+def rocker(rocker_file) -> Bearing:
+    return load_bearing(rocker_file)
+
+
+def run(bearing: Bearing, load: float = 5000.0, direction: float = DOWN, **more: object) -> Prediction:
+    return predict(bearing, load, direction, SPEED, mesh=(24, 4), **more)
+
+
+def pads(bearing: Bearing, **changes: object) -> Bearing:
+    return bearing.with_pads(tuple(replace(p, **changes) for p in bearing.pads))
+
+
+CASES = {
+    "all well": (lambda b: run(b), ()),
+    "fully unloaded pads": (lambda b: run(b, 8750.0, pivots=2e8), ("idle pads 3, 4",)),
+    "thin film": (lambda b: run(b, 5e4), ("overloaded pads 1",)),
+    "high pressure": (lambda b: run(b, 1e6, thermal="isothermal", pivots="rigid"), ("overloaded pads 1",)),
+    "flow back": (lambda b: run(b, 5e4), ("flow back at a leading edge",)),
+    "nothing to push against": (
+        lambda b: run(b.with_pads(b.pads[:1]), direction=1.5),
+        ("no pads against the load", "not converged"),
+    ),
+    "film lost to heat": (lambda b: run(b, 1e5), ("film lost", "not converged")),
+    "film lost at the pads' edges": (
+        lambda b: run(b, effects=[Effect("misalignment", angle=2e-3, direction=0.0)]),
+        ("film lost", "not converged"),
+    ),
+    "nothing carries": (
+        lambda b: run(b, effects=[Effect("starvation", arc_fraction=0.6)]),
+        ("not converged", "idle pads 1, 2, 3, 4, 5"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_condition_has_its_name(rocker, name):
+    action, names = CASES[name]
+    p = action(rocker)
+    if not names:
+        assert p.status == ()
+    for one in names:
+        assert one in p.status, p.status
+    assert p.converged is ("not converged" not in p.status)
+    # numbers where it converged, NaN where it did not: never a number without an equilibrium
+    assert np.isfinite(p.h).all() == p.converged
+    assert np.isnan(p.h).all() != p.converged
+    if not p.converged:
+        assert math.isnan(p.mesh_error)
+
+
+def test_a_load_between_two_pads_is_held_and_one_beside_them_is_not(rocker):
+    def alone(*numbers: int, direction: float, hold: float = 0.0) -> bool:
+        bearing = rocker.with_pads(tuple(rocker.pads[k - 1] for k in numbers))
+        setup = Setup(bearing, pivot_laws("kirk", bearing), rotational_stiffness=hold)
+        return unsupported(setup, 5000.0 * np.array([math.cos(direction), math.sin(direction)]))
+
+    low, high = rocker.pads[0].pivot_angle, rocker.pads[1].pivot_angle
+    middle = 0.5 * (low + high)
+    assert not alone(1, 2, direction=middle)
+    assert not alone(1, 2, direction=low)
+    assert alone(1, 2, direction=low - 0.01)
+    assert alone(1, 2, direction=high + 0.01)
+    assert alone(1, 2, direction=middle + math.pi)
+    assert not alone(1, direction=low)
+    assert alone(1, direction=low + 0.01)
+    assert not alone(1, direction=low + 0.01, hold=1e3)  # a held pad pushes aside as well
+    for direction in np.linspace(-3.0, 3.0, 13):
+        assert not alone(1, 2, 3, 4, 5, direction=float(direction))
+    bearing = rocker.with_pads(rocker.pads[:1])
+    assert not unsupported(Setup(bearing, pivot_laws("kirk", bearing)), np.zeros(2))
+
+
+@pytest.mark.slow
+def test_what_is_unsupported_never_converges(rocker):
+    two = rocker.with_pads(rocker.pads[:2])
+    setup = Setup(two, pivot_laws("kirk", two))
+    for direction in np.linspace(-math.pi, math.pi, 12, endpoint=False):
+        if unsupported(setup, 5000.0 * np.array([math.cos(direction), math.sin(direction)])):
+            p = run(two, direction=float(direction), thermal="isothermal")
+            assert not p.converged
+            assert "no pads against the load" in p.status
+
+
+def test_limits_of_a_pad_are_told_apart(rocker):
+    films = run(rocker).equilibrium.films
+    assert overloaded_pads(films) == []
+    hot = films[1]
+    kept = hot.work.temperature[3, 1]
+    hot.work.temperature[3, 1] = 151.0
+    assert overloaded_pads(films) == [2]
+    hot.work.temperature[3, 1] = kept
+    films[2].work.pressure[5, 0] = 46e6
+    films[3].work.thickness[5, 0] = 2e-6
+    assert overloaded_pads(films) == [3, 4]
+    films[2].idle = films[3].idle = True  # what carries nothing is not overloaded
+    assert overloaded_pads(films) == []
+
+
+def test_singular_steps_are_named(rocker, monkeypatch):
+    # no bearing is known that gets there: the guard is held by a step made of nothing
+    import model.statics.equilibrium as equilibrium
+
+    def nothing(*_: object) -> tuple[float, np.ndarray, np.ndarray]:
+        return 1.0, np.full(2, math.nan), np.zeros((5, 2))
+
+    monkeypatch.setattr(equilibrium, "newton_step", nothing)
+    p = run(rocker)
+    assert "singular" in p.status
+    assert not p.converged

@@ -1,0 +1,130 @@
+"""Dynamic coefficients: Eq. (9)-(12) against a dense solution of the whole system, and what each pad entry does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
+from model.dynamics.reduction import bearing_impedance, mass_centre_offset, pad_matrices, reduce_pads
+from model.effects import Effect
+from model.predict import Prediction, predict
+from model.setup import Setup
+
+SPEED = 2 * math.pi * 22.0
+DOWN = -math.pi / 2
+
+
+@pytest.fixture(scope="module")
+def rocker(rocker_file) -> Bearing:
+    return load_bearing(rocker_file)
+
+
+def dense(p: Prediction, omega: float) -> np.ndarray:
+    """Housing force per journal displacement from the equations of motion of every pad, one system for all.
+
+    Unknowns (tilt, outward deflection) per pad. Film forces follow from (a, b); Newton per pad: film moment and force
+    against inertia, k_theta, c_eta, and the pivot.
+    """
+    setup, films = p.setup, [f for f in p.equilibrium.films if f.forces is not None]
+    n = len(films)
+    a = np.zeros((2 + 2 * n, 2 + 2 * n), complex)
+    for m, film in enumerate(films):
+        z = film.forces.stiffness + 1j * omega * film.forces.damping
+        pad, arm = film.pad, setup.bearing.pivot_radius(film.pad)
+        # columns: x, y, tilt, eta -> a, b, by the film thickness formula of physics.md
+        chain = np.array([[*film.normal, 0.0, -1.0], [*film.tangent, arm, 0.0]])
+        force = z @ chain  # radial (outward on the pad) and tangential film force per unknown
+        columns = [0, 1, 2 + 2 * m, 3 + 2 * m]
+        a[0:2, columns] += np.column_stack([film.normal, film.tangent]) @ force
+        # the mass centre lies b ahead of the pivot and moves outward by eta - b tilt
+        b = mass_centre_offset(setup, film)
+        radial = np.array([0.0, 0.0, -b, 1.0]) * pad.mass * -(omega**2)
+        law = setup.pivots[film.number - 1]
+        pivot = law.vibration_stiffness(float(film.forces.force[0])) + 1j * omega * setup.pivot_damping
+        a[3 + 2 * m, columns] = -force[0] + radial + np.array([0.0, 0.0, 0.0, pivot])
+        inertia = np.array([0.0, 0.0, -(omega**2) * pad.moment_of_inertia + setup.rotational_stiffness, 0.0])
+        inertia[3] = -(omega**2) * pad.mass * -b
+        a[2 + 2 * m, columns] = arm * force[1] + inertia
+    inner = np.linalg.solve(a[2:, 2:], a[2:, :2])
+    return a[:2, :2] - a[:2, 2:] @ inner
+
+
+@pytest.mark.parametrize("hz", [5.0, 25.0, 120.0])
+@pytest.mark.parametrize("offset", [0.5, 0.6])
+def test_reduction_is_the_dense_solution(rocker, hz, offset):
+    heavy = rocker.with_pads(
+        tuple(replace(p, pivot_offset=offset, mass=5.0, moment_of_inertia=2e-2) for p in rocker.pads)
+    )
+    effects = [Effect("pivot_damping", damping=4e5), Effect("pivot_rotation", rotational_stiffness=3e4)]
+    p = predict(heavy, 5000.0, -1.2, SPEED, 2 * math.pi * hz, effects=effects)
+    expected = dense(p, 2 * math.pi * hz)
+    np.testing.assert_allclose(p.h, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_coupling_of_an_offset_mass_lowers_what_moves_together(rocker):
+    # kinetic energy 1/2 m (eta' - b t')^2 + 1/2 (I - m b^2) t'^2 with tilt and b counter-clockwise, eta outward
+    pads = tuple(replace(p, pivot_offset=0.6) for p in rocker.pads)
+    p = predict(rocker.with_pads(pads), 5000.0, DOWN, SPEED)
+    film = p.equilibrium.films[0]
+    b = mass_centre_offset(p.setup, film)
+    assert b < 0.0  # the pivot stands behind the middle, so that the centre is upstream (clockwise)
+    mass = pad_matrices(p.setup, film).pad_mass
+    for tilt, eta in ((1.0, 0.3), (-2.0, 1.0)):
+        energy = film.pad.mass * (eta - b * tilt) ** 2 + (film.pad.moment_of_inertia - film.pad.mass * b**2) * tilt**2
+        assert np.array([tilt, eta]) @ mass @ np.array([tilt, eta]) == pytest.approx(energy, rel=1e-12)
+
+
+def test_central_pivot_has_its_mass_on_the_pivot_line(rocker):
+    p = predict(rocker, 5000.0, DOWN, SPEED)
+    assert mass_centre_offset(p.setup, p.equilibrium.films[0]) == 0.0
+
+
+def test_rigid_pivots_leave_out_the_radial_motion(rocker):
+    p = predict(rocker, 5000.0, DOWN, SPEED, pivots="rigid")
+    stiff = [replace(m, pad_stiffness=np.diag([m.pad_stiffness[0, 0], 1e16])) for m in p.pad_matrices]
+    omega = np.array([100.0])
+    np.testing.assert_allclose(reduce_pads(stiff, omega), reduce_pads(list(p.pad_matrices), omega), rtol=1e-5, atol=1.0)
+
+
+def test_massless_pads_lose_nothing_below_50_hz(rocker):
+    light = rocker.with_pads(tuple(replace(p, mass=0.0, moment_of_inertia=0.0) for p in rocker.pads))
+    excitation = 2 * math.pi * np.array([10.0, 50.0])
+    p, q = (predict(b, 5000.0, DOWN, SPEED, excitation) for b in (rocker, light))
+    np.testing.assert_allclose(p.kyy, q.kyy, rtol=2e-3)
+
+
+def test_frequency_zero_and_infinity(rocker):
+    # pads follow quasi-statically at 0, stand still at high frequency (heavy inertia): then h is the film's own
+    heavy = rocker.with_pads(tuple(replace(p, mass=1e9, moment_of_inertia=1e9) for p in rocker.pads))
+    p = predict(heavy, 5000.0, DOWN, SPEED, 100.0)
+    film = sum(m.stiffness[:2, :2] + 100j * m.damping[:2, :2] for m in p.pad_matrices)
+    np.testing.assert_allclose(p.h, film, atol=1e-3 * np.abs(film).max())
+
+
+def test_added_mass_and_series_spring(rocker):
+    base = predict(rocker, 5000.0, DOWN, SPEED, 300.0)
+    setup: Setup = base.setup
+    omega = np.array([300.0])
+    heavy = bearing_impedance(setup.change(added_mass=20.0), base.equilibrium, omega)[0]
+    np.testing.assert_allclose(heavy, base.h - 300.0**2 * 20.0 * np.eye(2), atol=1e-6)
+    soft = bearing_impedance(setup.change(series_compliance=1e-9), base.equilibrium, omega)[0]
+    np.testing.assert_allclose(np.linalg.inv(soft), np.linalg.inv(base.h) + 1e-9 * np.eye(2), rtol=1e-9, atol=1e-18)
+
+
+def test_one_static_solution_serves_all_frequencies(rocker):
+    excitation = 2 * math.pi * np.array([10.0, 25.0, 50.0])
+    p = predict(rocker, 5000.0, DOWN, SPEED, excitation)
+    assert p.h.shape == (3, 2, 2)
+    for k, omega in enumerate(excitation):
+        np.testing.assert_allclose(p.h[k], predict(rocker, 5000.0, DOWN, SPEED, float(omega)).h, rtol=1e-12)
+
+
+def test_default_excitation_is_synchronous(rocker):
+    p = predict(rocker, 5000.0, DOWN, SPEED)
+    assert p.excitation == SPEED
+    assert p.cyy == pytest.approx(p.h[1, 1].imag / SPEED)

@@ -1,0 +1,153 @@
+"""The film's heat: balance, order, limits, carry-over, power."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
+from model.effects import Effect
+from model.film.energy import dissipation, solve_energy
+from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film.reynolds import solve_film
+from model.predict import predict
+from model.statics.heat_paths import outlet_temperature
+
+SPEED = 2 * math.pi * 22.0
+DOWN = -math.pi / 2
+MU, RHO, HEAT, CONDUCTIVITY, SURFACE, CLEARANCE = 0.03, 850.0, 2000.0, 0.13, 7.0, 1e-4
+
+
+@pytest.fixture(scope="module")
+def rocker(rocker_file) -> Bearing:
+    return load_bearing(rocker_file)
+
+
+def full_film(
+    shape: tuple[int, int],
+    wedge: tuple[float, float] = (0.0, 0.5),
+    length: float = 0.07,
+    conductivity: float = CONDUCTIVITY,
+) -> tuple[FilmGrid, FilmWork, np.ndarray]:
+    """A film that converges over its whole arc (no rupture), and its temperature for constant oil."""
+    grid = film_grid(-0.5, 0.5, 0.05, length, shape, True)
+    work = film_work(grid, 40.0)
+    work.viscosity[:] = MU
+    work.density[:] = RHO
+    a, b = wedge
+    assert solve_film(grid, work, (CLEARANCE, a * CLEARANCE, b * CLEARANCE), SURFACE, False).steps > 0
+    temperature = np.empty_like(work.temperature)
+    assert solve_energy(grid, work, 40.0, SURFACE, (HEAT, conductivity), temperature) == 0.0
+    return grid, work, temperature
+
+
+def enthalpy_out(grid: FilmGrid, work: FilmWork, temperature: np.ndarray) -> float:
+    """Heat carried out over the edges of the half film above the inlet temperature [W]."""
+    along = HEAT * work.flow_x[-1] @ (temperature[-1] - 40.0)
+    return float(along + HEAT * side_flow(work) @ (temperature[:, -1] - 40.0))
+
+
+def side_flow(work: FilmWork) -> np.ndarray:
+    """Mass flow over the side edge per station [kg/s]: what enters the half volumes there and does not go on."""
+    out = work.flow_z[:, -1].copy()
+    out[1:-1] += work.flow_x[:-1, -1] - work.flow_x[1:, -1]
+    out[[0, -1]] *= 0.5  # the first and last stations stand for half a step
+    return out
+
+
+def heat_made(grid: FilmGrid, work: FilmWork) -> float:
+    """Integral of mu U^2 / h + h^3 / (12 mu) |grad p|^2 over the half film [W], in plain numpy."""
+    px = np.gradient(work.pressure, grid.dx, axis=0, edge_order=2)
+    pz = np.gradient(work.pressure, grid.z, axis=1, edge_order=2)
+    h = work.thickness
+    density = MU * SURFACE**2 / h + h**3 / (12 * MU) * (px**2 + pz**2)
+    return float((density * grid.area).sum() / 2.0)
+
+
+def test_heat_made_leaves_with_the_oil():
+    errors = []
+    for scale in (1, 2, 4):
+        grid, work, temperature = full_film((40 * scale, 4 * scale))
+        made = heat_made(grid, work)
+        errors.append(abs(enthalpy_out(grid, work, temperature) / made - 1.0))
+        stations = dissipation(grid, work, SURFACE)
+        stations[[0, -1]] *= 0.5  # half stations at both ends
+        assert enthalpy_out(grid, work, temperature) == pytest.approx(stations.sum(), rel=2e-5)
+    assert errors[1] < 1e-3
+    assert errors[2] < errors[0] / 8.0  # second order: a sixteenth
+
+
+def test_dissipation_is_the_journals_work():
+    # with p = 0 on all edges, U (mu U/h + h/2 dp/dx) and mu U^2/h + h^3/12mu |grad p|^2 have one integral
+    grid, work, _ = full_film((160, 12))
+    px = np.gradient(work.pressure, grid.dx, axis=0, edge_order=2)
+    friction = MU * SURFACE / work.thickness + 0.5 * work.thickness * px
+    work_done = SURFACE * float((friction * grid.area).sum()) / 2.0
+    assert heat_made(grid, work) == pytest.approx(work_done, rel=2e-3)
+
+
+def test_couette_flow_heats_linearly():
+    # no wedge: no pressure; rho c h U/2 T' = mu U^2 / h
+    grid, _, temperature = full_film((40, 4), wedge=(0.0, 0.0))
+    rise = 2 * MU * SURFACE / (RHO * HEAT * CLEARANCE**2) * 0.05 * (grid.angle - grid.angle[0])
+    np.testing.assert_allclose(temperature - 40.0, np.repeat(rise[:, None], 5, axis=1), rtol=1e-9, atol=1e-9)
+
+
+def test_temperature_converges_with_second_order():
+    end = [full_film((32 * s, 4 * s))[2][-1, 0] for s in (1, 2, 4)]
+    assert abs(end[1] - end[2]) < 0.35 * abs(end[0] - end[1])
+
+
+def test_inlet_and_minimum_are_the_supply():
+    _, _, temperature = full_film((80, 6))
+    assert (temperature[0] == 40.0).all()
+    assert temperature.min() > 40.0 - 1e-9
+
+
+def test_isothermal_is_isothermal(rocker):
+    p = predict(rocker, 5000.0, DOWN, SPEED, thermal="isothermal")
+    assert all((t == 40.0).all() for t in p.temperature)
+    assert p.max_temperature == 40.0
+
+
+def test_no_viscosity_exponent_leaves_only_the_density(rocker):
+    oil = replace(rocker.oil, viscosity_exponent=0.0, thermal_expansion=0.0)
+    hot = predict(replace(rocker, oil=oil), 5000.0, DOWN, SPEED)
+    cold = predict(replace(rocker, oil=oil), 5000.0, DOWN, SPEED, thermal="isothermal")
+    assert hot.max_temperature > 44.0
+    np.testing.assert_allclose(hot.k, cold.k, atol=1e-7 * cold.kyy)
+
+
+def test_power_loss_is_what_heats_the_oil(rocker):
+    p = predict(rocker, 3000.0, DOWN, SPEED)
+    total = 0.0
+    for film in p.equilibrium.films:
+        assert not film.work.ruptured.any()  # then flows are those of a full film everywhere
+        total += 2.0 * rocker.oil.specific_heat * float(film.work.flow_x[-1] @ (film.work.temperature[-1] - 40.0))
+        total += 2.0 * rocker.oil.specific_heat * float(side_flow(film.work) @ (film.work.temperature[:, -1] - 40.0))
+    assert p.power_loss == pytest.approx(total, rel=0.005)
+
+
+def test_carry_over_is_a_fixed_point(rocker):
+    share = 0.6
+    p = predict(rocker, 5000.0, DOWN, SPEED, effects=[Effect("hot_oil_carryover", fraction=share)])
+    films = p.equilibrium.films
+    # the shaft turns counter-clockwise: pad k is fed by the one before it, against rotation
+    for film in films:
+        before = films[film.number - 2]
+        expected = 40.0 + share * (outlet_temperature(before) - 40.0)
+        assert film.inlet == pytest.approx(expected, abs=1e-3)
+        assert film.work.temperature[0].min() == pytest.approx(film.inlet, abs=1e-3)
+    cold = predict(rocker, 5000.0, DOWN, SPEED)
+    assert p.max_temperature > cold.max_temperature + 1.0
+
+
+def test_outlet_temperature_is_weighted_with_the_flow(rocker):
+    film = predict(rocker, 5000.0, DOWN, SPEED).equilibrium.films[0]
+    flow, t = film.work.flow_x[-1], film.work.temperature[-1]
+    assert outlet_temperature(film) == pytest.approx(float(np.average(t, weights=flow)), rel=1e-12)
+    assert t.min() < outlet_temperature(film) < t.max()

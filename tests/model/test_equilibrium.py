@@ -1,0 +1,191 @@
+"""Equilibria: their conditions from scratch, limits, symmetry, slopes, changes of regime."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
+from model.pivots import ConstantPivot
+from model.predict import Prediction, predict
+from model.statics.carrying import EDGE
+
+SPEED = 2 * math.pi * 22.0
+DOWN = -math.pi / 2
+
+
+def _robustness():
+    path = Path(__file__).resolve().parents[1] / "studies" / "robustness_model.py"
+    spec = importlib.util.spec_from_file_location("robustness_model", path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+robustness = _robustness()
+
+
+@pytest.fixture(scope="module")
+def rocker(rocker_file) -> Bearing:
+    return load_bearing(rocker_file)
+
+
+def assert_equilibrium(p: Prediction) -> None:
+    for name, value in robustness.errors(p).items():
+        assert value <= robustness.LIMITS[name], (name, value)
+
+
+@pytest.mark.parametrize("thermal", ["isothermal", "adiabatic"])
+@pytest.mark.parametrize("pivots", ["rigid", "kirk", 4e8])
+def test_conditions_of_equilibrium_from_scratch(rocker, thermal, pivots):
+    for direction in (DOWN, 0.3):
+        assert_equilibrium(predict(rocker, 5000.0, direction, SPEED, pivots=pivots, thermal=thermal))
+
+
+def test_every_condition_can_fail(rocker):
+    # the check is worth something only if it sees a wrong answer
+    p = predict(rocker, 5000.0, DOWN, SPEED)
+    assert_equilibrium(p)
+    p.equilibrium.films[0].tilt += 1e-6
+    assert robustness.errors(p)["reynolds"] > 10 * robustness.LIMITS["reynolds"]
+    p = predict(rocker, 5000.0, DOWN, SPEED)
+    p.equilibrium.films[1].deflection += 1e-9
+    assert robustness.errors(p)["pivot"] > robustness.LIMITS["pivot"]
+    p = predict(rocker, 5000.0, DOWN, SPEED)
+    p.equilibrium.films[0].work.pressure[:] *= 1.0001
+    assert robustness.errors(p)["force"] > 10 * robustness.LIMITS["force"]
+    p = predict(rocker, 5000.0, DOWN, SPEED)
+    p.equilibrium.films[0].work.temperature[5:] += 0.01
+    assert robustness.errors(p)["heat"] > 10 * robustness.LIMITS["heat"]
+    p = predict(rocker, 5000.0, DOWN, SPEED)
+    p.equilibrium.films[2].idle = True
+    assert robustness.errors(p)["missed"] > robustness.LIMITS["missed"]
+
+
+@pytest.mark.parametrize("pivots", ["rigid", "kirk"])
+def test_slope_of_the_static_locus_is_the_stiffness_at_frequency_zero(rocker, pivots):
+    def position(force: np.ndarray) -> np.ndarray:
+        load, direction = float(np.hypot(*force)), math.atan2(force[1], force[0])
+        return predict(rocker, load, direction, SPEED, pivots=pivots, thermal="isothermal").position
+
+    p = predict(rocker, 5000.0, DOWN, SPEED, 1e-3, pivots=pivots, thermal="isothermal")
+    force, step = np.array([0.0, -5000.0]), 25.0
+    compliance = np.column_stack(
+        [(position(force + step * e) - position(force - step * e)) / (2 * step) for e in np.eye(2)]
+    )
+    np.testing.assert_allclose(p.k @ compliance, np.eye(2), atol=2e-3)
+
+
+def test_very_stiff_pivots_are_rigid(rocker):
+    rigid = predict(rocker, 5000.0, DOWN, SPEED, pivots="rigid")
+    stiff = predict(rocker, 5000.0, DOWN, SPEED, pivots=1e14)
+    np.testing.assert_allclose(stiff.k, rigid.k, atol=2e-5 * rigid.kyy)
+    np.testing.assert_allclose(stiff.c, rigid.c, atol=2e-5 * rigid.cyy)
+    np.testing.assert_allclose(stiff.position, rigid.position, atol=1e-10)
+
+
+@pytest.mark.parametrize("turn", [2 * math.pi / 5, 1.0, math.pi])
+def test_bearing_and_load_turned_as_a_whole(rocker, turn):
+    pads = tuple(replace(pad, pivot_angle=pad.pivot_angle + turn) for pad in rocker.pads)
+    q = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    p = predict(rocker, 5000.0, -1.2, SPEED)
+    r = predict(rocker.with_pads(pads), 5000.0, -1.2 + turn, SPEED)
+    np.testing.assert_allclose(r.k, q @ p.k @ q.T, atol=1e-9 * p.kyy)
+    np.testing.assert_allclose(r.c, q @ p.c @ q.T, atol=1e-9 * p.cyy)
+    np.testing.assert_allclose(r.position, q @ p.position, atol=1e-15)
+    np.testing.assert_allclose(r.pad_load, p.pad_load, rtol=1e-9)
+
+
+def test_a_turn_by_one_pad_renumbers_the_pads(rocker):
+    p = predict(rocker, 5000.0, DOWN, SPEED)
+    r = predict(rocker, 5000.0, DOWN + 2 * math.pi / 5, SPEED)
+    np.testing.assert_allclose(np.roll(r.pad_load, -1), p.pad_load, rtol=1e-7)
+
+
+def test_five_equal_pads_without_load_are_isotropic(rocker):
+    p = predict(rocker, 0.0, DOWN, SPEED)
+    np.testing.assert_allclose(p.position, 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.diag(p.k), p.kxx, rtol=1e-6)
+    np.testing.assert_allclose(p.k[0, 1], -p.k[1, 0], rtol=1e-6)
+    np.testing.assert_allclose(np.diag(p.c), p.cxx, rtol=1e-6)
+
+
+def test_warm_start_does_not_change_the_answer(rocker):
+    cold = predict(rocker, 6000.0, -1.0, SPEED)
+    warm = predict(rocker, 6000.0, -1.0, SPEED, start=predict(rocker, 5000.0, DOWN, SPEED))
+    np.testing.assert_allclose(warm.k, cold.k, atol=1e-6 * cold.kyy)
+    np.testing.assert_allclose(warm.position, cold.position, atol=1e-12)
+
+
+def test_upper_pads_unload_and_are_listed(rocker):
+    p = predict(rocker, 8750.0, DOWN, SPEED, pivots=4e8)
+    assert p.idle_pads == (3, 4)
+    assert p.status == ("idle pads 3, 4",)
+    assert (p.pad_load[2:4] == 0.0).all()
+    assert [m.number for m in p.pad_matrices] == [1, 2, 5]
+    assert_equilibrium(p)
+
+
+@pytest.mark.slow
+def test_offset_pads_take_up_their_load_on_their_pivots(rocker):
+    # preload 0.1 and a pivot behind the middle: the pads carry down to a fold at a < 0, on soft pivots beyond it
+    pads = tuple(replace(p, pivot_offset=0.55, pad_clearance=p.assembled_clearance / 0.9) for p in rocker.pads)
+    for pivots in (2e8, 1e9, "rigid"):
+        for load in (300.0, 2000.0, 6000.0):
+            p = predict(rocker.with_pads(pads), load, 0.4, SPEED, pivots=pivots)
+            assert p.converged, (pivots, load, p.status)
+            assert_equilibrium(p)
+
+
+def three_pads(rocker: Bearing, arc: float) -> Bearing:
+    """Preload 0.1, pivots behind the middle: lightly loaded pads take up and shed their load with a jump."""
+    pad = replace(rocker.pads[0], arc=arc, pivot_offset=0.55, pad_clearance=80e-6 / 0.9)
+    return rocker.with_pads(tuple(replace(pad, pivot_angle=k * 2 * math.pi / 3) for k in range(3)))
+
+
+def test_no_steady_state_is_a_named_status(rocker):
+    p = predict(three_pads(rocker, 1.7), 1500.0, 1.0, SPEED, pivots=3e8)
+    assert not p.converged
+    assert p.status[0] == "pads 3 can neither carry nor idle"
+    assert np.isnan(p.k).all()
+    assert np.isnan(p.c).all()
+
+
+def test_a_pad_that_cannot_keep_its_load_is_named(rocker):
+    p = predict(three_pads(rocker, 1.4), 1500.0, 1.0, SPEED, pivots=3e8)
+    assert p.converged
+    assert p.status == ("pads 3 cannot keep their load", "idle pads 3")
+    assert_equilibrium(p)
+    # it would carry there, alone: its journal stands nearer than the edge of carrying, and the film opens both ways
+    film = p.equilibrium.films[2]
+    assert film.branch.reach[0] + EDGE * film.pad.pad_clearance < film.reach(p.position) <= 0.0
+
+
+def test_accuracy_and_iterations_are_reported(rocker):
+    p = predict(rocker, 5000.0, DOWN, SPEED)
+    assert p.equilibrium.force_residual < p.setup.accuracy == 1e-7
+    assert p.equilibrium.temperature_residual < 1e-4
+    assert 1 < p.equilibrium.iterations < 20
+
+
+def test_one_law_per_pad(rocker):
+    laws = [ConstantPivot(k) for k in (1e9, 5e8, 8e8, 3e8, 2e9)]
+    p = predict(rocker, 5000.0, DOWN, SPEED, pivots=laws)
+    np.testing.assert_allclose(p.deflection, p.pad_load / [law.value for law in laws], rtol=1e-6, atol=1e-13)
+
+
+@pytest.mark.slow
+def test_sixty_random_bearings():
+    outcome = robustness.run(robustness.draw(60, seed=11), turn_every=12)
+    assert outcome.converged >= 59
+    assert outcome.wrong == []
+    assert outcome.asymmetry < 1e-6
+    assert outcome.converged + sum(outcome.statuses.values()) == 60

@@ -1,0 +1,248 @@
+"""The film kernel against integrals, an independent solver and itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from scipy.sparse.linalg import spsolve
+
+from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film.reynolds import FilmForces, solve_film
+
+MU, RHO, SPEED, RADIUS, CLEARANCE = 0.03, 850.0, 7.0, 0.05, 1e-4
+
+
+def solve(
+    shape: tuple[int, int],
+    wedge: tuple[float, float],
+    length: float = 0.07,
+    arc: tuple[float, float] = (-0.5, 0.5),
+    sharp: bool = False,
+    symmetric: bool = True,
+) -> tuple[FilmGrid, FilmWork, FilmForces]:
+    """Solve one isoviscous film; `wedge` is (a, b) over the clearance."""
+    grid = film_grid(*arc, RADIUS, length, shape, symmetric)
+    work = film_work(grid, 40.0)
+    work.viscosity[:] = MU
+    work.density[:] = RHO
+    forces = solve_film(grid, work, (CLEARANCE, wedge[0] * CLEARANCE, wedge[1] * CLEARANCE), SPEED, sharp)
+    assert forces.steps > 0
+    return grid, work, forces
+
+
+def height(alpha: np.ndarray | float, wedge: tuple[float, float]) -> np.ndarray | float:
+    return CLEARANCE * (1.0 - wedge[0] * np.cos(alpha) - wedge[1] * np.sin(alpha))
+
+
+def long_bearing(wedge: tuple[float, float], arc: tuple[float, float]):
+    """Pressure of an infinitely long film, p' = 6 mu U R (h - h*) / h^3, with Swift-Stieber rupture (Sommerfeld)."""
+
+    def integral(power: int, end: float) -> float:
+        return quad(lambda t: 1.0 / height(t, wedge) ** power, arc[0], end, epsabs=0, epsrel=1e-11)[0]
+
+    def end_pressure(end: float, level: float) -> float:
+        return integral(2, end) - level * integral(3, end)
+
+    level, edge = integral(2, arc[1]) / integral(3, arc[1]), arc[1]
+    if level < height(arc[1], wedge):  # the film would have to pull at the end: it ruptures at dp/dx = 0
+        lowest = np.arctan2(wedge[1], wedge[0])
+        edge = brentq(lambda t: end_pressure(t, float(height(t, wedge))), lowest + 1e-6, arc[1])
+        level = float(height(edge, wedge))
+
+    def pressure(t: float) -> float:
+        return 6.0 * MU * SPEED * RADIUS * end_pressure(t, level) if t < edge else 0.0
+
+    return pressure, edge
+
+
+@pytest.mark.parametrize(
+    ("wedge", "ruptures"),
+    [((0.0, 0.6), False), ((0.6, 0.3), False), ((0.85, 0.1), True)],
+    ids=["slider", "pad", "deep"],
+)
+def test_infinitely_long_film_meets_sommerfelds_integral(wedge, ruptures):
+    pressure, edge = long_bearing(wedge, (-0.5, 0.5))
+    assert (edge < 0.5) is ruptures
+    worst = []
+    for nt in (40, 80, 160):
+        grid, work, _ = solve((nt, 2), wedge, length=100.0)
+        exact = np.array([pressure(t) for t in grid.angle])
+        worst.append(np.abs(work.pressure[:, 0] - exact).max() / exact.max())
+    assert worst[1] < 2e-3
+    assert worst[2] < worst[0] / 10.0  # second order: a sixteenth, with room for where the nodes fall
+
+
+def test_infinitely_short_film_meets_ocvirks_parabola():
+    wedge, length = (0.5, 0.3), 5e-4
+    grid, work, _ = solve((400, 8), wedge, length=length)
+    slope = CLEARANCE * (wedge[0] * np.sin(grid.angle) - wedge[1] * np.cos(grid.angle)) / RADIUS
+    h = height(grid.angle, wedge)
+    exact = np.maximum(-3.0 * MU * SPEED * slope / h**3, 0.0)[:, None] * (0.25 * length**2 - grid.z**2)
+    inside = slice(20, -20)  # the pressure must drop to zero at the ends within a length or so
+    assert np.abs(work.pressure - exact)[inside].max() < 2e-3 * exact.max()
+
+
+@pytest.mark.parametrize("wedge", [(0.7, 0.15), (0.9, 0.08), (-0.4, 0.5), (-0.6, 0.1)])
+def test_pressure_solves_the_complementarity_problem(wedge):
+    grid, work, _ = solve((80, 6), wedge)
+    p = work.pressure
+    outflow = reference_outflow(grid, p, wedge)
+    inner = p[1:-1, :-1]
+    scale = 0.5 * SPEED * CLEARANCE * RHO * grid.height.max()
+    assert p.min() >= 0.0
+    assert outflow.min() > -1e-9 * scale
+    assert np.abs(outflow[inner > 0.0]).max() < 1e-9 * scale
+    if wedge != (-0.4, 0.5):
+        assert (inner == 0.0).any()
+        assert (outflow[inner == 0.0] > 0.0).all()
+
+
+def reference_outflow(grid: FilmGrid, p: np.ndarray, wedge: tuple[float, float]) -> np.ndarray:
+    """Net mass flow out of every inner control volume of a half film [kg/s], in plain numpy."""
+    node = np.repeat(height(grid.angle, wedge)[:, None], len(grid.z), axis=1)
+    face = height(0.5 * (grid.angle[1:] + grid.angle[:-1]), wedge)[:, None]
+    along = RHO * grid.height * (0.5 * SPEED * face - face**3 / (12 * MU) * np.diff(p, axis=0) / grid.dx)
+    across = -RHO * grid.dx * node[:, 1:] ** 3 / (12 * MU) * np.diff(p, axis=1) / grid.dz
+    out = np.diff(along, axis=0)[:, :-1] + across[1:-1]
+    out[:, 1:] -= across[1:-1, :-1]
+    return out
+
+
+def reference_force(grid: FilmGrid, wedge: tuple[float, float], rates: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+    """Film force with squeeze, da/dt and db/dt [m/s]: another matrix, another solver, the same equation."""
+    nt, nz = len(grid.angle) - 1, len(grid.z) - 1
+    node, face = height(grid.angle, wedge), height(0.5 * (grid.angle[1:] + grid.angle[:-1]), wedge)
+    index = np.arange((nt - 1) * nz).reshape(nt - 1, nz)
+    rows, columns, values = [], [], []
+
+    def link(i: np.ndarray, j: np.ndarray, g: np.ndarray) -> None:
+        rows.extend([i, i])
+        columns.extend([i, j])
+        values.extend([g, -g])
+
+    gx = face[:, None] ** 3 / (12 * MU) * grid.height[:-1] / grid.dx
+    gz = node[1:-1, None] ** 3 / (12 * MU) * grid.dx / grid.dz
+    for a, b, g in ((index[:-1], index[1:], gx[1:-1]), (index[:, :-1], index[:, 1:], gz[:, :-1])):
+        link(a.ravel(), b.ravel(), g.ravel())
+        link(b.ravel(), a.ravel(), g.ravel())
+    matrix = sparse.coo_matrix(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(index.size, index.size)
+    )
+    wall = np.zeros(index.shape)
+    wall[0] += gx[0]
+    wall[-1] += gx[-1]
+    wall[:, -1] += gz[:, -1]
+    matrix = (matrix + sparse.diags(wall.ravel())).tocsr()
+    squeeze = -(rates[0] * np.cos(grid.angle[1:-1]) + rates[1] * np.sin(grid.angle[1:-1]))
+    source = -(0.5 * SPEED * np.diff(face) + squeeze * grid.dx)[:, None] * grid.height[:-1]
+    wet = np.ones(index.size, bool)
+    for _ in range(100):
+        p = np.zeros(index.size)
+        keep = np.flatnonzero(wet)
+        p[keep] = spsolve(matrix[keep][:, keep].tocsc(), source.ravel()[keep])
+        residual = matrix @ p - source.ravel()
+        new = np.where(wet, p > 0.0, residual < 0.0)
+        if (new == wet).all():
+            break
+        wet = new
+    else:
+        raise AssertionError("reference active set did not settle")
+    weighted = (p.reshape(index.shape) * grid.area[1:-1, :-1]).sum(axis=1)
+    return np.array([weighted @ grid.cos[1:-1], weighted @ grid.sin[1:-1]])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wedge", [(0.6, 0.25), (0.85, 0.1), (0.2, 0.4)])
+def test_stiffness_and_damping_are_differences_of_an_independent_solvers_forces(wedge):
+    grid, _, forces = solve((160, 8), wedge, sharp=True)
+    np.testing.assert_allclose(reference_force(grid, wedge), forces.force, rtol=1e-9)
+    step = 0.003  # of the clearance: small against the film, large enough that the rupture line crosses nodes
+    stiffness, damping = np.empty((2, 2)), np.empty((2, 2))
+    for k, unit in enumerate(np.eye(2)):
+        ahead, behind = (tuple(np.array(wedge) + s * step * unit) for s in (1, -1))
+        stiffness[:, k] = reference_force(grid, ahead) - reference_force(grid, behind)
+        rate = step * SPEED * CLEARANCE / RADIUS * unit
+        damping[:, k] = reference_force(grid, wedge, tuple(rate)) - reference_force(grid, wedge, tuple(-rate))
+    stiffness /= 2 * step * CLEARANCE
+    damping /= 2 * step * SPEED * CLEARANCE / RADIUS
+    np.testing.assert_allclose(forces.stiffness, stiffness, atol=2e-3 * np.abs(stiffness).max())
+    np.testing.assert_allclose(forces.damping, damping, atol=2e-3 * np.abs(damping).max())
+
+
+@pytest.mark.parametrize("wedge", [(0.6, 0.25), (-0.3, 0.5)])
+def test_plain_stiffness_is_the_derivative_of_the_discrete_force(wedge):
+    step = 1e-6  # small enough that no node changes sides
+    _, _, forces = solve((80, 6), wedge)
+    for k, unit in enumerate(np.eye(2)):
+        ahead, behind = (solve((80, 6), tuple(np.array(wedge) + s * step * unit))[2].force for s in (1, -1))
+        np.testing.assert_allclose(
+            forces.stiffness[:, k], (ahead - behind) / (2 * step * CLEARANCE), rtol=2e-6, atol=1e-3
+        )
+
+
+@pytest.mark.parametrize("wedge", [(0.6, 0.25), (0.85, 0.1), (-0.3, 0.5)])
+def test_half_speed_whirl_takes_the_pressure_away(wedge):
+    # squeeze rates (da, db)/dt = U / 2R (-b, a) cancel the wedge term of Eq. (2) at every angle
+    _, _, forces = solve((320, 12), wedge, sharp=True)
+    rates = 0.5 * SPEED / RADIUS * CLEARANCE * np.array([-wedge[1], wedge[0]])
+    np.testing.assert_allclose(forces.damping @ rates, -forces.force, atol=2e-3 * np.hypot(*forces.force))
+
+
+@pytest.mark.parametrize("wedge", [(0.0, 0.5), (0.65, 0.2), (0.9, 0.08)], ids=["full", "ruptured", "deep"])
+def test_forces_and_coefficients_converge_with_second_order(wedge):
+    fine = solve((320, 24), wedge, sharp=True)[2]
+    errors = []
+    for scale in (1, 2, 4):
+        f = solve((32 * scale, 2 * scale), wedge, sharp=True)[2]
+        errors.append(
+            [np.abs(got - want).max() / np.abs(want).max() for got, want in zip(f[:3], fine[:3], strict=True)]
+        )
+    order = np.log2(np.array(errors)[0] / np.array(errors)[2]) / 2.0
+    assert order[0] > 1.7  # force
+    # the rupture line falls between nodes by chance: single steps scatter, two halvings show the order
+    assert (order[1:] > 1.3).all(), order
+
+
+def test_half_width_is_the_mirrored_whole():
+    half, whole = solve((60, 4), (0.6, 0.3), sharp=True)[2], solve((60, 8), (0.6, 0.3), sharp=True, symmetric=False)[2]
+    for got, want in zip(half[:3], whole[:3], strict=True):
+        np.testing.assert_allclose(got, want, rtol=1e-10, atol=1e-10 * np.abs(want).max())
+
+
+def test_film_scales_as_reynolds_equation_says():
+    grid, work, base = solve((40, 4), (0.5, 0.3))
+    work.viscosity[:] = 2 * MU
+    work.ruptured[:] = False
+    double = solve_film(grid, work, (CLEARANCE, 0.5 * CLEARANCE, 0.3 * CLEARANCE), SPEED, False)
+    np.testing.assert_allclose(double.force, 2 * base.force, rtol=1e-12)
+    work.viscosity[:] = MU
+    work.density[:] = 3 * RHO  # the same everywhere: no matter
+    dense = solve_film(grid, work, (CLEARANCE, 0.5 * CLEARANCE, 0.3 * CLEARANCE), SPEED, False)
+    np.testing.assert_allclose(dense.force, base.force, rtol=1e-10)
+
+
+def test_active_set_settles_on_fine_meshes():
+    # the rupture line travels one node per step, so that a cold start needs steps in proportion to the mesh
+    _, coarse, _ = solve((80, 2), (0.9, 0.08))
+    _, work, forces = solve((1280, 2), (0.9, 0.08))
+    assert forces.steps > 60
+    assert work.ruptured[:, 0].mean() == pytest.approx(coarse.ruptured[:, 0].mean(), abs=0.02)
+
+
+def test_touching_film_is_reported():
+    grid = film_grid(-0.5, 0.5, RADIUS, 0.07, (40, 4), True)
+    work = film_work(grid, 40.0)
+    work.viscosity[:] = MU
+    work.density[:] = RHO
+    forces = solve_film(grid, work, (CLEARANCE, 1.2 * CLEARANCE, 0.0), SPEED, False)
+    assert forces.steps == -1
+    assert forces.min_film < 0.0
+
+
+@pytest.mark.parametrize("shape", [(3, 4), (41, 4), (40, 3), (40, 0)])
+def test_odd_meshes_are_refused(shape):
+    with pytest.raises(ValueError, match="even numbers of intervals"):
+        film_grid(-0.5, 0.5, RADIUS, 0.07, shape, True)

@@ -1,0 +1,150 @@
+"""Heat that leaves the film: into the pads, through the journal, to the next pad."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
+from model.effects import Effect
+from model.film.energy import dissipation, solve_energy
+from model.growth import Growth, grown
+from model.options import Options
+from model.predict import Prediction, predict
+from model.statics.heat_paths import minimal_residual, outlet_temperature
+
+SPEED = 2 * math.pi * 22
+
+
+@pytest.fixture(scope="module")
+def rocker() -> Bearing:
+    return load_bearing("model/bearings/rocker.toml")
+
+
+def run(bearing: Bearing, options: Options | None = None, **more: object) -> Prediction:
+    p = predict(bearing, 5000.0, speed=SPEED, options=options, **more)  # type: ignore[arg-type]
+    assert p.converged, p.status
+    return p
+
+
+def test_a_journal_of_one_temperature_keeps_no_heat(rocker):
+    p = run(rocker, Options(isothermal_journal=True))
+    taken = given = 0.0
+    for film in p.equilibrium.films:
+        exchange = 3.0 * rocker.oil.conductivity / film.work.thickness * film.grid.dx * film.grid.height
+        exchange[[0, -1]] *= 0.5
+        heat = exchange * (film.work.temperature - p.equilibrium.journal_temperature)
+        taken, given = taken + heat[heat > 0].sum(), given - heat[heat < 0].sum()
+    assert taken == pytest.approx(given, rel=1e-5)
+    assert taken > 10.0  # W: not nothing
+    assert p.max_temperature < run(rocker).max_temperature - 0.5
+    temperatures = [f.work.temperature for f in p.equilibrium.films]
+    assert min(t.min() for t in temperatures) < p.equilibrium.journal_temperature < p.max_temperature
+
+
+def test_heat_that_pads_take_is_what_their_solid_says(rocker):
+    cooled = rocker.with_pads(tuple(replace(p, back_convection=3000.0) for p in rocker.pads))
+    p = run(cooled, Options(conduction=True), thermal="tehd")
+    film = p.equilibrium.films[0]
+    assert film.give is not None
+    work, oil = film.work, rocker.oil
+    into_pad = film.give.flux @ (film.give.warmth @ (work.temperature - 40.0).ravel())
+    lost = float((film.grid.area.ravel() * into_pad).sum())
+    assert lost > 0.2 * 2.0 * dissipation(film.grid, work, SPEED * rocker.journal_radius).sum()
+    # the same heat taken away as a given loss, in one march, leaves the same temperature
+    work.exchange[:] = 0.0
+    work.gained[:] = -into_pad.reshape(work.gained.shape) * film.grid.dx * film.grid.height
+    again = np.empty_like(work.temperature)
+    heat = (oil.specific_heat, oil.conductivity)
+    solve_energy(film.grid, work, film.inlet, SPEED * rocker.journal_radius, heat, again)
+    np.testing.assert_allclose(again, work.temperature, atol=2e-3)
+
+
+def test_conduction_cools_and_a_pad_that_conducts_more_cools_more(rocker):
+    hot = [run(rocker, thermal="tehd").max_temperature]
+    for convection in (0.0, 500.0):
+        pads = tuple(replace(p, back_convection=convection) for p in rocker.pads)
+        hot.append(run(rocker.with_pads(pads), Options(conduction=True), thermal="tehd").max_temperature)
+    assert hot[0] > hot[1] > hot[2]
+
+
+def test_carried_over_oil_goes_round(rocker):
+    share = 0.6
+    p = run(rocker, effects=[Effect("hot_oil_carryover", fraction=share)])
+    order = sorted(p.equilibrium.films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
+    for before, film in zip([order[-1], *order[:-1]], order, strict=True):
+        assert film.inlet == pytest.approx(40.0 + share * (outlet_temperature(before) - 40.0), abs=1e-3)
+    assert p.equilibrium.iterations < 20
+
+
+@pytest.mark.slow
+def test_all_paths_together_converge_with_few_steps(rocker):
+    options = Options(conduction=True, isothermal_journal=True, growth=Growth(housing=48.0))
+    p = run(rocker, options, thermal="tehd", effects=[Effect("hot_oil_carryover", fraction=0.7)])
+    assert p.equilibrium.iterations < 30
+    assert p.status == ()
+
+
+def test_isothermal_films_exchange_nothing(rocker):
+    a = run(rocker, thermal="isothermal")
+    b = run(rocker, Options(conduction=True, isothermal_journal=True), thermal="isothermal")
+    np.testing.assert_array_equal(a.h, b.h)
+
+
+def test_krylov_steps_solve_a_known_system():
+    rng = np.random.default_rng(3)
+    matrix = np.eye(30) + 0.3 * rng.standard_normal((30, 30)) / math.sqrt(30)
+    right = rng.standard_normal(30)
+    x = minimal_residual(lambda v: matrix @ v, right, 1e-4)
+    assert np.linalg.norm(matrix @ x - right) < 1e-4 * np.linalg.norm(right)
+
+
+class TestGrowth:
+    def test_clearances_by_hand(self, rocker):
+        growth = Growth(reference=20.0, housing=48.0, expansion=(11e-6, 12e-6))
+        pad, new = rocker.pads[0], grown(rocker, growth, 40.0, 50.0).pads[0]
+        seat = rocker.journal_radius + pad.pad_clearance + pad.thickness
+        journal = 11e-6 * rocker.journal_radius * 30
+        thicker = pad.backing.thermal_expansion * pad.thickness * 20
+        wider = pad.backing.thermal_expansion * (rocker.journal_radius + pad.pad_clearance) * 20
+        assert new.assembled_clearance - pad.assembled_clearance == pytest.approx(
+            12e-6 * seat * 28 - thicker - journal, rel=1e-9
+        )
+        assert new.pad_clearance - pad.pad_clearance == pytest.approx(wider - journal, rel=1e-9)
+
+    def test_everything_warm_alike_grows_in_proportion(self, rocker):
+        expansion = rocker.pads[0].backing.thermal_expansion
+        growth = Growth(reference=20.0, housing=40.0, expansion=(expansion, expansion))
+        new = grown(rocker, growth, 40.0, 40.0)
+        for pad, was in zip(new.pads, rocker.pads, strict=True):
+            assert pad.pad_clearance == pytest.approx(was.pad_clearance * (1 + 20 * expansion), rel=1e-3)
+            assert pad.assembled_clearance == pytest.approx(was.assembled_clearance, abs=0.05e-6)
+
+    def test_the_journal_settles_at_its_own_temperature(self, rocker):
+        growth = Growth()
+        p = run(rocker, Options(growth=growth))
+        by_hand = grown(rocker, growth, 40.0, p.equilibrium.mean_journal_temperature)
+        again = run(by_hand)
+        np.testing.assert_allclose(again.h, p.h, rtol=1e-4)
+        assert p.setup.bearing.pads[0].assembled_clearance < rocker.pads[0].assembled_clearance
+        assert p.mesh_error < 0.01  # the coarser mesh does not grow once more
+
+    def test_no_clearance_left_is_said(self, rocker):
+        with pytest.raises(ValueError, match="no clearance left"):
+            run(rocker, Options(growth=Growth(journal=250.0)))
+
+    @pytest.mark.parametrize("wrong", [{"reference": math.nan}, {"housing": 900.0}, {"expansion": (1.0, 1e-5)}])
+    def test_nonsense_is_refused(self, wrong):
+        with pytest.raises(ValueError):
+            Growth(**wrong)
+
+
+def test_unknown_options_are_refused(rocker):
+    with pytest.raises(ValueError, match="cavitation must be one of"):
+        Options(cavitation="gumbel")
+    with pytest.raises(ValueError, match="options must be"):
+        predict(rocker, 5000.0, speed=SPEED, options={"conduction": True})  # type: ignore[arg-type]

@@ -1,0 +1,396 @@
+"""The pad as a solid: algebra, symmetry, heat balance, grids, cache."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from model.bearing import STEEL, Bearing, Material, Oil, Pad, Pivot
+from model.pad import operators as operators_module
+from model.pad import store as pad_store
+from model.pad.block_cholesky import BlockCholesky, factor_rows, forward_rows
+from model.pad.heat import conduct
+from model.pad.line import Line, graded
+from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, pivot_face, sector_mesh
+from model.pad.operators import pad_operators
+from model.pad.solid import PadSolid, pad_solid
+
+COARSE = MeshDensity(arc=6, face=1, half_length=3, backing=2)
+OIL = Oil(0.0396, 0.034, 860.0, 7e-4, 2000.0, 0.13, 40.0)
+PAD = Pad(-math.pi / 2, math.radians(63.5), 0.5, 0.13e-3, 0.08e-3, 16e-3, 3e-3, 16e-3, 0.54, 0.256e-3)
+ROCKER = Pivot("rocker", contact_length=39.6e-3, housing_diameter=0.132, pivot_diameter=0.1196)
+SPHERE = Pivot("spherical", sphere_diameter=0.4)
+
+
+def bearing(pivot: Pivot = ROCKER) -> Bearing:
+    return Bearing("test", 99.86e-3, 69.6e-3, (PAD,), pivot, OIL)
+
+
+@pytest.fixture(autouse=True)
+def _no_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TPJB_CACHE", "off")
+
+
+def grids(pad: Pad = PAD, n_theta: int = 25, n_z: int = 7, full: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    theta = pad.leading_edge + pad.arc * np.linspace(0.0, 1.0, n_theta)
+    half = 0.5 * 69.6e-3
+    return theta, np.linspace(-half if full else 0.0, half, 2 * n_z - 1 if full else n_z)
+
+
+def solid(pad: Pad = PAD, pivot: Pivot = ROCKER, **grid: object) -> PadSolid:
+    return pad_solid(pad, bearing(pivot), *grids(pad, **grid), density=COARSE)  # type: ignore[arg-type]
+
+
+def film_pressure(body: PadSolid) -> np.ndarray:
+    s = (body.film_theta - body.film_theta[0]) / np.ptp(body.film_theta)
+    z = body.film_z / body.film_z[-1]
+    return 3e6 * np.sin(np.pi * s)[:, None] * (1.0 - z**2)
+
+
+class TestLine:
+    def test_reproduces_polynomials_of_its_degree(self) -> None:
+        for degree in (1, 2, 3):
+            line = Line(np.array([0.0, 0.3, 1.0, 1.1]), degree)
+            x = np.linspace(0.0, 1.1, 37)
+            nodal = line.nodes**degree
+            np.testing.assert_allclose(line.tabulate(x) @ nodal, x**degree, atol=1e-13)
+            np.testing.assert_allclose(line.tabulate(x, 1) @ nodal, degree * x ** (degree - 1), atol=1e-12)
+
+    def test_matrix_integrates(self) -> None:
+        line = Line(np.array([1.0, 1.5, 3.0]))
+        f, g = line.nodes**2, line.nodes
+        weight = line.gauss[0]
+        assert f @ line.matrix(1, 0, weight) @ g == pytest.approx(2 * (3.0**4 - 1.0) / 4)
+
+    def test_rejects_what_is_no_line(self) -> None:
+        with pytest.raises(ValueError, match="strictly increasing"):
+            Line(np.array([0.0, 0.0, 1.0]))
+        with pytest.raises(ValueError, match="degree"):
+            Line(np.array([0.0, 1.0]), 0)
+
+    def test_graded_meets_both_ends(self) -> None:
+        breaks = graded(2.0, 3.0, 7, 0.1, 0.01)
+        sizes = np.diff(breaks)
+        assert breaks[0] == 2.0
+        assert breaks[-1] == 3.0
+        assert sizes[0] == pytest.approx(0.1)
+        assert sizes[-1] == pytest.approx(0.01)
+
+    def test_graded_falls_back_to_equal_elements(self) -> None:
+        np.testing.assert_allclose(np.diff(graded(0.0, 1.0, 4, 5.0, 5.0)), 0.25)
+
+
+class TestBlockCholesky:
+    @staticmethod
+    def blocks(n: int = 6, m: int = 4, band: int = 2) -> tuple[np.ndarray, list[dict[int, np.ndarray]]]:
+        rng = np.random.default_rng(20)
+        dense = np.zeros((n * m, n * m))
+        for i in range(n):
+            for j in range(max(0, i - band), i):
+                if i % 2 == 0 or i - j == 1:  # as for quadratic elements: mid slabs reach only their neighbours
+                    dense[i * m : (i + 1) * m, j * m : (j + 1) * m] = rng.normal(size=(m, m))
+        dense += dense.T + 30.0 * np.eye(n * m)
+        cut = [slice(i * m, (i + 1) * m) for i in range(n)]
+        rows = [
+            {j: dense[cut[i], cut[j]].copy() for j in range(i + 1) if np.any(dense[cut[i], cut[j]])} for i in range(n)
+        ]
+        return dense, rows
+
+    def test_solves_as_dense_algebra_does(self) -> None:
+        dense, rows = self.blocks()
+        rhs = np.random.default_rng(1).normal(size=(6, 4, 3))
+        got = BlockCholesky.factor(rows).solve(rhs)
+        np.testing.assert_allclose(got.reshape(24, 3), np.linalg.solve(dense, rhs.reshape(24, 3)), rtol=1e-12)
+
+    def test_growing_right_hand_sides(self) -> None:
+        dense, rows = self.blocks()
+        rhs = (np.eye(4)[:, :1] * np.ones((4, i + 1)) * (np.arange(i + 1) == i) for i in range(6))
+        y = np.zeros((6, 4, 6))
+        for i, block in enumerate(forward_rows(factor_rows(rows), rhs)):
+            y[i, :, : i + 1] = block
+        gram = np.einsum("imk,iml->kl", y, y)
+        np.testing.assert_allclose(gram, np.linalg.inv(dense)[::4, ::4], rtol=1e-10)
+
+    def test_says_when_not_positive_definite(self) -> None:
+        with pytest.raises(np.linalg.LinAlgError):
+            BlockCholesky.factor([{0: -np.eye(2)}])
+
+
+class TestCompliance:
+    @pytest.mark.parametrize("full", [False, True])
+    def test_work_is_symmetric_and_never_negative(self, full: bool) -> None:
+        body = solid(full=full)
+        work = body.film_mass @ body.compliance
+        scale = np.abs(work).max()
+        np.testing.assert_allclose(work, work.T, atol=1e-12 * scale)
+        assert np.linalg.eigvalsh(0.5 * (work + work.T)).min() > -1e-12 * scale
+
+    def test_matrices_do_what_the_methods_do(self) -> None:
+        body = solid()
+        p = film_pressure(body)
+        np.testing.assert_allclose(body.compliance @ p.ravel(), body.bend(p).ravel(), rtol=1e-10, atol=1e-15)
+        np.testing.assert_allclose(body.thermal @ p.ravel(), body.expand(p).ravel(), rtol=1e-10)
+        np.testing.assert_allclose(
+            body.heat_flux @ p.ravel(), body.heat_flow(p).ravel(), rtol=1e-9, atol=1e-9 * np.abs(p).max()
+        )
+        np.testing.assert_allclose(body.deform(p, p, 0.5), 0.5 * (body.bend(p) + body.expand(p)))
+
+    def test_half_film_stands_for_the_whole(self) -> None:
+        half, full = solid(), solid(full=True)
+        p = film_pressure(half)
+        whole = full.bend(np.concatenate((p[:, :0:-1], p), axis=1))
+        np.testing.assert_allclose(whole[:, 6:], half.bend(p), rtol=1e-11)
+        np.testing.assert_allclose(whole, whole[:, ::-1], rtol=1e-11)
+
+    def test_one_sided_film_bends_that_side_more(self) -> None:
+        full = solid(full=True)
+        p = film_pressure(full) * (full.film_z > 0)
+        got = full.bend(p)
+        mirrored = full.bend(p[:, ::-1])
+        np.testing.assert_allclose(got, mirrored[:, ::-1], rtol=1e-10, atol=1e-12 * got.max())
+        assert got[0, -1] > 1.2 * got[0, 0]
+
+    def test_pad_is_mirror_symmetric_about_a_central_pivot(self) -> None:
+        body = solid()
+        p = film_pressure(body)
+        np.testing.assert_allclose(body.bend(p[::-1])[::-1], body.bend(p), rtol=1e-9)
+
+    def test_pressure_opens_the_pad(self) -> None:
+        u = solid().bend(film_pressure(solid()))
+        assert u.min() > 0.0
+        assert u[0, 0] > 2.0 * u[12, 0]
+        assert u[-1, 0] > 2.0 * u[12, 0]
+
+    def test_stiffer_pads_bend_less(self) -> None:
+        soft = film_pressure(solid())
+        hard = dataclasses.replace(
+            PAD,
+            backing=dataclasses.replace(STEEL, youngs_modulus=412e9),
+            babbitt=dataclasses.replace(PAD.babbitt, youngs_modulus=80e9),
+        )
+        np.testing.assert_allclose(solid(hard).bend(soft), 0.5 * solid().bend(soft), rtol=1e-9)
+
+    def test_film_grid_hardly_matters(self) -> None:
+        fine, coarse = solid(n_theta=49, n_z=13), solid(n_theta=25, n_z=7)
+        expected = coarse.bend(film_pressure(coarse))
+        np.testing.assert_allclose(fine.bend(film_pressure(fine))[::2, ::2], expected, atol=0.01 * expected.max())
+
+    def test_uneven_film_grid_and_constant_field(self) -> None:
+        theta, _ = grids()
+        z = 0.5 * 69.6e-3 * np.linspace(0.0, 1.0, 7) ** 1.5
+        uneven = pad_solid(PAD, bearing(), theta, z, density=COARSE)
+        ones = np.ones((25, 7))
+        np.testing.assert_allclose(
+            uneven.bend(ones)[:, 0], solid().bend(ones)[:, 0], rtol=0.01, atol=0.003 * solid().bend(ones).max()
+        )
+
+
+class TestHeat:
+    def test_no_convection_no_gradient(self) -> None:
+        body = solid(dataclasses.replace(PAD, back_convection=0.0))
+        rise = np.full((25, 7), 12.0)
+        assert body.pad_temperature(rise)[2] == pytest.approx(12.0)
+        assert np.abs(body.heat_flow(rise)).max() < 1e-6
+        assert body.back_temperature(rise) == pytest.approx(12.0)
+
+    def test_heat_in_is_heat_out(self) -> None:
+        geometry = PadGeometry.of(PAD, bearing())
+        mesh = sector_mesh(geometry, COARSE)
+        solution = conduct(mesh, geometry.back_convection, np.linspace(5.0, 9.0, mesh.n_surface)[:, None])
+        field = solution.temperature[..., 0]
+        r, theta, z = mesh.r, mesh.theta, mesh.z
+        whole_r, whole_t, whole_z = (line.matrix(0, 0).sum(axis=0) for line in (r, theta, z))
+        weighted_r = r.matrix(0, 0, r.gauss[0]).sum(axis=0)
+        back = r.breaks[-1] * np.einsum("i,k,ik", whole_t, whole_z, field[:, -1])
+        end = np.einsum("i,j,ij", whole_t, weighted_r, field[:, :, -1])
+        edges = np.einsum("j,k,jk", whole_r, whole_z, field[0] + field[-1])
+        assert solution.heat.sum() == pytest.approx(geometry.back_convection * (back + end + edges), rel=1e-10)
+
+    def test_radial_conduction_far_from_the_edges(self) -> None:
+        """T(R_o) / T(R_i) = 1 / (1 + h R_o ln(R_o / R_i) / k), a cylindrical wall."""
+        thin = dataclasses.replace(
+            PAD, thickness=4e-3, elastic_thickness=4e-3, babbitt_thickness=0.0, back_convection=2e4
+        )
+        mesh = sector_mesh(PadGeometry.of(thin, bearing()), MeshDensity(backing=2))
+        middle = mesh.theta.n_nodes // 2
+        rise = conduct(mesh, 2e4, np.ones((mesh.n_surface, 1))).temperature[middle, -1, 0, 0]
+        inner, outer = mesh.r.breaks[[0, -1]]
+        assert rise == pytest.approx(1.0 / (1.0 + 2e4 * outer * math.log(outer / inner) / STEEL.conductivity), rel=1e-3)
+
+    def test_flux_adds_up_to_the_heat(self) -> None:
+        body = solid(full=True)
+        rise = 5.0 + body.film_theta[:, None] * np.ones(body.film_z.size)
+        total = (body.film_mass @ body.heat_flow(rise).ravel()).sum()
+        geometry = body.geometry
+        mesh = sector_mesh(geometry, COARSE)
+        heat = conduct(mesh, geometry.back_convection, np.ones((mesh.n_surface, 1))).heat
+        assert total == pytest.approx(2.0 * heat.sum() * 5.0, rel=1e-9)
+        assert body.peak_rise(rise) == rise.max()
+        assert body.pad_temperature(rise)[2].max() <= rise.max() * 1.01
+
+    def test_hot_lining_flattens_the_pad(self) -> None:
+        plain = solid(dataclasses.replace(PAD, babbitt=STEEL)).expand(np.ones((25, 7)))
+        lined = solid().expand(np.ones((25, 7)))
+        assert lined[0, 0] - lined[12, 0] > plain[0, 0] - plain[12, 0] + 0.1e-6
+
+    def test_pad_thickens_over_the_pivot(self) -> None:
+        """By alpha t per kelvin if free; by (1 + nu) / (1 - nu) times that where the face holds it sideways."""
+        pad = dataclasses.replace(PAD, babbitt=STEEL, back_convection=0.0)
+        grow = solid(pad).expand(np.ones((25, 7)))
+        assert 12e-6 * 16e-3 < -grow[12, 0] < 1.4 * 12e-6 * 16e-3
+
+    def test_odd_temperatures_vanish_in_the_middle(self) -> None:
+        body = solid(full=True)
+        rise = np.ones((25, 1)) * body.film_z[None, :] / body.film_z[-1]
+        grow = body.expand(rise)
+        np.testing.assert_allclose(grow, -grow[:, ::-1], atol=1e-10 * np.abs(grow).max())
+        flow = body.heat_flow(rise)
+        np.testing.assert_allclose(flow, -flow[:, ::-1], atol=1e-9 * np.abs(flow).max())
+
+
+class TestGeometry:
+    def test_faces_by_pivot_kind(self) -> None:
+        rocker = pivot_face(PAD, bearing())
+        assert (rocker.width, rocker.length) == pytest.approx((8e-3, 39.6e-3))
+        sphere = pivot_face(PAD, bearing(SPHERE))
+        assert sphere.width * sphere.length == pytest.approx(math.pi / 4 * 16e-3**2)
+        assert pivot_face(PAD, bearing(Pivot("rigid"))).length == 69.6e-3
+
+    def test_face_gives_way_on_a_short_pad(self) -> None:
+        short = dataclasses.replace(PAD, arc=math.radians(15.0), pivot_offset=0.8)
+        face = pivot_face(short, bearing())
+        assert face.width < 8e-3
+        assert np.isfinite(solid(short).bend(np.ones((25, 7)))).all()
+
+    def test_offset_pivot_and_full_length_strip(self) -> None:
+        offset = dataclasses.replace(PAD, pivot_offset=0.6)
+        body = pad_solid(offset, bearing(Pivot("rigid")), *grids(offset), density=COARSE)
+        there = np.zeros((25, 7))
+        there[body.film_theta < offset.leading_edge + 0.5 * offset.arc] = 1e6
+        u_long, u_short = body.bend(there), body.bend(there[::-1])
+        assert u_long[0, 0] > 1.3 * u_short[-1, 0] > 0.0  # the longer wing is the softer one
+
+    def test_no_lining(self) -> None:
+        bare = dataclasses.replace(PAD, babbitt_thickness=0.0)
+        steel = dataclasses.replace(PAD, babbitt=STEEL)
+        np.testing.assert_allclose(solid(bare).bend(np.ones((25, 7))), solid(steel).bend(np.ones((25, 7))), rtol=0.03)
+
+    def test_face_must_fit(self) -> None:
+        with pytest.raises(ValueError, match="does not fit"):
+            PadGeometry.of(PAD, bearing(), PivotFace(0.2, 0.01))
+        with pytest.raises(ValueError, match="longer than the pad"):
+            PadGeometry.of(PAD, bearing(), PivotFace(0.008, 0.1))
+        with pytest.raises(ValueError, match="positive"):
+            PivotFace(0.0, 0.01)
+
+    def test_density_has_its_least(self) -> None:
+        with pytest.raises(ValueError, match="half_length >= 3"):
+            MeshDensity(half_length=2)
+        assert MeshDensity().refined(2).arc == 2 * MeshDensity().arc
+
+    def test_micron_changes_share_a_solution(self) -> None:
+        moved = dataclasses.replace(PAD, pad_clearance=PAD.pad_clearance + 5e-6, assembled_clearance=60e-6)
+        assert solid(moved) is solid()
+
+    def test_grid_must_span_the_pad(self) -> None:
+        theta, z = grids()
+        for bad, name in (
+            ((theta[1:], z), "film_theta"),
+            ((theta, z[:-1]), "film_z"),
+            ((theta[::-1], z), "film_theta"),
+        ):
+            with pytest.raises(ValueError, match=name):
+                pad_solid(PAD, bearing(), *bad, density=COARSE)
+
+    def test_fields_must_fit_the_grid(self) -> None:
+        with pytest.raises(ValueError, match="pressure must have the film grid's shape"):
+            solid().bend(np.ones((7, 25)))
+
+    def test_travels_between_processes(self) -> None:
+        copy = pickle.loads(pickle.dumps(solid()))
+        np.testing.assert_array_equal(copy.bend(np.ones((25, 7))), solid().bend(np.ones((25, 7))))
+
+    def test_prints_itself(self) -> None:
+        text = repr(solid())
+        assert "25 x 7 film nodes, half length" in text
+        assert "held on 8.0 x 39.6 mm" in text
+        assert "um under 1 MPa" in text
+
+
+class TestStore:
+    @pytest.fixture
+    def counted(self, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+        calls: list[int] = []
+        original = operators_module._solve
+
+        def spy(*args: object) -> dict[str, np.ndarray]:
+            calls.append(1)
+            return original(*args)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(operators_module, "_solve", spy)
+        return calls
+
+    @staticmethod
+    def fresh() -> np.ndarray:
+        pad_operators.cache_clear()
+        return pad_operators(PadGeometry.of(PAD, bearing()), MeshDensity(2, 1, 3, 1), True).compliance
+
+    def test_second_process_reads_the_file(self, tmp_path, monkeypatch, counted) -> None:
+        monkeypatch.setenv("TPJB_CACHE", str(tmp_path / "deep" / "folder"))
+        first, second = self.fresh(), self.fresh()
+        assert len(counted) == 1
+        np.testing.assert_array_equal(first, second)
+        assert [path.suffix for path in (tmp_path / "deep" / "folder").iterdir()] == [".npz"]
+
+    @pytest.mark.parametrize("damage", [b"", b"not a zip", b"PK\x03\x04 cut off"])
+    def test_damaged_file_is_solved_again(self, tmp_path, monkeypatch, counted, damage) -> None:
+        monkeypatch.setenv("TPJB_CACHE", str(tmp_path))
+        first = self.fresh()
+        next(tmp_path.glob("*.npz")).write_bytes(damage)
+        np.testing.assert_array_equal(first, self.fresh())
+        assert len(counted) == 2
+
+    def test_wrong_content_is_solved_again(self, tmp_path, monkeypatch, counted) -> None:
+        monkeypatch.setenv("TPJB_CACHE", str(tmp_path))
+        first = self.fresh()
+        path = next(tmp_path.glob("*.npz"))
+        with np.load(path) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+        arrays["compliance"][0, 0] = np.nan
+        np.savez(path, **arrays)
+        np.testing.assert_array_equal(first, self.fresh())
+        assert len(counted) == 2
+
+    def test_unwritable_folder_is_no_error(self, tmp_path, monkeypatch, counted) -> None:
+        (tmp_path / "file").write_text("in the way")
+        monkeypatch.setenv("TPJB_CACHE", str(tmp_path / "file" / "folder"))
+        assert np.isfinite(self.fresh()).all()
+        assert len(counted) == 1
+
+    def test_old_files_are_pruned(self, tmp_path, monkeypatch) -> None:
+        monkeypatch.setenv("TPJB_CACHE", str(tmp_path))
+        monkeypatch.setattr(pad_store, "_KEEP", 3)
+        for i in range(6):
+            assert pad_store.save_arrays(f"{i:032d}", {"a": np.zeros(2)})
+        assert len(list(tmp_path.iterdir())) == 3
+
+    def test_key_follows_geometry(self) -> None:
+        one, two = PadGeometry.of(PAD, bearing()), PadGeometry.of(PAD, bearing(SPHERE))
+        assert pad_store.storage_key(one) != pad_store.storage_key(two)
+        assert pad_store.storage_key(one) == pad_store.storage_key(PadGeometry.of(PAD, bearing()))
+
+    def test_folder_follows_the_environment(self, monkeypatch) -> None:
+        assert pad_store.cache_folder() is None
+        monkeypatch.delenv("TPJB_CACHE")
+        folder = pad_store.cache_folder()
+        assert folder is None or folder.name == "tpjb-ident"
+
+
+def test_materials_reach_the_solution() -> None:
+    odd = dataclasses.replace(PAD, backing=Material(206e9, 0.3, 12e-6, 5.4))
+    rise = np.ones((25, 7))
+    assert solid(odd).back_temperature(rise)[12, 0] < solid().back_temperature(rise)[12, 0]

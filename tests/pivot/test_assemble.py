@@ -1,0 +1,496 @@
+"""From blocks to a curve and its status, and records that are refused: exact staircases, one thing wrong at a time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rigdata.problem import RigDataError
+from tpjb_ident.pivot.assemble import Choice, assemble_curve
+from tpjb_ident.pivot.bad_holds import GROUPS_ON_RAMP, bad_blocks
+from tpjb_ident.pivot.fit import LAWS, MODEL_ERROR, REFERENCE_SHARE, UNKNOWN_ZERO, _fit_data
+from tpjb_ident.pivot.laws.law_fit import LawFit
+from tpjb_ident.pivot.records.blocks import Blocks
+from tpjb_ident.pivot.records.dry_record import DryRecord, read_dry_run
+from tpjb_ident.pivot.records.pickup import Pickup
+from tpjb_ident.pivot.records.projection import Direction, project
+from tpjb_ident.pivot.records.refusals import check_directions, check_pickup, check_placement
+from tpjb_ident.pivot.records.settings import PivotSettings
+from tpjb_ident.pivot.records.steps import Hold
+from tpjb_ident.slow_records.flat_channels import refuse_flat_channels
+from tpjb_ident.slow_records.noise import NoiseModel
+
+ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
+LEVELS = np.arange(500.0, 5001.0, 500.0)
+SCALE, PER = 4e-9, 6
+NOISE = NoiseModel(white=1e-18, flicker=1e-18, drift=1e-9)
+REACH = 8e-5
+
+
+def channel(quantity, axis, uncertainty=None):
+    return SimpleNamespace(quantity=quantity, axis=axis, uncertainty=uncertainty)
+
+
+CHANNELS = {
+    "X1A": channel("displacement", math.radians(45.0)), "X1B": channel("displacement", math.radians(135.0)),
+    "L1H": channel("force", 0.0), "L1V": channel("force", math.radians(90.0)),
+}  # fmt: skip
+
+
+def vectors(angle, size):
+    return np.outer(size, [math.cos(angle), math.sin(angle)])
+
+
+def record(pad=1, levels=LEVELS, turn=(0.0, 0.0), shift=(0.0, 0.0), held=True, name=None, branch=1, pickup=None):
+    """A staircase of exact blocks: load and displacement `turn` off the pad, displacement moved by `shift` [m]."""
+    load = np.repeat(levels, PER) if held else np.linspace(levels[0], levels[-1], PER * len(levels))
+    n, angle = len(load), float(ANGLES[pad - 1])
+    hold = np.repeat(np.arange(len(levels)), PER) if held else np.full(n, -1)
+    place = vectors(angle, np.full(n, REACH)) + vectors(angle + turn[1], SCALE * load) + np.array(shift)
+    zeros = np.zeros(n)
+    blocks = Blocks(0.1 * np.arange(n), np.full(n, 0.1), vectors(angle + turn[0], load), place,
+                    zeros, zeros, hold, np.full(n, branch))  # fmt: skip
+    holds = tuple(Hold(0.6 * k, 0.6 * k + 0.6, level, branch) for k, level in enumerate(levels)) if held else ()
+    run = SimpleNamespace(id=name or f"p-{pad}", file=f"p-{pad}.csv", pad=pad, channels=CHANNELS)
+    return DryRecord(run, pad, angle, holds, blocks, project(blocks, angle), 0.0, 0.0, pickup)
+
+
+def check(one, **settings):
+    return check_directions(one, NOISE, PivotSettings(**settings), ANGLES)
+
+
+@pytest.mark.parametrize(
+    ("load", "moved", "taken"), [(7.5, 0.0, True), (-8.5, -8.5, False), (0.0, 29.0, True), (0.0, -31.0, False)]
+)
+def test_directions_are_taken_up_to_their_limits(load, moved, taken):
+    one = record(turn=(math.radians(load), math.radians(moved)))
+    if taken:
+        found = check(one)
+        assert math.degrees(found[0].angle) == pytest.approx(load, abs=1e-6)
+        assert math.degrees(found[1].angle) == pytest.approx(moved, abs=1e-3)
+    else:
+        with pytest.raises(RigDataError, match=r"p-1 says pad 1 at -90 deg, but its (force|displacement) grows -"):
+            check(one)
+    assert check(one, load_angle_limit=0.2, displacement_angle_limit=0.6)
+
+
+@pytest.mark.parametrize(
+    ("turn", "guess"),
+    [
+        ((72.0, 72.0), "force grows .72.0 deg away from .*wrong pad: load and displacement both point at pad 2"),
+        ((-72.0, -80.0), "wrong pad: load and displacement both point at pad 5"),
+        ((20.0, 25.0), r"wrong angle: load and displacement turn together by \+20 deg"),
+        ((90.0, 10.0), "wrong channel: .*so force channels are exchanged or reversed"),
+        ((180.0, 0.0), "force grows .*180.0 deg opposite to"),
+        ((3.0, 120.0), "displacement grows .120.0 deg away from .*so displacement channels"),
+        ((60.0, -100.0), "wrong pad, wrong channel or wrong angle"),
+    ],
+)
+def test_the_likeliest_mistake_is_named(turn, guess):
+    with pytest.raises(RigDataError, match=guess):
+        check(record(turn=tuple(np.radians(turn))))
+
+
+def campaign(**odd):
+    """One run per pad about a common centre somewhere; `odd` moves that of pad 3, along and beside its direction."""
+    centre = np.array([2e-5, -5e-5])
+    out = np.array([math.cos(ANGLES[2]), math.sin(ANGLES[2])])
+    moved = REACH * (odd.get("along", 0.0) * out + odd.get("aside", 0.0) * np.array([-out[1], out[0]]))
+    return [record(pad, shift=centre + (moved if pad == 3 else 0.0)) for pad in range(1, 6)]
+
+
+@pytest.mark.parametrize(
+    ("odd", "named"),
+    [({}, False), ({"aside": 0.11}, False), ({"aside": 0.16}, True), ({"aside": -0.16}, True),
+     ({"along": 0.4}, False), ({"along": 0.65}, True), ({"along": -0.65}, True)],
+)  # fmt: skip
+def test_a_shaft_that_stands_elsewhere_is_named(odd, named):
+    found = check_placement(campaign(**odd))
+    assert [p.run for p in found] == (["p-3"] if named else [])
+    if named:
+        assert "toward pad 3" in found[0].what
+        # the reach holds the first load's deflection: 80 um and 2 um
+        assert "say 82 um toward it" in found[0].what
+
+
+def test_two_pads_tell_no_centre():
+    assert check_placement(campaign(aside=0.5)[1:3]) == []
+    assert check_placement([]) == []
+
+
+def signed(pad, size, name=None):
+    return record(pad, pickup=Pickup(tuple(CHANNELS), np.array(size), np.full(4, 0.01)), name=name)
+
+
+def test_runs_whose_mains_is_that_of_exchanged_channels_are_named():
+    size = [1.0 + 0.2j, -0.3 + 1.1j, 0.8 - 0.9j, 0.1 + 0.6j]
+    good = [signed(pad, size) for pad in (1, 2, 3)]
+    assert check_pickup(good) == []
+    found = check_pickup([*good, signed(4, [size[k] for k in (0, 1, 3, 2)])])
+    assert [p.run for p in found] == ["p-4"]
+    assert "L1H and L1V are exchanged: then its mains pick-up is that of 3 other dry runs" in found[0].what
+    assert check_pickup([]) == []
+
+
+def law(name="linear", scale=SCALE, friction=0.0, chi_square=50.0, contact=(), zero=0.0, spread=1e-6):
+    theta = [zero, friction, math.log(scale), *contact]
+    return LawFit(
+        LAWS[name], 2000.0, bool(contact), np.array(theta), spread**2 * np.eye(len(theta)), 0.0, chi_square, 57
+    )
+
+
+def choice(*records, fits=None, weights=(1.0,), good=None, directions=None):
+    masks = tuple(np.ones(len(r.blocks), dtype=bool) for r in records) if good is None else good
+    both = (Direction(0.0, 1e-3), Direction(0.0, 1e-3)) if directions is None else directions
+    return Choice(tuple(records), masks, (both,) * len(records), fits or (law(),), np.array(weights))
+
+
+def curve(*records, settings=None, refused=(), **chosen):
+    return assemble_curve(choice(*(records or (record(),)), **chosen), NOISE, settings or PivotSettings(), refused)
+
+
+def test_steps_are_the_means_of_holds_from_the_lowest_loads_reading():
+    made = curve(fits=(law(zero=-2e-6, friction=0.02),))
+    np.testing.assert_allclose(made.steps.load, 0.98 * LEVELS)
+    # the zero reading of the law is counted from the first load's reading
+    np.testing.assert_allclose(made.steps.deflection, SCALE * (LEVELS - 500.0) + 2e-6, atol=1e-15)
+    np.testing.assert_allclose(made.steps.deflection_se, math.sqrt(NOISE.mean_variance(0.6)))
+    np.testing.assert_allclose(made.steps.across_load, 0.0, atol=1e-9)
+    np.testing.assert_allclose(made.steps.across_deflection, 0.0, atol=1e-15)
+    np.testing.assert_array_equal(made.steps.weight, 1.0)
+    np.testing.assert_array_equal(made.steps.branch, 1)
+    assert (made.valid_from, made.valid_to) == pytest.approx((500.0, 5000.0))
+    assert (made.pad, made.angle, made.runs, made.status) == (1, ANGLES[0], ("p-1",), ())
+    assert made.hysteresis is None
+    aside = curve(record(turn=(0.01, 0.2)))
+    np.testing.assert_allclose(aside.steps.across_load, LEVELS * math.sin(0.01), rtol=1e-9)
+    moved = SCALE * (LEVELS - 500.0) * math.sin(0.2)
+    np.testing.assert_allclose(aside.steps.across_deflection, moved, atol=1e-15)
+
+
+def test_runs_of_one_pad_have_one_zero():
+    """The second run starts lower: its first reading is where all deflections are counted from."""
+    low = record(levels=LEVELS[::-1] - 250.0, name="down", branch=-1)
+    made = curve(record(), low, fits=(law(friction=0.01),))
+    assert made.runs == ("p-1", "down")
+    np.testing.assert_allclose(made.steps.load[:10], 0.99 * LEVELS)
+    np.testing.assert_allclose(made.steps.load[10:], 1.01 * (LEVELS[::-1] - 250.0))
+    np.testing.assert_allclose(made.steps.deflection[:10], SCALE * (LEVELS - 250.0), atol=1e-15)
+    np.testing.assert_allclose(made.steps.deflection[10:], SCALE * (LEVELS[::-1] - 500.0), atol=1e-15)
+    # the loop of a straight law with a share mu of friction: 2 mu s F over the loads of both
+    width = 2 * 0.01 * SCALE * np.array([500.0, 4750.0])
+    assert made.hysteresis.energy == pytest.approx(0.5 * width.sum() * 4250.0, rel=1e-6)
+
+
+def test_a_bad_block_spoils_its_hold_and_a_ramp_has_blocks_for_steps():
+    good = np.ones(60, dtype=bool)
+    good[20] = False
+    made = curve(good=(good,))
+    np.testing.assert_array_equal(made.steps.weight, np.arange(10) != 3)
+    assert made.status == ("bad-steps: 1 left out",)
+    ramp = curve(record(held=False), good=(good,))
+    assert len(ramp.steps) == 60
+    assert ramp.status == ("bad-steps: 1 left out", "no-holds: drift cannot be told from deflection")
+
+
+def test_certificates_of_channels_that_share_a_direction():
+    """Two probes at 45 deg to the pad share it: 1/sqrt(2) of one; two cells of which one lies along: that one."""
+    probes = {f"X1{n}": channel("displacement", math.radians(a), 0.01) for n, a in (("A", 45.0), ("B", 135.0))}
+    cells = {"L1H": channel("force", 0.0, 0.2), "L1V": channel("force", math.radians(90.0), 0.02)}
+    others = {"A1H": channel("acceleration", 0.0, 0.5), "Q": channel("force", None, 0.7)}
+    certified = probes | cells | others
+    one = record()
+    one.run.channels = certified
+    assert curve(one).relative_calibration == pytest.approx(math.hypot(0.01 / math.sqrt(2.0), 0.02), rel=1e-9)
+    one.run.channels = CHANNELS
+    assert curve(one).relative_calibration == 0.0
+
+
+def test_scatter_beyond_the_noise_widens_the_interval_by_birges_ratio():
+    calm, wild = curve(fits=(law(chi_square=57.0),)), curve(fits=(law(chi_square=570.0),))
+    np.testing.assert_allclose(wild.law.covariance, 10.0 * calm.law.covariance)
+    assert wild.status == ("misfit: the scatter exceeds the noise",)
+    np.testing.assert_allclose(calm.law.covariance, 1e-12 * np.eye(3))
+    exact = replace(law(chi_square=9.0), freedom=0)
+    assert curve(fits=(exact,)).status == ()
+
+
+CONTACT = (3e-6, math.log(500.0))
+
+
+@pytest.mark.parametrize(
+    ("changes", "status"),
+    [
+        ({"directions": (Direction(math.radians(-4.1), 0.0), Direction(0.0, 0.0))}, "load-off-pad: -4.10 deg"),
+        (
+            {"directions": (Direction(0.0, 0.0), Direction(math.radians(15.1), 0.0))},
+            r"moves-aside: the shaft goes \+15.10",
+        ),
+        ({"fits": (law(contact=CONTACT),)}, "contact-incomplete: below 1701 N"),
+        ({"fits": (law(contact=(3e-4, math.log(3000.0))),)}, "contact-never-complete"),
+        (
+            {"fits": (law(), law("hertz-point")), "weights": (0.49, 0.51)},
+            "law-undecided: linear 0.49, hertz-point 0.51",
+        ),
+        ({"refused": ("p-9 (why)",)}, r"runs-refused: p-9 \(why\)"),
+    ],
+)
+def test_every_condition_has_its_name(changes, status):
+    import re
+
+    found = curve(**changes).status
+    assert any(re.search(status, said) for said in found), found
+
+
+def test_conditions_just_within_their_limits_say_nothing():
+    inside = (Direction(math.radians(3.9), 0.0), Direction(math.radians(-14.9), 0.0))
+    assert curve(directions=inside).status == ()
+    # with and without contact loss it is the same law
+    both = (law(), law(contact=CONTACT), law("hertz-point"))
+    assert curve(fits=both, weights=(0.3, 0.21, 0.49)).status == ()
+    lost = replace(record(), lost=0.051)
+    assert curve(lost).status == ("samples-lost",)
+    assert curve(replace(record(), lost=0.049)).status == ()
+
+
+def test_what_a_law_is_fitted_to_has_all_its_variances():
+    first = record()
+    blocks = replace(first.blocks, load_spread=np.full(60, 30.0), rate=np.full(60, 200.0))
+    first = replace(first, blocks=blocks, quantisation=3e-8)
+    settings = PivotSettings(lag_allowance=0.01)
+    every = np.ones(60, dtype=bool)
+    data = _fit_data([first], [every], NOISE, settings)
+    root = np.linalg.inv(data.whitener)
+    covariance = root @ root.T
+    moved = SCALE * 4500.0
+    own = (SCALE * 30.0) ** 2 + (0.01 * SCALE * 200.0) ** 2 + (MODEL_ERROR * moved) ** 2
+    one_hold = 3e-8**2 * (blocks.hold[:, None] == blocks.hold[None, :])
+    expected = NOISE.covariance(blocks.time, blocks.duration) + own * np.eye(60) + one_hold
+    np.testing.assert_allclose(covariance, expected, rtol=1e-6, atol=1e-22)
+    assert data.reference_load == pytest.approx(REFERENCE_SHARE * 5000.0)
+    assert data.friction == (settings.friction_share, settings.friction_share_se)
+    np.testing.assert_allclose(data.deflection, SCALE * (np.repeat(LEVELS, PER) - 500.0), atol=1e-15)
+    # two runs: each its own zero and drift; both branches tell friction
+    down = replace(first, blocks=replace(blocks, branch=np.full(60, -1)))
+    some = every.copy()
+    some[5] = False
+    both = _fit_data([first, down], [every, some], NOISE, settings)
+    root = np.linalg.inv(both.whitener)
+    joint = root @ root.T
+    np.testing.assert_allclose(joint[:60, 60:], 0.0, atol=1e-20)
+    np.testing.assert_allclose(joint[:60, :60], expected + UNKNOWN_ZERO**2, rtol=1e-6)
+    assert joint.shape == (119, 119)
+    assert both.friction == (0.0, 0.05)
+    np.testing.assert_array_equal(both.branch, np.r_[np.ones(60), -np.ones(59)])
+
+
+def noisy(one, seed, off):
+    rng = np.random.default_rng(seed)
+    p = one.projection
+    error = np.linalg.cholesky(NOISE.covariance(one.blocks.time, one.blocks.duration)) @ rng.standard_normal(len(off))
+    return replace(one, projection=replace(p, deflection=p.deflection + error + off))
+
+
+@pytest.mark.parametrize("bad", [None, 3, 6])
+def test_a_hold_that_slipped_is_left_out_and_no_other(bad):
+    off = np.zeros(60) if bad is None else 5e-7 * (np.repeat(np.arange(10), PER) == bad)
+    found = bad_blocks(noisy(record(), 4, off), NOISE, LAWS, _fit_data, PivotSettings())
+    np.testing.assert_array_equal(np.flatnonzero(found), [] if bad is None else PER * bad + np.arange(PER))
+
+
+def test_a_ramp_is_looked_at_in_fifteen_stretches():
+    one = record(held=False)
+    off = 5e-7 * ((np.arange(60) >= 24) & (np.arange(60) < 28))
+    found = np.flatnonzero(bad_blocks(noisy(one, 5, off), NOISE, LAWS, _fit_data, PivotSettings()))
+    assert GROUPS_ON_RAMP == 15
+    np.testing.assert_array_equal(found, np.arange(24, 28))
+    wide = PivotSettings(bad_hold_limit=1e9)
+    assert not bad_blocks(noisy(one, 5, off), NOISE, LAWS, _fit_data, wide).any()
+
+
+class Run:
+    """A dry run in memory, one value per sample and channel."""
+
+    def __init__(self, n=4000, rate=500.0, pad=1, seed=1):
+        rng = np.random.default_rng(seed)
+        self.id, self.file, self.pad, self.sample_rate, self.channels = "p-1-up", "p.csv", pad, rate, CHANNELS
+        self.time = np.arange(n) / rate
+        load = np.interp(self.time, *np.array([[0, 0.5, 2.5, 3, 5, 5.5, 8], [100, 1000, 1000, 2000, 2000, 3000, 3000]]))
+        self.force = vectors(ANGLES[0], load) + rng.standard_normal((n, 2))
+        self.displacement = vectors(ANGLES[0], REACH + SCALE * load) + 2e-8 * rng.standard_normal((n, 2))
+
+    def vector(self, quantity):
+        return _Vector(getattr(self, quantity), self.time)
+
+    def record(self, name):
+        vector = getattr(self, CHANNELS[name].quantity)
+        axis = CHANNELS[name].axis
+        return SimpleNamespace(values=vector @ np.array([math.cos(axis), math.sin(axis)]))
+
+
+class _Vector:
+    def __init__(self, values, time):
+        self.values, self.time = values, time[: len(values)]
+
+    def __len__(self):
+        return len(self.values)
+
+
+def read(run, **settings):
+    return read_dry_run(run, ANGLES, PivotSettings(**settings))
+
+
+def test_a_sound_run_gives_its_holds_and_blocks():
+    found = read(Run())
+    assert [round(h.level, -1) for h in found.holds] == [1000.0, 2000.0, 3000.0]
+    assert (found.pad, found.angle, found.quantisation) == (1, ANGLES[0], 0.0)
+    assert found.lost < 2e-3
+    slope = np.polyfit(found.projection.load, found.projection.deflection, 1)[0]
+    assert slope == pytest.approx(SCALE, rel=1e-3)
+    assert found.pickup is not None
+    assert found.pickup.channels == tuple(CHANNELS)
+
+
+def spoilt(kind):
+    run = Run(n=4000 if kind != "short" else 49)
+    if kind == "lost":
+        run.force[:2001] = np.nan
+    if kind == "still":
+        run.displacement[:] = run.displacement[0]
+    if kind == "few":
+        run = Run(n=60)
+    if kind in ("none", "sixth"):
+        run.pad = None if kind == "none" else 6
+    return run
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("none", "names pad None, the bearing has pads 1 to 5"),
+        ("sixth", "names pad 6"),
+        ("short", "has 49 samples"),
+        ("lost", "of which 50 % are missing or glitches"),
+        ("still", "stands still|does not move: a dead or disconnected channel"),
+        ("few", "gives only . usable averages of 0.1 s"),
+    ],
+)
+def test_runs_that_hold_too_little_are_refused(kind, said):
+    with pytest.raises(RigDataError, match=said):
+        read(spoilt(kind))
+
+
+def test_shuffled_time_stamps_are_put_in_order():
+    run = Run()
+    plain = read(run)
+    run.time[[1000, 1001]] = run.time[[1001, 1000]]
+    for name in ("force", "displacement"):
+        getattr(run, name)[[1000, 1001]] = getattr(run, name)[[1001, 1000]]
+    again = read(run)
+    np.testing.assert_allclose(again.projection.load, plain.projection.load, rtol=1e-9)
+
+
+def test_steps_of_a_converter_that_no_noise_reaches_are_known():
+    run = Run()
+    step = 1e-6
+    clean = vectors(ANGLES[0], REACH + SCALE * (run.force @ vectors(ANGLES[0], [1.0])[0]).round(-2))
+    run.displacement = np.round(clean / step) * step
+    assert read(run).quantisation == pytest.approx(step / math.sqrt(6.0), rel=1e-6)
+
+
+@pytest.mark.parametrize(("samples", "named"), [(49, False), (51, True), (700, True)])
+def test_a_channel_that_stands_still_is_named_with_time_and_share(samples, named):
+    run = Run()
+    run.displacement[1000 : 1000 + samples] = run.displacement[1000]
+    if not named:
+        refuse_flat_channels(run)
+        return
+    with pytest.raises(RigDataError) as caught:
+        refuse_flat_channels(run)
+    assert [p.place for p in caught.value.problems] == ["channel X1A", "channel X1B"]
+    said = caught.value.problems[0].what
+    assert f"from 2.00 s on for {100 * samples / 4000:.0f} % of the run" in said
+
+
+def test_a_computed_record_may_stand_still():
+    run = Run()
+    run.displacement = np.round(run.displacement / 2e-6) * 2e-6
+    run.displacement[1000:1700] = run.displacement[1000]
+    refuse_flat_channels(run)
+
+
+def repeating(share, stuck, n=4000):
+    """A run whose probes repeat a share of their readings, and stand still for a while."""
+    run = Run(n)
+    same = np.arange(n) % 20 < 20 * share
+    last = np.maximum.accumulate(np.where(same, 0, np.arange(n)))
+    run.displacement = run.displacement[last]
+    run.displacement[1000 : 1000 + stuck] = run.displacement[1000]
+    return run
+
+
+@pytest.mark.parametrize(
+    ("share", "stuck", "named"), [(0.4, 700, True), (0.6, 700, False), (0.4, 80, False), (0.4, 140, True)]
+)
+def test_repeated_readings_make_longer_stretches_plausible(share, stuck, named):
+    """With two of five readings repeated a stretch of nine is to be expected; ten times that is none of chance.
+
+    Where more than half repeat, the converter's step hides the noise, and standing still says nothing.
+    """
+    run = repeating(share, stuck)
+    if named:
+        with pytest.raises(RigDataError) as caught:
+            refuse_flat_channels(run)
+        assert {p.place for p in caught.value.problems} == {"channel X1A", "channel X1B"}
+    else:
+        refuse_flat_channels(run)
+
+
+def test_what_probes_cannot_tell_cells_still_can():
+    run = repeating(0.6, 700)
+    run.force[2000:2400] = run.force[2000]
+    with pytest.raises(RigDataError) as caught:
+        refuse_flat_channels(run)
+    assert [p.place for p in caught.value.problems] == ["channel L1H", "channel L1V"]
+
+
+def test_the_shorter_vector_ends_the_record():
+    run = Run()
+    plain = read(run)
+    run.force = run.force[:-300]
+    short = read(run)
+    assert short.blocks.time[-1] == pytest.approx(plain.blocks.time[-1] - 0.6, abs=0.15)
+    run.displacement, run.force = run.displacement[:-500], Run().force
+    assert read(run).blocks.time[-1] == pytest.approx(plain.blocks.time[-1] - 1.0, abs=0.15)
+
+
+@pytest.mark.parametrize("top", [1000.0, 4000.0])
+def test_after_a_reversal_the_pivot_sticks_for_eight_per_cent(top):
+    from tpjb_ident.pivot.bad_holds import sticking
+
+    load = top * np.array([0.5, 0.8, 1.0, 0.97, 0.93, 0.91, 0.8, 0.95, 0.5, 0.53, 0.55, 0.9])
+    branch = np.array([1, 1, 1, -1, -1, -1, -1, -1, -1, 1, 1, 1])
+    stuck = np.flatnonzero(sticking(load, branch))
+    # within 0.08 of the top, and on the way up again within 0.04 of where it turned at half of it
+    np.testing.assert_array_equal(stuck, [3, 4, 9])
+
+
+def test_a_hold_that_slipped_takes_the_ramps_beside_it_along():
+    """Six blocks on every hold, two on every ramp between them."""
+    one = record()
+    n = 10 * 8
+    hold = np.where(np.arange(n) % 8 < 2, -1, np.arange(n) // 8)
+    into = np.interp(np.arange(n) % 8, [0, 2], [0.25, 1.0])
+    load = np.where(hold < 0, LEVELS[np.arange(n) // 8] - 500.0 * (1.0 - into), LEVELS[np.arange(n) // 8])
+    place = vectors(ANGLES[0], REACH + SCALE * load)
+    zeros = np.zeros(n)
+    blocks = Blocks(0.1 * np.arange(n), np.full(n, 0.1), vectors(ANGLES[0], load), place, zeros, zeros, hold,
+                    np.ones(n, dtype=int))  # fmt: skip
+    made = replace(one, blocks=blocks, projection=project(blocks, ANGLES[0]))
+    off = 8e-7 * (hold == 4)
+    found = np.flatnonzero(bad_blocks(noisy(made, 6, off), NOISE, LAWS, _fit_data, PivotSettings()))
+    np.testing.assert_array_equal(found, np.arange(4 * 8, 5 * 8 + 2))

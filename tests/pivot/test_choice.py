@@ -1,0 +1,201 @@
+"""Which law, from which load on, and what pads tell each other: held against sums that can be done by hand."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from tpjb_ident.pivot.contact import contact_onset, contact_onset_se
+from tpjb_ident.pivot.fit import LAWS
+from tpjb_ident.pivot.laws.choice import keep_likely, posterior_weights
+from tpjb_ident.pivot.laws.law_fit import LawFit
+from tpjb_ident.pivot.laws.shape_sharing import ALIKE, HOPELESS, SMALLEST_SHARE, shared_priors, with_shared_shape
+from tpjb_ident.pivot.records.settings import LAW_NAMES, PivotSettings
+
+REFERENCE = 2000.0
+
+
+def fitted(name, evidence=0.0, contact=False, shape=(), gap=0.0, decay=500.0, scale=4e-9, covariance=None):
+    """A fit with stated numbers."""
+    theta = [0.0, 0.0, math.log(scale), *shape, *((gap, math.log(decay)) if contact else ())]
+    spread = np.eye(len(theta)) if covariance is None else covariance
+    return LawFit(LAWS[name], REFERENCE, contact, np.array(theta), spread, evidence, 0.0, 10)
+
+
+def test_a_pad_alone_weighs_evidence_with_the_stated_priors():
+    """Seven parts of ten for full contact, a fiftieth of a physical law for the spline."""
+    given = [("linear", False), ("linear", True), ("hertz-point", False), ("spline", False)]
+    evidence = [1.0, 2.5, 0.5, 4.0]
+    (weights,) = posterior_weights([[fitted(n, e, c) for (n, c), e in zip(given, evidence)]])
+    prior = np.array([0.7, 0.3, 0.7, 0.7 * 0.02])
+    by_hand = prior * np.exp(evidence)
+    np.testing.assert_allclose(weights, by_hand / by_hand.sum(), rtol=1e-12)
+
+
+PADS = (
+    [("linear", False, 0.3), ("linear", True, 0.9), ("power", False, 0.0), ("spline", False, 1.0)],
+    [("linear", False, 0.5), ("linear", True, 0.1), ("power", False, 1.2), ("power", True, 1.1)],
+    [("linear", False, 1.4), ("power", False, 0.2), ("spline", False, 2.0)],
+)
+
+
+def test_pads_of_one_bearing_vote_for_each_other():
+    """The shares are the fixed point that is stated: half a pad spread over the laws, and the other pads' votes."""
+    pads = [[fitted(n, e, c) for n, c, e in pad] for pad in PADS]
+    weights = posterior_weights(pads)
+    vote = {True: 0.3, False: 1.0}
+    for own, pad in enumerate(PADS):
+        share = {"linear": 0.5 / 2.02, "power": 0.5 / 2.02, "spline": 0.5 * 0.02 / 2.02}
+        for other, candidates in enumerate(PADS):
+            if other != own:
+                for (name, contact, _), weight in zip(candidates, weights[other]):
+                    share[name] += vote[contact] * weight
+        by_hand = np.array([share[n] * (0.3 if c else 0.7) * math.exp(e) for n, c, e in pad])
+        np.testing.assert_allclose(weights[own], by_hand / by_hand.sum(), atol=3e-4)
+        assert weights[own].sum() == pytest.approx(1.0, abs=1e-14)
+    alone = [posterior_weights([pad])[0] for pad in pads]
+    assert weights[0][:2].sum() > 1.1 * alone[0][:2].sum()  # the other pads' word for a straight line is heard
+
+
+def test_order_and_a_common_evidence_do_not_matter():
+    pads = [[fitted(n, e, c) for n, c, e in pad] for pad in PADS]
+    base = posterior_weights(pads)
+    turned = posterior_weights([pad[::-1] for pad in pads[::-1]])
+    raised = posterior_weights([[dataclasses.replace(f, log_evidence=f.log_evidence - 900.0) for f in p] for p in pads])
+    for own, back, same in zip(base, turned[::-1], raised):
+        np.testing.assert_allclose(back[::-1], own, atol=1e-6)
+        np.testing.assert_allclose(same, own, atol=1e-9)
+
+
+def test_what_is_kept_is_sorted_and_sums_to_one():
+    fits = [fitted(name) for name in ("linear", "power", "hertz-point", "spline")]
+    kept, shares = keep_likely(fits, np.array([0.25, 0.0005, 0.7385, 0.011]))
+    assert [fit.name for fit in kept] == ["hertz-point", "linear", "spline"]
+    np.testing.assert_allclose(shares, np.array([0.7385, 0.25, 0.011]) / 0.9995)
+    even, _ = keep_likely(fits[:2], np.array([0.5, 0.5]))
+    assert [fit.name for fit in even] == ["linear", "power"]
+
+
+def test_the_onset_of_a_straight_pivot_is_a_logarithm():
+    """gap / F0 exp(-F / F0) = tolerance times the compliance, which is constant."""
+    gap, decay, scale, tolerance = 3e-6, 400.0, 4e-9, 0.05
+    covariance = np.diag([1e-14, 1e-6, 0.02, 1e-7, 0.05]) ** 2
+    covariance[3, 4] = covariance[4, 3] = -0.3e-7 * 0.05
+    fit = fitted("linear", contact=True, gap=gap, decay=decay, scale=scale, covariance=covariance)
+    onset = decay * math.log(gap / (decay * tolerance * scale))
+    assert contact_onset(fit, tolerance) == pytest.approx(onset, rel=1e-5)
+    slope = np.array([0.0, 0.0, -decay, decay / gap, onset - decay])
+    assert contact_onset_se(fit, tolerance) == pytest.approx(math.sqrt(slope @ covariance @ slope), rel=0.01)
+
+
+@pytest.mark.parametrize(("name", "shape"), [("power", (0.6,)), ("hertz-point", ()), ("hertz-line", (0.1,))])
+def test_at_the_onset_the_missing_contact_adds_its_share(name, shape):
+    fit = fitted(name, contact=True, shape=shape, gap=4e-6)
+    for tolerance in (0.02, 0.05, 0.2):
+        at = np.array([contact_onset(fit, tolerance)])
+        assert at[0] > 0.0
+        assert fit.missing_compliance(at) == pytest.approx(tolerance * fit.compliance(at), rel=1e-4)
+
+
+def test_contact_that_lacks_nothing_has_no_onset():
+    assert contact_onset(fitted("linear"), 0.05) == 0.0
+    assert contact_onset_se(fitted("linear"), 0.05) == 0.0
+    assert contact_onset(fitted("linear", contact=True, gap=0.0), 0.05) == 0.0
+    assert contact_onset(fitted("linear", contact=True, gap=-1e-6), 0.05) == 0.0
+    # a gap so small that even at no load it adds less than the share
+    assert contact_onset(fitted("linear", contact=True, gap=1e-9), 0.05) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"laws": ("hertz",)}, r"laws must name some of hertz-line, .*spline, got \['hertz'\]"),
+        ({"laws": ()}, "got none"),
+        ({"block": 0.0}, "block must be positive, got 0.0"),
+        ({"longest_glitch": 0}, "longest_glitch must be positive, got 0"),
+        ({"lag_allowance": -1.0}, "lag_allowance must be positive"),
+        ({"contact_tolerance": math.nan}, "contact_tolerance must be positive"),
+        ({"drift_rate": 0.0}, "drift_rate must be positive"),
+    ],
+)
+def test_settings_without_sense_are_refused(fields, message):
+    with pytest.raises(ValueError, match=message):
+        PivotSettings(**fields)
+
+
+def test_settings_with_sense_are_taken():
+    assert PivotSettings(laws=("linear",), block=0.02, drift_rate=1e-12).laws == ("linear",)
+    assert set(LAW_NAMES) == set(LAWS)
+
+
+def with_information(information, own, shape, law="power", share_evidence=0.0):
+    """Fit whose shape the data know with `information` beside the law's prior `own`."""
+    k = len(shape)
+    covariance = np.eye(3 + k)
+    covariance[3:, 3:] = np.linalg.inv(information + own)
+    return fitted(law, share_evidence, shape=tuple(shape), covariance=covariance)
+
+
+@pytest.mark.parametrize("name", ["power", "bilinear"])
+def test_a_shape_known_from_other_pads_is_a_mean_of_random_effects(name):
+    """Each pad tells the common shape with its own variance and the spread among pads; the prior counts as one more."""
+    law = LAWS[name]
+    own, k = law.prior_precision, len(law.parameters)
+    rng = np.random.default_rng(4)
+    spread = ALIKE**2 * np.linalg.inv(own)
+    estimates = law.prior_mean + 0.05 * rng.standard_normal((3, k))
+    precision, pull = own.copy(), own @ law.prior_mean
+    fits, shares = [], (np.array([0.9, 0.1]), np.array([0.4, 0.6]), np.array([1.0, 0.0]))
+    for estimate, share in zip(estimates, shares):
+        root = rng.standard_normal((k, k))
+        information = 2000.0 * (root @ root.T + np.eye(k))
+        mode = np.linalg.solve(information + own, information @ estimate + own @ law.prior_mean)
+        fits.append([with_information(information, own, mode, name), fitted("linear")])
+        told = share[0] * np.linalg.inv(np.linalg.inv(information) + spread)
+        precision, pull = precision + told, pull + told @ estimate
+    asked = [fitted(name, shape=law.prior_mean, covariance=np.eye(3 + k)), fitted("linear")]
+    prior = shared_priors([*fits, asked], [*shares, np.array([0.5, 0.5])], pad=3)
+    assert set(prior) == {name}
+    np.testing.assert_allclose(prior[name].mean, np.linalg.solve(precision, pull), rtol=1e-9)
+    np.testing.assert_allclose(prior[name].precision, np.linalg.inv(np.linalg.inv(precision) + spread), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("share", "asked"), [(0.9 * SMALLEST_SHARE, False), (1.1 * SMALLEST_SHARE, True)])
+def test_a_law_that_no_other_pad_likes_has_no_shape_to_share(share, asked):
+    own = LAWS["power"].prior_precision
+    pad = [with_information(np.array([[900.0]]), own, [0.7]), fitted("linear")]
+    weights = [np.array([share, 1.0 - share]), np.array([0.5, 0.5])]
+    assert ("power" in shared_priors([pad, pad], weights, pad=1)) is asked
+    # what the pad itself likes does not count
+    assert "power" not in shared_priors([pad, pad], [np.array([0.0, 1.0]), np.array([1.0, 0.0])], pad=1)
+
+
+def test_both_priors_count_alike_and_the_better_fit_stays():
+    own = LAWS["power"].prior_precision
+    pads = [[with_information(np.array([[900.0]]), own, [0.7]), fitted("linear")] for _ in range(2)]
+    weights = [np.array([0.8, 0.2])] * 2
+    for evidence, winner in ((2.0, 0.66), (-2.0, 0.7)):
+        again = with_information(np.array([[900.0]]), own, [0.66], share_evidence=evidence)
+        shared = with_shared_shape(pads, weights, [lambda fit, prior, again=again: again] * 2)
+        assert shared[0][0].shape[0] == winner
+        assert shared[0][0].log_evidence == pytest.approx(math.log(0.5 * (1.0 + math.exp(evidence))))
+        assert shared[0][1] is pads[0][1]
+
+
+@pytest.mark.parametrize(("behind", "asked"), [(HOPELESS - 1.0, True), (HOPELESS + 1.0, False)])
+def test_a_hopeless_law_is_not_fitted_again(behind, asked):
+    own = LAWS["power"].prior_precision
+    poor = with_information(np.array([[900.0]]), own, [0.7], share_evidence=-behind)
+    pads = [[poor, fitted("linear")], [with_information(np.array([[900.0]]), own, [0.7]), fitted("linear")]]
+    calls = []
+
+    def refit(fit, prior):
+        calls.append(fit)
+        return fit
+
+    shared = with_shared_shape(pads, [np.array([0.5, 0.5])] * 2, [refit, lambda fit, prior: fit])
+    assert (calls == [poor]) is asked
+    assert shared[0][0].log_evidence == pytest.approx(-behind)

@@ -1,0 +1,258 @@
+"""Curves, tables and pivots.toml, made from a law that is known exactly."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import PchipInterpolator
+
+from tpjb_ident.pivot import pads_table, pivot_table, pivots_text, write_pivots
+from tpjb_ident.pivot.contact import contact_onset, contact_onset_se
+from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
+from tpjb_ident.pivot.fit import LAWS
+from tpjb_ident.pivot.hysteresis import measure_loop
+from tpjb_ident.pivot.laws.choice import keep_likely, posterior_weights
+from tpjb_ident.pivot.laws.law_fit import FitData, fit_law
+from tpjb_ident.pivot.records.projection import Direction
+
+REFERENCE = 2000.0
+LOADS = np.array([50.0, 250.0, 1000.0, 2000.0, 4000.0, 8000.0])
+
+
+def data(load, deflection, noise=2e-8, branch=None):
+    friction = (0.0, 0.05) if branch is not None else (0.0, 1e-4)
+    branch = np.ones(len(load)) if branch is None else branch
+    return FitData(load, deflection, branch, np.eye(len(load)) / noise, REFERENCE, friction)
+
+
+def rocker(load):
+    return 7e-11 * load * (18.95 - np.log(load))
+
+
+def fit(name="hertz-line", contact=False, gap=0.0, seed=0, noise=2e-8):
+    load = np.linspace(250.0, 5000.0, 120)
+    deflection = rocker(load) - gap * np.exp(-load / 500.0) + 3e-5
+    deflection = deflection + noise * np.random.default_rng(seed).standard_normal(len(load))
+    return fit_law(LAWS[name], contact, data(load, deflection, noise))
+
+
+def curve(**changes):
+    load = np.linspace(500.0, 5000.0, 10)
+    steps = PivotSteps(load, rocker(load), np.full(10, 1e-8), 0 * load, 0 * load, np.ones(10, dtype=int), np.ones(10))
+    whole = PivotCurve(
+        pad=1,
+        angle=-np.pi / 2,
+        steps=steps,
+        fits=(fit(),),
+        weights=np.ones(1),
+        onset_load=0.0,
+        onset_load_se=0.0,
+        valid_from=250.0,
+        valid_to=5000.0,
+        load_direction=Direction(0.02, 0.001),
+        displacement_direction=Direction(0.1, 0.01),
+    )
+    return replace(whole, **changes)
+
+
+def test_the_fit_finds_the_law_behind_noisy_points():
+    found = fit(seed=3)
+    tangent = 7e-11 * (17.95 - np.log(LOADS))
+    error = np.log(found.compliance(LOADS) / tangent)
+    gradient = found.log_compliance_gradient(LOADS)
+    se = np.sqrt(np.einsum("ij,jk,ik->i", gradient, found.covariance, gradient))
+    assert np.all(np.abs(error[1:]) < 4 * se[1:])
+    assert np.abs(error[2:5]).max() < 0.02
+    assert found.theta[0] == pytest.approx(3e-5, abs=1e-7)
+
+
+def test_standard_errors_are_those_of_repeated_fits():
+    fits = [fit(seed=s) for s in range(60)]
+    scatter = np.std([np.log(f.compliance(LOADS[2:5])) for f in fits], axis=0)
+    gradient = fits[0].log_compliance_gradient(LOADS[2:5])
+    stated = np.sqrt(np.einsum("ij,jk,ik->i", gradient, fits[0].covariance, gradient))
+    assert stated == pytest.approx(scatter, rel=0.4)
+
+
+def test_contact_loss_is_told_from_the_pivot():
+    found = fit(contact=True, gap=3e-6, seed=1)
+    assert found.theta[-2] == pytest.approx(3e-6, rel=0.1)
+    assert np.exp(found.theta[-1]) == pytest.approx(500.0, rel=0.06)
+    load = np.linspace(100.0, 6000.0, 60_000)
+    missing = 3e-6 / 500.0 * np.exp(-load / 500.0)
+    true = load[missing > 0.05 * 7e-11 * (17.95 - np.log(load))].max()
+    assert contact_onset(found, 0.05) == pytest.approx(true, rel=0.1)
+    assert 0.0 < contact_onset_se(found, 0.05) < 0.2 * true
+    assert contact_onset(fit(), 0.05) == 0.0
+
+
+def test_evidence_prefers_the_true_law_and_sees_contact_loss():
+    load = np.linspace(250.0, 5000.0, 120)
+    noise = 2e-8
+    rng = np.random.default_rng(4)
+    sphere = 5e-8 * load ** (2 / 3) + noise * rng.standard_normal(120)
+    upper = sphere - 3e-6 * np.exp(-load / 500.0)
+    pads = [
+        [fit_law(law, contact, data(load, x, noise)) for law in LAWS.values() for contact in (False, True)]
+        for x in (sphere, sphere, upper)
+    ]
+    for fits, weights, contact in zip(pads, posterior_weights(pads), (False, False, True), strict=True):
+        likely, shares = keep_likely(fits, weights)
+        assert likely[0].name == "hertz-point"
+        assert likely[0].contact is contact
+        assert shares.sum() == pytest.approx(1.0)
+        assert np.all(np.diff(shares) <= 0)
+
+
+def test_friction_is_found_from_both_branches():
+    up = np.linspace(250.0, 5000.0, 80)
+    load, branch = np.r_[up, up[::-1]], np.r_[np.ones(80), -np.ones(80)]
+    deflection = rocker(load * (1 - 0.03 * branch))
+    found = fit_law(LAWS["hertz-line"], False, data(load, deflection, 1e-8, branch))
+    assert found.theta[1] == pytest.approx(0.03, abs=0.001)
+    assert found.deflection(LOADS[1:]) == pytest.approx(rocker(LOADS[1:]), rel=0.005)
+
+
+def test_load_and_deflection_are_inverse():
+    c = curve()
+    assert c.load(c.deflection(LOADS)) == pytest.approx(LOADS, rel=1e-6)
+    assert c.load(0.0) == 0.0
+    assert c.deflection(LOADS.reshape(2, 3)).shape == (2, 3)
+
+
+def test_tangent_and_secant():
+    c = curve()
+    step = 0.1
+    slope = 2 * step / (c.deflection(LOADS + step) - c.deflection(LOADS - step))
+    assert c.stiffness(LOADS) == pytest.approx(slope, rel=1e-5)
+    assert c.secant(LOADS) == pytest.approx(LOADS / c.deflection(LOADS), rel=1e-12)
+    assert np.all(c.stiffness(LOADS) > c.secant(LOADS))
+
+
+def test_bands_enclose_and_widen_beyond_the_points():
+    c = curve()
+    lo, hi = c.stiffness_band(LOADS)
+    assert np.all((lo < c.stiffness(LOADS)) & (c.stiffness(LOADS) < hi))
+    narrow = c.stiffness_band(LOADS, 0.5)
+    assert np.all((narrow[0] > lo) & (narrow[1] < hi))
+    se = c.relative_stiffness_se([5000.0, 8000.0, 12000.0])
+    assert se[0] < se[1] < se[2]
+    assert c.is_extrapolated([100.0, 300.0, 5000.0, 5001.0]).tolist() == [True, False, False, True]
+
+
+def test_other_laws_widen_the_band():
+    two = curve(fits=(fit(), fit("hertz-point")), weights=np.array([0.7, 0.3]))
+    assert np.all(two.relative_stiffness_se(LOADS) > curve().relative_stiffness_se(LOADS))
+    assert two.stiffness(LOADS) == pytest.approx(curve().stiffness(LOADS))
+
+
+@pytest.mark.parametrize("bad", [-1.0, np.nan, [100.0, -5.0]])
+def test_impossible_loads_are_refused(bad):
+    with pytest.raises(ValueError, match="load"):
+        curve().stiffness(bad)
+    with pytest.raises(ValueError, match="deflection"):
+        curve().load(bad)
+
+
+def test_it_says_what_it_is():
+    text = str(curve(status=("bad-steps: 1 left out",)))
+    assert "pad 1" in text
+    assert "hertz-line" in text
+    assert "bad-steps" in text
+    assert curve().includes_housing is True
+
+
+def test_table_has_the_contract_columns_and_the_formula_beside():
+    frame = pivot_table([curve(), curve(pad=2)], formula=lambda pad, load: (2e9 * pad, 4e9))
+    needed = {"pad", "force_N", "deflection_m", "stiffness_N_per_m", "stiffness_N_per_m_lo", "stiffness_N_per_m_hi"}
+    assert needed <= set(frame.columns)
+    assert {2000.0, 4000.0} <= set(frame.force_N)
+    assert frame.extrapolated.any()
+    assert not frame[frame.force_N == 4000.0].extrapolated.any()
+    assert frame.ratio_tangent.to_numpy() == pytest.approx(frame.stiffness_N_per_m.to_numpy() / 4e9)
+    second = frame[frame.pad == 2]
+    assert second.ratio_secant.to_numpy() == pytest.approx(second.secant_N_per_m.to_numpy() / 4e9)
+    assert np.all(frame.ratio_tangent_lo < frame.ratio_tangent_hi)
+
+
+def test_toml_carries_the_tangent(tmp_path):
+    path = write_pivots(tmp_path / "pivots.toml", [curve(pad=2), curve()], 'campaign "A"\n')
+    found = tomllib.loads(path.read_text())
+    assert found["schema"] == "tpjb-pivots/1"
+    assert found["source"] == 'campaign "A"\n'
+    assert found["includes_housing"] is True
+    assert [p["pad"] for p in found["pads"]] == [1, 2]
+    pad = found["pads"][0]
+    assert (pad["valid_from_N"], pad["valid_to_N"]) == (250.0, 5000.0)
+    assert pad["force_N"][0] == pad["deflection_m"][0] == 0.0
+    assert pad["force_N"][-1] >= 10_000.0
+    law = PchipInterpolator(pad["force_N"], pad["deflection_m"])
+    loads = np.linspace(200.0, 10_000.0, 997)
+    assert law(loads) == pytest.approx(curve().deflection(loads), rel=1e-5)
+    assert 1.0 / law.derivative()(loads) == pytest.approx(curve().stiffness(loads), rel=1e-3)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_toml_is_written_whole_or_not_at_all(tmp_path):
+    target = tmp_path / "pivots.toml"
+    target.write_text("old")
+    with pytest.raises(ValueError, match="at least one"):
+        write_pivots(target, [], "a")
+    assert target.read_text() == "old"
+    assert "includes_housing = true" in pivots_text([curve()], "a")
+
+
+def test_loop_area_of_friction():
+    # a linear pivot with friction mu: between the branches lies 2 s mu F, integrated over F
+    s, mu = 1e-9, 0.02
+    load = np.linspace(500.0, 5000.0, 181)
+    up, down = s * load * (1 - mu), s * load * (1 + mu)
+    loop = measure_loop(
+        np.r_[load, load[::-1]],
+        np.r_[up, down[::-1]],
+        np.diag(np.full(362, 1e-9) ** 2),
+        np.r_[np.ones(181, dtype=int), -np.ones(181, dtype=int)],
+    )
+    area = s * mu * (5000.0**2 - 500.0**2)
+    assert loop.energy == pytest.approx(area, rel=1e-4)
+    assert loop.loss_factor == pytest.approx(area / (np.pi / 4 * 4500.0 * (up[-1] - up[0])), rel=1e-3)
+    assert loop.load_range == (500.0, 5000.0)
+    assert 0 < loop.energy_se < 0.05 * loop.energy
+    assert measure_loop(load, up, np.eye(181) * 1e-18, np.ones(181, dtype=int)) is None
+
+
+def test_a_drift_from_up_to_down_is_an_error_of_the_whole_loop():
+    load = np.linspace(500.0, 5000.0, 10)
+    both, branch = np.r_[load, load[::-1]], np.r_[np.ones(10, dtype=int), -np.ones(10, dtype=int)]
+    shift = np.outer(branch < 0, branch < 0) * 1e-7**2
+    loop = measure_loop(both, 1e-9 * both, shift, branch)
+    assert loop.energy_se == pytest.approx(1e-7 * 4500.0, rel=1e-6)
+    assert "loop from 500 to 5000 N" in str(loop)
+
+
+def test_steps_show_what_the_law_says_with_its_way_into_contact():
+    law = fit(contact=True, gap=3e-6, seed=5)
+    one = curve(fits=(law,), onset_load=2000.0, valid_from=2000.0)
+    load = np.array([500.0, 2500.0, 5000.0, 7500.0])
+    value, lo, hi = one.reading_band(load)
+    applied = load / (1.0 - law.theta[1])
+    assert value == pytest.approx(law.reading(applied, np.ones(4)) - law.theta[0])
+    assert value[0] < one.deflection(500.0) - 0.8e-6
+    width = hi - lo
+    # tight among the points, wider beyond them
+    assert width[2] < 0.05e-6
+    assert width[3] > 2 * width[2]
+
+
+def test_one_row_per_pad_says_what_the_curve_holds():
+    frame = pads_table(
+        [curve(), curve(pad=2, onset_load=1800.0, onset_load_se=60.0, status=("contact-incomplete: x",))]
+    )
+    assert frame["includes_housing"].all()
+    assert frame["onset_N"].tolist() == [0.0, 1800.0]
+    assert frame["status"].tolist() == ["ok", "contact-incomplete: x"]
+    assert frame["load_off_pad_deg"].iloc[0] == pytest.approx(np.degrees(0.02))
+    assert np.isnan(frame["loop_energy_J"]).all()

@@ -1,0 +1,180 @@
+"""The whole way from dry runs to curves, on small records made by hand; and who may be refused on the way."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rigdata.channel_statistics import ChannelStatistics
+from rigdata.problem import RigDataError
+from tests.pivot.test_assemble import ANGLES, CHANNELS, REACH, SCALE, channel, check, record, vectors
+from tests.pivot.test_assemble import Run as FirstPad
+from tpjb_ident.pivot.fit import fit_pivots
+from tpjb_ident.pivot.records.refusals import check_placement
+from tpjb_ident.pivot.records.settings import PivotSettings
+from tpjb_ident.slow_records.flat_channels import _repeated, refuse_flat_channels
+
+LEVELS = 500.0 * np.arange(1, 9)
+
+
+class Run(FirstPad):
+    """A staircase of eight levels against one pad; `slip` [m] moves everything on the fourth."""
+
+    def __init__(self, pad, seed=1, points_at=None, slip=0.0, name=None, soft=1.0, down=False):
+        super().__init__(n=10)
+        n, rng = 3200, np.random.default_rng([seed, pad])
+        self.id, self.file, self.pad, self.sample_rate = name or f"dry-{pad}", f"dry-{pad}.csv", pad, 500.0
+        self.time = np.arange(n) / 500.0
+        levels = LEVELS[::-1] if down else LEVELS
+        load = np.interp(
+            self.time, np.ravel([[0.8 * k, 0.8 * k + 0.2] for k in range(1, 8)]), np.repeat(levels, 2)[1:-1]
+        )
+        moved = soft * SCALE * load + slip * ((self.time > 2.5) & (self.time < 3.3))
+        angle = ANGLES[(points_at or pad) - 1]
+        self.force = vectors(angle, load) + rng.standard_normal((n, 2))
+        self.displacement = vectors(angle, REACH + moved) + 2e-8 * rng.standard_normal((n, 2))
+
+
+def campaign(*runs):
+    return SimpleNamespace(of_kind=lambda kind: list(runs) if kind == "dry_pivot" else [])
+
+
+LINE = PivotSettings(laws=("linear",))
+
+
+def fit(*runs, **settings):
+    return fit_pivots(campaign(*runs), ANGLES, dataclasses.replace(LINE, **settings))
+
+
+@pytest.fixture(scope="module")
+def curves():
+    """Pads in no order, the second tested twice, the third twice as soft; the first slipped in one hold."""
+    return fit(Run(2), Run(3, soft=2.0), Run(1, slip=2e-6), Run(2, seed=5, name="again", down=True))
+
+
+def test_every_pad_has_its_curve_in_order(curves):
+    assert [curve.pad for curve in curves] == [1, 2, 3]
+    assert [curve.runs for curve in curves] == [("dry-1",), ("dry-2", "again"), ("dry-3",)]
+    for curve, soft in zip(curves, (1.0, 1.0, 2.0), strict=True):
+        assert curve.angle == ANGLES[curve.pad - 1]
+        np.testing.assert_allclose(curve.stiffness(np.array([1000.0, 3000.0])), 1 / (soft * SCALE), rtol=0.02)
+        assert abs(curve.load_direction.angle) < 0.01
+        assert abs(curve.displacement_direction.angle) < 0.05
+        assert sum(curve.weights) == pytest.approx(1.0)
+        assert {fit.name for fit in curve.fits} == {"linear"}
+    np.testing.assert_allclose(curves[2].steps.load, LEVELS, rtol=5e-3)
+    assert len(curves[1].steps.load) == 16
+    assert curves[1].hysteresis is not None
+    assert curves[2].hysteresis is None
+
+
+def test_a_hold_that_slipped_takes_no_part(curves):
+    assert curves[0].steps.weight[3] == 0.0
+    assert curves[0].steps.weight.sum() >= 5.0
+    assert any(said.startswith("bad-steps: ") for said in curves[0].status)
+    np.testing.assert_array_equal(curves[2].steps.weight, 1.0)
+    assert all("refused" not in said for curve in curves for said in curve.status)
+
+
+def test_every_law_is_tried_with_and_without_contact_loss_and_the_likeliest_leads():
+    (curve,) = fit(Run(4), laws=("hertz-point", "linear"))
+    assert curve.law.name == "linear"
+    assert {(f.name, f.contact) for f in curve.fits} <= {(n, c) for n in ("linear", "hertz-point") for c in (0, 1)}
+    assert any(f.contact for f in curve.fits)
+
+
+def refused(*runs, **settings):
+    with pytest.raises(RigDataError) as caught:
+        fit(*runs, **settings)
+    return caught.value.problems
+
+
+def test_all_that_is_wrong_is_told_at_once():
+    """A pad that the bearing lacks, and one run that points at another pad than it says."""
+    found = refused(Run(1), Run(2, points_at=4, name="lies"), Run(6, points_at=1, name="sixth"))
+    assert {p.run for p in found} == {"sixth", "lies"}
+    assert any("both point at pad 4" in p.what for p in found)
+    (nothing,) = refused()
+    assert "has no runs of kind dry_pivot" in nothing.what
+    (none,) = refused(Run(6, points_at=1), on_refusal="skip")
+    assert "names pad 6" in none.what
+
+
+def test_records_that_are_refused_are_left_out_where_that_is_wished_and_named():
+    lies = Run(2, points_at=4, name="lies")
+    (curve,) = fit(Run(1), lies, on_refusal="skip")
+    (said,) = [s for s in curve.status if s.startswith("runs-refused")]
+    assert "lies (run lies says pad 2" in said
+    (other,) = fit(Run(1), Run(1, seed=3, name="again"), lies, on_refusal="few")
+    assert other.runs == ("dry-1", "again")
+    # half of them are no accident
+    assert {p.run for p in refused(Run(1), lies, on_refusal="few")} == {"lies"}
+
+
+def test_a_shaft_that_stands_elsewhere_is_refused_too():
+    """Its directions are right: only the other runs tell. Every reason of a run counts once."""
+    odd = Run(5)
+    odd.displacement = odd.displacement + REACH * 0.5 * np.array([-math.sin(ANGLES[4]), math.cos(ANGLES[4])])
+    (problem,) = refused(*(Run(pad) for pad in (1, 2, 4)), odd)
+    assert problem.run == "dry-5"
+    assert "run dry-5: the shaft stands" in problem.what
+
+
+def test_runs_that_stand_less_orderly_are_allowed_more():
+    """Five robust standard deviations of where the campaign's own runs stand beside their pads."""
+
+    def placed(odd):
+        """Two runs per pad, as far to one side as to the other; one of pad 3 by `odd`."""
+        out = []
+        for pad, aside in [(p, s * 0.08) for p in range(1, 6) for s in (1, -1)] + [(3, odd)]:
+            angle = ANGLES[pad - 1]
+            shift = REACH * aside * np.array([-math.sin(angle), math.cos(angle)])
+            out.append(record(pad, shift=shift, name=f"{pad}{aside:+}"))
+        return [p.run for p in check_placement(out)]
+
+    assert placed(0.35) == []
+    assert placed(0.9) == ["3+0.9"]
+
+
+@pytest.mark.parametrize(
+    ("turn", "guess"),
+    [
+        ((170.0, -170.0), "turn together by .170"),
+        ((-172.0, 175.0), "turn together by -172"),
+        ((40.0, 40.0), "turn together by .40"),
+    ],
+)
+def test_directions_are_compared_around_the_circle(turn, guess):
+    with pytest.raises(RigDataError, match=f"wrong angle: load and displacement {guess}"):
+        check(record(turn=tuple(np.radians(turn))))
+
+
+def test_repeated_readings_are_counted_beside_the_longest_stretch():
+    """Three equal readings are two repeats, and one stretch; what is left is two more of seven."""
+    seen = ChannelStatistics()
+    seen.add(np.array([1.0, 1, 1, 2, 3, 3, 4, 4, 5, 6]))
+    assert _repeated(seen) == pytest.approx(2 / 7)
+    alone = ChannelStatistics()
+    alone.add(np.array([1.0, 2, 2, 2, 3]))
+    assert _repeated(alone) == 0.0
+
+
+def test_one_coarse_channel_lets_its_quantity_stand_still():
+    run = FirstPad()
+    run.force = np.round(run.force / [4.0, 1e-9]) * [4.0, 1e-9]  # the horizontal cell repeats most readings
+    run.force[1000:1700] = run.force[1000]
+    refuse_flat_channels(run)
+
+
+def test_channels_of_other_quantities_may_stand_still():
+    run = FirstPad()
+    run.channels = CHANNELS | {"T1": channel("temperature", None)}
+    asked = []
+    original = run.record
+    run.record = lambda name: asked.append(name) or original(name)
+    refuse_flat_channels(run)
+    assert sorted(asked) == sorted(CHANNELS)

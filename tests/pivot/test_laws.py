@@ -1,0 +1,93 @@
+"""Pivot laws: derivatives, monotony, and the printed formulas as special cases."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tpjb_ident.pivot.fit import LAWS
+
+LOADS = np.geomspace(0.03, 4.5, 60)
+
+
+def some_shape(law, share):
+    """A shape inside the law's bounds, `share` standard deviations off its prior mean."""
+    low, high = law.bounds
+    spread = np.sqrt(np.diag(np.linalg.inv(law.prior_precision))) if len(low) else np.zeros(0)
+    return np.clip(law.prior_mean + share * spread, low, high)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@settings(max_examples=12)
+@given(share=st.floats(-1.5, 1.5))
+def test_compliance_is_the_derivative_of_the_deflection(name, share):
+    law = LAWS[name]
+    q = some_shape(law, share)
+    step = 1e-5
+    up, down = law.phi(LOADS * (1 + step), q)[0], law.phi(LOADS * (1 - step), q)[0]
+    slope = (up - down) / (2 * step * LOADS)
+    tolerance = 0.02 if name == "spline" else 1e-5  # the spline bends at its nodes
+    assert slope == pytest.approx(law.psi(LOADS, q)[0], rel=tolerance)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@settings(max_examples=12)
+@given(share=st.floats(-1.2, 1.2))
+def test_derivatives_with_respect_to_the_shape(name, share):
+    law = LAWS[name]
+    q = some_shape(law, share)
+    for function, loads in ((law.phi, LOADS), (law.psi, LOADS)):
+        _, analytic = function(loads, q)
+        for j in range(len(q)):
+            step = np.zeros(len(q))
+            step[j] = 1e-6
+            numeric = (function(loads, q + step)[0] - function(loads, q - step)[0]) / 2e-6
+            assert analytic[:, j] == pytest.approx(numeric, rel=2e-3, abs=2e-3 * np.max(np.abs(numeric)) + 1e-9)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@settings(max_examples=12)
+@given(share=st.floats(-2.0, 2.0))
+def test_every_law_rises_from_zero(name, share):
+    law = LAWS[name]
+    q = some_shape(law, share)
+    phi = law.phi(np.r_[0.0, LOADS], q)[0]
+    assert phi[0] == pytest.approx(0.0, abs=1e-6)
+    assert np.all(np.diff(phi) > 0)
+    assert np.all(law.psi(LOADS, q)[0] > 0)
+
+
+def test_line_contact_is_the_printed_rocker_formula():
+    # Eq. (17) of the paper, its rocker: E 206 GPa, nu 0.3, L 39.6 mm, D_H 132 mm, D_P 119.6 mm
+    front = math.pi * 206e9 * 0.0396 / (1 - 0.3**2)
+    load = np.linspace(100.0, 9000.0, 50)
+    logarithm = np.log(front * 0.0124 / (4.0 * load))
+    printed = load * (2.0 / 3.0 + logarithm) * 2.0 / front
+    reference = 2000.0
+    bracket = 2.0 / 3.0 + math.log(front * 0.0124 / (4.0 * reference)) - 1.0
+    kappa, scale = 1.0 / bracket, 2.0 / front * bracket
+    law = LAWS["hertz-line"]
+    ours = scale * reference * law.phi(load / reference, np.array([kappa]))[0]
+    assert ours == pytest.approx(printed, rel=1e-12)
+    tangent = front / 2.0 / (logarithm - 1.0 / 3.0)
+    assert 1.0 / (scale * law.psi(load / reference, np.array([kappa]))[0]) == pytest.approx(tangent, rel=1e-12)
+
+
+def test_point_contact_tangent_is_one_and_a_half_secants():
+    law = LAWS["hertz-point"]
+    none = np.zeros(0)
+    secant = LOADS / law.phi(LOADS, none)[0]
+    assert 1.0 / law.psi(LOADS, none)[0] == pytest.approx(1.5 * secant, rel=1e-12)
+
+
+def test_a_spline_can_be_a_power_law():
+    law, power = LAWS["spline"], LAWS["power"]
+    from tpjb_ident.pivot.laws.spline_law import FIXED, NODES
+
+    q = np.delete(-0.3 * NODES, FIXED)
+    assert law.psi(LOADS, q)[0] == pytest.approx(power.psi(LOADS, np.array([0.7]))[0], rel=1e-9)
+    assert law.phi(LOADS, q)[0] == pytest.approx(power.phi(LOADS, np.array([0.7]))[0], rel=2e-4)

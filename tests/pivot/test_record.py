@@ -1,0 +1,357 @@
+"""From a dry record to blocks: glitches, pieces and branches whose number and place can be counted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tpjb_ident.pivot.records.blocks import MOST_BLOCKS, Samples, cut_blocks
+from tpjb_ident.pivot.records.steps import MAINS_PERIOD, Hold, _bin, find_holds
+from tpjb_ident.slow_records.glitches import good_samples
+
+RATE = 500.0
+
+
+def noise(n=2000, seed=1):
+    return np.random.default_rng(seed).standard_normal(n)
+
+
+def with_jump(length, size=1000.0, at=900, n=2000):
+    values = noise(n)
+    values[at : at + length] += size
+    return values[:, None]
+
+
+@pytest.mark.parametrize("length", [1, 2, 5, 10, 11, 12, 15, 20, 21, 22, 30])
+def test_a_disturbance_goes_whole_up_to_its_longest_and_not_at_all_from_twice_that(length):
+    """Seen from any sample of it, the neighbourhood before and after must be sound for the most part.
+
+    Of 2 * 10 + 1 samples on either side, eleven spoilt ones are the majority; two samples more go on either side.
+    """
+    found = np.flatnonzero(~good_samples(with_jump(length), longest=10))
+    seen = length if length <= 11 else 22 - length
+    if seen <= 0:
+        assert len(found) == 0
+    else:
+        middle = 900 + (length - 1) / 2
+        np.testing.assert_array_equal(found, np.arange(middle - seen / 2 - 1.5, middle + seen / 2 + 2))
+
+
+def test_the_longest_disturbance_is_sixty_samples_unless_said():
+    spoilt = with_jump(61)
+    assert (~good_samples(spoilt)).sum() == 61 + 4
+    assert (~good_samples(with_jump(62))).sum() == 60 + 4
+
+
+@pytest.mark.parametrize(("size", "seen"), [(6.4, False), (7.7, True), (-6.4, False), (-7.7, True)])
+def test_seven_standard_deviations_are_a_glitch(size, seen):
+    values = noise()
+    values[1000] = size
+    assert good_samples(values[:, None], longest=30)[1000] == (not seen)
+
+
+@pytest.mark.parametrize(("steps", "seen"), [(3, False), (5, True)])
+def test_a_converter_without_noise_is_known_to_half_a_step(steps, seen):
+    values = np.floor(np.arange(2000) / 100.0)
+    values[1050] += steps
+    assert good_samples(values[:, None], longest=20)[1050] == (not seen)
+    # rounding residues are no steps of a converter
+    residue = values + 1e-9 * (np.arange(2000) % 2)
+    assert good_samples(residue[:, None], longest=20)[1050] == (not seen)
+
+
+def test_few_samples_are_taken_as_they_are():
+    values = np.array([0.0, 0.1, 0.0, 0.1, 900.0, 0.1, 0.0])[:, None]
+    assert good_samples(values).all()
+    values[2] = np.nan
+    np.testing.assert_array_equal(good_samples(values), np.arange(7) != 2)
+    eight = np.array([0.0, 0.1, 0.2, 0.1, 0.0, 0.1, 0.2, 0.1])[:, None]
+    assert good_samples(eight).shape == (8,)
+
+
+def spoilt_programme(seed):
+    """Ramps and levels with knocks, some of them near the ends."""
+    rng = np.random.default_rng(seed)
+    knots = np.cumsum(rng.uniform(100, 400, 8))
+    n = int(knots[-1])
+    values = np.interp(np.arange(n), knots, rng.uniform(0, 5000, 8)) + rng.standard_normal(n)
+    for place in (6, n // 3, n - 9, *rng.integers(0, n - 30, 3)):
+        values[place : place + rng.integers(1, 6)] += rng.choice([-1, 1]) * rng.uniform(2000, 4000)
+    return values
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_time_may_run_backwards_and_units_may_differ(seed):
+    values = spoilt_programme(seed)
+    good = good_samples(values[:, None], longest=25)
+    assert 10 < (~good).sum() < 0.12 * len(good)
+    np.testing.assert_array_equal(good_samples(values[::-1, None], longest=25), good[::-1])
+    np.testing.assert_array_equal(good_samples(-1e-9 * values[:, None], longest=25), good)
+    np.testing.assert_array_equal(good_samples(np.column_stack([noise(len(values)), values]), longest=25), good)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.2, -0.3])
+def test_a_record_may_begin_and_end_within_a_ramp(slope):
+    for seed in range(5):
+        values = slope * np.arange(600) + noise(600, seed)
+        assert good_samples(values[:, None]).all()
+
+
+def samples(load, start=0.0, rate=RATE, keep=slice(None)):
+    time = start + np.arange(len(load)) / rate
+    vector = np.column_stack([0.5 * load, -load])
+    return Samples(time[keep], vector[keep], 1e-9 * vector[keep], load[keep], 0.0)
+
+
+@pytest.mark.parametrize("start", [0.0, 500.0])
+def test_a_ramp_is_cut_into_halves_of_the_length(start):
+    """Ten seconds in pieces of a twentieth, each with its exact mean, whenever the clock started."""
+    load = 100.0 + 0.8 * np.arange(5001)
+    blocks = cut_blocks(samples(load, start), (), 0.1)
+    assert len(blocks) == 200
+    np.testing.assert_allclose(np.diff(blocks.time), 0.05, atol=2e-3)
+    np.testing.assert_allclose(blocks.duration, 0.05, atol=2.1e-3)
+    assert blocks.duration.sum() == pytest.approx(10.0, abs=3e-3)
+    np.testing.assert_allclose(blocks.load[:, 1], -(100.0 + 400.0 * (blocks.time - start)), rtol=1e-9)
+    np.testing.assert_allclose(blocks.load[:, 0], -0.5 * blocks.load[:, 1], rtol=1e-12)
+    np.testing.assert_allclose(blocks.displacement, 1e-9 * blocks.load, rtol=1e-12)
+    np.testing.assert_allclose(blocks.rate, 400.0, rtol=1e-9)
+    np.testing.assert_allclose(blocks.load_spread, 0.0, atol=1e-9)
+    assert set(blocks.hold) == {-1}
+    assert set(blocks.branch) == {1}
+    assert set(cut_blocks(samples(load[::-1], start), (), 0.1).branch) == {-1}
+    some = blocks.take(np.arange(200) % 3 == 0)
+    assert len(some) == 67
+    np.testing.assert_array_equal(some.load, blocks.load[::3])
+
+
+def test_holds_have_pieces_of_their_own():
+    load = np.interp(np.arange(3000) / RATE, [0, 2, 3, 4, 6], [0, 1000, 1000, 2000, 0])
+    holds = (Hold(2.0, 3.0, 1000.0, 1), Hold(4.0, 4.05, 2000.0, -1))
+    blocks = cut_blocks(samples(load), holds, 0.1)
+    first = blocks.hold == 0
+    assert first.sum() == 10
+    np.testing.assert_allclose(blocks.duration[first], 0.1, atol=2.1e-3)
+    np.testing.assert_allclose(blocks.time[first], 2.049 + 0.1 * np.arange(10), atol=2.1e-3)
+    assert (blocks.rate[first] == 0).all()
+    assert (blocks.branch[first] == 1).all()
+    # half a piece's length is one piece
+    assert (blocks.hold == 1).sum() == 1
+    assert blocks.branch[blocks.hold == 1] == -1
+    np.testing.assert_allclose(blocks.duration[blocks.hold < 0], 0.05, atol=2.1e-3)
+    up, down = blocks.time < 2.0, blocks.time > 4.1
+    assert (up.sum(), down.sum()) == (40, 38)
+    assert (blocks.branch[up] == 1).all()
+    assert (blocks.branch[down] == -1).all()
+
+
+@pytest.mark.parametrize(("hold", "pieces"), [(0.19, 0), (0.21, 1), (0.74, 1), (0.76, 2), (1.24, 2), (1.26, 3)])
+def test_pieces_are_about_as_long_as_asked(hold, pieces):
+    blocks = cut_blocks(samples(np.full(3001, 500.0)), (Hold(2.0, 2.0 + hold, 500.0, 1),), 0.5)
+    assert (blocks.hold == 0).sum() == pieces
+
+
+def test_a_level_in_noise_has_the_spread_of_its_mean():
+    load = 1000.0 + 20.0 * noise(20_000)
+    blocks = cut_blocks(samples(load), (Hold(0.0, 40.0, 1000.0, 1),), 0.2)
+    np.testing.assert_allclose(blocks.load_spread, 20.0 / np.sqrt(100.0), rtol=0.03)
+    assert np.std(blocks.load[:, 1]) == pytest.approx(2.0, rel=0.15)
+
+
+@pytest.mark.parametrize(("lost", "kept"), [(23, True), (28, False)])
+def test_a_piece_with_half_of_its_samples_stays(lost, kept):
+    keep = np.ones(5001, dtype=bool)
+    keep[2000 : 2000 + lost] = False
+    blocks = cut_blocks(samples(np.full(5001, 500.0), keep=keep), (Hold(0.0, 10.0, 500.0, 1),), 0.1)
+    assert len(blocks) == (100 if kept else 99)
+
+
+def test_three_samples_make_a_piece_and_two_do_not():
+    hold = (Hold(0.0, 10.0, 500.0, 1),)
+    assert len(cut_blocks(samples(np.full(401, 500.0), rate=40.0), hold, 0.1)) == 100
+    assert len(cut_blocks(samples(np.full(151, 500.0), rate=15.0), hold, 0.1)) == 0
+
+
+@pytest.mark.parametrize(("held", "seconds"), [(0.0, 440.0), (440.0, 440.0), (220.0, 440.0), (30.0, 40.0)])
+def test_long_records_have_as_many_pieces_as_can_be_borne(held, seconds):
+    n = int(seconds * 100)
+    load = np.interp(np.arange(n + 1) / 100.0, [0, held, seconds], [100.0, 100.0, 5000.0])
+    blocks = cut_blocks(samples(load, rate=100.0), (Hold(0.0, held, 100.0, 1),) if held else (), 0.2)
+    assert len(blocks) == pytest.approx(min(MOST_BLOCKS, held / 0.2 + (seconds - held) / 0.1), abs=2)
+
+
+def test_the_load_turns_where_it_was_farthest():
+    """A way back of 1.5 % of the range is none; where the load has turned, the pieces after its peak go down."""
+    knots = ([0, 4, 4.06, 8, 12], [0.0, 1000.0, 970.0, 2000.0, 500.0])
+    time = np.arange(6001) / RATE
+    load = 300.0 + np.interp(time, *knots)
+    blocks = cut_blocks(samples(load), (), 0.1)
+    assert (blocks.branch[blocks.time < 7.99] == 1).all()
+    assert (blocks.branch[blocks.time > 8.01] == -1).all()
+    mirrored = cut_blocks(samples(5000.0 - load), (), 0.1)
+    np.testing.assert_array_equal(mirrored.branch, -blocks.branch)
+    again = cut_blocks(samples(300.0 + np.interp(time, *np.array([[0, 3, 6, 9, 12], [0, 900, 100, 1000, 0]]))), (), 0.1)
+    turns = again.time[1:][np.diff(again.branch) != 0]
+    np.testing.assert_allclose(turns, [3.025, 6.025, 9.025], atol=0.06)
+    assert again.branch[0] == 1
+
+
+def staircase(rng=None, hold=1.0, ramp=0.5, levels=(1000.0, 2000.0, 3000.0), rate=RATE):
+    knots, values = [0.0], [0.0]
+    for level in levels:
+        knots += [knots[-1] + ramp, knots[-1] + ramp + hold]
+        values += [level, level]
+    time = np.arange(int(round(knots[-1] * rate))) / rate
+    load = np.interp(time, knots, values)
+    return time, load if rng is None else load + 5.0 * rng.standard_normal(len(load))
+
+
+@pytest.mark.parametrize("start", [0.0, 1e3])
+@pytest.mark.parametrize("hold", [1.0, 20.0])
+def test_holds_end_and_begin_within_a_bin_of_the_truth(start, hold):
+    """Two mains periods; in records of more than eighty seconds a two-thousandth of them."""
+    time, load = staircase(hold=hold)
+    bin_width = 0.02 * max(2.0, np.ceil(time[-1] / 40.0))
+    found = find_holds(time + start, load)
+    assert len(found) == 3
+    for k, one in enumerate(found):
+        begin = start + 0.5 + k * (hold + 0.5)
+        assert begin - 1e-6 <= one.start <= begin + 1.5 * bin_width + 1e-6
+        assert begin + hold - 1.5 * bin_width - 1e-6 <= one.stop <= begin + hold + 0.01
+        assert one.duration == pytest.approx(one.stop - one.start)
+
+
+def test_a_slow_approach_is_cut_off_the_front_and_a_late_move_off_the_end():
+    """A level that is reached as exp(-t / 0.1 s) counts once it is within four standard deviations of the noise."""
+    time, load = staircase(hold=3.0)
+    for k in range(3):
+        begin = 0.5 + 3.5 * k
+        inside = (time >= begin) & (time < begin + 3.0)
+        load[inside] -= 300.0 * np.exp(-(time[inside] - begin) / 0.1)
+    rng = np.random.default_rng(5)
+    found = find_holds(time, load + 20.0 * rng.standard_normal(len(load)))
+    assert len(found) == 3
+    for k, one in enumerate(found):
+        # 300 exp(-t / 0.1) = 4 * 20 / sqrt(20 samples of a bin): 0.28 s
+        assert one.start == pytest.approx(0.5 + 3.5 * k + 0.28, abs=0.12)
+        assert one.level == pytest.approx(1000.0 * (k + 1), abs=4.0)
+
+
+def test_one_bad_bin_does_not_split_a_hold_but_a_move_does():
+    rng = np.random.default_rng(2)
+    time, load = staircase(rng, hold=2.0)
+    knocked = load.copy()
+    knocked[(time > 1.52) & (time < 1.56)] += 7.5
+    assert len(find_holds(time, knocked)) == 3
+    moved = load.copy()
+    moved[(time > 1.5) & (time <= 2.5)] += 100.0
+    levels = [hold.level for hold in find_holds(time, moved)]
+    assert levels == pytest.approx([1000.0, 1100.0, 2000.0, 3000.0], abs=5.0)
+
+
+@pytest.mark.parametrize(("hold", "found"), [(0.26, 3), (0.16, 0)])
+def test_the_shortest_hold(hold, found):
+    assert len(find_holds(*staircase(hold=hold, ramp=0.4))) == found
+
+
+@pytest.mark.parametrize(("rest", "bins"), [(0, 10), (9, 10), (10, 11), (11, 11)])
+def test_bins_are_medians_over_two_mains_periods(rest, bins):
+    """Twenty samples each at 500 Hz; the last counts with half of them; whenever the clock started."""
+    for start in (0.0, 1e3 + 0.0137):
+        time = start + np.arange(200 + rest) / RATE
+        load = 7.0 * (time - start)
+        load[::20] += 1e3  # one wild sample of a bin is no matter
+        found = _bin(time, load)
+        assert len(found.time) == bins
+        np.testing.assert_allclose(found.time[:10] - start, (20 * np.arange(10) + 9.5) / RATE, atol=1e-9)
+        np.testing.assert_allclose(found.load[:10], 7.0 * (20 * np.arange(10) + 10.5 - 0.5) / RATE, atol=0.008)
+        assert found.width == pytest.approx(2 * MAINS_PERIOD)
+        assert found.noise == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("seconds", "periods"), [(30.0, 2), (79.0, 2), (101.0, 3), (399.0, 10)])
+def test_long_records_have_two_thousand_bins_of_whole_mains_periods(seconds, periods):
+    time = np.arange(int(seconds * 100) + 1) / 100.0
+    found = _bin(time, np.random.default_rng(1).standard_normal(len(time)))
+    assert found.width == pytest.approx(periods * MAINS_PERIOD)
+    assert abs(len(found.time) - seconds / found.width) <= 1
+
+
+def test_the_noise_of_a_bin_does_not_feel_ramps_nor_corners():
+    rng = np.random.default_rng(3)
+    time, load = staircase(hold=2.0)
+    noise = 5.0 * rng.standard_normal(len(load))
+    expected = 5.0 * np.sqrt(np.pi / 2 / 20)  # of a median of twenty
+    assert _bin(time, noise).noise == pytest.approx(expected, rel=0.25)
+    assert _bin(time, load + noise).noise == pytest.approx(_bin(time, noise).noise, rel=0.2)
+
+
+@pytest.mark.parametrize("samples", [1, 19, 40, 41, 60, 150])
+def test_a_record_of_a_few_bins_has_no_holds(samples):
+    assert find_holds(np.arange(samples) / RATE, np.full(samples, 500.0)) == ()
+
+
+@pytest.mark.parametrize(
+    ("levels", "branches"),
+    [
+        ((200.0, 800.0, 1400.0), [1, 1, 1]),
+        ((4000.0, 3000.0, 2000.0), [-1, -1, -1]),
+        ((200.0, 800.0, 100.0), [1, 1, -1]),
+        ((2000.0, 1000.0), [-1, -1]),
+    ],
+)
+def test_noise_does_not_decide_how_a_first_hold_was_reached(levels, branches):
+    for seed in range(6):
+        time, load = staircase(np.random.default_rng(seed), levels=levels)
+        late = time > 0.5  # the record starts when the first level has been reached
+        found = find_holds(time[late], load[late])
+        assert [hold.branch for hold in found] == branches
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_creep_that_is_slower_than_a_ramp_is_cut_off_either_end(sense):
+    """Sixty newtons per second are no ramp of two thousand; thirty newtons are no part of a level known to one."""
+    time, load = staircase(hold=3.0, levels=(1000.0, 2000.0))
+    load = load + 0.5 * np.random.default_rng(4).standard_normal(len(load))
+    begin = 0.5
+    since, left = time - begin, begin + 3.0 - time
+    load += 60.0 * sense * np.where((since >= 0) & (since < 0.5), 0.5 - since, 0.0)
+    load += 60.0 * sense * np.where((left >= 0) & (left < 0.5), 0.5 - left, 0.0)
+    first, second = find_holds(time, load)
+    assert first.start == pytest.approx(begin + 0.49, abs=0.09)
+    assert first.stop == pytest.approx(begin + 2.51, abs=0.09)
+    assert first.level == pytest.approx(1000.0, abs=0.3)
+    assert second.duration > 2.8
+
+
+def test_four_bins_are_a_hold():
+    """Six whole bins stand still, of which the two beside the ramps feel them."""
+    holds = find_holds(*staircase(hold=0.24, ramp=0.4))
+    assert len(holds) == 3
+    for k, one in enumerate(holds):
+        begin = 0.4 + 0.64 * k
+        assert begin - 1e-9 < one.start < one.stop < begin + 0.24 + 1e-9
+
+
+def test_half_a_second_can_hold_a_hold():
+    time, load = staircase(hold=0.4, ramp=0.12, levels=(1000.0,))
+    (hold,) = find_holds(time, load)
+    assert hold.level == pytest.approx(1000.0)
+    assert 0.12 - 1e-9 <= hold.start < 0.21
+    assert hold.stop == pytest.approx(0.52, abs=0.05)
+
+
+def test_a_move_of_nine_standard_deviations_is_no_noise():
+    """Of a median of twenty samples; the levels before and after are two holds."""
+    rng = np.random.default_rng(2)
+    time, load = staircase(rng, hold=2.0)
+    load[(time > 1.5) & (time <= 2.5)] += 9 * 5.0 * np.sqrt(np.pi / 2 / 20)
+    assert len(find_holds(time, load)) == 4
+
+
+def test_a_record_that_leaves_its_only_hold_has_one():
+    time, load = staircase(levels=(2000.0, 3000.0))
+    kept = (time > 0.5) & (time < 1.9)
+    (hold,) = find_holds(time[kept], load[kept])
+    assert hold.level == pytest.approx(2000.0)
+    assert abs(hold.branch) == 1

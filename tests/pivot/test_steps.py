@@ -1,0 +1,156 @@
+"""Holds, glitches and blocks: what is found in a load programme, and what is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tpjb_ident.pivot.bad_holds import sticking
+from tpjb_ident.pivot.records.blocks import MOST_BLOCKS, Samples, cut_blocks
+from tpjb_ident.pivot.records.steps import find_holds
+from tpjb_ident.slow_records.glitches import good_samples
+
+RATE = 500.0
+
+
+def programme(levels, holds, ramp=0.3, overshoot=0.0, leak=0.0, start=250.0):
+    """Time, load and the true (start, stop, level) of the holds of a staircase."""
+    knots, values, truth = [0.0], [start], []
+    for level, hold in zip(levels, holds, strict=True):
+        arrival = knots[-1] + ramp
+        truth.append((arrival, arrival + hold, level))
+        knots += [arrival, arrival + hold]
+        values += [level, level]
+    time = np.arange(int(knots[-1] * RATE)) / RATE
+    load = np.interp(time, knots, values)
+    before = start
+    for begin, stop, level in truth:
+        inside = (time >= begin) & (time < stop)
+        since = time[inside] - begin
+        load[inside] += overshoot * (level - before) * np.exp(-since / 0.08) + leak * level * since
+        before = level
+    return time, load, truth
+
+
+UP = tuple(500.0 * k for k in range(1, 11))
+CASES = {
+    "up": {"levels": UP, "holds": [1.0] * 10},
+    "down": {"levels": UP[::-1][1:], "holds": [1.0] * 9, "start": 5000.0},
+    "cycle": {"levels": UP + UP[-2::-1], "holds": [1.0] * 19},
+    "unequal": {"levels": UP, "holds": [0.5, 3.0, 0.8, 1.0, 2.0, 0.6, 4.0, 1.0, 0.7, 1.5]},
+    "overshoot": {"levels": UP, "holds": [1.5] * 10, "overshoot": 0.15},
+    "leaking": {"levels": UP, "holds": [1.0] * 10, "leak": -0.004},
+    "long holds": {"levels": UP[::2], "holds": [12.0] * 5},
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_hold_is_found_and_nothing_else(name):
+    time, load, truth = programme(**CASES[name])
+    load = load + 2.6 * np.random.default_rng(3).standard_normal(len(load))
+    holds = find_holds(time, load)
+    assert len(holds) == len(truth)
+    for hold, (start, stop, level) in zip(holds, truth, strict=True):
+        assert start - 0.05 < hold.start < start + 0.6
+        assert stop - 0.15 < hold.stop < stop + 0.05
+        assert hold.level == pytest.approx(level, rel=0.01, abs=8.0)
+
+
+def test_branches_of_a_cycle():
+    time, load, truth = programme(**CASES["cycle"])
+    holds = find_holds(time, load)
+    assert [h.branch for h in holds] == [1] * 10 + [-1] * 9
+    assert len(truth) == 19
+
+
+def test_an_overshoot_is_cut_off_the_front():
+    time, load, _ = programme(**CASES["overshoot"])
+    for hold in find_holds(time, load):
+        inside = (time >= hold.start) & (time < hold.stop)
+        assert np.ptp(load[inside]) < 0.02 * 500.0
+
+
+def test_a_continuous_ramp_has_no_holds():
+    time = np.arange(6000) / RATE
+    load = 250.0 + 400.0 * time + np.random.default_rng(1).normal(0.0, 2.6, len(time))
+    assert find_holds(time, load) == ()
+
+
+def test_jitter_and_a_gap_in_time_do_no_harm():
+    time, load, _ = programme(**CASES["up"])
+    rng = np.random.default_rng(7)
+    keep = (time < 5.0) | (time > 5.4)
+    time, load = (time + rng.uniform(-2e-4, 2e-4, len(time)))[keep], load[keep]
+    assert len(find_holds(np.sort(time), load)) in (10, 11)  # the gap may split the hold it falls into
+
+
+@pytest.mark.parametrize("length", [3, 20, 50])
+@pytest.mark.parametrize("place", [700, 3000, 6300])
+def test_glitches_are_found_whole(length, place):
+    time, load, _ = programme(**CASES["up"])
+    rng = np.random.default_rng(length)
+    values = np.column_stack([load + 2.6 * rng.standard_normal(len(load)), 1e-9 * load])
+    values[place : place + length, 0] += 900.0
+    good = good_samples(values)
+    assert not good[place : place + length].any()
+    assert good.sum() >= len(time) - length - 8
+
+
+def test_clean_ramps_and_corners_are_no_glitches():
+    _, load, _ = programme(**CASES["up"])
+    values = load[:, None] + 2.6 * np.random.default_rng(0).standard_normal((len(load), 1))
+    assert good_samples(values).mean() > 0.9995
+
+
+def test_missing_values_are_left_out():
+    values = np.ones((400, 2)) + 1e-3 * np.random.default_rng(0).standard_normal((400, 2))
+    values[100:110, 1] = np.nan
+    good = good_samples(values)
+    assert not good[100:110].any()
+    assert good[130:].all()
+
+
+def make_samples(time, load):
+    vector = np.column_stack([np.zeros_like(load), -load])
+    return Samples(time, vector, 1e-9 * vector, load, 0.0)
+
+
+def test_blocks_average_holds_and_ramps():
+    time, load, truth = programme(**CASES["up"])
+    holds = find_holds(time, load)
+    blocks = cut_blocks(make_samples(time, load), holds, 0.1)
+    for k, (_, _, level) in enumerate(truth):
+        assert blocks.load[blocks.hold == k, 1] == pytest.approx(-level, rel=1e-3)
+        assert (blocks.rate[blocks.hold == k] == 0.0).all()
+    moving = blocks.hold < 0
+    assert np.median(blocks.rate[moving]) == pytest.approx(500.0 / 0.3, rel=0.1)
+    assert np.all(np.diff(blocks.time) > 0)
+
+
+def test_blocks_of_a_long_record_stay_few():
+    time = np.arange(150_000) / RATE
+    load = 10.0 * time + 100.0
+    blocks = cut_blocks(make_samples(time, load), (), 0.1)
+    assert len(blocks) <= 2 * MOST_BLOCKS
+    assert blocks.load[:, 1] == pytest.approx(-(10.0 * blocks.time + 100.0), rel=1e-9)
+
+
+def test_a_block_that_lost_its_samples_is_dropped():
+    time = np.arange(5000) / RATE
+    load = 500.0 + 0.0 * time
+    keep = (time < 2.0) | (time > 2.45)
+    blocks = cut_blocks(make_samples(time[keep], load[keep]), (), 0.2)
+    assert not np.any((blocks.time > 2.1) & (blocks.time < 2.35))
+
+
+def test_a_ramp_with_noise_does_not_turn_but_a_reversal_does():
+    time = np.arange(6000) / RATE
+    load = 250.0 + 800.0 * np.minimum(time, 12.0 - time) + np.random.default_rng(1).normal(0.0, 30.0, len(time))
+    blocks = cut_blocks(make_samples(time, load), (), 0.1)
+    turned = np.flatnonzero(np.diff(blocks.branch))
+    assert len(turned) == 1
+    assert blocks.time[turned[0]] == pytest.approx(6.0, abs=0.3)
+    assert (blocks.branch[:20] == 1).all()
+    stuck = sticking(-blocks.load[:, 1], blocks.branch)
+    assert stuck.any()
+    assert np.all(np.abs(blocks.time[stuck] - 6.3) < 0.5)

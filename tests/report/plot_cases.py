@@ -1,0 +1,276 @@
+"""Results made by hand, and every picture drawn from them once.
+
+``python -m tests.report.plot_cases`` draws the pictures that `test_plots` compares with anew: look at them before you
+commit them.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+
+import matplotlib
+import matplotlib.image
+import matplotlib.style
+import numpy as np
+import pandas as pd
+
+from rigdata.operating_point import OperatingPoint
+from tests.studies.evidence.case import case_table
+from tests.studies.evidence.counts import SPECIAL, confusion_matrix
+from tests.studies.evidence.measures import closure_table, coverage_table, no_effect_p, power_table
+from tests.studies.evidence.next_tests import next_test_table, separations
+from tests.studies.evidence_cases import rows
+from tests.studies.pages import (
+    case_dots,
+    closure_boxes,
+    confusion_map,
+    coverage_dots,
+    next_test_dots,
+    outcome_bars,
+    p_values_line,
+    power_curves,
+)
+from tpjb_ident.clearance.locus import Locus, LocusPoint
+from tpjb_ident.clearance.measure import ClearancePolygon
+from tpjb_ident.clearance.polygon import corners
+from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
+from tpjb_ident.pivot.fit import LAWS
+from tpjb_ident.pivot.laws.law_fit import LawFit
+from tpjb_ident.pivot.records.projection import Direction
+from tpjb_ident.report import plots
+from tpjb_ident.slow_records.noise import NoiseModel
+
+PICTURES = Path(__file__).parent / "pictures"
+DPI = 60
+ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
+
+
+def curve(pad: int = 1, softer: float = 1.0, gap: float = 0.0, down: bool = False) -> PivotCurve:
+    """Curve of a line contact; `gap` [m] of missing contact; `down` adds unloading steps."""
+    # zero reading, friction, ln scale, kappa and, with contact loss, gap and ln load
+    theta = [0.0, 0.004, np.log(7.25e-10 * softer), 0.0966, *((gap, np.log(500.0)) if gap else ())]
+    spread = np.array([2e-8, 2e-3, 0.02, 0.015, *((1e-7, 0.06) if gap else ())])
+    law = LawFit(LAWS["hertz-line"], 2000.0, bool(gap), np.array(theta), np.diag(spread**2), 0.0, 60.0, 100)
+    load = np.linspace(500.0, 5000.0, 10)
+    branch = np.ones(10)
+    if down:
+        load, branch = np.r_[load, load[-2::-1]], np.r_[branch, -np.ones(9)]
+    reading = law.reading(load / (1.0 - 0.004 * branch), branch)
+    weight = np.ones(len(load))
+    weight[4] = 0.0
+    reading[4] += 0.8e-6
+    n = len(load)
+    steps = PivotSteps(load, reading, np.full(n, 4e-8), 0.03 * load, 0.15 * reading, branch.astype(int), weight)
+    onset = 2200.0 if gap else 0.0
+    return PivotCurve(
+        pad=pad,
+        angle=float(ANGLES[pad - 1]),
+        steps=steps,
+        fits=(law,),
+        weights=np.ones(1),
+        onset_load=onset,
+        onset_load_se=100.0 if gap else 0.0,
+        valid_from=max(onset, 250.0),
+        valid_to=5000.0,
+        load_direction=Direction(0.03, 0.001),
+        displacement_direction=Direction(0.149, 0.01),
+    )
+
+
+def curves() -> list[PivotCurve]:
+    """Five pads, the upper two with incomplete contact."""
+    return [curve(p, 1.0 + 0.25 * p, 3e-6 if p in (3, 4) else 0.0) for p in range(1, 6)]
+
+
+def formula(pad: int, load: float) -> tuple[float, float]:
+    """Kirk-like secant and tangent [N/m]."""
+    return 1.2e9 + 1e8 * np.log(load / 1000.0), 1.3e9 + 1e8 * np.log(load / 1000.0)
+
+
+def polygon(clearance: float = 80e-6, odd: float = 8e-6) -> ClearancePolygon:
+    """Pentagon with one pad off."""
+    sides = np.full(5, clearance)
+    sides[2] += odd
+    se = np.full(5, 0.1e-6)
+    return ClearancePolygon(
+        run="c-1",
+        point=OperatingPoint(200.0, 0.0, 0.0),
+        angles=ANGLES,
+        centre=np.zeros(2),
+        centre_covariance=np.zeros((2, 2)),
+        clearance=sides,
+        clearance_se=se,
+        clearance_pushed=sides + 3e-6,
+        clearance_pushed_se=se,
+        fitted_angle=ANGLES,
+        fitted_angle_se=np.full(5, 1e-3),
+        corners=corners(ANGLES, sides),
+        push_load=200.0,
+        pivot_scale=1.0,
+        pivot_scale_se=0.02,
+        noise=NoiseModel(1e-17, 1e-17, 1e-8),
+    )
+
+
+def locus(n: int = 10) -> Locus:
+    """Positions on an oval."""
+    points = []
+    for k in range(n):
+        direction = 2 * np.pi * k / n - np.pi / 2
+        place = np.array([48e-6 * np.cos(direction), 44e-6 * np.sin(direction)])
+        point = OperatingPoint(5000.0, direction, 2 * np.pi * 22.0)
+        points.append(LocusPoint(f"l-{k}", point, 5000.0, direction, place, np.diag([1.2e-6, 0.6e-6]) ** 2))
+    return Locus(tuple(points), np.zeros(2), np.full(2, np.nan))
+
+
+def oval(scale: float) -> np.ndarray:
+    """Predicted positions."""
+    turn = np.linspace(0.0, 2 * np.pi, 20, endpoint=False)
+    return scale * 1e-6 * np.column_stack([48 * np.cos(turn), 44 * np.sin(turn)])
+
+
+def comparison(softer: float = 1.0) -> pd.DataFrame:
+    """Table as comparison.csv: six loads at 25 Hz, four frequencies at 5 kN, three pivot models."""
+    points = [(1e3 * w, 25.0) for w in (2.5, 3.75, 5.0, 6.25, 7.5, 8.75)] + [(5e3, f) for f in (10.0, 40.0, 50.0)]
+    rows = []
+    for variant, factor in (("rigid", 1.5), ("kirk", 1.25), ("measured", 1.01)):
+        for load, frequency in points:
+            row = {"pivots": variant, "static_load_N": load, "static_load_direction_deg": -90.0, "shaft_speed_Hz": 22.0,
+                   "excitation_Hz": frequency, "pivot_extrapolated": load > 7e3,
+                   "coherence": 1.0 - (0.2 if frequency == 50.0 else 1e-4)}  # fmt: skip
+            for size, unit, part in ((3e4, "N_per_m", "k"), (80.0, "Ns_per_m", "c")):
+                for entry, share in (("xx", 0.5), ("xy", 0.02), ("yx", -0.03), ("yy", 1.0)):
+                    value = softer * share * size * load * (1.0 + 0.004 * (frequency - 25.0))
+                    half = 0.03 * softer * size * load
+                    name = f"{part}{entry}_{unit}"
+                    row |= {name: value, f"{name}_lo": value - half, f"{name}_hi": value + half,
+                            f"{name}_predicted": value * factor}  # fmt: skip
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+@dataclass
+class Shaken:
+    """A dynamic run: a 25 Hz line and noise, forces that follow the displacement."""
+
+    id: str = "d-1"
+    sample_rate: float = 1000.0
+
+    def __post_init__(self):
+        rng = np.random.default_rng(4)
+        t = np.arange(2000) / self.sample_rate
+        line = np.sin(2 * np.pi * 25.0 * t)
+        move = np.column_stack([line, 0.7 * line]) + 0.3 * rng.standard_normal((2000, 2))
+        self.data = {"displacement": 1e-6 * move, "force": 500.0 * move + 150.0 * rng.standard_normal((2000, 2))}
+        self.point = OperatingPoint(5000.0, 0.0, 2 * np.pi * 22.0, 2 * np.pi * 25.0)
+
+    def vector(self, quantity):
+        return _Vector(self.data[quantity])
+
+
+class _Vector:
+    def __init__(self, values):
+        self.values = values
+
+    def __len__(self):
+        return len(self.values)
+
+
+def windows() -> SimpleNamespace:
+    """Weights of twenty windows, one of them rejected."""
+    weights = np.column_stack([np.linspace(0.8, 1.0, 20), np.linspace(1.0, 0.7, 20)])
+    weights[6] = 0.0, 0.1
+    why = SimpleNamespace(run="d-05000-25-03", time=0.67, weight=0.0, reason="burst in X1A")
+    return SimpleNamespace(stiffness=SimpleNamespace(weights=weights), rejected=(why,))
+
+
+GAPS = {
+    "kxx": {"heldout_before": 9.1, "heldout_after": 1.0},
+    "cyy": {"heldout_before": 41.0, "heldout_after": 1.2},
+    "locus_x": {"fitted_before": 2.0, "fitted_after": 3.0},
+    "clearance_pushed": {"heldout_before": 1.0, "heldout_after": 0.9},
+}
+EFFECTS = ("pivot_flexibility", "soft_pivot, pad 1", "thermal_growth", "oil_viscosity")
+SEPARATION = np.array([[np.nan, 1.2, 4.8, 5.5], [4.1, np.nan, 5.9, 5.0], [5.2, 3.4, np.nan, 2.2], [np.nan] * 4])
+
+
+def arcs() -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
+    """Angles, deformation and temperature of five pads."""
+    angles = [np.linspace(a - 0.5, a + 0.5, 30) for a in np.radians([270.0, 342.0, 414.0, 486.0, 558.0])]
+    bent = [1e-6 * (3 + k - 20 * (a - a.mean()) ** 2) for k, a in enumerate(angles)]
+    return angles, bent, [40.0 + 20.0 * (a - a[0]) - 2.0 * k for k, a in enumerate(angles)]
+
+
+CASES = {
+    "pad_deformation": lambda: plots.pad_deformation(*arcs(), title="Pad deformation"),
+    "pad_projection": lambda: plots.pad_projection(curves()),
+    "load_deflection": lambda: plots.load_deflection([curve(1, down=True), curve(3, 2.0, 3e-6)], up_to=6000.0),
+    "pivot_stiffness": lambda: plots.pivot_stiffness(curves(), formula, loads=np.linspace(200.0, 6500.0, 80)),
+    "pivots_of_bearings": lambda: plots.pivots_of_bearings(
+        {"rocker": curve(), "spherical": curve(1, 3.0)}, {"rocker": formula}, title="Pad #1"
+    ),
+    "clearance_and_locus": lambda: plots.clearance_and_locus(
+        {"rocker": polygon(), "spherical": polygon(100e-6, 0.0)}, locus(), {"kirk": oval(0.8), "measured": oval(1.0)},
+        drawing=(ANGLES, np.full(5, 80e-6)),
+    ),
+    "direct_coefficients": lambda: plots.direct_coefficients({"rocker": comparison(), "spherical": comparison(0.5)}),
+    "coefficient": lambda: plots.coefficient(comparison(), "kyy"),
+    "residual_map": lambda: plots.residual_map(comparison()),
+    "residual_series": lambda: plots.residual_series(comparison(), "frequency"),
+    "coherence": lambda: plots.coherence(comparison()[:9]),
+    "coherence_spectrum": lambda: plots.coherence_spectrum(Shaken()),
+    "window_weights": lambda: plots.window_weights(windows()),
+    "isolability": lambda: plots.isolability(SEPARATION, EFFECTS),
+    "gap": lambda: plots.gap(GAPS),
+    "gap_controls": lambda: plots.gap_controls(
+        11.9, 1.2, {"best wrong effect": (6.3, 5.1, 7.7), "no-effect campaign": 1.04}, noise_floor=0.9
+    ),
+    "confusion": lambda: confusion_map.confusion(confusion_matrix(rows(), size=6.0), SPECIAL),
+    "power": lambda: power_curves.power(power_table(rows())),
+    "p_values": lambda: p_values_line.p_values(no_effect_p(rows()), 0.01),
+    "interval_coverage": lambda: coverage_dots.interval_coverage(coverage_table(rows())),
+    "closures": lambda: closure_boxes.closures(closure_table([r for r in rows() if "rung" not in r])),
+    "case_gaps": lambda: case_dots.case_gaps(case_table(rows())),
+    "next_tests": lambda: next_test_dots.next_tests(next_test_table(rows()), separations(rows())),
+    "outcomes": lambda: outcome_bars.outcomes(
+        {"hidden, d' = 6": {"named right": 7, "group right": 1, "consistent": 2, "named wrong": 1},
+         "left out": {"unexplained": 5, "group wrong": 1, "named wrong": 2}}, [11, 8]
+    ),
+}  # fmt: skip
+
+
+def drawn(figure) -> np.ndarray:
+    """Grey levels (h, w) of a figure at low resolution; its texts then know where they stand."""
+    figure.set_dpi(DPI)
+    figure.canvas.draw()
+    return np.asarray(figure.canvas.buffer_rgba(), dtype=float)[..., :3] @ [0.299, 0.587, 0.114]
+
+
+def default_style():
+    """matplotlib's own style and font, whatever the user has set."""
+    return matplotlib.style.context(["default", {"font.family": "DejaVu Sans"}])
+
+
+@functools.cache
+def picture(name: str):
+    """Figure of a case, drawn, its grey levels, and whether it left the global style as it was."""
+    with default_style():
+        before = dict(matplotlib.rcParams)
+        figure = CASES[name]()
+        grey = drawn(figure)
+        return figure, grey, dict(matplotlib.rcParams) == before
+
+
+def main() -> None:
+    """Draw all pictures anew."""
+    for name in CASES:
+        grey = np.round(picture(name)[1] / 17.0) * 17.0  # sixteen levels: a quarter of the bytes
+        matplotlib.image.imsave(PICTURES / f"{name}.png", grey.astype(np.uint8), cmap="gray", vmin=0, vmax=255,
+                                pil_kwargs={"compress_level": 9})  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+"""The report: self-contained, escaped, complete."""
+
+from __future__ import annotations
+
+import html.parser
+import re
+
+import pytest
+
+from tpjb_ident.report.figure import panel, save_panels, svg_text
+from tpjb_ident.report.page import Page, Section, Table, render_page
+from tpjb_ident.report.plots.style import add_legend, new_picture
+
+HOSTILE = "<script>alert(1)</script>\"'& <img src=x onerror=alert(2)> $\\frac{a}{b}$ \x1b[31m\u202e"
+
+
+@pytest.fixture(scope="module")
+def page_and_svg(tmp_path_factory):
+    figure, axes = new_picture("static load, kN", "kxx, MN/m")
+    axes.plot([1, 2, 3], [1, 4, 9], color="#0072b2", label=r"pivot <b> & \$5")
+    axes.plot([1, 2, 3], [1, 2, 3], marker="o", clip_on=True)
+    add_legend(axes)
+    other, axes = new_picture("x", "y")
+    axes.plot([0, 1], [1, 0], marker="s")
+    panels = [panel("one", f"first {HOSTILE}", figure, "g"), panel("two", "second", other, "g")]
+    page = Page(
+        title=HOSTILE,
+        subtitle=HOSTILE,
+        answer=HOSTILE,
+        more=[HOSTILE],
+        key_table=Table(HOSTILE, [HOSTILE, "n"], [[HOSTILE, "1"]]),
+        sections=[Section(HOSTILE, notes=[HOSTILE], panels=panels, tables=[Table("t", ["a"], [[HOSTILE]])])],
+        settings={HOSTILE: HOSTILE},
+        inputs={HOSTILE: "0" * 64},
+    )
+    folder = tmp_path_factory.mktemp("figures") / "figures"
+    texts = save_panels(panels, folder)
+    return render_page(page, texts), texts, folder
+
+
+class Tags(html.parser.HTMLParser):
+    """Every start tag with its attributes, in order; open elements checked against end tags."""
+
+    VOID = frozenset({"meta", "br", "img", "link", "input", "hr"})
+
+    def __init__(self):
+        super().__init__()
+        self.seen, self.open = [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.seen.append((tag, dict(attrs)))
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.seen.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def parsed(text):
+    tags = Tags()
+    tags.feed(text)
+    assert tags.open == []
+    return tags.seen
+
+
+def test_nothing_from_outside_becomes_markup(page_and_svg):
+    tags = parsed(page_and_svg[0])
+    assert not [t for t, _ in tags if t in ("img", "iframe", "object", "link", "b")]
+    assert [a for t, a in tags if t == "script"] == [{}]  # our own, held by its hash
+    assert not [a for _, attrs in tags for a in attrs if a.startswith("on")]
+    assert page_and_svg[0].count("&lt;script&gt;") >= 10
+
+
+def test_nothing_is_loaded_from_anywhere(page_and_svg):
+    for tag, attrs in parsed(page_and_svg[0]):
+        for name in ("src", "href", "xlink:href", "data", "action"):
+            value = attrs.get(name)
+            assert value is None or value.startswith("#"), (tag, name, value)
+    assert not re.search(r"@import|url\((?!#)", page_and_svg[0])
+    assert "default-src 'none'" in page_and_svg[0]
+
+
+def test_control_characters_do_not_reach_the_page(page_and_svg):
+    assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f\u202a-\u202e]", page_and_svg[0])
+
+
+def test_ids_are_unique_and_every_reference_has_its_target(page_and_svg):
+    text = page_and_svg[0]
+    ids = re.findall(r'\bid="([^"]+)"', text)
+    assert len(ids) == len(set(ids))
+    targets = set(re.findall(r'(?:href="|url\()#([^")]+)', text))
+    assert targets
+    assert targets <= set(ids)
+
+
+def test_figures_follow_the_page_but_files_keep_their_colours(page_and_svg):
+    text, _, folder = page_and_svg
+    figures = text[text.index("<figure") :]
+    assert "var(--blue)" in figures
+    assert "#0072b2" not in figures
+    file = (folder / "one.svg").read_text(encoding="utf-8")
+    assert "#0072b2" in file
+    assert 'fill="white"' in file
+    assert (folder / "one.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_text_in_figures_is_text(page_and_svg):
+    file = (page_and_svg[2] / "one.svg").read_text(encoding="utf-8")
+    assert "static load, kN</text>" in file
+    assert "&lt;b&gt;" in file
+
+
+def test_the_same_figure_gives_the_same_bytes(page_and_svg):
+    figure, axes = new_picture("x", "y")
+    axes.plot([0, 1], [1, 0], marker="s")
+    assert svg_text(panel("two", "second", figure, "g").figure, "two") == page_and_svg[1]["two"]
+
+
+def test_no_global_matplotlib_setting_is_left_behind():
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    figure, _ = new_picture("x", "y")
+    svg_text(figure, "z")
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_the_only_script_is_ours_and_the_policy_lets_no_other_run(page_and_svg):
+    import base64
+    import hashlib
+    from pathlib import Path
+
+    import tpjb_ident.report
+
+    (script,) = re.findall(r"<script>(.*?)</script>", page_and_svg[0], flags=re.S)
+    source = Path(tpjb_ident.report.__file__).parent / "templates" / "sort.js"
+    assert script.strip() == source.read_text(encoding="utf-8").strip()
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in page_and_svg[0]
+
+
+def test_markers_carry_their_values(page_and_svg):
+    _, texts, _ = page_and_svg
+    assert texts["one"].count("<title>kxx ") == 3
+    assert "<title>kxx 2 MN/m at static load 2 kN</title>" in texts["one"]
+    assert texts["two"].count("<title>") == 2

@@ -1,0 +1,362 @@
+"""Campaigns: loading, lazy access, vectors, fingerprints, and paths that must not leave the folder."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from dataclasses import FrozenInstanceError
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rigdata
+from rigdata.problem import RigDataError
+from rigdata.safe_path import inside
+from tpjb_ident.check.campaign import check_campaign
+
+MANIFEST = """\
+schema = "tpjb-rig/1"
+id = "rocker-A"
+bearing = "rocker.toml"
+description = "free text"
+
+[housing]
+mass = "30 kg"
+
+[acquisition]
+sample_rate = "100 Hz"
+
+[channels.X1A]
+quantity = "displacement"
+axis = "45 deg"
+unit = "V"
+sensitivity = "7.78 mV/um"
+polarity = -1
+
+[channels.X1B]
+quantity = "displacement"
+axis = "115 deg"
+unit = "V"
+sensitivity = "7.78 mV/um"
+polarity = -1
+
+[channels.L1H]
+quantity = "force"
+axis = "0 deg"
+unit = "N"
+
+[channels.T2]
+quantity = "temperature"
+pad = 2
+position = 0.75
+unit = "degC"
+
+[channels.T1]
+quantity = "temperature"
+pad = 1
+position = 0.75
+unit = "degC"
+
+[channels.K1]
+quantity = "speed"
+unit = "V"
+sensitivity = "100 mV/Hz"
+
+[channels.spare]
+quantity = "ignore"
+
+[[runs]]
+id = "l-1"
+file = "runs/l-1.csv"
+kind = "locus"
+shaft_speed = "22 Hz"
+static_load = "5 kN"
+static_load_direction = "-90 deg"
+
+[[runs]]
+id = "p-1"
+file = "runs/p-1.csv"
+kind = "dry_pivot"
+pad = 1
+"""
+X, Y = 3e-6, -5e-6
+AXES = np.radians([45.0, 115.0])
+
+
+def write(folder: Path, manifest: str = MANIFEST, rows: int = 50) -> Path:
+    (folder / "runs").mkdir(parents=True, exist_ok=True)
+    (folder / "campaign.toml").write_text(manifest, encoding="utf-8")
+    (folder / "rocker.toml").write_text('name = "rocker"\n')
+    volts = [-(np.cos(a) * X + np.sin(a) * Y) * 7780.0 for a in AXES]
+    line = f"{volts[0]:.9f},{volts[1]:.9f},100,41,40,2.2,text\n"
+    for name in ("l-1", "p-1"):
+        (folder / "runs" / f"{name}.csv").write_text("X1A,X1B,L1H,T2,T1,K1,spare\n" + line * rows)
+    return folder
+
+
+def test_what_a_campaign_tells(tmp_path):
+    campaign = rigdata.load_campaign(write(tmp_path))
+    assert (campaign.id, campaign.description, campaign.bearing_name) == ("rocker-A", "free text", "rocker.toml")
+    assert campaign.bearing_text == 'name = "rocker"\n'
+    assert campaign.housing_mass == 30.0
+    assert [r.id for r in campaign.runs] == ["l-1", "p-1"]
+    assert [r.id for r in campaign.of_kind("dry_pivot")] == ["p-1"]
+    assert "2 runs" in str(campaign)
+    run = campaign.run("l-1")
+    assert (run.kind, run.point.static_load, run.pad, run.branch) == ("locus", 5000.0, None, "up")
+    assert run.sample_rate == 100.0
+    assert run.file == "runs/l-1.csv"
+    assert "spare" not in run.channels
+    with pytest.raises(RigDataError, match="Did you mean 'l-1'"):
+        campaign.run("l-11")
+    with pytest.raises(RigDataError, match="not described"):
+        run.record("spare")
+    with pytest.raises(FrozenInstanceError):
+        run.id = "other"
+
+
+def test_the_manifest_file_itself_can_be_given(tmp_path):
+    assert rigdata.load_campaign(write(tmp_path) / "campaign.toml").id == "rocker-A"
+
+
+def test_probes_at_any_two_angles_become_x_and_y(tmp_path):
+    vector = rigdata.load_campaign(write(tmp_path)).run("l-1").vector("displacement", 3, 8)
+    assert vector.values == pytest.approx(np.tile([X, Y], (5, 1)), abs=1e-12)
+    assert vector.names == ("X1A", "X1B")
+    assert vector.rate == 100.0
+
+
+def test_speed_and_temperatures(tmp_path):
+    run = rigdata.load_campaign(write(tmp_path)).run("l-1")
+    assert run.speed().values[0] == pytest.approx(2 * np.pi * 22)
+    assert [(t.channel, t.pad, t.position) for t in run.temperatures()] == [("T1", 1, 0.75), ("T2", 2, 0.75)]
+    assert run.record("T1").values[0] == pytest.approx(313.15)
+
+
+def test_vectors_that_cannot_be_made(tmp_path):
+    campaign = rigdata.load_campaign(write(tmp_path))
+    with pytest.raises(RigDataError, match="has 1 channels, two are needed"):
+        campaign.run("l-1").vector("force")
+    with pytest.raises(RigDataError, match="has 0 channels"):
+        campaign.run("l-1").vector("acceleration")
+    collinear = write(tmp_path / "b", MANIFEST.replace('axis = "115 deg"', 'axis = "-135 deg"'))
+    with pytest.raises(RigDataError, match="along one line"):
+        rigdata.load_campaign(collinear).run("l-1").vector("displacement")
+
+
+def test_fingerprint_names_every_file(tmp_path):
+    folder = write(tmp_path)
+    prints = rigdata.load_campaign(folder).fingerprint()
+    assert set(prints) == {"campaign.toml", "rocker.toml", "runs/l-1.csv", "runs/p-1.csv"}
+    assert prints["runs/l-1.csv"] == hashlib.sha256((folder / "runs/l-1.csv").read_bytes()).hexdigest()
+    (folder / "runs/p-1.csv").unlink()
+    assert rigdata.load_campaign(folder).fingerprint()["runs/p-1.csv"] == "missing"
+
+
+def test_a_campaign_travels_to_worker_processes(tmp_path):
+    campaign = rigdata.load_campaign(write(tmp_path))
+    campaign.run("l-1").record("X1A")
+    again = pickle.loads(pickle.dumps(campaign))
+    assert np.array_equal(again.run("l-1").record("X1A").values, campaign.run("l-1").record("X1A").values)
+
+
+def test_threads_share_a_campaign(tmp_path):
+    campaign = rigdata.load_campaign(write(tmp_path))
+    results: list[float] = []
+    work = [
+        threading.Thread(target=lambda: results.append(campaign.run("l-1").record("X1A").values[0])) for _ in range(8)
+    ]
+    for thread in work:
+        thread.start()
+    for thread in work:
+        thread.join()
+    assert len(results) == 8
+    assert len(set(results)) == 1
+
+
+def test_a_campaign_goes_on_without_a_vanished_run(tmp_path):
+    folder = write(tmp_path)
+    (folder / "runs/p-1.csv").unlink()
+    campaign = rigdata.load_campaign(folder)
+    assert len(campaign.run("l-1").record("X1A")) == 50
+    with pytest.raises(RigDataError, match="not there"):
+        campaign.run("p-1").record("X1A")
+
+
+def test_missing_bearing_file_is_a_warning(tmp_path):
+    folder = write(tmp_path)
+    (folder / "rocker.toml").unlink()
+    campaign = rigdata.load_campaign(folder)
+    assert campaign.bearing_text == ""
+    assert [p.severity for p in campaign.notes] == ["warning"]
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("../secret.csv", "leaves the campaign folder"),
+        ("runs/../../secret.csv", "leaves the campaign folder"),
+        ("..\\\\secret.csv", "leaves the campaign folder"),
+        ("/etc/passwd", "not relative"),
+        ("C:/secret.csv", "not relative"),
+        ("C:secret.csv", "not relative"),
+        ("\\\\\\\\server\\\\share\\\\x.csv", "not relative"),
+        ("//server/share/x.csv", "not relative"),
+        ("~/x.csv", "not relative"),
+        ("", "is empty"),
+        ("a\\u0000b", "NUL"),
+        ("a\\nb", "control"),
+        ("x" * 2000, "too long"),
+    ],
+)
+@pytest.mark.parametrize("key", ["file", "bearing"])
+def test_paths_that_leave_the_folder(tmp_path, name, says, key):
+    old = 'bearing = "rocker.toml"' if key == "bearing" else 'file = "runs/p-1.csv"'
+    folder = write(tmp_path / "c", MANIFEST.replace(old, f'{key} = "{name}"'))
+    (tmp_path / "secret.csv").write_text("X1A\n1\n")
+    with pytest.raises(RigDataError) as caught:
+        rigdata.load_campaign(folder)
+    if not (key == "bearing" and name == ""):
+        assert says in str(caught.value)
+    assert any(p.severity == "error" for p in check_campaign(folder))
+
+
+@pytest.mark.parametrize("what", ["file", "folder"])
+def test_symlinks_out_of_the_folder(tmp_path, what):
+    folder = write(tmp_path / "c")
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (outside / "p-1.csv").write_text("X1A\n1\n")
+    if what == "file":
+        (folder / "runs/p-1.csv").unlink()
+        (folder / "runs/p-1.csv").symlink_to(outside / "p-1.csv")
+    else:
+        (folder / "runs").rename(folder / "old")
+        (folder / "runs").symlink_to(outside)
+    with pytest.raises(RigDataError, match="by a symlink"):
+        rigdata.load_campaign(folder)
+
+
+def test_symlinks_that_stay_inside_and_a_folder_that_is_one(tmp_path):
+    folder = write(tmp_path / "c")
+    (folder / "runs/p-1.csv").rename(folder / "store.csv")
+    (folder / "runs/p-1.csv").symlink_to(folder / "store.csv")
+    (tmp_path / "link").symlink_to(folder)
+    assert rigdata.load_campaign(tmp_path / "link").run("p-1").length == 50
+
+
+def test_circle_of_symlinks(tmp_path):
+    folder = write(tmp_path)
+    (folder / "runs/p-1.csv").unlink()
+    (folder / "runs/p-1.csv").symlink_to(folder / "runs/p-1.csv")
+    assert any(p.severity == "error" for p in check_campaign(folder))
+
+
+def test_a_pipe_in_place_of_a_file_does_not_hang(tmp_path):
+    folder = write(tmp_path)
+    (folder / "runs/p-1.csv").unlink()
+    os.mkfifo(folder / "runs/p-1.csv")
+    with pytest.raises(RigDataError, match="not an ordinary file"):
+        rigdata.load_campaign(folder).run("p-1").record("X1A")
+    (folder / "campaign.toml").unlink()
+    os.mkfifo(folder / "campaign.toml")
+    with pytest.raises(RigDataError):
+        rigdata.load_campaign(folder)
+
+
+@pytest.mark.parametrize("name", ["nowhere", "a\0b", "x" * 5000, ""])
+def test_paths_that_are_no_campaign(tmp_path, name):
+    with pytest.raises(RigDataError):
+        rigdata.load_campaign(str(tmp_path / name))
+    assert check_campaign(str(tmp_path / name))
+
+
+def test_a_record_or_a_pipe_is_no_campaign(tmp_path):
+    folder = write(tmp_path)
+    with pytest.raises(RigDataError, match="is a record"):
+        rigdata.load_campaign(folder / "runs" / "l-1.csv")
+    os.mkfifo(tmp_path / "pipe.h5")
+    with pytest.raises(RigDataError, match="ordinary file"):
+        rigdata.load_campaign(tmp_path / "pipe.h5")
+
+
+def test_a_folder_without_rights(tmp_path, monkeypatch):
+    def no_rights(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "is_dir", no_rights)
+    with pytest.raises(RigDataError, match="Permission denied"):
+        rigdata.load_campaign(tmp_path)
+
+
+def test_problems_travel_back_from_worker_processes(tmp_path):
+    folder = write(tmp_path, MANIFEST.replace("[housing]", "[housng]"))
+    with pytest.raises(RigDataError) as caught:
+        rigdata.load_campaign(folder)
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert again.problems == caught.value.problems
+    assert str(again) == str(caught.value)
+
+
+def test_messages_cannot_steer_a_terminal():
+    problem = rigdata.Problem("error", "a\x1b[31m.csv", "line 1", "\u202eabc\x07", "mend")
+    assert str(problem).isprintable()
+    assert "\\x1b[31m" in str(problem)
+
+
+def test_folder_without_manifest_names_the_hdf5_file_in_it(tmp_path):
+    (tmp_path / "c.h5").write_bytes(b"")
+    with pytest.raises(RigDataError, match=r"c\.h5"):
+        rigdata.load_campaign(tmp_path)
+
+
+def test_manifest_in_another_encoding_names_the_line(tmp_path):
+    folder = write(tmp_path)
+    (folder / "campaign.toml").write_bytes(MANIFEST.replace("free text", "Prüfstand").encode("cp1252"))
+    with pytest.raises(RigDataError, match="line 4"):
+        rigdata.load_campaign(folder)
+
+
+def test_manifest_with_byte_order_mark(tmp_path):
+    folder = write(tmp_path)
+    (folder / "campaign.toml").write_bytes(MANIFEST.encode("utf-8-sig"))
+    assert rigdata.load_campaign(folder).id == "rocker-A"
+
+
+def test_raw_data_is_not_touched(tmp_path):
+    folder = write(tmp_path)
+    paths = [p for p in folder.rglob("*") if p.is_file()]
+    before = {p: (p.read_bytes(), p.stat().st_mtime_ns) for p in paths}
+    for path in paths:
+        path.chmod(0o444)
+    check_campaign(folder)
+    rigdata.load_campaign(folder).run("l-1").vector("displacement")
+    assert {p: (p.read_bytes(), p.stat().st_mtime_ns) for p in paths} == before
+    assert sorted(p for p in folder.rglob("*") if p.is_file()) == sorted(paths)
+
+
+@given(st.text(max_size=40))
+@settings(max_examples=80, deadline=None)
+def test_no_name_ever_leaves_the_folder(tmp_path_factory, name):
+    root = tmp_path_factory.getbasetemp().resolve()
+    try:
+        target = inside(root, name, "campaign.toml", "file")
+    except RigDataError:
+        return
+    assert target.is_relative_to(root)
+
+
+def test_importing_rigdata_alone_is_light():
+    code = (
+        "import sys, rigdata; heavy = {'pandas', 'pyarrow', 'h5py', 'pint', 'scipy', 'numpy'} & set(sys.modules); "
+        "print(sorted(heavy)); assert 'load_campaign' in dir(rigdata)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,389 @@
+"""CSV records: every seed of trouble of the export format, taken or refused with file, line and column."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rigdata
+from rigdata.problem import RigDataError
+from rigdata.readers.numbers import MISSING
+from tpjb_ident.check.campaign import check_campaign
+
+HEAD = """\
+schema = "tpjb-rig/1"
+id = "t"
+bearing = "b.toml"
+[acquisition]
+sample_rate = "10 Hz"
+[channels.X1A]
+quantity = "displacement"
+axis = "0 deg"
+unit = "um"
+[channels.X1B]
+quantity = "displacement"
+axis = "90 deg"
+unit = "um"
+"""
+TIME = '[channels.Zeit]\nquantity = "time"\nunit = "s"\n'
+RUN = '[[runs]]\nid = "c-1"\nfile = "runs/c-1.csv"\nkind = "clearance"\n'
+ROWS = [(0.5 * i, 1.5 + i, -2.25 * i) for i in range(30)]
+
+
+def make(folder: Path, data: bytes | str, csv: str = "", time: bool = True) -> rigdata.Run:
+    (folder / "runs").mkdir(exist_ok=True)
+    (folder / "b.toml").write_text('name = "b"\n')
+    (folder / "campaign.toml").write_text(HEAD + (TIME if time else "") + csv + RUN)
+    (folder / "runs" / "c-1.csv").write_bytes(data if isinstance(data, bytes) else data.encode())
+    return rigdata.load_campaign(folder).run("c-1")
+
+
+def table(delimiter=";", decimal=",", end="\r\n", names=("Zeit", "X1A", "X1B"), tail="", rows=ROWS) -> str:
+    lines = [delimiter.join(names)]
+    lines += [delimiter.join(f"{v:.4f}".replace(".", decimal) for v in row) + tail for row in rows]
+    return end.join(lines) + end
+
+
+def expect_good(run: rigdata.Run, rate: float = 2.0) -> None:
+    assert run.length == len(ROWS)
+    assert run.sample_rate == pytest.approx(rate)
+    record = run.record("X1A")
+    assert record.values == pytest.approx([1e-6 * r[1] for r in ROWS])
+    assert record.time == pytest.approx([r[0] for r in ROWS])
+    vector = run.vector("displacement")
+    assert vector.values[:, 1] == pytest.approx([1e-6 * r[2] for r in ROWS], abs=1e-18)
+
+
+def refused(run: rigdata.Run, *says: str, channel: str = "X1A") -> None:
+    with pytest.raises(RigDataError) as caught:
+        run.record(channel)
+    text = str(caught.value)
+    for part in ("runs/c-1.csv", *says):
+        assert part in text, text
+
+
+PREAMBLE = "HBM catman; Prüfstand\r\nDatum: 14.03.2019; 09:41\r\n\r\nKanäle;3;X1A\r\n"
+UNITS = "s;µm;µm\r\n"
+
+
+@pytest.mark.parametrize("decimal", [",", "."])
+@pytest.mark.parametrize("end", ["\r\n", "\n", "\r"])
+@pytest.mark.parametrize("delimiter", [";", "\t", ",", "|", " "])
+def test_delimiters_decimals_line_ends(tmp_path, delimiter, decimal, end):
+    if delimiter == decimal:
+        pytest.skip("cannot be told apart by anyone")
+    expect_good(make(tmp_path, table(delimiter, decimal, end)))
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+def test_encodings_are_detected(tmp_path, encoding):
+    body = table()
+    text = PREAMBLE + body.replace("\r\n", "\r\n" + UNITS, 1)
+    expect_good(make(tmp_path, text.encode(encoding)))
+
+
+def test_dialect_given_by_the_manifest(tmp_path):
+    text = PREAMBLE + table().replace("\r\n", "\r\n" + UNITS, 1)
+    csv = '[csv]\ndelimiter = ";"\ndecimal = ","\nencoding = "cp1252"\nheader_line = 5\nunits_line = 6\n'
+    expect_good(make(tmp_path, text.encode("cp1252"), csv))
+
+
+def test_byte_order_mark_wins_over_a_wrong_encoding(tmp_path):
+    expect_good(make(tmp_path, table().encode("utf-8-sig"), '[csv]\nencoding = "cp1252"\n'))
+
+
+def test_preamble_that_holds_delimiters_and_a_channel_name(tmp_path):
+    text = "a;b;c\r\nX1A;X1B;Zeit sind die Kanäle\r\n;;;\r\n" + table()
+    expect_good(make(tmp_path, text))
+
+
+def test_channel_list_in_the_preamble_is_not_the_names_line(tmp_path):
+    expect_good(make(tmp_path, "Zeit;X1A;X1B\r\nnone;of;these\r\nare;numbers;yet\r\n" + "x\r\n" * 6 + table()))
+
+
+def test_names_with_units_in_brackets_and_quotes(tmp_path):
+    text = table().replace("Zeit;X1A;X1B", '"Zeit [s]";"X1A [µm]";X1B (µm)')
+    expect_good(make(tmp_path, text))
+
+
+def test_quoted_numbers(tmp_path):
+    rows = "\n".join(",".join(f'"{v:.4f}"'.replace(".", ",") for v in row) for row in ROWS)
+    expect_good(make(tmp_path, "Zeit,X1A,X1B\n" + rows + "\n"))
+
+
+def test_trailing_delimiter_in_samples_only_and_everywhere(tmp_path):
+    expect_good(make(tmp_path, table(tail=";")))
+    expect_good(make(tmp_path, table(tail=";", names=("Zeit", "X1A", "X1B", ""))))
+
+
+def test_blank_last_lines(tmp_path):
+    expect_good(make(tmp_path, table() + "\r\n\r\n  \r\n"))
+
+
+def test_last_lines_of_bare_delimiters(tmp_path):
+    expect_good(make(tmp_path, table() + ";;\r\n;;\r\n"))
+
+
+def test_no_newline_at_the_end(tmp_path):
+    expect_good(make(tmp_path, table().rstrip()))
+
+
+def test_blanks_around_numbers_and_plus_signs(tmp_path):
+    expect_good(make(tmp_path, table().replace(";", " ; ").replace(" ; 1", " ; +1")))
+
+
+def test_space_aligned_columns(tmp_path):
+    lines = ["  Zeit      X1A      X1B"] + ["".join(f"{v:9.3f}" for v in row) for row in ROWS]
+    expect_good(make(tmp_path, "\n".join(lines) + "\n"))
+
+
+@pytest.mark.parametrize("mark", [m for m in MISSING if m not in {"*", "?"}])
+@pytest.mark.parametrize("blank", ["", " "])
+def test_missing_values(tmp_path, mark, blank):
+    lines = table().split("\r\n")
+    cells = lines[4].split(";")
+    lines[4] = ";".join([cells[0], blank + mark + blank, cells[2]])
+    values = make(tmp_path, "\r\n".join(lines)).record("X1A").values
+    assert np.flatnonzero(np.isnan(values)).tolist() == [3]
+    assert values[4] == pytest.approx(1e-6 * ROWS[4][1])
+
+
+def test_overflow_number_is_missing(tmp_path):
+    assert np.isnan(make(tmp_path, table().replace("3,5000", "1E+99")).record("X1A").values[2])
+
+
+def test_time_column_wins_over_the_stated_rate_and_without_one_the_stated_counts(tmp_path):
+    assert make(tmp_path, table()).sample_rate == pytest.approx(2.0)
+    run = make(tmp_path, table(), time=False)
+    assert run.sample_rate == 10.0
+    assert run.record("X1A").time[:3] == pytest.approx([0.0, 0.1, 0.2])
+
+
+def test_jitter_and_gaps_are_used_as_they_are(tmp_path):
+    times = np.cumsum(np.r_[0.0, np.tile([0.49, 0.51, 0.5], 9), 4.0, 0.5])
+    rows = [(float(t), *r[1:]) for t, r in zip(times, ROWS, strict=True)]
+    run = make(tmp_path, table(rows=rows))
+    assert run.record("X1A").time == pytest.approx(times, abs=1e-4)
+    assert run.sample_rate == pytest.approx(2.0, rel=0.02)
+    found = [p.what for p in check_campaign(tmp_path)]
+    assert any("1 gaps, about 7 samples lost" in w for w in found)
+
+
+def test_rounded_time_column_gives_the_true_rate(tmp_path):
+    rows = [(round(i / 2000, 3), 1.0 * i, 2.0) for i in range(4000)]
+    run = make(tmp_path, table(rows=rows))
+    assert run.sample_rate == pytest.approx(2000.0, rel=1e-3)
+
+
+def test_missing_times_are_filled_in(tmp_path):
+    lines = table().split("\r\n")
+    lines[4] = ";" + lines[4].partition(";")[2]
+    assert make(tmp_path, "\r\n".join(lines)).record("X1A").time[3] == pytest.approx(1.5)
+
+
+def test_time_running_backwards_is_refused_with_its_line(tmp_path):
+    lines = PREAMBLE + table().replace("5,0000;", "1,0000;")
+    refused(make(tmp_path, lines), "line 16, column Zeit", "backwards")
+
+
+def test_truncated_last_line_is_left_out_with_a_warning(tmp_path):
+    run = make(tmp_path, table().rstrip()[:-12])
+    assert run.length == len(ROWS) - 1
+    (problem,) = run.reader.problems()
+    assert problem.severity == "warning"
+    assert "cut off" in problem.what
+    assert "line 31" in problem.place
+
+
+def test_last_line_cut_inside_its_last_number(tmp_path):
+    run = make(tmp_path, table().rstrip()[:-2])
+    assert run.length == len(ROWS) - 1
+    assert "cut off" in run.reader.problems()[0].what
+
+
+def test_line_with_too_few_cells_in_the_middle(tmp_path):
+    lines = table().split("\r\n")
+    lines[10] = lines[10].rpartition(";")[0]
+    refused(make(tmp_path, "\r\n".join(lines)), "line 11", "has 2 cells, the names have 3")
+
+
+def test_line_with_too_many_cells(tmp_path):
+    lines = table().split("\r\n")
+    lines[10] += ";7"
+    refused(make(tmp_path, "\r\n".join(lines)), "line 11", "has 4 cells")
+
+
+def test_text_in_a_numeric_column(tmp_path):
+    lines = (PREAMBLE + table()).split("\r\n")
+    lines[14] = lines[14].replace(";", ";abc", 1)
+    lines[20] = lines[20].replace(";", ";x", 1)
+    refused(make(tmp_path, "\r\n".join(lines)), "line 15, column 2 (X1A)", "'abc", "not a number", "1 more")
+
+
+def test_cp1252_text_in_a_numeric_column(tmp_path):
+    refused(make(tmp_path, table().encode().replace(b"6,5000;", b"\xfcber;")), "line 7, column 2 (X1A)", "'über'")
+
+
+def test_text_in_a_column_that_is_not_described_does_not_matter(tmp_path):
+    lines = table().split("\r\n")
+    lines = [line + (";Bemerkung" if i == 0 else ";schön, 1;".rstrip(";")) for i, line in enumerate(lines) if line]
+    expect_good(make(tmp_path, "\r\n".join(lines).encode("cp1252")))
+
+
+def test_duplicate_names_are_refused_with_their_columns(tmp_path):
+    rows = [(*r, 9.0) for r in ROWS]
+    run = make(tmp_path, table(names=("Zeit", "X1A", "X1B", "X1A"), rows=rows))
+    refused(run, "line 1", "'X1A'", "columns 2, 4")
+
+
+def test_missing_channel_names_the_nearest_column(tmp_path):
+    run = make(tmp_path, table(names=("Zeit", "X1A", "X1b")))
+    assert run.record("X1A").values[0] == pytest.approx(1.5e-6)
+    refused(run, "channel X1B", "missing", "Did you mean 'X1b'", channel="X1B")
+
+
+def test_no_line_holds_the_names(tmp_path):
+    refused(make(tmp_path, table(names=("a", "b", "c"))), "no line holds a channel name", "X1A")
+
+
+@pytest.mark.parametrize(
+    ("csv", "says"),
+    [
+        ('[csv]\ndelimiter = ","\n', ["delimiter ','", "';' finds 3", "leave it out"]),
+        ('[csv]\ndecimal = "."\n', ["decimal is '.'", "'0,0000'"]),
+        ("[csv]\nheader_line = 3\n", ["line 3", "names stand in line 1"]),
+        ("[csv]\nheader_line = 300\n", ["header_line is 300", "names stand in line 1"]),
+    ],
+)
+def test_a_manifest_that_contradicts_the_file(tmp_path, csv, says):
+    refused(make(tmp_path, table(), csv), *says)
+
+
+@pytest.mark.parametrize("data", [b"", b"\r\n\r\n", b"Zeit;X1A;X1B\r\n", b"Zeit;X1A;X1B\r\ns;um;um\r\n", b"\0" * 5000])
+def test_empty_files(tmp_path, data):
+    refused(make(tmp_path, data))
+
+
+def test_a_line_of_megabytes_is_refused(tmp_path):
+    refused(make(tmp_path, b"7" * 3_000_000))
+    refused(make(tmp_path, table().encode() + b"1;" + b"7" * 9_000_000))
+
+
+def test_vanished_file_and_directory_in_its_place(tmp_path):
+    run = make(tmp_path, table())
+    (tmp_path / "runs" / "c-1.csv").unlink()
+    refused(run, "not there")
+    (tmp_path / "runs" / "c-1.csv").mkdir()
+    refused(run, "not an ordinary file")
+
+
+def test_changed_file_is_read_again(tmp_path):
+    run = make(tmp_path, table())
+    assert run.record("X1A").values[0] == pytest.approx(1.5e-6)
+    (tmp_path / "runs" / "c-1.csv").write_text(table().replace(";1,5000;", ";7,25000;"))
+    assert run.record("X1A").values[0] == pytest.approx(7.25e-6)
+
+
+def test_slices(tmp_path):
+    run = make(tmp_path, table())
+    whole = run.vector("displacement")
+    part = run.vector("displacement", 5, 9)
+    assert np.array_equal(part.values, whole.values[5:9])
+    assert np.array_equal(part.time, whole.time[5:9])
+    assert len(run.record("X1A", -3)) == 3
+    assert len(run.record("X1A", 20, 10)) == 0
+
+
+def test_cached_columns_cannot_be_spoilt(tmp_path):
+    run = make(tmp_path, table())
+    run.record("X1A").values[:] = 0.0
+    assert run.record("X1A").values[0] == pytest.approx(1.5e-6)
+
+
+CELLS = st.one_of(
+    st.floats(-1e6, 1e6).map(lambda v: f"{v:.6g}"), st.sampled_from(["", "NaN", "-", "#N/A", "1E+99", "+1", " 2 "])
+)
+
+
+@given(
+    rows=st.lists(st.tuples(CELLS, CELLS), min_size=1, max_size=20),
+    delimiter=st.sampled_from([";", "\t", "|"]),
+    comma=st.booleans(),
+    end=st.sampled_from(["\n", "\r\n"]),
+    preamble=st.lists(st.text(st.characters(codec="cp1252", categories=["L", "N", "P"]), max_size=20), max_size=3),
+)
+@settings(max_examples=40, deadline=None)
+def test_what_is_written_is_read(tmp_path_factory, rows, delimiter, comma, end, preamble):
+    """Any mixture of numbers and gaps, in any dialect, comes back; a first row to tell decimals by."""
+    rows = [("0.25", "-1.5"), *rows]
+    lines = [*(p for p in preamble if "X1" not in p), delimiter.join(["X1A", "X1B"])]
+    lines += [delimiter.join(row).replace(".", "," if comma else ".") for row in rows]
+    folder = tmp_path_factory.mktemp("c")
+    run = make(folder, (end.join(lines) + end).encode("cp1252"), time=False)
+    for index, name in enumerate(("X1A", "X1B")):
+        expected = [_number(row[index]) for row in rows]
+        assert run.record(name).values == pytest.approx(np.array(expected) * 1e-6, nan_ok=True, rel=1e-12)
+
+
+def _number(cell: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        return float("nan")
+    return value if abs(value) < 1e30 else float("nan")
+
+
+@given(st.binary(max_size=400))
+@settings(max_examples=40, deadline=None)
+def test_any_bytes_are_read_or_refused(tmp_path_factory, data):
+    folder = tmp_path_factory.mktemp("b")
+    run = make(folder, b"X1A;X1B\n1,5;2\n2,5;3\n" + data, time=False)
+    try:
+        assert run.record("X1A").values.dtype == np.float64
+    except RigDataError as caught:
+        complete = all(p.cure and p.file for p in caught.problems)
+        assert complete
+    assert isinstance(check_campaign(folder), list)
+
+
+def test_decimal_mark_that_shows_late(tmp_path):
+    """The head holds whole numbers only."""
+    rows = [f"{i};{i};{2 * i}" for i in range(400)] + ["400,5;1,5;2,5"]
+    run = make(tmp_path, "Zeit;X1A;X1B\n" + "\n".join(rows) + "\n")
+    assert run.record("X1A").values[-1] == pytest.approx(1.5e-6)
+
+
+def test_file_with_none_of_the_used_channels(tmp_path):
+    text = table(names=("Zeit", "a", "b"))
+    csv = TIME.replace('quantity = "time"\nunit = "s"', 'quantity = "ignore"')
+    refused(make(tmp_path, text, csv, time=False), "none of the channels")
+
+
+def test_large_files_are_parsed_by_column(tmp_path, monkeypatch):
+    monkeypatch.setattr("rigdata.readers.text.csv._LARGE_FILE", 100)
+    expect_good(make(tmp_path, table()))
+    expect_good(make(tmp_path, table() + ";;\r\n"))
+
+
+def test_a_cache_lets_go_of_old_runs():
+    from rigdata.readers.text.csv import TableCache
+    from rigdata.readers.text.csv_table import Table
+
+    cache = TableCache(limit=2000)
+    for i in range(5):
+        cache.put((i,), Table({"x": np.zeros(100)}, 100))
+    assert [cache.get((i,)) is not None for i in range(5)] == [False, False, False, True, True]
+
+
+def test_unreadable_file(tmp_path, monkeypatch):
+    run = make(tmp_path, table())
+
+    def no_rights(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("rigdata.readers.text.csv_table.open_ascii", no_rights)
+    refused(run, "Permission denied")

@@ -1,0 +1,263 @@
+"""Records of other loggers: every file is written by that format's own library and read through the same Run."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigdata import RigDataError, load_campaign
+from rigdata.readers.formats.foreign import FORMATS, ForeignReader, is_foreign, read_foreign
+from rigdata.readers.series import Series, on_one_clock
+from rigdata.readers.time_names import is_time, seconds
+from tpjb_ident.check.campaign import check_campaign
+
+RATE, COUNT = 1000.0, 2000
+TIME = np.arange(COUNT) / RATE
+X = np.sin(2 * math.pi * 25 * TIME) - 0.3
+F = 2.0 * np.cos(2 * math.pi * 25 * TIME)
+SLOW = TIME[::100]
+T = 40.0 + SLOW
+
+MANIFEST = """
+schema = "tpjb-rig/1"
+id = "foreign"
+bearing = "b.toml"
+[housing]
+mass = "30 kg"
+[channels.X1A]
+quantity = "displacement"
+axis = "45 deg"
+unit = "V"
+sensitivity = "7.78 mV/um"
+polarity = -1
+[channels.L1H]
+quantity = "force"
+axis = "0 deg"
+unit = "kN"
+[channels.T1]
+quantity = "temperature"
+unit = "degC"
+[[runs]]
+id = "one"
+file = "FILE"
+kind = "dynamic"
+shaft_speed = "22 Hz"
+static_load = "5 kN"
+static_load_direction = "-90 deg"
+excitation_frequency = "25 Hz"
+"""
+
+
+def write_tdms(path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    fast = {"wf_increment": 1 / RATE, "wf_start_offset": 0.0, "unit_string": "V"}
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([
+            nptdms.ChannelObject("fast", "X1A", X, properties=fast),
+            nptdms.ChannelObject("fast", "L1H", F, properties={**fast, "unit_string": "kN"}),
+            nptdms.ChannelObject("slow", "T1", T, properties={"wf_increment": 100 / RATE, "wf_start_offset": 0.0}),
+            nptdms.ChannelObject("slow", "remark", ["a text"]),
+        ])  # fmt: skip
+
+
+def write_uff(path: Path) -> None:
+    pyuff = pytest.importorskip("pyuff")
+    file = pyuff.UFF(str(path))
+    for name, values, step in (("X1A", X, 1 / RATE), ("L1H", F, 1 / RATE), ("T1", T, 100 / RATE)):
+        file.write_sets(
+            pyuff.prepare_58(
+                binary=0, id1=name, func_type=1, rsp_node=1, rsp_dir=1, ref_node=1, ref_dir=1, data=values,
+                x=step * np.arange(len(values)), abscissa_inc=step, abscissa_min=0.0, abscissa_spec_data_type=17,
+                abscissa_axis_units_lab="s", ordinate_spec_data_type=0, ordinate_axis_units_lab="NONE",
+                orddenom_spec_data_type=0, z_axis_spec_data_type=0,
+            ),
+            mode="add",
+        )  # fmt: skip
+
+
+def write_mf4(path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf", reason="asammdf is heavy; install the extra mdf to run this")
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(X, TIME, name="X1A", unit="V"), asammdf.Signal(F, TIME, name="L1H", unit="kN")])
+        file.append([asammdf.Signal(T, SLOW, name="T1", unit="degC")])
+        file.save(path, overwrite=True)
+
+
+def write_mat5(path: Path) -> None:
+    from scipy.io import savemat
+
+    slow = np.interp(TIME, SLOW, T)
+    savemat(path, {"t": TIME, "X1A": X, "L1H": F, "T1": slow, "note": "text"}, oned_as="column")
+
+
+def write_mat73(path: Path) -> None:
+    # the library behind MATLAB's save -v7.3 is HDF5; MATLAB puts 512 bytes of its own text in front
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in (("t", TIME), ("X1A", X), ("L1H", F), ("T1", np.interp(TIME, SLOW, T))):
+            data = file.create_dataset(name, data=values[None, :])
+            data.attrs["MATLAB_class"] = np.bytes_("double")
+        text = file.create_dataset("note", data=np.frombuffer(b"t\0e\0", dtype="uint16"))
+        text.attrs["MATLAB_class"] = np.bytes_("char")
+    with path.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\x02IM")
+
+
+def write_parquet(path: Path) -> None:
+    import pandas as pd
+
+    frame = pd.DataFrame({"Time": TIME, "X1A": X, "L1H": F, "T1": np.interp(TIME, SLOW, T), "who": "me"})
+    frame.to_parquet(path, index=False)
+
+
+def write_catman(path: Path) -> None:
+    """Write a table as catman exports it: two clocks, tabs, decimal comma, the slow part padded with blanks."""
+    lines = ["CATMAN", "Kanäle: 5", "", "Zeit  1 - Standardrate [s]\tX1A [V]\tL1H [kN]\tZeit  2 - langsam [s]\tT1 [°C]"]
+    for i in range(COUNT):
+        cells = [f"{TIME[i]:.4f}", f"{X[i]:.6f}", f"{F[i]:.6f}"]
+        cells += [f"{SLOW[i]:.2f}", f"{T[i]:.4f}"] if i < len(SLOW) else ["", ""]
+        lines.append("\t".join(cells).replace(".", ","))
+    path.write_bytes(("\r\n".join(lines) + "\r\n").encode("cp1252"))
+
+
+WRITERS = {
+    "one.tdms": write_tdms,
+    "one.unv": write_uff,
+    "one.mf4": write_mf4,
+    "one.mat": write_mat5,
+    "new.mat": write_mat73,
+    "one.parquet": write_parquet,
+    "one.asc": write_catman,
+}
+
+
+def in_a_child(name: str, *others: object) -> object:
+    """Parameters of a test; MDF takes a second for each file, since its library is loaded in a process of its own."""
+    return pytest.param(name, *others, marks=pytest.mark.slow) if name == "one.mf4" else pytest.param(name, *others)
+
+
+@pytest.fixture(params=[in_a_child(name) for name in WRITERS])
+def campaign(request, tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")  # what other people's writers warn of is not ours to judge
+        WRITERS[request.param](tmp_path / request.param)
+    (tmp_path / "campaign.toml").write_text(MANIFEST.replace("FILE", request.param), encoding="utf-8")
+    return tmp_path
+
+
+def test_every_format_comes_through_the_same_record(campaign):
+    run = load_campaign(campaign).run("one")
+    record = run.record("X1A")
+    assert record.rate == pytest.approx(RATE)
+    assert len(record) == COUNT
+    np.testing.assert_allclose(record.values, -X / 7780.0, atol=1e-9)  # 7.78 mV/um, polarity -1
+    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
+    np.testing.assert_allclose(run.record("L1H").values, 1e3 * F, atol=1e-3)
+    warm = run.record("T1").values
+    inside = np.isfinite(warm) & (SLOW[-1] >= TIME)
+    assert inside.sum() > 0.9 * COUNT
+    np.testing.assert_allclose(warm[inside], 313.15 + TIME[inside], atol=1e-3)
+
+
+def test_slices_and_checks_work_like_those_of_csv(campaign):
+    run = load_campaign(campaign).run("one")
+    np.testing.assert_array_equal(run.record("X1A", 10, 20).values, run.record("X1A").values[10:20])
+    problems = check_campaign(campaign)
+    assert not [p for p in problems if "cannot be read" in p.what]
+
+
+def test_a_misspelt_channel_is_answered_with_the_nearest(campaign):
+    text = (campaign / "campaign.toml").read_text(encoding="utf-8").replace("channels.X1A", "channels.X1a")
+    (campaign / "campaign.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(RigDataError, match="Did you mean 'X1A'"):
+        load_campaign(campaign).run("one").record("X1a")
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        pytest.param("one.mf4", b"") if (name, content) == ("one.mf4", b"") else in_a_child(name, content)
+        for name in ("one.tdms", "one.unv", "one.mf4", "one.mat", "one.parquet")
+        for content in (b"", b"rubbish\n" * 50, b"TDSm" + b"\xff" * 400, b"PAR1" + b"\0" * 64)
+    ],
+)
+@pytest.mark.filterwarnings("ignore")
+def test_a_broken_file_is_refused_by_name(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(RigDataError) as caught:
+        on_one_clock(read_foreign(tmp_path / name, name), name)
+    assert name in str(caught.value)
+
+
+def test_a_missing_library_is_named_with_its_extra(tmp_path, monkeypatch):
+    import sys
+
+    (tmp_path / "a.tdms").write_bytes(b"x")
+    monkeypatch.setitem(sys.modules, "nptdms", None)
+    monkeypatch.delitem(sys.modules, "rigdata.readers.formats.tdms", raising=False)
+    with pytest.raises(RigDataError, match=r'pip install "tpjb-ident\[tdms\]"'):
+        read_foreign(tmp_path / "a.tdms", "a.tdms")
+
+
+def test_links_out_of_a_matlab_file_are_refused(tmp_path):
+    import h5py
+
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        file["x"] = h5py.ExternalLink("/etc/passwd", "/x")
+    with pytest.raises(RigDataError, match="is a link"):
+        read_foreign(tmp_path / "a.mat", "a.mat")
+
+
+def test_channels_without_times_must_be_of_one_length():
+    with pytest.raises(RigDataError, match="different lengths"):
+        on_one_clock([Series("a", "", np.zeros(4)), Series("b", "", np.zeros(5))], "f")
+
+
+def test_the_fastest_clock_wins_and_what_is_outside_is_missing():
+    fast = Series("a", "V", np.arange(11.0), 0.1 * np.arange(11))
+    slow = Series("b", "K", np.array([0.0, 1.0]), np.array([0.2, 0.8]))
+    columns = on_one_clock([slow, fast], "f")
+    assert columns.length == 11
+    assert np.isnan(columns.values["b"][[0, 1, 9, 10]]).all()
+    np.testing.assert_allclose(columns.values["b"][2:9], np.linspace(0, 1, 7), atol=1e-12)
+    assert "b (" in columns.notes[0]
+
+
+def test_twins_in_two_groups_get_their_groups_name():
+    columns = on_one_clock([Series("a", "", np.zeros(3), group="g1"), Series("a", "", np.ones(3), group="g2")], "f")
+    assert list(columns.values) == ["g1.a", "g2.a"]
+
+
+def test_only_these_suffixes_are_foreign(tmp_path):
+    (tmp_path / "a.txt").write_text("t;x\n0;1\n1;2\n2;3\n", encoding="utf-8")
+    assert not is_foreign(tmp_path / "a.txt")
+    assert not is_foreign(tmp_path / "a.csv")
+    assert all(is_foreign(tmp_path / f"a{suffix}") for suffix in FORMATS)
+
+
+def test_a_rate_is_asked_for_where_the_file_knows_none(tmp_path):
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"X1A": X})
+    with pytest.raises(RigDataError, match="sample_rate"):
+        ForeignReader(tmp_path / "a.mat", "a.mat", "r").rate()
+    assert ForeignReader(tmp_path / "a.mat", "a.mat", "r", stated_rate=500.0).time(0, 3)[2] == pytest.approx(0.004)
+
+
+@pytest.mark.parametrize("name", ["Zeit", "TIME [s]", "Time  1 - default sample rate", "t", "t [ms]", "Temps"])
+def test_times_by_name(name):
+    assert is_time(name)
+
+
+@pytest.mark.parametrize("name", ["T", "T1", "Temperature", "Timer", "X1A", "torque", "Tempo1", ""])
+def test_no_times_by_name(name):
+    assert not is_time(name)
+
+
+def test_times_in_other_units():
+    np.testing.assert_allclose(seconds(np.array([1.0, 2.0]), "[ms]"), [1e-3, 2e-3])

@@ -1,0 +1,399 @@
+"""HDF5 campaigns: slices, rates, links, storage, filters."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import rigdata
+from rigdata.problem import RigDataError
+from rigdata.readers.hdf5 import reader as hdf5
+from rigdata.readers.hdf5.heaps import too_long_text
+from tpjb_ident.check.campaign import check_campaign
+
+MANIFEST = """\
+schema = "tpjb-rig/1"
+id = "t"
+bearing = "b.toml"
+[acquisition]
+sample_rate = "10 Hz"
+[channels.X1A]
+quantity = "displacement"
+axis = "0 deg"
+unit = "um"
+[channels.X1B]
+quantity = "displacement"
+axis = "90 deg"
+unit = "um"
+[[runs]]
+id = "c-1"
+file = "runs/c-1.csv"
+kind = "clearance"
+"""
+N = 1000
+
+
+def make(path: Path, manifest: str = MANIFEST, rate: object = 500.0) -> rigdata.Run:
+    with h5py.File(path, "w") as file:
+        file.attrs["manifest"] = manifest
+        file.attrs["bearing"] = 'name = "b"'
+        group = file.create_group("runs/c-1")
+        if rate is not None:
+            group.attrs["sample_rate_hz"] = rate
+        for i, name in enumerate(("X1A", "X1B")):
+            data = np.arange(N, dtype="f4") * (1 + i)
+            group.create_dataset(name, data=data, chunks=(100,), compression="gzip", shuffle=True)
+    return rigdata.load_campaign(path).run("c-1")
+
+
+def change(path: Path):
+    return h5py.File(path, "r+")
+
+
+def refused(path: Path, *says: str) -> None:
+    with pytest.raises(RigDataError) as caught:
+        rigdata.load_campaign(path).run("c-1").record("X1A")
+    for part in (path.name, *says):
+        assert part in str(caught.value)
+    assert any(p.severity == "error" for p in check_campaign(path))
+
+
+def test_values_are_calibrated_float64(tmp_path):
+    run = make(tmp_path / "c.h5")
+    record = run.record("X1A", 10, 13)
+    assert record.values.dtype == np.float64
+    assert record.values == pytest.approx([10e-6, 11e-6, 12e-6])
+    assert record.time == pytest.approx(np.array([10, 11, 12]) / 500.0)
+    assert run.length == N
+    assert run.file == "c.h5:/runs/c-1"
+    assert rigdata.load_campaign(tmp_path / "c.h5").bearing_text == 'name = "b"'
+
+
+def test_a_slice_reads_only_its_own_samples(tmp_path, monkeypatch):
+    run = make(tmp_path / "c.h5")
+    asked = []
+    plain = h5py.Dataset.__getitem__
+
+    def spy(self, key, *rest, **more):
+        asked.append(key)
+        return plain(self, key, *rest, **more)
+
+    monkeypatch.setattr(h5py.Dataset, "__getitem__", spy)
+    run.vector("displacement", 200, 300)
+    assert asked == [slice(200, 300), slice(200, 300)]
+
+
+def test_attribute_wins_over_run_which_wins_over_acquisition(tmp_path):
+    with_run = MANIFEST + 'sample_rate = "250 Hz"\n'
+    assert make(tmp_path / "a.h5", with_run).sample_rate == 500.0
+    assert make(tmp_path / "b.h5", with_run, rate=None).sample_rate == 250.0
+    assert make(tmp_path / "c.h5", rate=None).sample_rate == 10.0
+
+
+def test_time_dataset(tmp_path):
+    clock = MANIFEST.replace("[[runs]]", '[channels.t]\nquantity = "time"\nunit = "ms"\n[[runs]]')
+    path = tmp_path / "c.h5"
+    assert make(path, clock).record("X1A").time[1] == pytest.approx(1 / 500)
+    with change(path) as file:
+        file["runs/c-1/t"] = np.arange(N) * 4.0 + 1.0
+        del file["runs/c-1"].attrs["sample_rate_hz"]
+    run = rigdata.load_campaign(path).run("c-1")
+    assert run.sample_rate == pytest.approx(250.0)
+    assert run.record("X1A", 0, 2).time == pytest.approx([0.001, 0.005])
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf, "abc", [1.0, 2.0]])
+def test_senseless_rates(tmp_path, rate):
+    make(tmp_path / "c.h5", rate=rate)
+    refused(tmp_path / "c.h5", "sample_rate_hz")
+
+
+def test_external_link(tmp_path):
+    make(tmp_path / "other.h5")
+    make(tmp_path / "c.h5")
+    with change(tmp_path / "c.h5") as file:
+        del file["runs/c-1/X1A"]
+        file["runs/c-1/X1A"] = h5py.ExternalLink("other.h5", "/runs/c-1/X1A")
+    refused(tmp_path / "c.h5", "link out of the file", "other.h5")
+
+
+def test_external_group_link_and_soft_link_through_it(tmp_path):
+    make(tmp_path / "other.h5")
+    make(tmp_path / "c.h5")
+    with change(tmp_path / "c.h5") as file:
+        del file["runs/c-1/X1A"]
+        file["outside"] = h5py.ExternalLink("other.h5", "/")
+        file["runs/c-1/X1A"] = h5py.SoftLink("/outside/runs/c-1/X1A")
+    refused(tmp_path / "c.h5", "link out of the file")
+
+
+def test_soft_link_inside_the_file_is_taken(tmp_path):
+    make(tmp_path / "c.h5")
+    with change(tmp_path / "c.h5") as file:
+        file["store"] = np.full(N, 7.0)
+        file["alias"] = h5py.SoftLink("/store")
+        del file["runs/c-1/X1A"]
+        file["runs/c-1/X1A"] = h5py.SoftLink("/alias")
+    assert rigdata.load_campaign(tmp_path / "c.h5").run("c-1").record("X1A").values[0] == pytest.approx(7e-6)
+
+
+@pytest.mark.parametrize("target", ["/nowhere", "/runs/c-1/X1A", "loop"])
+def test_dangling_and_circular_soft_links(tmp_path, target):
+    make(tmp_path / "c.h5")
+    with change(tmp_path / "c.h5") as file:
+        del file["runs/c-1/X1A"]
+        file["runs/c-1/loop"] = h5py.SoftLink("X1A")
+        file["runs/c-1/X1A"] = h5py.SoftLink(target)
+    refused(tmp_path / "c.h5", "X1A")
+
+
+def test_external_storage(tmp_path):
+    make(tmp_path / "c.h5")
+    (tmp_path / "raw.bin").write_bytes(np.zeros(N, dtype="f8").tobytes())
+    with change(tmp_path / "c.h5") as file:
+        del file["runs/c-1/X1A"]
+        file["runs/c-1"].create_dataset("X1A", shape=(N,), dtype="f8", external=[("raw.bin", 0, N * 8)])
+    refused(tmp_path / "c.h5", "another file")
+
+
+def test_virtual_dataset(tmp_path):
+    make(tmp_path / "other.h5")
+    make(tmp_path / "c.h5")
+    with change(tmp_path / "c.h5") as file:
+        del file["runs/c-1/X1A"]
+        layout = h5py.VirtualLayout(shape=(N,), dtype="f4")
+        layout[:] = h5py.VirtualSource("other.h5", "runs/c-1/X1A", shape=(N,))
+        file["runs/c-1"].create_virtual_dataset("X1A", layout)
+    refused(tmp_path / "c.h5", "another file")
+
+
+def test_unknown_filter_is_refused_before_anything_is_loaded(tmp_path):
+    path = tmp_path / "c.h5"
+    make(path)
+    with change(path) as file:
+        del file["runs/c-1/X1A"]
+        creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        creation.set_chunk((100,))
+        creation.set_filter(32015, h5py.h5z.FLAG_OPTIONAL, ())  # zstd, a plug-in
+        h5py.h5d.create(file["runs/c-1"].id, b"X1A", h5py.h5t.IEEE_F64LE, h5py.h5s.create_simple((N,)), creation)
+    refused(path, "filter 32015")
+
+
+def test_decompression_bombs(tmp_path):
+    path = tmp_path / "c.h5"
+    make(path)
+    with change(path) as file:
+        del file["runs/c-1/X1A"]
+        del file["runs/c-1/X1B"]
+        file["runs/c-1"].create_dataset("X1A", shape=(10**13,), dtype="f8", chunks=(1000,), compression="gzip")
+        file["runs/c-1"].create_dataset("X1B", shape=(N,), maxshape=(None,), dtype="f8", chunks=(10**9 // 2,))
+    refused(path, "X1A")
+    with pytest.raises(RigDataError, match="chunks"):
+        rigdata.load_campaign(path).run("c-1").reader.read(["X1B"], 0, 10)
+
+
+def test_a_request_for_billions_of_samples_is_refused(tmp_path):
+    path = tmp_path / "c.h5"
+    make(path)
+    with change(path) as file:
+        for name in ("X1A", "X1B"):
+            del file[f"runs/c-1/{name}"]
+            file["runs/c-1"].create_dataset(name, shape=(2**30,), dtype="f4", chunks=(1000,), fillvalue=1.0)
+    run = rigdata.load_campaign(path).run("c-1")
+    with pytest.raises(RigDataError, match="in slices"):
+        run.record("X1A")
+    assert run.record("X1A", 2**29, 2**29 + 3).values == pytest.approx([1e-6] * 3)
+
+
+@pytest.mark.parametrize("data", [np.zeros((3, 3)), np.array(["a", "b"], dtype="S1"), np.zeros(3, dtype="c8")])
+def test_datasets_that_are_no_record(tmp_path, data):
+    make(tmp_path / "c.h5")
+    with change(tmp_path / "c.h5") as file:
+        del file["runs/c-1/X1A"]
+        file["runs/c-1/X1A"] = data
+    refused(tmp_path / "c.h5", "X1A", "not 1-D numbers")
+
+
+def test_group_in_place_of_a_dataset_and_the_other_way_round(tmp_path):
+    make(tmp_path / "c.h5")
+    with change(tmp_path / "c.h5") as file:
+        del file["runs/c-1/X1A"]
+        file.create_group("runs/c-1/X1A")
+    refused(tmp_path / "c.h5", "X1A", "not a dataset")
+    with change(tmp_path / "c.h5") as file:
+        del file["runs/c-1"]
+        file["runs/c-1"] = 3.0
+    refused(tmp_path / "c.h5", "not a group")
+
+
+def test_short_channel_and_missing_channel_and_missing_group(tmp_path):
+    path = tmp_path / "c.h5"
+    make(path)
+    with change(path) as file:
+        del file["runs/c-1/X1B"]
+        file["runs/c-1/X1B"] = np.zeros(N - 5)
+    with pytest.raises(RigDataError, match="X1B: has 995 samples, the others 1000"):
+        rigdata.load_campaign(path).run("c-1").record("X1B")
+    with change(path) as file:
+        del file["runs/c-1/X1B"]
+    with pytest.raises(RigDataError, match="X1B: channel is missing in the file"):
+        rigdata.load_campaign(path).run("c-1").record("X1B")
+    with change(path) as file:
+        del file["runs/c-1"]
+    refused(path, "group is missing")
+
+
+def test_integer_counts_and_big_endian(tmp_path):
+    make(tmp_path / "c.h5")
+    with change(tmp_path / "c.h5") as file:
+        del file["runs/c-1/X1A"]
+        file["runs/c-1/X1A"] = np.arange(N, dtype=">i2")
+    assert rigdata.load_campaign(tmp_path / "c.h5").run("c-1").record("X1A", 5, 6).values == pytest.approx([5e-6])
+
+
+@pytest.mark.parametrize("bad", [b"", b"no hdf5 at all", b"\x89HDF\r\n\x1a\n" + b"\0" * 100])
+def test_files_that_are_no_hdf5(tmp_path, bad):
+    (tmp_path / "c.h5").write_bytes(bad)
+    with pytest.raises(RigDataError, match="HDF5"):
+        rigdata.load_campaign(tmp_path / "c.h5")
+
+
+@pytest.mark.slow  # a lock is seen by other processes only
+def test_a_file_that_is_being_written(tmp_path):
+    make(tmp_path / "c.h5")
+    code = "import sys, rigdata\ntry:\n  rigdata.load_campaign(sys.argv[1])\nexcept rigdata.RigDataError as e: print(e)"
+    with change(tmp_path / "c.h5"):
+        told = subprocess.run([sys.executable, "-c", code, str(tmp_path / "c.h5")], capture_output=True, text=True)
+    assert "being written by another program" in told.stdout, told
+
+
+def test_truncated_and_scrambled_files(tmp_path):
+    path = tmp_path / "c.h5"
+    make(path)
+    good = path.read_bytes()
+    rng = np.random.default_rng(5)
+    for _ in range(60):
+        data = bytearray(good)
+        if rng.random() < 0.3:
+            data = data[: rng.integers(100, len(data))]
+        for at in rng.integers(0, len(data), rng.integers(1, 30)):
+            data[at] = rng.integers(0, 256)
+        path.write_bytes(bytes(data))
+        problems = check_campaign(path)
+        assert all(p.what and p.file for p in problems)
+
+
+@pytest.mark.parametrize("value", [None, 3.0, b"\xff\xfe", "", np.arange(4)])
+def test_manifest_attribute_must_be_text(tmp_path, value):
+    path = tmp_path / "c.h5"
+    make(path)
+    with change(path) as file:
+        del file.attrs["manifest"]
+        if value is not None:
+            file.attrs["manifest"] = value
+    with pytest.raises(RigDataError, match="manifest"):
+        rigdata.load_campaign(path)
+
+
+def test_manifest_as_fixed_length_bytes(tmp_path):
+    path = tmp_path / "c.h5"
+    make(path)
+    with change(path) as file:
+        file.attrs["manifest"] = np.bytes_(MANIFEST.encode())
+    assert rigdata.load_campaign(path).id == "t"
+
+
+def test_nothing_is_written_and_no_file_stays_open(tmp_path):
+    path = tmp_path / "c.h5"
+    run = make(path)
+    before = path.read_bytes()
+    path.chmod(0o444)
+    run.vector("displacement")
+    check_campaign(path)
+    assert path.read_bytes() == before
+    assert h5py.h5f.get_obj_count(h5py.h5f.OBJ_ALL, h5py.h5f.OBJ_FILE) == 0
+
+
+def test_display_name_and_limits_are_documented():
+    assert 1 in hdf5._FILTERS
+    assert 32015 not in hdf5._FILTERS
+
+
+@pytest.mark.parametrize("reserved", [0, 0x7F])
+def test_heap_that_the_library_would_walk_for_ever(tmp_path, reserved):
+    """One wrong byte: the free space of the heap that holds the manifest claims size zero."""
+    path = tmp_path / "c.h5"
+    make(path)
+    data = bytearray(path.read_bytes())
+    data[data.index(b"GCOL") + 5] = reserved  # which nobody looks at
+    at = data.index(b"GCOL") + 16
+    index, need = int.from_bytes(data[at : at + 2], "little"), int.from_bytes(data[at + 8 : at + 16], "little")
+    while index:
+        at += 16 + (need + 7) // 8 * 8
+        index, need = int.from_bytes(data[at : at + 2], "little"), int.from_bytes(data[at + 8 : at + 16], "little")
+    data[at + 8 : at + 16] = bytes(8)
+    path.write_bytes(bytes(data))
+    with pytest.raises(RigDataError, match="damaged"):
+        rigdata.load_campaign(path)
+
+
+def test_samples_that_look_like_a_heap_by_chance_are_none(tmp_path):
+    make(tmp_path / "c.h5")
+    with change(tmp_path / "c.h5") as file:
+        file["runs/c-1"].create_dataset("X2", data=np.frombuffer(b"GCOL\x01abc" + b"\xff" * 8, dtype="u1"))
+    assert rigdata.load_campaign(tmp_path / "c.h5").run("c-1").length == N
+
+
+def test_signalling_nan_is_missing(tmp_path):
+    make(tmp_path / "c.h5")
+    with change(tmp_path / "c.h5") as file:
+        del file["runs/c-1/X1A"]
+        file["runs/c-1/X1A"] = np.full(N, 0x7F800001, dtype="u4").view("f4")
+    assert np.isnan(rigdata.load_campaign(tmp_path / "c.h5").run("c-1").record("X1A").values).all()
+
+
+@pytest.mark.parametrize("name", ["manifest", "bearing"])
+@pytest.mark.parametrize("block", [0, 512])
+def test_a_text_that_claims_gigabytes_is_refused_before_room_is_made(tmp_path, name, block):
+    """A wrong byte in the length of a text: found by fuzzing, the library made room for 4 GB."""
+    path = tmp_path / "a.h5"
+    texts = {"manifest": MANIFEST, "bearing": 'name = "b"' + " " * 300}
+    with h5py.File(path, "w", userblock_size=block) as file:
+        file.attrs.update(texts)
+    data = bytearray(path.read_bytes())
+    for at in range(data.index(name.encode() + b"\0"), len(data) - 4):
+        if int.from_bytes(data[at : at + 4], "little") == len(texts[name]):
+            data[at + 3] = 0xF0
+            break
+    assert too_long_text(path, list(texts), block) is None
+    path.write_bytes(data)
+    assert too_long_text(path, list(texts), block) == name
+    with pytest.raises(RigDataError, match=f"root attribute {name}: claims a text longer than the file"):
+        rigdata.load_campaign(path)
+
+
+def test_a_rate_that_stands_elsewhere_in_the_file_is_refused(tmp_path):
+    make(tmp_path / "a.h5", rate="500")
+    refused(tmp_path / "a.h5", "attribute sample_rate_hz", "is not a number")
+
+
+@pytest.mark.parametrize("rate", ["1e-300 Hz", "1e13 Hz"])
+def test_a_rate_that_no_times_can_be_counted_from_is_refused(tmp_path, rate):
+    make(tmp_path / "a.h5", MANIFEST.replace("10 Hz", rate), rate=None)
+    refused(tmp_path / "a.h5", "sample rate: is 1e", "sample_rate in the manifest")
+
+
+def test_the_stored_hash_reads_no_attribute_that_stands_elsewhere(tmp_path):
+    run = make(tmp_path / "a.h5")
+    before = run.reader.stored_hash()
+    with change(tmp_path / "a.h5") as file:
+        file["runs/c-1"].attrs["comment"] = "a text in the heap"
+    assert run.reader.stored_hash() == before
+    with change(tmp_path / "a.h5") as file:
+        file["runs/c-1"].attrs["mark"] = np.bytes_("here")
+    assert run.reader.stored_hash() != before

@@ -1,0 +1,187 @@
+"""A folder of exports without a manifest: what is guessed, what is marked, and that the finished draft works."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rigdata import RigDataError, load_campaign
+from rigdata.readers.series import Series
+from rigdata.readers.text.head import find_head
+from rigdata.survey.channel_guess import guess_channel, usable_unit
+from rigdata.survey.draft import MARK, draft_manifest, survey
+from rigdata.survey.exports import Export, read_exports, record_files
+from rigdata.survey.run_guess import guess_run
+from rigdata.survey.spectrum import look_at
+from tpjb_ident.check.campaign import check_campaign
+
+RATE = 1000.0
+
+
+@pytest.fixture(scope="module")
+def exports(tmp_path_factory):
+    """CSV folder of a virtual rig, in German spelling, its manifest taken away."""
+    from rigdata.virtual_rig import (
+        ClearanceSweep,
+        DryTest,
+        Instruments,
+        Noise,
+        RigPlan,
+        RigTruth,
+        Timing,
+        VirtualRig,
+        locus_points,
+        operating_points,
+        write_campaign,
+    )
+
+    plan = RigPlan(
+        dynamic=operating_points([(2500.0, 25.0), (5000.0, 40.0)]),
+        directions=(0.0, math.pi / 2),
+        locus=locus_points(2, load=1000.0),
+        dry=(DryTest(1, levels=(500.0, 1000.0, 2000.0)),),
+        clearance=(ClearanceSweep(seconds=6.0),),
+        timing=Timing(dynamic_seconds=1.0),
+    )
+    truth = RigTruth.constant(np.diag([1e8, 2e8]), np.diag([5e5, 7e5]), bearing_text='schema = "tpjb-bearing/1"\n')
+    rig = VirtualRig(truth, plan, Instruments.like_paper(5, 3), Noise.like_samples(), seed=3)
+    folder = tmp_path_factory.mktemp("exports") / "rig"
+    write_campaign(folder, rig, "csv-german")
+    text = (folder / "campaign.toml").read_text(encoding="utf-8")
+    (folder / "campaign.toml").unlink()
+    return folder, text
+
+
+@pytest.fixture(scope="module")
+def found(exports):
+    problems = []
+    surveyed = survey(list(read_exports(exports[0], problems)))
+    assert not problems
+    return surveyed
+
+
+def test_kinds_and_set_points_are_guessed_right(found):
+    kinds = dict(zip((e.rpartition("/")[2][0] for e in found.exports), (r.kind for r in found.runs), strict=True))
+    assert kinds == {"c": "clearance", "d": "dynamic", "l": "locus", "p": "dry_pivot"}
+    assert found.clock == "Zeit"
+    assert found.speed_line == pytest.approx(22.0, abs=0.3)
+    by_name = {e.rpartition("/")[2]: r for e, r in zip(found.exports, found.runs, strict=True)}
+    for name, load, line in (("d-02500-25-01.csv", 2500.0, 25.0), ("d-05000-40-02.csv", 5000.0, 40.0)):
+        assert by_name[name].load == load
+        assert by_name[name].lines[0].frequency == pytest.approx(line, abs=0.2)
+        assert by_name[name].direction == pytest.approx(-90.0, abs=2.0)
+    assert by_name["p-1-up.csv"].pad == 1
+
+
+def test_a_draft_says_what_is_missing_and_works_when_that_is_filled_in(exports, found):
+    folder, original = exports
+    draft = draft_manifest(found, "rig", "bearing.toml")
+    assert MARK in draft
+    (folder / "draft.toml").write_text(draft, encoding="utf-8")
+    problems = check_campaign(folder / "draft.toml")
+    assert {p.severity for p in problems} == {"error"}
+    assert any("X1A" in str(p) and "line" in p.place for p in problems)
+    filled = draft.replace('"?? kg"', '"30 kg"')
+    for name, lines in _calibrations(original).items():
+        head, _, rest = filled.partition(f"[channels.{name}]\n")
+        body, _, tail = rest.partition("\n\n")
+        quantity = next(line for line in body.splitlines() if line.startswith("quantity"))
+        filled = f"{head}[channels.{name}]\n{quantity}\n{lines}\n\n{tail}"
+    assert MARK not in "".join(line.partition("#")[0] for line in filled.splitlines())
+    (folder / "draft.toml").write_text(filled, encoding="utf-8")
+    campaign = load_campaign(folder / "draft.toml")
+    (folder / "original.toml").write_text(original, encoding="utf-8")
+    truth = load_campaign(folder / "original.toml")
+    assert {r.id: r.kind for r in campaign.runs} == {r.id: r.kind for r in truth.runs}
+    run = truth.runs[0].id
+    np.testing.assert_allclose(campaign.run(run).vector("force").values, truth.run(run).vector("force").values)
+
+
+def _calibrations(manifest: str) -> dict[str, str]:
+    """Everything but the quantity that the rig's own manifest says of each channel."""
+    out = {}
+    for block in manifest.split("[channels.")[1:]:
+        name, _, body = block.partition("]\n")
+        lines = body.split("\n\n")[0].split("[[runs]]")[0].strip().splitlines()
+        if 'quantity = "time"' not in lines:
+            out[name] = "\n".join(line for line in lines if not line.startswith("quantity"))
+    return out
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "quantity", "axis"),
+    [
+        ("X1A", "V", "displacement", ""),
+        ("L1H", "mV", "force", "0 deg"),
+        ("A1V", "V", "acceleration", "90 deg"),
+        ("T1", "V", "temperature", ""),
+        ("whatever", "um", "displacement", ""),
+        ("channel 7", "kN", "force", ""),
+        ("Drehzahl", "U/min", "speed", ""),
+        ("oil", "°C", "temperature", ""),
+        ("p_supply", "bar", "pressure", ""),
+        ("Zeit", "s", "time", ""),
+        ("spare", "V", "", ""),
+        ("=cmd|' /C calc'!A0", "sheep", "", ""),
+    ],
+)
+def test_channels_are_guessed_by_unit_first_then_by_name(name, unit, quantity, axis):
+    guess = guess_channel(name, unit)
+    assert (guess.quantity, guess.axis) == (quantity, axis)
+    assert guess.why
+
+
+def test_units_are_spelt_as_a_manifest_spells_them():
+    assert usable_unit("µm") == "um"
+    assert usable_unit("U/min") == "rpm"
+    assert usable_unit("g/no") == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "names", "units", "decimal"),
+    [
+        ("t;a;b\ns;V;N\n0,0;1,5;2\n0,1;1,6;3\n0,2;1,7;4\n", ("t", "a", "b"), ("s", "V", "N"), ","),
+        ("remark\n\nTime [s],a [V]\n0.0,1.5\n0.1,1.6\n0.2,1.7\n", ("Time [s]", "a [V]"), ("s", "V"), "."),
+        ("0.0\t1.5\n0.1\t1.6\n0.2\t1.7\n", ("column1", "column2"), ("", ""), "."),
+        ("t|a\n1|\n2|NaN\n3|7\n", ("t", "a"), ("", ""), "."),
+    ],
+)
+def test_the_head_of_an_unknown_text_file_is_found(tmp_path, text, names, units, decimal):
+    (tmp_path / "a.txt").write_text(text, encoding="utf-8")
+    head = find_head(tmp_path / "a.txt")
+    assert (head.names, head.units, head.decimal) == (names, units, decimal)
+
+
+def test_a_text_without_numbers_is_no_record(tmp_path):
+    (tmp_path / "a.txt").write_text("Dear Sir,\nplease find\n", encoding="utf-8")
+    with pytest.raises(RigDataError, match="no table of numbers"):
+        find_head(tmp_path / "a.txt")
+
+
+def test_a_folder_without_records_says_what_would_be_one(tmp_path):
+    with pytest.raises(RigDataError, match=r"holds no records.*\.csv.*\.tdms"):
+        record_files(tmp_path)
+
+
+def test_movement_beats_a_misleading_name():
+    time = np.arange(4000) / RATE
+    force = Series("F1", "N", np.floor(time) * 500.0, time)
+    guess = guess_run(Export("dynamic-7.csv", (force,)), {"F1": guess_channel("F1", "N")})
+    assert guess.kind == "dry_pivot"
+    assert "its name says dynamic" in guess.why
+
+
+def test_a_look_finds_lines_and_dead_channels():
+    time = np.arange(2000) / RATE
+    rng = np.random.default_rng(1)
+    swing = 3.0 * np.sin(2 * np.pi * 25.3 * time) + np.sin(2 * np.pi * 22 * time) + 0.01 * rng.standard_normal(2000)
+    look = look_at(swing + 5.0 * time, RATE)
+    assert [round(x.frequency, 1) for x in look.lines[:2]] == [25.3, 22.0]
+    assert look.lines[0].amplitude == pytest.approx(3.0, rel=0.1)
+    assert look_at(np.full(100, 2.5), RATE).flat
+    nothing = look_at(np.full(100, np.nan), RATE)
+    assert nothing.missing == 100
+    assert math.isnan(nothing.mean)
+    assert look_at(rng.standard_normal(2000), RATE).lines == ()

@@ -1,0 +1,205 @@
+"""What the virtual rig writes, read back by rigdata: with no noise the records are the physics."""
+
+from __future__ import annotations
+
+import functools
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import rigdata
+from rigdata.operating_point import OperatingPoint
+from rigdata.virtual_rig import (
+    ClearanceSweep,
+    DryTest,
+    Instruments,
+    Noise,
+    RigPlan,
+    RigTruth,
+    Sensor,
+    SetPointMiss,
+    Timing,
+    VirtualRig,
+    locus_points,
+    operating_points,
+    write_campaign,
+)
+from tpjb_ident.check.campaign import check_campaign
+
+K = np.array([[2.0e8, 1.3e7], [-1.1e7, 4.0e8]])
+C = np.array([[4.0e5, 2.0e4], [1.0e4, 6.0e5]])
+LAYOUTS = {"hdf5": 1e-9, "csv": 1e-6, "csv-german": 1e-6, "csv-tabbed": 1e-6, "csv-bare": 1e-6}
+
+
+def small_plan() -> RigPlan:
+    return RigPlan(
+        dynamic=operating_points([(5000.0, 25.0), (5000.0, 40.0)]),
+        directions=(0.0, math.radians(75.0)),
+        locus=locus_points(3),
+        dry=(DryTest(1, levels=(500.0, 1500.0)), DryTest(3, levels=(500.0,), branch="cycle")),
+        clearance=(ClearanceSweep(seconds=2.0),),
+        timing=Timing(dynamic_seconds=1.0, locus_seconds=0.5),
+    )
+
+
+def quiet_rig(**changes) -> VirtualRig:
+    rig = VirtualRig(RigTruth.constant(K, C), small_plan(), Instruments.like_paper(seed=3), Noise.none(), seed=5)
+    return replace(rig, **changes)
+
+
+def phasor(run, quantity, omega):
+    record = run.vector(quantity)
+    design = np.stack([np.ones(len(record)), np.cos(omega * record.time), np.sin(omega * record.time)], axis=1)
+    fit = np.linalg.lstsq(design, record.values, rcond=None)[0]
+    return fit[1] - 1j * fit[2]
+
+
+def fitted_stiffness(runs, housing_mass=30.0):
+    omega = runs[0].point.excitation
+    d = np.array([phasor(run, "displacement", omega) for run in runs])
+    f = np.array([phasor(run, "force", omega) + housing_mass * phasor(run, "acceleration", omega) for run in runs])
+    return np.linalg.solve(d, f).T
+
+
+@pytest.fixture(scope="module")
+def quiet(tmp_path_factory):
+    """The campaign without noise in any layout."""
+
+    @functools.cache
+    def campaign(layout):
+        target = tmp_path_factory.mktemp(layout) / ("c.h5" if layout == "hdf5" else "c")
+        write_campaign(target, quiet_rig(), layout)
+        return rigdata.load_campaign(target)
+
+    return campaign
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_noise_free_records_give_back_the_stiffness(quiet, layout):
+    runs = quiet(layout).of_kind("dynamic")
+    for frequency in (25.0, 40.0):
+        omega = 2 * np.pi * frequency
+        pair = [run for run in runs if run.point.excitation_hz == frequency]
+        np.testing.assert_allclose(fitted_stiffness(pair), K + 1j * omega * C, rtol=LAYOUTS[layout])
+
+
+SLOW = {"hdf5", "csv", "csv-german", "csv-bare"}
+
+
+@pytest.mark.parametrize("layout", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in LAYOUTS])
+def test_the_check_finds_nothing_in_a_sound_campaign(tmp_path, layout):
+    target = tmp_path / ("c.h5" if layout == "hdf5" else "c")
+    write_campaign(target, quiet_rig(noise=Noise.like_samples()), layout)
+    assert check_campaign(target) == []
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_means_temperatures_and_speed_come_back(tmp_path, layout):
+    rig = quiet_rig(instruments=Instruments.like_paper())
+    target = tmp_path / ("c.h5" if layout == "hdf5" else "c")
+    write_campaign(target, rig, layout)
+    campaign = rigdata.load_campaign(target)
+    run = campaign.of_kind("locus")[1]
+    # the probes' zero is 0 V: the bearing centre stands at the gap voltage of 8 V
+    centre = -8.0 / 7.78e-3 * 1e-6 * np.array([math.cos(math.pi / 4) + math.cos(3 * math.pi / 4), math.sqrt(2)])
+    position = run.vector("displacement").values.mean(axis=0) - centre
+    np.testing.assert_allclose(position, rig.truth.centre(rig.plan.locus[1]), atol=1e-11)
+    angle = run.point.static_load_direction
+    force = run.vector("force").values.mean(axis=0)
+    np.testing.assert_allclose(force, 5000.0 * np.array([math.cos(angle), math.sin(angle)]), atol=1e-3)
+    assert [t.pad for t in run.temperatures()] == [1, 2, 3, 4, 5]
+    np.testing.assert_allclose(run.record("T2").values, 273.15 + 47.5, atol=1e-6)
+    np.testing.assert_allclose(run.record("K1").values, 2 * np.pi * 22.0, atol=1e-6)
+
+
+def test_manifest_set_points_are_those_of_the_plan(quiet):
+    rig, campaign = quiet_rig(), quiet("hdf5")
+    for planned, found in zip(rig.runs(), campaign.runs, strict=True):
+        assert (planned.id, planned.kind) == (found.id, found.kind)
+        if planned.point is not None:
+            want, have = planned.point, found.point
+            assert have.static_load == pytest.approx(want.static_load, rel=1e-12)
+            assert have.static_load_direction == pytest.approx(want.static_load_direction, abs=1e-10)
+            assert have.shaft_speed == pytest.approx(want.shaft_speed, rel=1e-12)
+            assert have.excitation == pytest.approx(want.excitation, rel=1e-12)
+    dry = campaign.of_kind("dry_pivot")
+    assert [(run.pad, run.branch) for run in dry] == [(1, "up"), (3, "cycle")]
+
+
+def test_stiffness_is_asked_at_the_point_really_run():
+    def stiffness(point: OperatingPoint):
+        return K * (point.static_load / 5000.0) + 1j * point.excitation * C
+
+    plan = replace(small_plan(), dynamic=operating_points([(5000.0, 25.0)]), directions=(0.0,))
+    truth = replace(RigTruth.constant(K, C), stiffness=stiffness)
+    for follows in (True, False):
+        noise = replace(Noise.none(), set_point=SetPointMiss(load=0.05, stiffness_follows=follows))
+        rig = quiet_rig(truth=truth, plan=plan, noise=noise)
+        record = rig.simulate("d-05000-25-01")
+        load = record.physics.facts["static_load_N"]
+        assert abs(load / 5000 - 1) > 0.005
+        line = record.physics.motion.lines[0]
+        h = stiffness(OperatingPoint(load if follows else 5000.0, excitation=2 * np.pi * 25))
+        np.testing.assert_allclose(h @ line.displacement, line.oil_force, rtol=1e-12, atol=1e-9)
+
+
+def test_frequencies_can_share_a_record(tmp_path):
+    plan = replace(small_plan(), joint_frequencies=True)
+    for layout in ("hdf5", "csv"):
+        target = tmp_path / layout
+        write_campaign(target, quiet_rig(plan=plan), layout)
+        campaign = rigdata.load_campaign(target)
+        first, other = campaign.run("d-05000-25-01"), campaign.run("d-05000-40-01")
+        np.testing.assert_array_equal(first.record("X1A").values, other.record("X1A").values)
+        # each of two lines has 1/sqrt(2) of 10 % of 5 kN
+        for run in (first, other):
+            force = phasor_joint(run, "force", [25.0, 40.0])[run.point.excitation_hz]
+            inertia = 30.0 * phasor_joint(run, "acceleration", [25.0, 40.0])[run.point.excitation_hz]
+            assert abs(force[0] + inertia[0]) == pytest.approx(500.0 / math.sqrt(2), rel=1e-5)
+
+
+def phasor_joint(run, quantity, frequencies):
+    record = run.vector(quantity)
+    columns = [np.ones(len(record))]
+    for frequency in frequencies:
+        turn = 2 * np.pi * frequency * record.time
+        columns += [np.cos(turn), np.sin(turn)]
+    fit = np.linalg.lstsq(np.stack(columns, axis=1), record.values, rcond=None)[0]
+    return {f: fit[1 + 2 * i] - 1j * fit[2 + 2 * i] for i, f in enumerate(frequencies)}
+
+
+def test_probes_at_other_angles_and_engineering_units(tmp_path):
+    base = Instruments.like_paper()
+    probes = (
+        Sensor("DX", "displacement", "um", 1e6, math.radians(20.0), span=500.0),
+        Sensor.probe("DY", math.radians(80.0)),
+    )
+    rig = quiet_rig(instruments=replace(base, sensors=(*probes, *base.sensors[2:])))
+    write_campaign(tmp_path / "c.h5", rig)
+    runs = rigdata.load_campaign(tmp_path / "c.h5").of_kind("dynamic")[:2]
+    np.testing.assert_allclose(fitted_stiffness(runs), K + 1j * runs[0].point.excitation * C, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_the_check_finds_nothing_in_a_whole_short_campaign(tmp_path):
+    rig = VirtualRig(RigTruth.constant(K, C), RigPlan.short(), Instruments.like_paper(seed=2), seed=4)
+    write_campaign(tmp_path / "c.h5", rig)
+    assert check_campaign(tmp_path / "c.h5") == []
+
+
+@pytest.mark.slow
+def test_a_campaign_like_the_papers_has_its_runs_and_is_quickly_made(tmp_path):
+    rig = VirtualRig(RigTruth.constant(K, C), instruments=Instruments.like_paper(seed=2), seed=4)
+    done = []
+    start = time.process_time()
+    write_campaign(tmp_path / "c.h5", rig, progress=lambda n, total, run: done.append((n, total, run)))
+    assert time.process_time() - start < 5.0
+    assert len(done) == 92
+    assert done[-1] == (92, 92, "c-1")
+    campaign = rigdata.load_campaign(tmp_path / "c.h5")
+    assert [len(campaign.of_kind(k)) for k in ("dynamic", "locus", "dry_pivot", "clearance")] == [66, 20, 5, 1]
+    points = {(r.point.static_load, r.point.excitation_hz) for r in campaign.of_kind("dynamic")}
+    assert len(points) == 11

@@ -1,0 +1,129 @@
+"""Jobs come out the same wherever they run, and a lost worker loses nothing."""
+
+from __future__ import annotations
+
+import os
+import signal
+import warnings
+from concurrent.futures import Executor, Future
+from pathlib import Path
+
+import pytest
+
+from tpjb_ident.runtime.executors import InProcessWorkers, LostJobsError, PoolWorkers, in_order, local_workers
+from tpjb_ident.runtime.workers import open_workers
+
+
+def doubled(x):
+    return 2 * x
+
+
+def refused(x):
+    if x in (3, 5):
+        raise ValueError(f"no {x}")
+    return x
+
+
+def with_shared(shared, x):
+    return shared["offset"] + x
+
+
+def warned(x):
+    warnings.warn(f"mind {x}", RuntimeWarning, stacklevel=1)
+    return x
+
+
+def dies_once(folder, x):
+    """Kill the worker, the first time that job 4 is tried."""
+    mark = Path(folder) / "died"
+    if x == 4 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 3 * x
+
+
+def dies(x):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def has_own_class():
+    class Odd(Exception):
+        def __init__(self, a, b):
+            super().__init__(a)
+
+    raise Odd(1, 2)
+
+
+@pytest.fixture(scope="module")
+def two():
+    with local_workers(2) as workers:
+        yield workers
+
+
+def jobs(n):
+    return [(i,) for i in range(n)]
+
+
+class Backwards(Executor):
+    """Ends its jobs in the wrong order."""
+
+    def __init__(self):
+        self.held = []
+
+    def submit(self, fn, /, *args, **kwargs):
+        future = Future()
+        self.held.append((future, fn, args))
+        if len(self.held) == 4:
+            for held, task, arguments in reversed(self.held):
+                held.set_result(task(*arguments))
+            self.held.clear()
+        return future
+
+
+def test_answers_stand_in_order_even_if_they_end_in_another():
+    workers = PoolWorkers(Backwards, 2)
+    assert [index for index, _ in workers.outcomes(doubled, jobs(8))] != list(range(8))
+    assert list(in_order(workers, doubled, jobs(8))) == [2 * i for i in range(8)]
+
+
+def test_here_and_in_processes_alike(two):
+    shared = {"offset": 100}
+    for workers in (InProcessWorkers(), two):
+        assert list(in_order(workers, doubled, jobs(9))) == [2 * i for i in range(9)]
+        assert list(in_order(workers, with_shared, jobs(3), shared)) == [100, 101, 102]
+        assert list(in_order(workers, doubled, [])) == []
+
+
+def test_the_first_error_in_order_is_raised_where_it_stands(two):
+    for workers in (InProcessWorkers(), two):
+        answers = in_order(workers, refused, jobs(8))
+        assert [next(answers) for _ in range(3)] == [0, 1, 2]
+        with pytest.raises(ValueError, match="no 3"):
+            next(answers)
+
+
+def test_a_warning_on_a_worker_is_a_warning_here(two):
+    with pytest.warns(RuntimeWarning, match="mind 7"):
+        assert list(in_order(two, warned, [(7,)])) == [7]
+
+
+def test_an_error_that_cannot_travel_comes_as_its_text(two):
+    with pytest.raises(RuntimeError, match="Odd"):
+        list(in_order(two, has_own_class, [()]))
+
+
+def test_a_killed_process_loses_nothing(tmp_path):
+    with local_workers(2) as workers:
+        assert list(in_order(workers, dies_once, [(str(tmp_path), i) for i in range(12)])) == [3 * i for i in range(12)]
+    assert (tmp_path / "died").exists()
+
+
+@pytest.mark.slow
+def test_a_job_that_kills_every_worker_is_given_up():
+    with local_workers(2) as workers, pytest.raises(LostJobsError, match=r"3 times in a row.*memory"):
+        list(in_order(workers, dies, jobs(1)))
+
+
+def test_one_worker_is_this_process():
+    with open_workers(1) as workers:
+        assert isinstance(workers, InProcessWorkers)

@@ -1,0 +1,203 @@
+"""The output folder: whole or not at all, never over somebody's files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tpjb_ident.cli.common.record import write_record
+from tpjb_ident.errors import BadInputError
+from tpjb_ident.runtime.output_folder import former_runs, output_folder
+from tpjb_ident.runtime.publish import READY
+
+
+def fill(target, command, names, inputs=()):
+    with output_folder(target, command, inputs) as folder:
+        for name in names:
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_text(command)
+        write_record(folder, target, command, {"a": 1}, {"in.h5": "0" * 64})
+
+
+def fill_half(target, error):
+    with output_folder(target, "pivot") as folder:
+        (folder / "a.csv").write_text("new")
+        raise error
+
+
+def names_in(folder):
+    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
+
+
+def test_a_new_folder_appears_whole(tmp_path):
+    fill(tmp_path / "deep" / "out", "pivot", ["a.csv", "figures/b.svg"])
+    assert names_in(tmp_path / "deep" / "out") == ["a.csv", "figures/b.svg", "run.json"]
+    assert [p.name for p in (tmp_path / "deep").iterdir()] == ["out"]
+
+
+def test_after_an_error_nothing_is_there(tmp_path):
+    with pytest.raises(RuntimeError):
+        fill_half(tmp_path / "out", RuntimeError)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_error_leaves_the_former_results_alone(tmp_path):
+    fill(tmp_path / "out", "pivot", ["a.csv"])
+    before = (tmp_path / "out" / "a.csv").read_bytes()
+    with pytest.raises(KeyboardInterrupt):
+        fill_half(tmp_path / "out", KeyboardInterrupt)
+    assert (tmp_path / "out" / "a.csv").read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
+def test_commands_share_a_folder_and_its_record(tmp_path):
+    fill(tmp_path / "out", "pivot", ["pivots.toml"])
+    fill(tmp_path / "out", "identify", ["coefficients.csv"])
+    data = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert data["schema"] == "tpjb-run/1"
+    assert set(data["commands"]) == {"pivot", "identify"}
+    assert data["commands"]["pivot"]["outputs"] == ["pivots.toml"]
+    assert data["commands"]["identify"]["inputs_sha256"] == {"in.h5": "0" * 64}
+    assert data["commands"]["identify"]["versions"]["numpy"]
+
+
+def test_a_second_run_replaces_and_drops_what_it_no_longer_makes(tmp_path):
+    fill(tmp_path / "out", "compare", ["a.csv", "figures/old.svg"])
+    fill(tmp_path / "out", "identify", ["keep.csv"])
+    fill(tmp_path / "out", "compare", ["a.csv"])
+    assert names_in(tmp_path / "out") == ["a.csv", "keep.csv", "run.json"]
+
+
+def test_a_foreign_file_of_the_same_name_is_not_replaced(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "a.csv").write_text("precious")
+    with pytest.raises(BadInputError, match=r"a\.csv, which tpjb did not write"):
+        fill(tmp_path / "out", "pivot", ["a.csv"])
+    assert (tmp_path / "out" / "a.csv").read_text() == "precious"
+    assert names_in(tmp_path) == ["out/a.csv"]
+
+
+def test_other_foreign_files_stay(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    fill(tmp_path / "out", "pivot", ["a.csv"])
+    assert names_in(tmp_path / "out") == ["a.csv", "notes.txt", "run.json"]
+
+
+@pytest.mark.parametrize("where", [".", "runs", "results/today"])
+def test_a_campaign_folder_is_never_written_to(tmp_path, where):
+    campaign = tmp_path / "campaign"
+    campaign.mkdir()
+    (campaign / "campaign.toml").write_text("")
+    with pytest.raises(BadInputError, match="raw data"):
+        fill(campaign / where, "pivot", ["a.csv"], (campaign,))
+    assert names_in(campaign) == ["campaign.toml"]
+
+
+def test_not_even_another_campaigns_folder_is_written_to(tmp_path):
+    (tmp_path / "campaign.toml").write_text("")
+    with pytest.raises(BadInputError, match="raw data"):
+        fill(tmp_path / "results", "pivot", ["a.csv"])
+    assert names_in(tmp_path) == ["campaign.toml"]
+
+
+def test_a_folder_that_cannot_be_made_is_named_as_given():
+    with pytest.raises(BadInputError, match=r"--out /proc/nowhere/out: cannot be made"):
+        fill(Path("/proc/nowhere/out"), "pivot", ["a.csv"])
+
+
+def test_a_link_into_the_campaign_is_followed_before_the_check(tmp_path):
+    campaign = tmp_path / "campaign"
+    campaign.mkdir()
+    (campaign / "campaign.toml").write_text("")
+    link = tmp_path / "innocent"
+    link.symlink_to(campaign, target_is_directory=True)
+    with pytest.raises(BadInputError, match="raw data"):
+        fill(link / "results", "pivot", ["a.csv"], (campaign,))
+
+
+def test_a_file_is_no_folder(tmp_path):
+    (tmp_path / "out").write_text("x")
+    with pytest.raises(BadInputError, match="is a file"):
+        fill(tmp_path / "out", "pivot", ["a.csv"])
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{", '{"schema": "other"}', '{"schema": "tpjb-run/1", "commands": {"x": 1}}']
+)
+def test_a_broken_record_counts_as_none(tmp_path, text):
+    (tmp_path / "run.json").write_text(text)
+    assert former_runs(tmp_path) == {}
+
+
+def test_a_record_cannot_make_us_delete_outside_the_folder(tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    victim = tmp_path / "victim.txt"
+    victim.write_text("x")
+    lie = {"schema": "tpjb-run/1", "commands": {"pivot": {"outputs": ["../victim.txt"]}}}
+    (out / "run.json").write_text(json.dumps(lie))
+    fill(out, "pivot", ["a.csv"])
+    assert victim.exists()
+
+
+def moved_half(target):
+    """Make a folder as a kill leaves it between the first and the last file of a set."""
+    fill(target, "identify", ["a.csv", "old.csv"])
+    with output_folder(target.parent / "other", "identify") as folder:
+        (folder / "a.csv").write_text("new a")
+        (folder / "b.csv").write_text("new b")
+        (folder / ".stale").write_text(json.dumps(["old.csv", "../victim.txt"]))
+        write_record(folder, target, "identify", {"a": 2}, {})
+    (target.parent / "other").rename(target / READY)
+    (target / READY / "a.csv").replace(target / "a.csv")
+    (target / "run.json").unlink()
+
+
+def test_what_a_kill_left_half_moved_is_finished_by_the_next_command(tmp_path):
+    target = tmp_path / "out"
+    (tmp_path / "victim.txt").write_text("x")
+    moved_half(target)
+    assert former_runs(target) == {}
+    fill(target, "pivot", ["c.csv"])
+    assert names_in(target) == ["a.csv", "b.csv", "c.csv", "run.json"]
+    assert (target / "b.csv").read_text() == "new b"
+    assert former_runs(target)["identify"]["settings"] == {"a": 2}
+    assert (tmp_path / "victim.txt").exists()
+
+
+def test_a_folder_that_a_killed_run_left_beside_is_cleared_and_a_living_one_is_not(tmp_path):
+    dead = tmp_path / ".out.part-dead"
+    dead.mkdir()
+    (dead / "half.csv").write_text("x")
+    with output_folder(tmp_path / "out", "pivot") as living:
+        assert not dead.exists()
+        fill(tmp_path / "out", "identify", ["a.csv"])
+        assert living.exists()
+        (living / "b.csv").write_text("b")
+        write_record(living, tmp_path / "out", "pivot", {}, {})
+    assert names_in(tmp_path) == ["out/a.csv", "out/b.csv", "out/run.json"]
+
+
+def test_two_commands_at_once_both_stand_in_the_record(tmp_path):
+    target = tmp_path / "out"
+    fill(target, "predict", ["p.csv"])
+    with output_folder(target, "pivot") as folder:
+        (folder / "b.csv").write_text("b")
+        write_record(folder, target, "pivot", {}, {})
+        fill(target, "identify", ["a.csv"])  # begins and ends between the other's record and its end
+    assert set(former_runs(target)) == {"predict", "pivot", "identify"}
+
+
+def test_every_output_is_recorded_with_its_fingerprint_and_where_the_inputs_lie(tmp_path):
+    source = tmp_path / "data" / "in.h5"
+    source.parent.mkdir()
+    source.write_text("x")
+    with output_folder(tmp_path / "out", "pivot") as folder:
+        (folder / "a.csv").write_text("")
+        write_record(folder, tmp_path / "out", "pivot", {"campaign": source, "gone": tmp_path / "none"}, {})
+    entry = former_runs(tmp_path / "out")["pivot"]
+    assert entry["outputs_sha256"] == {"a.csv": "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"}
+    assert entry["inputs_at"] == {"campaign": "../data/in.h5"}

@@ -1,0 +1,316 @@
+"""Put each named fault into good virtual campaigns: what does `tpjb check` say, and does identification go on?
+
+    python tests/studies/fault_detection.py [--seeds 3] [--first 1] [--good 30] [--faults dead ..] [--identify]
+        [--rows FILE]
+
+Per fault: the share of campaigns in which the struck run is named with an error or a warning, the share in which
+another run is blamed, and with ``--identify`` what became of the coefficients: the largest error of the direct terms
+against the truth, what identification itself says of them, and in how many campaigns it says so. Good campaigns of
+various make (number of directions, noise, points, bearings that wander from run to run) give the rate of false alarms.
+``--rows FILE`` keeps a JSON line per campaign; the same call again does what is missing there and prints the table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rigdata
+from model.bearing_file import load_bearing
+from rigdata.operating_point import OperatingPoint
+from rigdata.virtual_rig import Fault, Noise, operating_points
+from rigdata.virtual_rig.truth import load_vector
+from tests.good_campaigns import BEARINGS, DAMPING, PLAN, RUN, STIFFNESS, directions, stiff_rig, written
+from tpjb_ident.check.campaign import check_campaign
+from tpjb_ident.compare.bearing_checks import bearing_problems
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+MISS = Noise.like_samples().set_point
+BEARING = BEARINGS / "rocker.toml"
+TEXT = BEARING.read_text("utf-8")
+#: Of that bearing, and of the virtual rig's polygon [m].
+CLEARANCE = 80e-6
+
+#: The faults of the list, in one run unless the name says otherwise.
+FAULTS: dict[str, Fault] = {
+    "dead probe": Fault("dead", RUN, "X1A"),
+    "dead load cell": Fault("dead", RUN, "L1H"),
+    "probe stuck for 0.2 s": Fault("stuck", RUN, "X1A", start=0.5, length=0.2),
+    "load cell stuck half-way": Fault("stuck", RUN, "L1V", start=1.0),
+    "load cell clipped at 60 %": Fault("clipped", RUN, "L1H"),
+    "probe clipped at 90 %": Fault("clipped", RUN, "X1A", value=0.9),
+    "probes swapped": Fault("swapped", RUN, "X1A", other="X1B"),
+    "load cells swapped": Fault("swapped", RUN, "L1H", other="L1V"),
+    "accelerometers swapped": Fault("swapped", RUN, "A1H", other="A1V"),
+    "probe inverted": Fault("inverted", RUN, "X1A"),
+    "load cell inverted": Fault("inverted", RUN, "L1V"),
+    "accelerometer inverted": Fault("inverted", RUN, "A1H"),
+    "probe 3 ms late": Fault("delayed", RUN, "X1A", value=3e-3),
+    "probe 1 ms late": Fault("delayed", RUN, "X1A", value=1e-3),
+    "probe reads 30 % too much": Fault("scaled", RUN, "X1A", value=1.3),
+    "probe reads 10 % too much": Fault("scaled", RUN, "X1A", value=1.1),
+    "probe reads 5 % too much": Fault("scaled", RUN, "X1A", value=1.05),
+    "probe reads 3 % too much": Fault("scaled", RUN, "X1A", value=1.03),
+    "probe reads 3 % too little": Fault("scaled", RUN, "X1B", value=0.97),
+    "probe reads 5 % too little": Fault("scaled", RUN, "X1B", value=0.95),
+    "cell reads 10 % too much": Fault("scaled", RUN, "L1H", value=1.1),
+    "cell reads 5 % too much": Fault("scaled", RUN, "L1H", value=1.05),
+    "cell reads 3 % too much": Fault("scaled", RUN, "L1H", value=1.03),
+    "loaded cell reads 5 % too little": Fault("scaled", RUN, "L1V", value=0.95),
+    "loaded cell reads 3 % too much": Fault("scaled", RUN, "L1V", value=1.03),
+    "probe sensitivity ten times off": Fault("scaled", RUN, "X1A", value=10.0),
+    "cell sensitivity ten times off": Fault("scaled", RUN, "L1H", value=0.1),
+    "cells ten times off, all runs": Fault("scaled", "*", "L1*", value=0.1),
+    "probe ten times off, all runs": Fault("scaled", "*", "X1A", value=10.0),
+    "both probes ten times too large, all runs": Fault("scaled", "*", "X1*", value=10.0),
+    "both probes ten times too small, all runs": Fault("scaled", "*", "X1*", value=0.1),
+    "probe 3 % off, all runs": Fault("scaled", "*", "X1A", value=1.03),
+    "probe 10 % off, all runs": Fault("scaled", "*", "X1A", value=1.1),
+    "wrong pad label": Fault("wrong_pad", "p-2-up", value=3.0),
+    "static load 1.6 times the cells'": Fault("wrong_load", RUN, value=1.6),
+    "static load 1.1 times the cells'": Fault("wrong_load", RUN, value=1.1),
+    "speed channel doubled, all runs": Fault("scaled", "*", "K1", value=2.0),
+    "speed 5 % off in one run": Fault("scaled", RUN, "K1", value=1.05),
+    "no excitation": Fault("missing_excitation", RUN),
+    "wrong excitation frequency": Fault("wrong_frequency", RUN, value=3.0),
+    "wrong excitation direction": Fault("wrong_direction", RUN, value=0.4),
+    "duplicated run": Fault("duplicate_run", RUN, other="d-05000-25-02"),
+    "gap without values": Fault("nan_gap", RUN, "X1A", start=0.5, length=0.2),
+    "crosstalk of 30 %": Fault("crosstalk", RUN, "L1H", value=0.3),
+    "missing file": Fault("missing_file", RUN),
+}
+#: Good campaigns; those of the second kind wander from run to run.
+GOOD, WANDERING = "none (false alarms)", "none, wandering (false alarms)"
+#: One channel of `RUN` with all that it reads, gap voltage included, times a factor, as from a wrong amplifier.
+AMPLIFIED = {"probe amplified 3 % too much": ("X1A", 1.03), "probe amplified 5 % too little": ("X1B", 0.95)}
+#: In place of a fault: some runs from a bearing half as stiff, as when two bearings' runs got into one campaign.
+MIXED = "mixed bearings: every third run of another"
+
+
+#: What identification says of every virtual campaign, good or bad.
+USUAL = {"calibration-uncertainty-unstated", "cells-against-set-points"}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one campaign with one fault led to; the last two are those of identification."""
+
+    named: bool
+    blamed_others: bool
+    severity: str
+    error: float = math.nan
+    said: frozenset[str] = frozenset()
+
+
+def write(path: Path, seed: int, fault: Fault | None, stiffness: float = 1.0) -> None:
+    """Write a campaign."""
+    faults = () if fault is None else (fault,)
+    written(path, stiff_rig(seed, *faults, k=stiffness * STIFFNESS, bearing_name=BEARING.name, bearing_text=TEXT))
+
+
+def write_various(path: Path, seed: int) -> None:
+    """Write a good campaign whose make depends on the seed: directions, noise, operating points."""
+    plan = replace(
+        PLAN,
+        directions=directions((4, 6, 8)[seed % 3]),
+        dynamic=operating_points([(5000.0, 25.0), *([(2500.0, 35.0), (8000.0, 15.0)] if seed % 5 == 0 else [])]),
+    )
+    noise = Noise.like_samples().scaled((0.5, 1.0, 2.0)[seed // 3 % 3])
+    written(path, stiff_rig(1000 + seed, plan=plan, noise=noise, bearing_name=BEARING.name, bearing_text=TEXT))
+
+
+def write_wandering(path: Path, seed: int) -> None:
+    """Write a good campaign in which every run has a temperature of its own, in some seeds with outliers among them.
+
+    Stiffness scatters by 0.5 to 2 % from run to run, damping by twice as much, the mean position by 0.2 to 1 um besides
+    what the load does. What a run is like hangs on by how much it misses its set points, which is drawn for every run.
+    """
+    size, heavy = (0.5, 1.0, 2.0)[seed % 3], bool(seed // 3 % 2)
+
+    def chance(point: OperatingPoint) -> tuple[float, float]:
+        warm = (point.shaft_speed_hz / 22.0 - 1) / MISS.speed
+        turned = (point.static_load_direction + math.pi / 2) / MISS.direction
+        return (warm * abs(warm), turned * abs(turned)) if heavy else (warm, turned)
+
+    def stiffness(point: OperatingPoint) -> ComplexArray:
+        warm = 0.01 * size * chance(point)[0]
+        softer = (point.static_load / 5000.0) ** 0.6 * (1 - warm)
+        return np.asarray(softer * STIFFNESS + 1j * point.excitation * (1 - 2 * warm) * DAMPING)
+
+    def position(point: OperatingPoint) -> FloatArray:
+        warm, turned = chance(point) if point.static_load > 0 and point.shaft_speed > 0 else (0.0, 0.0)
+        moved = 0.5e-6 * size * np.array([0.6 * warm + 0.8 * turned, 0.8 * warm - 0.6 * turned])
+        return np.asarray(np.linalg.solve(STIFFNESS, load_vector(point)) + moved)
+
+    plan = replace(PLAN, directions=directions((6, 4, 8)[seed // 2 % 3]), locus=())
+    texts = {"bearing_name": BEARING.name, "bearing_text": TEXT}
+    written(path, stiff_rig(2000 + seed, plan=plan, stiffness=stiffness, position=position, **texts))
+
+
+def mix(path: Path, other: Path) -> None:
+    """Put every third dynamic run of `other` into `path`."""
+    import h5py
+
+    with h5py.File(path, "r+") as file, h5py.File(other) as source:
+        for number, name in enumerate(sorted(n for n in file["runs"] if n.startswith("d-"))):
+            if number % 3 == 0:
+                del file[f"runs/{name}"]
+                source.copy(f"runs/{name}", file["runs"])
+
+
+def amplify(path: Path, channel: str, factor: float) -> None:
+    """Multiply one channel's readings in `RUN`."""
+    import h5py
+
+    with h5py.File(path, "r+") as file:
+        file[f"runs/{RUN}/{channel}"][...] *= factor
+
+
+def judge(path: Path, struck: str | None) -> Outcome:
+    """What the check says."""
+    known = check_campaign(path)
+    campaign = rigdata.load_campaign(path)
+    found = [
+        p
+        for p in [*known, *bearing_problems(campaign, load_bearing(campaign.bearing_text), known)]
+        if p.severity != "note"
+    ]
+    mine = [p for p in found if struck is None or p.run == struck or struck == "*"]
+    worst = "error" if any(p.severity == "error" for p in mine) else "warning" if mine else "-"
+    return Outcome(bool(mine), any(p not in mine for p in found), worst)
+
+
+def identified(path: Path) -> tuple[float, frozenset[str]]:
+    """Largest error of the direct terms at the struck point; names of what identification says."""
+    from tpjb_ident.dynamic.identify import IdentifySettings, identify
+
+    try:
+        result = identify(rigdata.load_campaign(path), IdentifySettings(methods=(), clearance=CLEARANCE))
+    except ValueError as error:
+        return math.nan, frozenset({f"refused: {error}"})
+    # a wrong label makes a point of its own
+    point = max((p for p in result.points if p.point.excitation_hz == 25.0), key=lambda p: p.n_windows)
+    h = point.stiffness.h
+    omega = 2 * math.pi * 25.0
+    errors = [abs(h[i, i] - STIFFNESS[i, i] - 1j * omega * DAMPING[i, i]) / abs(STIFFNESS[i, i]) for i in (0, 1)]
+    said = {str(c) for c in (*result.conditions, *(c for p in result.points for c in p.quality))}
+    return float(max(errors)), frozenset(said - USUAL)
+
+
+def row(name: str, outcomes: list[Outcome]) -> str:
+    """One line of the table."""
+    n = len(outcomes)
+    named, others = sum(o.named for o in outcomes), sum(o.blamed_others for o in outcomes)
+    errors = [o.error for o in outcomes if not math.isnan(o.error)]
+    worst = f"{100 * max(errors):.1f} %" if errors else "-"
+    severity = ", ".join(sorted({o.severity for o in outcomes}))
+    counts = Counter(c for o in outcomes for c in o.said)
+    said = ", ".join(f"{c} {k}" for c, k in counts.most_common()) or "-"
+    return f"| {name} | {named} of {n} | {severity} | {others} of {n} | {worst} | {said} |"
+
+
+class Rows:
+    """Outcomes by fault and seed, kept in a file as they come."""
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+        lines = path.read_text("utf-8").splitlines() if path is not None and path.exists() else []
+        self.known = {(row["what"], row["fault"], row["seed"]): row for row in map(json.loads, lines)}
+
+    def take(self, what: str, fault: str, seed: int, values: dict[str, object]) -> None:
+        """Keep one result."""
+        row = {"what": what, "fault": fault, "seed": seed, **values}
+        self.known[what, fault, seed] = row
+        if self.path is not None:
+            with self.path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+
+    def outcome(self, fault: str, seed: int) -> Outcome:
+        """What is known of one campaign."""
+        checked = self.known["check", fault, seed]
+        found = self.known.get(("identify", fault, seed))
+        named, others, severity = (checked[k] for k in ("named", "others", "severity"))
+        if found is None:
+            return Outcome(named, others, severity)
+        error = math.nan if found["error"] is None else found["error"]
+        return Outcome(named, others, severity, error, frozenset(found["said"]))
+
+
+def make(path: Path, name: str, seed: int) -> str | None:
+    """Write the campaign of a row; the run that its fault strikes, None where it strikes several or none."""
+    fault = FAULTS.get(name)
+    if name in (GOOD, WANDERING):
+        (write_various if name == GOOD else write_wandering)(path, seed)
+        return None
+    write(path, seed, fault)
+    if name in AMPLIFIED:
+        amplify(path, *AMPLIFIED[name])
+        return RUN
+    if name == MIXED:
+        other = path.with_name("other.h5")
+        write(other, seed + 100, None, 0.5)
+        mix(path, other)
+        other.unlink()
+    return None if fault is None else fault.run
+
+
+def work(name: str, seed: int, rows: Rows, folder: Path, wanted: tuple[str, ...]) -> None:
+    """Do what is missing of one campaign."""
+    missing = [w for w in wanted if (w, name, seed) not in rows.known]
+    if not missing:
+        return
+    path = folder / "c.h5"
+    struck = make(path, name, seed)
+    if "check" in missing:
+        found = judge(path, struck)
+        rows.take(
+            "check",
+            name,
+            seed,
+            {"named": found.named, "others": found.blamed_others, "severity": found.severity},
+        )
+    if "identify" in missing:
+        error, said = identified(path)
+        rows.take("identify", name, seed, {"error": None if math.isnan(error) else error, "said": sorted(said)})
+    path.unlink()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--first", type=int, default=1, help="first seed")
+    parser.add_argument("--good", type=int, default=12, help="good campaigns")
+    parser.add_argument("--faults", nargs="*", help="parts of names")
+    parser.add_argument("--identify", action="store_true")
+    parser.add_argument("--no-check", action="store_true", help="identify only, for a file of rows that has the rest")
+    parser.add_argument("--rows", type=Path, help="file of results, one JSON line each; what it has is not done again")
+    given = parser.parse_args()
+    began, rows = time.time(), Rows(given.rows)
+    wanted = (*(() if given.no_check else ("check",)), *(("identify",) if given.identify else ()))
+    print("| fault | named | as | others blamed | worst error of direct terms | identify says |")
+    print("|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as scratch:
+        for name in (GOOD, WANDERING, *FAULTS, *AMPLIFIED, MIXED):
+            if given.faults and not any(part in name for part in given.faults):
+                continue
+            seeds = range(given.first, given.first + (given.good if name in (GOOD, WANDERING) else given.seeds))
+            for seed in seeds:
+                work(name, seed, rows, Path(scratch), wanted)
+            if not given.no_check:
+                print(row(name, [rows.outcome(name, seed) for seed in seeds]), flush=True)
+    print(f"\n{given.seeds} campaigns per row, {time.time() - began:.0f} s", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

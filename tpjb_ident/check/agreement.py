@@ -1,0 +1,132 @@
+"""Runs of one operating point against each other: a run whose gains, signs or channels are others' stands apart.
+
+All runs of a point share one matrix H. Each run is held against the matrix of the others, in units of what these
+scatter about it themselves, so that a quiet rig shows a gain that is some per cent off and a noisy one does not cry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.problem import Severity
+from tpjb_ident.check.answers import Answer, misfit_of, solve_stiffness
+from tpjb_ident.check.gain_evidence import PointReadings, leverage
+from tpjb_ident.check.one_gain import gain_of_run
+from tpjb_ident.check.run_gains import channel_names
+from tpjb_ident.check.set_points import to_plane
+from tpjb_ident.check.wiring import repairs
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+#: A run that differs by this share stands apart in any case, where the others agree to the second share.
+_OUTLIER, _AGREE = 0.08, 0.03
+#: Differences below this share are no fault: loads and temperatures differ from run to run.
+_LEAST = 0.03
+#: Probability at which chance is no explanation any more.
+_CHANCE = 1e-4
+#: Runs needed before one can be told apart from the others, and share of them that can be.
+_MIN_RUNS, _MOST = 4, 1 / 3
+
+
+def check_agreement(
+    group: Sequence[Answer], stiffness: ComplexArray, readings: PointReadings | None = None
+) -> set[int]:
+    """Name runs that answer otherwise than the others at their operating point; their places in the group.
+
+    Parameters
+    ----------
+    group : sequence of Answer
+        Runs of one operating point.
+    stiffness : (2, 2) complex ndarray
+        H that most of them agree on.
+    readings : PointReadings, optional
+        Of the same runs, for naming the channel whose gain explains one of them.
+    """
+    if len(group) < _MIN_RUNS:
+        return set()
+    misfits = np.array([misfit_of(a, stiffness) for a in group])
+    told = set()
+    if np.median(misfits) <= _AGREE:
+        allowed = max(_OUTLIER, 6 * float(np.median(misfits)))
+        told = {i for i, misfit in enumerate(misfits) if misfit > allowed}
+    told |= _apart(group, told)
+    others = [i for i in range(len(group)) if i not in told]
+    common = solve_stiffness([group[i] for i in others]) if told and len(others) > 1 else None
+    for i in sorted(told):
+        gain = None if readings is None else gain_of_run(readings, i, others)
+        hint = (
+            "" if gain is None or gain.chance > _CHANCE else _as_if(channel_names(group)[gain.channels[0]], gain.gain)
+        )
+        _tell(group[i], stiffness if common is None else common, hint)
+    return told
+
+
+def _apart(group: Sequence[Answer], known: set[int]) -> set[int]:
+    """Runs beyond chance of the others' matrix, the worst first, until none is left or too many are."""
+    apart: set[int] = set(known)
+    while len(apart) + 1 <= _MOST * len(group):
+        left = [i for i in range(len(group)) if i not in apart]
+        if len(left) < _MIN_RUNS:
+            break
+        tried = [(_distance(group[i], [group[j] for j in left if j != i]), i) for i in left]
+        (ratio, misfit), worst = max(tried)
+        if ratio < 1.0 or misfit < _LEAST:
+            break
+        apart.add(worst)
+    return apart
+
+
+def _distance(one: Answer, others: Sequence[Answer]) -> tuple[float, float]:
+    """How far a run is from the others' matrix: over what chance allows, and as a share of its force.
+
+    With s^2 the others' variance per equation and d the run's displacement, its residual r has the variance
+    s^2 (1 + d* (sum of d d*)^-1 d); |r|^2 over it follows an F distribution.
+    """
+    stiffness = solve_stiffness(others)
+    spare = 2 * (2 * len(others) - 4)
+    if stiffness is None or spare < 4:
+        return 0.0, 0.0
+    from scipy.special import fdtri
+
+    scales = np.array([np.linalg.norm(a.displacement) for a in others])
+    unit = np.stack([a.displacement for a in others]) / scales[:, None]
+    rest = np.stack([a.force - stiffness @ a.displacement for a in others]) / scales[:, None]
+    variance = float(np.sum(np.abs(rest) ** 2)) / spare
+    size = float(np.linalg.norm(one.displacement))
+    residual = float(np.linalg.norm(one.force - stiffness @ one.displacement)) / size
+    ratio = residual**2 / 4 / (max(variance, 1e-300) * (1 + leverage(unit, one.displacement / size)))
+    return ratio / float(fdtri(4, spare, 1 - _CHANCE)), misfit_of(one, stiffness)
+
+
+def _as_if(name: str, gain: float) -> str:
+    return f"; as if {name} read {abs(gain - 1):.0%} too {'much' if gain > 1 else 'little'}"
+
+
+def _tell(answer: Answer, stiffness: ComplexArray, gain: str) -> None:
+    misfit = misfit_of(answer, stiffness)
+    hint = _name_misfit(answer, stiffness, misfit) or gain
+    severity: Severity = "error" if misfit > 0.5 or (hint and misfit > 0.2) else "warning"
+    share = f"{misfit:.0%}" if misfit > 0.1 else f"{misfit:.1%}"
+    what = f"differs by {share} from the other runs at this operating point{hint}"
+    cure = "Check this run's channels and set points; leave it out or repeat it"
+    answer.seen.report.say("disagrees", severity, "displacement and force", what, cure)
+
+
+def _name_misfit(answer: Answer, stiffness: ComplexArray, misfit: float) -> str:
+    """Name the one wiring fault of probes or cells that explains a run apart from the others."""
+    tried = [(misfit_of(answer, stiffness, m), w) for w, m in repairs(answer.channels, scales=True)]
+    seen, where = answer.seen, answer.seen.pick("force")
+    cells = [seen.channels[i] for i in where]
+    if len(cells) == 2 and seen.lines is not None:
+        phasors = seen.lines.phasor[where]
+        for words, matrix in repairs(cells, scales=True):
+            # The inertia part of the force stays: only the cells are supposed to be at fault.
+            force = answer.force + to_plane(cells, matrix @ phasors - phasors)
+            tried.append((misfit_of(replace(answer, force=force), stiffness), words))
+    tried.sort()
+    clear = tried[0][0] < misfit / 4 and tried[0][0] < tried[1][0] / 2
+    return f"; as if {tried[0][1]}" if clear else ""

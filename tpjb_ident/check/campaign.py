@@ -1,0 +1,105 @@
+"""Read everything of a campaign and report every problem found, not just the first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from rigdata.campaign import Campaign, load_campaign
+from rigdata.leftovers import leftovers
+from rigdata.problem import Problem, RigDataError
+from rigdata.run import Run
+from tpjb_ident.check.consistency import check_housing, check_load_ratios
+from tpjb_ident.check.findings import Finding, merge
+from tpjb_ident.check.observation import Observation, observe
+from tpjb_ident.check.positions import check_positions
+from tpjb_ident.check.response import check_accelerometers, check_responses
+from tpjb_ident.check.set_points import check_excitation, check_speed, check_static_load
+from tpjb_ident.check.slow_tests import check_dry, check_locus, check_shaft_follows, check_sweeps
+
+_ORDER = {"error": 0, "warning": 1, "note": 2}
+Progress = Callable[[int, int], None]
+
+
+def check_campaign(path: str | Path, progress: Progress | None = None) -> list[Problem]:
+    """Read every channel of every run and judge it, alone and beside the others.
+
+    Parameters
+    ----------
+    path : str or Path
+        As for `rigdata.load_campaign`.
+    progress : callable, optional
+        Called with the number of runs read so far and of all runs.
+
+    Returns
+    -------
+    list of Problem
+        Errors first; empty where nothing was found. Bad input never raises: it is in the list. A problem
+        with a `run` concerns that run alone; one without concerns the campaign.
+    """
+    try:
+        campaign = load_campaign(path)
+    except RigDataError as error:
+        return _sorted(error.problems)
+    seen: list[Observation] = []
+    for count, run in enumerate(campaign.runs, start=1):
+        seen.append(observe(run))
+        if progress is not None:
+            progress(count, len(campaign.runs))
+    return _sorted([*campaign.notes, *_judge(campaign, seen)])
+
+
+def _judge(campaign: Campaign, seen: Sequence[Observation]) -> list[Problem]:
+    of_kind = {k: [s for s in seen if s.run.kind == k] for k in ("dynamic", "dry_pivot", "locus", "clearance")}
+    for one in seen:
+        check_static_load(one)
+        check_speed(one)
+    check_load_ratios(seen)
+    check_positions(seen)
+    check_excitation(of_kind["dynamic"], campaign.housing_mass)
+    check_dry(of_kind["dry_pivot"])
+    _spread_doubts(seen)
+    check_responses(of_kind["dynamic"], campaign.housing_mass, of_kind["clearance"])
+    check_accelerometers(of_kind["dynamic"])
+    check_housing(of_kind["dynamic"])
+    check_shaft_follows(of_kind["dry_pivot"])
+    check_sweeps(of_kind["clearance"])
+    check_locus(of_kind["locus"])
+    _check_duplicates(seen)
+    findings: list[Finding] = [f for one in seen for f in one.report.found]
+    return [*merge(findings, campaign.path.name, campaign.runs), *leftovers(campaign)]
+
+
+def _spread_doubts(seen: Sequence[Observation]) -> None:
+    """Cells that are wired wrongly in many runs are so in all, also where the load does not show it."""
+    judged = [one for one in seen if one.run.kind in {"dynamic", "locus", "dry_pivot"}]
+    doubted = sum("force" in one.report.doubts for one in judged)
+    if doubted >= 3 and 3 * doubted >= len(judged):
+        for one in seen:
+            one.report.doubts.add("force")
+
+
+def _check_duplicates(seen: Sequence[Observation]) -> None:
+    first: dict[str, Observation] = {}
+    for one in seen:
+        other = first.setdefault(one.digest, one) if one.digest else one
+        if other is one:
+            continue
+        if _shared_record(one.run, other.run):
+            what = f"shares its record with run {other.run.id}, at another excitation frequency"
+            one.report.say("shared", "note", "", what, "Nothing, if both lines were excited at once")
+            continue
+        what = f"holds the very samples of run {other.run.id} ({other.run.file})"
+        cure = "One of the two is a copy: find the right file, or delete the run"
+        one.report.say("duplicate", "error", "", what, cure)
+
+
+def _shared_record(one: Run, other: Run) -> bool:
+    """Whether one record excited at several frequencies serves both runs."""
+    same = replace(one.point, excitation=other.point.excitation) == other.point
+    return one.kind == other.kind == "dynamic" and same and one.point != other.point
+
+
+def _sorted(problems: Sequence[Problem]) -> list[Problem]:
+    return sorted(dict.fromkeys(problems), key=lambda p: _ORDER[p.severity])

@@ -1,0 +1,116 @@
+"""Runs against each other: static loads as the cells read them, housing acceleration per cell force.
+
+Both ratios belong to the rig and not to the bearing, so all runs share them, whatever their operating point.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpjb_ident.check.observation import Observation
+from tpjb_ident.check.set_points import excited, plane_vector
+from tpjb_ident.check.wiring import repairs
+
+ComplexArray = NDArray[np.complex128]
+#: Runs needed before one can be told apart.
+_MIN_RUNS = 4
+#: A load that differs by this share (or this angle, as a share of the load) from the others' is no scatter.
+_LOAD_OFF = 0.04
+#: In units of the robust standard deviation over the runs.
+_MANY = 6.0
+#: Share of the foretold acceleration.
+_ACCELERATION_OFF = 0.1
+#: Lines below this many times their noise say nothing.
+_CLEAR = 30.0
+
+
+def check_load_ratios(runs: Sequence[Observation]) -> None:
+    """Mean force over set point of every dynamic and locus run against that of all others."""
+    shown: list[tuple[Observation, complex]] = []
+    for seen in runs:
+        stated = seen.run.point.static_load
+        if seen.run.kind not in {"dynamic", "locus"} or seen.lines is None or not stated > 0:
+            continue
+        mean = plane_vector(seen, "force", seen.lines.mean)
+        if mean is not None:
+            turn = complex(np.exp(1j * seen.run.point.static_load_direction))
+            shown.append((seen, complex(mean[0], mean[1]) / (stated * turn)))
+    if len(shown) < _MIN_RUNS:
+        return
+    ratios = np.array([r for _, r in shown])
+    middle = complex(np.median(ratios.real), np.median(ratios.imag))
+    off = np.abs(ratios - middle) / max(abs(middle), 1e-12)
+    allowed = max(_LOAD_OFF, _MANY * 1.4826 * float(np.median(off)))
+    for (seen, ratio), distance in zip(shown, off):
+        told = any(f.key.startswith("load ") for f in seen.report.found)
+        if distance > allowed and not told:
+            turned = math.degrees(np.angle(ratio / middle))
+            what = (
+                f"is {abs(ratio / middle) - 1:+.1%} in size and {turned:+.1f} deg in direction off what the set point "
+                "and the other runs of the campaign let one expect"
+            )
+            cure = "Check static_load and its direction in this run, and the gain of the cells"
+            seen.report.say("load ratio", "warning", "mean force", what, cure)
+
+
+def check_housing(runs: Sequence[Observation]) -> None:
+    """Acceleration against cell force of the dynamic runs of one frequency: one matrix serves them all."""
+    groups: dict[tuple[float, tuple[str, ...]], list[tuple[Observation, ComplexArray, ComplexArray]]] = {}
+    for seen in runs:
+        where = seen.pick("acceleration")
+        if seen.lines is None or len(where) != 2 or "force" in seen.report.doubts or not excited(seen):
+            continue
+        force = plane_vector(seen, "force", seen.lines.phasor)
+        readings = seen.lines.phasor[where]
+        if force is None or not np.all(np.isfinite(readings)):
+            continue
+        if np.linalg.norm(readings) < _CLEAR * np.linalg.norm(seen.lines.floor[where]):
+            continue
+        names = tuple(seen.channels[i].name for i in where)
+        key = (round(seen.run.point.excitation_hz, 6), names)
+        groups.setdefault(key, []).append((seen, force, np.asarray(readings)))
+    for (_, names), group in groups.items():
+        if len(group) >= _MIN_RUNS:
+            _judge_housing(group, names)
+
+
+def _misfit(force: ComplexArray, readings: ComplexArray, matrix: ComplexArray) -> float:
+    return float(np.linalg.norm(readings - matrix @ force) / np.linalg.norm(readings))
+
+
+def _common_matrix(group: Sequence[tuple[Observation, ComplexArray, ComplexArray]]) -> ComplexArray | None:
+    """Matrix (2, 2) from cell force to readings with the least median misfit among all pairs of runs."""
+    best: tuple[float, ComplexArray] | None = None
+    for first, second in combinations(group[:24], 2):
+        forces = np.stack([first[1], second[1]], axis=1)
+        scaled = forces / np.linalg.norm(forces, axis=0)
+        if np.linalg.svd(scaled, compute_uv=False)[-1] < 0.3:
+            continue
+        matrix = np.asarray(np.linalg.solve(forces.T, np.stack([first[2], second[2]])).T, dtype=np.complex128)
+        misfit = float(np.median([_misfit(f, r, matrix) for _, f, r in group]))
+        if best is None or misfit < best[0]:
+            best = (misfit, matrix)
+    return None if best is None else best[1]
+
+
+def _judge_housing(group: Sequence[tuple[Observation, ComplexArray, ComplexArray]], names: Sequence[str]) -> None:
+    matrix = _common_matrix(group)
+    if matrix is None:
+        return
+    misfits = np.array([_misfit(f, r, matrix) for _, f, r in group])
+    allowed = max(_ACCELERATION_OFF, _MANY * float(np.median(misfits)))
+    for (seen, force, readings), misfit in zip(group, misfits):
+        if misfit <= allowed:
+            continue
+        channels = [seen.channels[i] for i in seen.pick("acceleration")]
+        tried = sorted((_misfit(force, m @ readings, matrix), words) for words, m in repairs(channels, scales=True))
+        hint = f"; as if {tried[0][1]}" if tried[0][0] < min(misfit / 3, tried[1][0] / 2) else ""
+        what = f"differs by {misfit:.0%} from what the cell force and the other runs at this frequency foretell{hint}"
+        cure = "Check polarity, cables and sensitivity of the accelerometers in this run"
+        place = f"channels {' and '.join(names)}"
+        seen.report.say("housing", "warning", place, what, cure)

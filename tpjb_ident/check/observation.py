@@ -1,0 +1,226 @@
+"""What one pass over a run's samples leaves for the checks that compare runs."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.calibration import VECTOR_QUANTITIES, Channel
+from rigdata.channel_statistics import ChannelStatistics
+from rigdata.problem import Problem, RigDataError
+from rigdata.run import Run
+from tpjb_ident.check.clock import check_clock
+from tpjb_ident.check.findings import Reporter
+from tpjb_ident.check.lines import Lines, fit_lines, strongest_line
+from tpjb_ident.check.rotation import turning_frequency
+from tpjb_ident.check.signals import check_signal, needed
+
+FloatArray = NDArray[np.float64]
+#: Samples read at a time; signs and lines are judged on the first block [samples].
+BLOCK = 2**19
+_FITTED = 2**16
+_DECIMATED = 4000
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One run, seen once.
+
+    Attributes
+    ----------
+    run : Run
+    channels : tuple of Channel
+        Displacement, force and acceleration channels that could be read and live.
+    lines : Lines or None
+        Mean, phasor at the excitation, noise of `channels`, SI.
+    spread : (3, m) ndarray
+        2 %, 50 % and 98 % quantiles of `channels`, SI.
+    other_line : float
+        Strongest line of the force in a dynamic run apart from the known ones [Hz]; NaN where none.
+    samples : (n, m) ndarray
+        Thinned to a few thousand, SI; kept of dry and clearance runs only.
+    speed : float
+        Mean of the speed channel [rad/s]; NaN where there is none.
+    digest : str
+        Of all displacement and force readings; "" where none could be read.
+    report : Reporter
+        Findings so far.
+    """
+
+    run: Run
+    channels: tuple[Channel, ...]
+    lines: Lines | None = field(repr=False)
+    spread: FloatArray = field(repr=False)
+    other_line: float
+    samples: FloatArray = field(repr=False)
+    speed: float
+    digest: str
+    report: Reporter = field(repr=False)
+
+    def pick(self, quantity: str) -> list[int]:
+        """Places of the channels of `quantity` in `channels`."""
+        return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
+
+
+def observe(run: Run) -> Observation:
+    """Read every channel of `run` once, block by block, and judge each by itself."""
+    report = Reporter(run)
+    try:
+        length = run.length
+        report.take(run.reader.problems())
+    except RigDataError as error:
+        report.take(error.problems)
+        return _blind(run, report)
+    time = _usable_time(report, run, length)
+    statistics, first, digest = _scan(report, run, length)
+    readable = {n: run.channels[n] for n in first}
+    if not readable:
+        return _blind(run, report)
+    live = tuple(c for n, c in readable.items() if c.quantity in VECTOR_QUANTITIES and not _is_dead(statistics[n]))
+    used = np.stack([first[c.name] for c in live], axis=1) if live else np.empty((length, 0))
+    lines = _lines(run, live, time[:_FITTED], used[:_FITTED]) if time is not None and live else None
+    noise_free = _is_noise_free(run, live, used, lines)
+    if noise_free:
+        report.say("no noise", "note", "", "the readings show no noise", "Nothing, if the data are computed")
+    for name, channel in readable.items():
+        others = [n for n, c in readable.items() if c.quantity == channel.quantity and n != name]
+        alone = all(_is_dead(statistics[n]) for n in others)
+        check_signal(report, channel, statistics[name], noise_free, alone)
+    if time is None or not live:
+        return replace(_blind(run, report), digest=digest, speed=_mean_speed(readable, first))
+    thin = slice(None, None, max(1, len(time) // _DECIMATED))
+    return Observation(
+        run=run,
+        channels=live,
+        lines=lines,
+        spread=_spread(used),
+        other_line=_other_line(run, live, time[:_FITTED], used[:_FITTED]),
+        samples=used[thin] if run.kind in {"dry_pivot", "clearance"} else np.empty((0, len(live))),
+        speed=_mean_speed(readable, first),
+        digest=digest,
+        report=report,
+    )
+
+
+def _usable_time(report: Reporter, run: Run, length: int) -> FloatArray | None:
+    try:
+        time = run.time(0, min(length, BLOCK))
+        check_clock(report, time)
+    except RigDataError as error:
+        report.take(error.problems)
+        return None
+    return time if len(time) > 2 else None
+
+
+def _scan(report: Reporter, run: Run, length: int) -> tuple[dict[str, ChannelStatistics], dict[str, FloatArray], str]:
+    """Read all blocks: statistics per channel, the first block in SI, a digest of the main readings."""
+    channels = {n: c for n, c in run.channels.items() if c.quantity != "time"}
+    statistics = {name: ChannelStatistics() for name in channels}
+    digests = {n: hashlib.sha256() for n, c in channels.items() if c.quantity in {"displacement", "force"}}
+    first: dict[str, FloatArray] = {}
+    for start in range(0, length, BLOCK):
+        blocks = _read_block(report, run, channels, start, min(start + BLOCK, length))
+        channels = {n: channels[n] for n in blocks}
+        for name, block in blocks.items():
+            statistics[name].add(block)
+            if name in digests:
+                digests[name].update(block.tobytes())
+            if start == 0:
+                first[name] = channels[name].to_si(block)
+    first = {n: v for n, v in first.items() if n in channels}
+    whole = "".join(digests[n].hexdigest() for n in first if n in digests)
+    return statistics, first, hashlib.sha256(whole.encode()).hexdigest() if whole else ""
+
+
+def _read_block(
+    report: Reporter, run: Run, channels: Mapping[str, Channel], start: int, stop: int
+) -> dict[str, FloatArray]:
+    """Read one block; a channel that fails is reported, by what the run needs, and left out."""
+    try:
+        return dict(zip(channels, run.reader.read(list(channels), start, stop)))
+    except RigDataError:
+        blocks: dict[str, FloatArray] = {}  # one by one, to tell all that fail
+    for name, channel in channels.items():
+        try:
+            (blocks[name],) = run.reader.read([name], start, stop)
+        except RigDataError as error:
+            report.take(error.problems if needed(run, channel) else [_milder(p) for p in error.problems])
+    return blocks
+
+
+def _blind(run: Run, report: Reporter) -> Observation:
+    return Observation(run, (), None, np.empty((3, 0)), math.nan, np.empty((0, 0)), math.nan, "", report)
+
+
+def _milder(problem: Problem) -> Problem:
+    """A fault of a channel that the run can do without."""
+    return replace(problem, severity="warning" if problem.severity == "error" else problem.severity)
+
+
+def _is_dead(seen: ChannelStatistics) -> bool:
+    return seen.values == 0 or seen.constant
+
+
+def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: Lines | None) -> bool:
+    """Whether noise stays below the converter's steps, as in records computed without noise."""
+    main = [i for i, c in enumerate(live) if c.quantity in {"displacement", "force"}]
+    if not main:
+        return run.kind != "dynamic"
+    for index in main:
+        column = used[:_FITTED, index]
+        column = column[np.isfinite(column)]
+        if len(column) < 10:
+            return False
+        # Away from steady running nothing fits, but noise shows in the bends from sample to sample.
+        bends = np.diff(column, 2) / math.sqrt(6.0)
+        noise = 1.4826 * float(np.median(np.abs(bends)))
+        if lines is not None and run.kind in {"dynamic", "locus"}:
+            noise = float(lines.scatter[index])
+        steps = np.diff(np.unique(column[:4000]))
+        if not noise <= max(0.7 * float(np.min(steps, initial=np.inf)), 1e-7 * float(np.ptp(column))):
+            return False
+    return True
+
+
+def _lines(run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray) -> Lines:
+    excitation = run.point.excitation_hz if run.kind == "dynamic" else 0.0
+    probes = values[:, [i for i, c in enumerate(channels) if c.quantity == "displacement"]]
+    others = [excitation, 50.0, 2 * excitation]
+    speed = turning_frequency(time, probes, run.point.shaft_speed_hz, [f for f in others if f > 0])
+    return fit_lines(time, values, [excitation, speed, 2 * speed, *others[1:]], [speed, 2 * speed])
+
+
+def _spread(values: FloatArray) -> FloatArray:
+    """Quantiles column by column; NaN where a column has no value."""
+    spread = np.full((3, values.shape[1]), np.nan)
+    for index, column in enumerate(values.T):
+        known = column[np.isfinite(column)]
+        if len(known):
+            spread[:, index] = np.quantile(known, [0.02, 0.5, 0.98])
+    return spread
+
+
+def _other_line(run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray) -> float:
+    where = [i for i, c in enumerate(channels) if c.quantity == "force"]
+    if run.kind != "dynamic" or not where:
+        return math.nan
+    column = values[:, max(where, key=lambda i: _range(values[:, i]))]
+    speed = run.point.shaft_speed_hz
+    return strongest_line(time, column, [speed, 2 * speed, 50.0, run.point.excitation_hz])
+
+
+def _range(values: FloatArray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.std(known)) if len(known) else 0.0
+
+
+def _mean_speed(channels: Mapping[str, Channel], first: Mapping[str, FloatArray]) -> float:
+    for name, channel in channels.items():
+        if channel.quantity == "speed" and np.isfinite(first[name]).any():
+            return float(np.nanmedian(first[name]))
+    return math.nan

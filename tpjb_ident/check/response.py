@@ -1,0 +1,148 @@
+"""Signs and places of sensors, from how the shaft answers to force.
+
+A bearing film pushes back: the symmetric parts of stiffness and damping are positive definite. A probe
+wired to the wrong input or with the wrong sign turns the answer into its mirror image, which is not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.calibration import Channel
+from rigdata.problem import Severity
+from tpjb_ident.check.agreement import check_agreement
+from tpjb_ident.check.answers import Answer, answer_of, misfit_of, robust_stiffness
+from tpjb_ident.check.observation import Observation
+from tpjb_ident.check.run_gains import check_gains, point_readings, probe_centres
+from tpjb_ident.check.set_points import excited, to_plane
+from tpjb_ident.check.wiring import name_fault
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+#: Where half of the runs differ by more than this share there is no one answer to judge.
+_NO_ANSWER = 0.08
+_DEFINITE = 0.05
+_MAX_ANISOTROPY = 6.0
+
+
+def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[Observation] = ()) -> None:
+    """Compare the dynamic runs of every operating point with each other and with what a film can do.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+        All dynamic ones.
+    mass : float
+        Of the housing [kg]; NaN where not stated.
+    sweeps : sequence of Observation
+        Clearance runs, for what the probes read at the bearing's centre.
+    """
+    groups: dict[object, list[Answer]] = {}
+    for seen in runs:
+        answer = answer_of(seen, mass)
+        if answer is not None:
+            names = tuple(c.name for c in answer.channels)
+            groups.setdefault((seen.run.point, names), []).append(answer)
+    centres = probe_centres(sweeps)
+    for group in groups.values():
+        stiffness = robust_stiffness(group)
+        if stiffness is None:
+            continue
+        _check_signs(group, stiffness)
+        readings = point_readings(group, centres)
+        told = check_agreement(group, stiffness, readings)
+        if readings is not None:
+            check_gains(group, told, readings)
+
+
+def definiteness(matrix: NDArray) -> float:
+    """Least over greatest eigenvalue of the symmetric part; 1 is isotropic, not above 0 impossible."""
+    low, high = np.linalg.eigvalsh((matrix + matrix.T) / 2)
+    return float(low / high) if high > 0 else -1.0
+
+
+def _film_like(stiffness: ComplexArray) -> float:
+    return min(definiteness(stiffness.real), definiteness(stiffness.imag))
+
+
+def mirrored(channels: Sequence[Channel], repair: FloatArray) -> FloatArray:
+    """What a repair (2, 2) of the readings of two channels does to X, Y (2, 2)."""
+    inverse = np.stack([to_plane(channels, e) for e in np.eye(2)], axis=1)
+    return np.asarray(inverse @ repair @ np.linalg.inv(inverse))
+
+
+def _check_signs(group: Sequence[Answer], stiffness: ComplexArray) -> None:
+    """Positive stiffness and damping; most of the runs must agree, else there is no one answer to judge."""
+    if np.median([misfit_of(a, stiffness) for a in group]) > _NO_ANSWER:
+        return
+    channels = group[0].channels
+    names = " and ".join(c.name for c in channels)
+    if _film_like(stiffness) > _DEFINITE:
+        _check_scales(group, stiffness, names)
+        return
+    hint = name_fault(channels, lambda repair: _film_like(stiffness @ np.linalg.inv(mirrored(channels, repair))))
+    damping = float(np.linalg.eigvalsh((stiffness.imag + stiffness.imag.T) / 2)[0])
+    kind = "damping" if definiteness(stiffness.real) > _DEFINITE else "stiffness"
+    for answer in group:
+        what = f"answer the force with negative {kind}, which a film does not have{hint}"
+        cure = "Check axis, polarity and cables of the probes (and of the cells)"
+        severity: Severity = "error" if hint or damping < 0 else "warning"
+        answer.seen.report.say(f"signs {names}{hint}", severity, f"channels {names}", what, cure)
+
+
+def _check_scales(group: Sequence[Answer], stiffness: ComplexArray, names: str) -> None:
+    """A film is not many times stiffer along one probe than along the other."""
+    channels = group[0].channels
+    along = np.stack([to_plane(channels, e) for e in np.eye(2)], axis=1)
+    sizes = np.linalg.norm(stiffness @ along, axis=0)
+    if sizes.max() < _MAX_ANISOTROPY * sizes.min():
+        return
+    large, small = channels[int(np.argmin(sizes))].name, channels[int(np.argmax(sizes))].name
+    what = (
+        f"{large} moves {sizes.max() / sizes.min():.0f} times more per force than {small}; "
+        "as if one sensitivity were ten times off"
+    )
+    for answer in group:
+        cure = "Check the sensitivities of the two probes"
+        answer.seen.report.say(f"scales {names}", "warning", f"channels {names}", what, cure)
+
+
+def check_accelerometers(runs: Sequence[Observation]) -> None:
+    """Housing acceleration against cell force: on springs, the two are in antiphase."""
+    shown: dict[str, list[tuple[Observation, complex]]] = {}
+    for seen in runs:
+        for name, ratio in _accelerations(seen):
+            shown.setdefault(name, []).append((seen, ratio))
+    cure = "Check polarity, axis and sensitivity of the accelerometer"
+    usual = {n: float(np.median([abs(r) for _, r in v])) for n, v in shown.items() if len(v) >= 3}
+    for name, ratios in shown.items():
+        directions = [r / abs(r) for _, r in ratios]
+        if len(ratios) >= 3 and float(np.mean(np.real(directions))) > 0.7:
+            what = "moves in phase with the cell force; the housing on its springs should move against it"
+            for seen, _ in ratios:
+                seen.report.say(f"accelerometer {name}", "warning", f"channel {name}", what, cure)
+        least = min(usual.values(), default=math.nan)
+        if name in usual and usual[name] > _MAX_ANISOTROPY * least:
+            what = f"shows {usual[name] / least:.0f} times the acceleration per force of the other direction"
+            for seen, _ in ratios:
+                seen.report.say(f"acceleration {name}", "warning", f"channel {name}", what, cure)
+
+
+def _accelerations(seen: Observation) -> list[tuple[str, complex]]:
+    """Acceleration over cell force along each accelerometer that shows the line clearly."""
+    lines, where = seen.lines, seen.pick("force")
+    if lines is None or len(where) < 2 or "force" in seen.report.doubts or not excited(seen):
+        return []
+    force = to_plane([seen.channels[i] for i in where], lines.phasor[where])
+    found: list[tuple[str, complex]] = []
+    for index in seen.pick("acceleration"):
+        channel, phasor = seen.channels[index], lines.phasor[index]
+        axis = channel.axis or 0.0
+        along = complex(force @ np.array([math.cos(axis), math.sin(axis)]))
+        if abs(phasor) > 8 * lines.floor[index] and abs(along) > 0.3 * float(np.linalg.norm(force)):
+            found.append((channel.name, complex(phasor) / along))
+    return found

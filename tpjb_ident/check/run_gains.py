@@ -1,0 +1,131 @@
+"""Tell the dynamic runs in which one probe or cell has another gain than in the other runs of its operating point."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.calibration import Channel
+from tpjb_ident.check.answers import Answer
+from tpjb_ident.check.gain_evidence import PointReadings
+from tpjb_ident.check.observation import Observation
+from tpjb_ident.check.one_gain import WrongGain, wrong_gains
+from tpjb_ident.check.set_points import to_plane
+
+FloatArray = NDArray[np.float64]
+#: Median of the amplitude of a noise line, in standard deviations of its real part (Rayleigh).
+_MEDIAN = math.sqrt(2 * math.log(2))
+#: Sectors into which the directions of a sweep's load are sorted, and share of them that must be met.
+_SECTORS, _MET = 36, 0.9
+
+
+def check_gains(group: Sequence[Answer], told: Collection[int], readings: PointReadings) -> None:
+    """Name runs with one wrong gain.
+
+    Parameters
+    ----------
+    group : sequence of Answer
+        Runs of one operating point, with the same displacement channels.
+    told : collection of int
+        Places of those already told to differ.
+    readings : PointReadings
+        Of the same runs.
+    """
+    for found in wrong_gains(readings, told):
+        _tell(group[found.run], found, [channel_names(group)[i] for i in found.channels])
+
+
+def channel_names(group: Sequence[Answer]) -> list[str]:
+    """Names of the two probes and two cells."""
+    first = group[0]
+    return [c.name for c in (*first.channels, *_cells(first.seen))]
+
+
+def point_readings(group: Sequence[Answer], centres: dict[str, float]) -> PointReadings | None:
+    """Phasors and means of all runs of a point, by channel; None where they have not the same two cells, or no means.
+
+    Parameters
+    ----------
+    group : sequence of Answer
+        Runs of one operating point, with the same displacement channels.
+    centres : dict
+        What probes read at the bearing's centre, by channel [m].
+    """
+    probes, seen = group[0].channels, [a.seen for a in group]
+    cells = _cells(seen[0])
+    names = [c.name for c in cells]
+    lines = [one.lines for one in seen if one.lines is not None]
+    if len(names) != 2 or len(lines) < len(group) or any([c.name for c in _cells(one)] != names for one in seen):
+        return None
+    places = [(one.pick("displacement"), one.pick("force")) for one in seen]
+    cell_plane, cell_phasors = _plane(cells), np.stack([f.phasor[c] for f, (_, c) in zip(lines, places, strict=True)])
+    return PointReadings(
+        probes=np.stack([a.readings for a in group]),
+        cells=cell_phasors,
+        inertia=np.stack([a.force for a in group]) - cell_phasors @ cell_plane.T,
+        probe_means=np.stack([f.mean[p] for f, (p, _) in zip(lines, places, strict=True)]),
+        cell_means=np.stack([f.mean[c] for f, (_, c) in zip(lines, places, strict=True)]),
+        probe_plane=_plane(probes),
+        cell_plane=cell_plane,
+        centre=(centres.get(probes[0].name), centres.get(probes[1].name)),
+        noise=np.stack([np.concatenate([f.floor[p], f.floor[c]]) for f, (p, c) in zip(lines, places, strict=True)])
+        / _MEDIAN,
+    )
+
+
+def _cells(seen: Observation) -> list[Channel]:
+    return [seen.channels[i] for i in seen.pick("force")]
+
+
+def _plane(channels: Sequence[Channel]) -> FloatArray:
+    """From two readings to X and Y, (2, 2)."""
+    return np.stack([to_plane(channels, unit) for unit in np.eye(2)], axis=1)
+
+
+def probe_centres(sweeps: Sequence[Observation]) -> dict[str, float]:
+    """What every probe reads at the bearing's centre [m], from clearance runs whose load goes around."""
+    found: dict[str, list[float]] = {}
+    for seen in sweeps:
+        cells, probes = seen.pick("force"), seen.pick("displacement")
+        if len(cells) != 2 or not probes or "force" in seen.report.doubts or "displacement" in seen.report.doubts:
+            continue
+        load = to_plane([seen.channels[i] for i in cells], seen.samples[:, cells].T).T
+        for index in probes:
+            centre = swept_centre(load, seen.samples[:, index])
+            if centre is not None:
+                found.setdefault(seen.channels[index].name, []).append(centre)
+    return {name: float(np.median(values)) for name, values in found.items()}
+
+
+def swept_centre(load: FloatArray, reading: FloatArray) -> float | None:
+    """Mean of a probe's readings (n,) over all directions of a sweeping load (n, 2); None where it does not go around.
+
+    Sides and corners of the clearance polygon lie evenly around the centre.
+    """
+    known = np.isfinite(load).all(axis=1) & np.isfinite(reading)
+    if not known.any():
+        return None
+    across = load[known] - np.median(load[known], axis=0)
+    turn = np.arctan2(across[:, 1], across[:, 0]) / (2 * math.pi) + 0.5
+    sector = np.floor(turn * _SECTORS) % _SECTORS
+    middles = [float(np.median(reading[known][sector == s])) for s in range(_SECTORS) if np.any(sector == s)]
+    return float(np.mean(middles)) if len(middles) >= _MET * _SECTORS else None
+
+
+def _tell(answer: Answer, found: WrongGain, names: Sequence[str]) -> None:
+    cure = "Check this channel's amplifier, range and cable in this run; leave it out or repeat it"
+    answer.seen.report.say(f"gain {names[0]}", "warning", f"channel {names[0]}", gain_in_words(found, names), cure)
+
+
+def gain_in_words(found: WrongGain, names: Sequence[str]) -> str:
+    """What a wrong gain looks like; `names` are those of its channels, the likeliest first."""
+    off = found.gain - 1
+    others = f" (or {' or '.join(names[1:])} another gain)" if len(names) > 1 else ""
+    by = "phasor and mean say so" if found.means else "its phasor says so, its mean cannot"
+    return (
+        f"reads {abs(off):.1%} too {'much' if off > 0 else 'little'} (standard error {found.error:.1%}) beside the "
+        f"other runs at this operating point{others}; {by}"
+    )

@@ -1,0 +1,198 @@
+"""Set points of a run against what its channels show: load, directions, speed, excitation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.calibration import Channel
+from rigdata.problem import Severity
+from rigdata.vector import inverse_directions
+from tpjb_ident.check.observation import Observation
+from tpjb_ident.check.wiring import guess_wiring, repairs
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+_ANGLE_WARNING, _ANGLE_ERROR = 10.0, 30.0
+_SPEED_STILL = 2 * math.pi * 0.5
+_LINE_OVER_FLOOR = 8.0
+
+
+def to_plane(channels: Sequence[Channel], readings: NDArray) -> NDArray:
+    """X, Y from one value per channel; complex stays complex."""
+    inverse = inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
+    return np.asarray(inverse @ readings)
+
+
+def plane_vector(seen: Observation, quantity: str, values: NDArray) -> NDArray | None:
+    """X, Y of one value per channel of `quantity`; None where its channels do not span the plane."""
+    where = seen.pick(quantity)
+    if len(where) < 2:
+        return None
+    vector = to_plane([seen.channels[i] for i in where], values[where])
+    return vector if np.all(np.isfinite(vector)) else None
+
+
+def angle_between(first: float, second: float, period: float = 360.0) -> float:
+    """Smallest angle between two directions [deg]."""
+    return abs((first - second + period / 2) % period - period / 2)
+
+
+def check_static_load(seen: Observation) -> None:
+    """Mean force of a dynamic or locus run against the stated static load and its direction."""
+    run = seen.run
+    if run.kind not in {"dynamic", "locus"} or seen.lines is None:
+        return
+    mean = plane_vector(seen, "force", seen.lines.mean)
+    stated = run.point.static_load
+    if mean is None or stated <= 0:
+        return
+    size, place = float(np.hypot(*mean)), "mean force"
+    _check_size(seen, size / stated)
+    if size < 0.02 * stated:
+        return
+    points, says = math.degrees(math.atan2(mean[1], mean[0])), run.point.static_load_direction_deg
+    off = angle_between(points, says)
+    if off <= _ANGLE_WARNING:
+        return
+    where = seen.pick("force")
+    wanted = np.array([math.cos(math.radians(says)), math.sin(math.radians(says))])
+    guess = guess_wiring([seen.channels[i] for i in where], seen.lines.mean[where], wanted)
+    severity: Severity = "error" if off > _ANGLE_ERROR else "warning"
+    if severity == "error":
+        seen.report.doubts.add("force")
+    what = f"points to {points:.0f} deg, static_load_direction is {says:g} deg{guess}"
+    cure = "Check the cells' axis and polarity, their cables, and static_load_direction"
+    seen.report.say(f"load direction{guess}", severity, place, what, cure)
+
+
+def _check_size(seen: Observation, ratio: float) -> None:
+    off = abs(ratio - 1.0)
+    if off <= 0.1:
+        return
+    hint = ""
+    for factor in (10.0, 100.0, 1000.0):
+        for times, word in ((factor, "too small"), (1 / factor, "too large")):
+            if abs(ratio / times - 1.0) < 0.3:
+                hint = f"; as if the sensitivity in the manifest were {factor:g} times {word}"
+    severity: Severity = "error" if ratio < 0.7 or ratio > 1.4 else "warning"
+    load = seen.run.point.static_load
+    what = f"is {ratio * load:.4g} N, static_load says {load:.4g} N ({ratio:.3g} times){hint}"
+    cure = "Check sensitivity, full_scale and excitation of the cells, and static_load"
+    seen.report.say(f"load size{hint}", severity, "mean force", what, cure)
+
+
+def check_speed(seen: Observation) -> None:
+    """Speed channel against the stated shaft speed."""
+    stated, measured = seen.run.point.shaft_speed, seen.speed
+    if math.isnan(measured):
+        return
+    stated_hz, measured_hz = stated / (2 * math.pi), measured / (2 * math.pi)
+    if stated == 0.0:
+        if abs(measured) > _SPEED_STILL:
+            what = f"shows {measured_hz:.3g} Hz in a run without rotation"
+            seen.report.say("speed", "warning", "speed channel", what, "Check the channel, kind and shaft_speed")
+        return
+    off = abs(measured / stated - 1.0)
+    if off > 0.03:
+        severity: Severity = "error" if off > 0.1 else "warning"
+        what = f"shows {measured_hz:.4g} Hz, shaft_speed says {stated_hz:.4g} Hz"
+        seen.report.say("speed", severity, "speed channel", what, "Check shaft_speed and the channel's sensitivity")
+
+
+def oil_force(seen: Observation, mass: float) -> ComplexArray | None:
+    """Force phasor of the film on the housing, F_cell + m_h a_h, X and Y [N]; None where not measured."""
+    if seen.lines is None:
+        return None
+    force = plane_vector(seen, "force", seen.lines.phasor)
+    if force is None:
+        return None
+    acceleration = plane_vector(seen, "acceleration", seen.lines.phasor)
+    total = force if acceleration is None or math.isnan(mass) else force + mass * acceleration
+    return np.asarray(total, dtype=np.complex128)
+
+
+def excited(seen: Observation) -> bool:
+    """Whether the force shows the excitation line above its noise."""
+    if seen.lines is None:
+        return False
+    where = seen.pick("force")
+    size, floor = np.abs(seen.lines.phasor[where]), seen.lines.floor[where]
+    return bool(np.any(size > _LINE_OVER_FLOOR * floor) and np.any(size > 0))
+
+
+def check_excitation(runs: Sequence[Observation], mass: float) -> None:
+    """Excitation of dynamic runs: there at all, as strong as in the other runs, in the stated direction."""
+    forces = {id(s): f for s in runs if (f := oil_force(s, mass)) is not None}
+    relative = {
+        id(s): float(np.linalg.norm(forces[id(s)])) / max(s.run.point.static_load, 1e-9)
+        for s in runs
+        if id(s) in forces and excited(s)
+    }
+    usual = float(np.median(list(relative.values()))) if relative else 0.0
+    shown: list[tuple[Observation, ComplexArray]] = []
+    for seen in runs:
+        if id(seen) not in forces:
+            continue
+        if id(seen) not in relative or (len(relative) > 3 and relative[id(seen)] < 0.1 * usual):
+            _missing_line(seen)
+        elif "force" not in seen.report.doubts:
+            shown.append((seen, forces[id(seen)]))
+    _check_directions(shown)
+
+
+def _missing_line(seen: Observation) -> None:
+    point = seen.run.point
+    other = seen.other_line
+    hint = f"; the strongest other line is near {other:.3g} Hz" if math.isfinite(other) else ""
+    what = f"the force shows no line at the excitation frequency of {point.excitation_hz:g} Hz{hint}"
+    cure = "Check excitation_frequency, and whether the actuators ran; repeat the run"
+    seen.report.say("no excitation", "error", "force", what, cure)
+    seen.report.doubts.add("force")
+
+
+def _along(force: ComplexArray) -> float:
+    """Direction of the long axis of the force ellipse [deg, modulo 180]; NaN where it is nearly a circle."""
+    sizes, axes = np.linalg.eigh(np.real(np.outer(force, force.conj())))
+    return math.degrees(math.atan2(axes[1, 1], axes[0, 1])) if sizes[0] < 0.25 * sizes[1] else math.nan
+
+
+def _check_directions(shown: Sequence[tuple[Observation, ComplexArray]]) -> None:
+    stated = [
+        (s, f, math.degrees(s.run.excitation_direction)) for s, f in shown if s.run.excitation_direction is not None
+    ]
+    off = [(s, f, d) for s, f, d in stated if angle_between(_along(f), d, 180.0) > _ANGLE_WARNING]
+    guess = _common_wiring([(s, d) for s, _, d in stated]) if len(off) > 2 else ""
+    for seen, _, _ in stated if guess else ():
+        seen.report.doubts.add("force")  # the cells are wired wrongly in the other runs too
+    for seen, force, says in off:
+        shows = _along(force)
+        severity: Severity = "error" if guess or angle_between(shows, says, 180.0) > _ANGLE_ERROR else "warning"
+        if severity == "error":
+            seen.report.doubts.add("force")
+        near = round(says + (shows - says + 90.0) % 180.0 - 90.0)
+        what = f"the excitation shows along {near} deg, excitation_direction says {says:g} deg{guess}"
+        cure = "Check excitation_direction, and the cells' axes and cables"
+        seen.report.say(f"excitation direction{guess}", severity, "force", what, cure)
+
+
+def _common_wiring(stated: Sequence[tuple[Observation, float]]) -> str:
+    """One fault of the cells that brings nearly all excitations into their stated directions."""
+    first = stated[0][0]
+    channels = [first.channels[i] for i in first.pick("force")]
+    if len(channels) != 2:
+        return ""
+    for words, matrix in repairs(channels):
+        right = 0
+        for seen, says in stated:
+            where = seen.pick("force")
+            if seen.lines is None or [seen.channels[i].name for i in where] != [c.name for c in channels]:
+                continue
+            mended = to_plane(channels, matrix @ seen.lines.phasor[where])
+            right += angle_between(_along(mended), says, 180.0) <= _ANGLE_WARNING
+        if right >= 0.8 * len(stated):
+            return f"; as if {words}"
+    return ""

@@ -1,0 +1,186 @@
+"""Check dry, clearance and locus runs: the shaft must go where it is pushed, toward the stated pad."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.problem import Severity
+from tpjb_ident.check.observation import Observation
+from tpjb_ident.check.pad_labels import check_labels
+from tpjb_ident.check.response import definiteness, mirrored
+from tpjb_ident.check.set_points import angle_between, to_plane
+from tpjb_ident.check.wiring import guess_wiring, name_fault
+
+FloatArray = NDArray[np.float64]
+_ANGLE_WARNING, _ANGLE_ERROR = 10.0, 30.0
+#: Cosine of the angle between load and motion; rigs move sideways by up to a quarter of the way.
+_FOLLOWS = math.cos(math.radians(40.0))
+#: A shaft that moves less than this [m] in a dry test may as well be a probe that drifts.
+_FIRM_MOVE = 1.5e-6
+#: A clearance polygon and a locus are far from round; 1 is round.
+_LEAST_DEFINITE = 0.02
+
+
+def _planes(seen: Observation) -> tuple[FloatArray, FloatArray] | None:
+    """Force and displacement (n, 2) of the thinned samples, rows without a value left out."""
+    force, shaft = seen.pick("force"), seen.pick("displacement")
+    if len(force) < 2 or len(shaft) != 2:
+        return None
+    rows = np.isfinite(seen.samples[:, force + shaft]).all(axis=1)
+    if np.count_nonzero(rows) < 20:
+        return None
+    samples = seen.samples[rows]
+    axes_force = np.array([seen.channels[i].axis for i in force])
+    axes_shaft = np.array([seen.channels[i].axis for i in shaft])
+    return (
+        samples[:, force] @ np.linalg.pinv(np.stack([np.cos(axes_force), np.sin(axes_force)], axis=1)).T,
+        samples[:, shaft] @ np.linalg.pinv(np.stack([np.cos(axes_shaft), np.sin(axes_shaft)], axis=1)).T,
+    )
+
+
+def check_dry(runs: Sequence[Observation]) -> None:
+    """Dry pivot runs: a load that rises, its direction, pads told apart."""
+    directions: list[tuple[Observation, float]] = []
+    for seen in runs:
+        planes = _planes(seen)
+        if planes is None:
+            continue
+        push = _main_move(planes[0])
+        if push is None:
+            seen.report.say("no load", "error", "force", "the load does not rise", "Check the cells; repeat the run")
+            continue
+        shows = math.degrees(math.atan2(push[1], push[0]))
+        directions.append((seen, shows))
+        if "static_load_direction" in seen.run.stated:
+            _check_push(seen, shows, push)
+    check_labels(directions)
+
+
+def check_shaft_follows(runs: Sequence[Observation]) -> None:
+    """Dry pivot runs: the shaft goes toward the pad, where the force can be trusted."""
+    for seen in runs:
+        planes = _planes(seen)
+        push = None if planes is None or "force" in seen.report.doubts else _main_move(planes[0])
+        if planes is not None and push is not None:
+            _check_follows(seen, planes, push)
+
+
+def _main_move(force: FloatArray) -> FloatArray | None:
+    """From the least to the greatest force, (2,) [N]; None where it hardly changes."""
+    size = np.linalg.norm(force, axis=1)
+    few = max(3, len(force) // 20)
+    order = np.argsort(size)
+    low, high = np.median(force[order[:few]], axis=0), np.median(force[order[-few:]], axis=0)
+    noise = float(np.median(np.abs(np.diff(size))))
+    move = high - low
+    return move if float(np.hypot(*move)) > max(10 * noise, 1e-9) else None
+
+
+def _check_push(seen: Observation, shows: float, push: FloatArray) -> None:
+    says = seen.run.point.static_load_direction_deg
+    off = angle_between(shows, says)
+    if off <= _ANGLE_WARNING:
+        return
+    where = seen.pick("force")
+    channels = [seen.channels[i] for i in where]
+    wanted = np.array([math.cos(math.radians(says)), math.sin(math.radians(says))])
+    axes = np.array([c.axis for c in channels])
+    readings = np.stack([np.cos(axes), np.sin(axes)], axis=1) @ push
+    guess = guess_wiring(channels, readings, wanted)
+    severity: Severity = "error" if off > _ANGLE_ERROR else "warning"
+    if guess:
+        seen.report.doubts.add("force")
+    what = f"the load rises toward {shows:.0f} deg, static_load_direction of pad {seen.run.pad} is {says:g} deg{guess}"
+    cure = "Check pad and static_load_direction of this run, and the cells' axes and cables"
+    seen.report.say(f"push direction{guess}", severity, "force", what, cure)
+
+
+def _check_follows(seen: Observation, planes: tuple[FloatArray, FloatArray], push: FloatArray) -> None:
+    """The shaft must go toward the pad, mainly along the load."""
+    unit = push / np.hypot(*push)
+    load = planes[0] @ unit
+    centred = load - load.mean()
+    slope = centred @ (planes[1] - planes[1].mean(axis=0)) / float(centred @ centred)
+    size = float(np.hypot(*slope))
+    if size * float(np.ptp(load)) < _FIRM_MOVE or float(slope @ unit) > _FOLLOWS * size:
+        return
+    where = seen.pick("displacement")
+    channels = [seen.channels[i] for i in where]
+    axes = np.array([c.axis for c in channels])
+    readings = np.stack([np.cos(axes), np.sin(axes)], axis=1) @ slope
+    guess = guess_wiring(channels, readings, unit, within=20.0)
+    goes, pushed = math.degrees(math.atan2(slope[1], slope[0])), math.degrees(math.atan2(unit[1], unit[0]))
+    what = f"the shaft goes toward {goes:.0f} deg while the load pushes toward {pushed:.0f} deg{guess}"
+    cure = "Check axis, polarity and cables of the probes"
+    names = " and ".join(c.name for c in channels)
+    seen.report.say(f"signs {names}{guess}", "error", f"channels {names}", what, cure)
+
+
+def check_sweeps(runs: Sequence[Observation]) -> None:
+    """Clearance runs: the shaft moves to the side to which the small load pushes it."""
+    for seen in runs:
+        planes = _planes(seen)
+        if planes is None:
+            continue
+        force, shaft = planes[0] - planes[0].mean(axis=0), planes[1] - planes[1].mean(axis=0)
+        sizes = np.linalg.svd(force, compute_uv=False)
+        if sizes[-1] < 0.3 * sizes[0]:
+            what = "the load does not sweep around all directions"
+            seen.report.say("sweep", "warning", "force", what, "A clearance run needs a rotating load")
+            continue
+        gain = np.linalg.lstsq(force, shaft, rcond=None)[0].T
+        _judge_gain(seen, gain)
+
+
+def check_locus(runs: Sequence[Observation]) -> None:
+    """Locus runs together: mean positions follow the directions of the loads."""
+    groups: dict[object, list[Observation]] = {}
+    for seen in runs:
+        measured = len(seen.pick("displacement")) == 2 and len(seen.pick("force")) >= 2
+        if seen.lines is not None and measured and "force" not in seen.report.doubts:
+            groups.setdefault((seen.run.point.static_load, seen.run.point.shaft_speed), []).append(seen)
+    for group in groups.values():
+        loads: list[FloatArray] = []
+        places: list[FloatArray] = []
+        for seen in group:
+            assert seen.lines is not None
+            for quantity, into in (("force", loads), ("displacement", places)):
+                where = seen.pick(quantity)
+                into.append(to_plane([seen.channels[i] for i in where], seen.lines.mean[where]))
+        force, shaft = np.array(loads), np.array(places)
+        rows = np.isfinite(np.hstack([force, shaft])).all(axis=1)
+        if np.count_nonzero(rows) < 4:
+            continue
+        force, shaft = force[rows] - force[rows].mean(axis=0), shaft[rows] - shaft[rows].mean(axis=0)
+        sizes = np.linalg.svd(force, compute_uv=False)
+        if sizes[-1] > 0.3 * sizes[0]:
+            gain = np.linalg.lstsq(force, shaft, rcond=None)[0].T
+            for seen in group:
+                _judge_gain(seen, gain)
+            _judge_places([group[i] for i in np.flatnonzero(rows)], shaft, shaft - force @ gain.T)
+
+
+def _judge_places(group: Sequence[Observation], shaft: FloatArray, off: FloatArray) -> None:
+    """A position that lies elsewhere than the others of its load and speed let one expect."""
+    size, misfit = float(np.median(np.hypot(*shaft.T))), np.hypot(*off.T)
+    for seen, distance in zip(group, misfit):
+        if len(group) >= 6 and distance > max(0.7 * size, 5 * float(np.median(misfit))):
+            what = f"the mean position lies {1e6 * distance:.0f} um from where the other directions let one expect it"
+            cure = "Check the probes of this run: sign, sensitivity, moved?"
+            seen.report.say("place", "warning", "displacement", what, cure)
+
+
+def _judge_gain(seen: Observation, gain: FloatArray) -> None:
+    """`gain` (2, 2) [m/N] from force to displacement must be positive definite."""
+    if definiteness(gain) > _LEAST_DEFINITE or not np.any(gain) or "force" in seen.report.doubts:
+        return
+    channels = [seen.channels[i] for i in seen.pick("displacement")]
+    hint = name_fault(channels, lambda repair: definiteness(mirrored(channels, repair) @ gain))
+    names = " and ".join(c.name for c in channels)
+    what = f"the shaft does not go to the side to which the load pushes it{hint}"
+    cure = "Check axis, polarity and cables of the probes (and of the cells)"
+    seen.report.say(f"signs {names}{hint}", "error" if hint else "warning", f"channels {names}", what, cure)

@@ -1,0 +1,1 @@
+"""Clearance polygon and shaft centre locus from slow sweeps (paper, Fig. 14)."""

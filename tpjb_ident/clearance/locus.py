@@ -1,0 +1,304 @@
+"""Shaft positions over load direction, from the bearing centre (paper, Fig. 14)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.operating_point import OperatingPoint
+from rigdata.problem import Problem, RigDataError
+from tpjb_ident.clearance.measure import ClearancePolygon
+from tpjb_ident.slow_records.flat_channels import refuse_flat_channels
+from tpjb_ident.slow_records.glitches import good_samples
+from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from rigdata.campaign import Campaign, Run
+
+FloatArray = NDArray[np.float64]
+
+DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
+BLOCK = 0.1  # [s], for learning the noise
+NOISE_RUNS = 8  # that noise is learnt from, spread over the test
+SAME_DIRECTION = math.radians(1.0)
+LOAD_MISS = 0.05  # relative, between set point and measured load
+DIRECTION_MISS = math.radians(5.0)
+
+
+@dataclass(frozen=True)
+class LocusPoint:
+    """Mean shaft position under one static load.
+
+    Attributes
+    ----------
+    run : str
+        Where it came from.
+    point : OperatingPoint
+        Set points.
+    load, load_direction : float
+        As the cells measured it [N], [rad].
+    position : (2,) ndarray
+        From the bearing centre [m]; from the probes' own zero where no centre is known.
+    covariance : (2, 2) ndarray
+        [m^2], the centre's own included.
+    """
+
+    run: str
+    point: OperatingPoint
+    load: float
+    load_direction: float
+    position: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True)
+class Locus:
+    """Positions of the shaft centre over load direction.
+
+    Attributes
+    ----------
+    points : tuple of LocusPoint
+        In order of load and direction.
+    centre : (2,) ndarray
+        Reading of the bearing centre that was taken off [m]; zero where none is known.
+    drift : (2,) ndarray
+        Drift taken off, per run in the order of testing [m]; NaN where no direction was repeated.
+    status : tuple of str
+        Named conditions.
+    """
+
+    points: tuple[LocusPoint, ...]
+    centre: FloatArray
+    drift: FloatArray
+    status: tuple[str, ...] = field(default=())
+
+    def to_frame(self) -> pd.DataFrame:
+        """Table of `locus.csv` (outputs.md)."""
+        import pandas as pd
+
+        se = np.sqrt(np.array([np.diag(p.covariance) for p in self.points]))
+        place = np.array([p.position for p in self.points])
+        return pd.DataFrame(
+            {
+                "static_load_N": [p.point.static_load for p in self.points],
+                "static_load_direction_deg": [p.point.static_load_direction_deg for p in self.points],
+                "shaft_speed_Hz": [p.point.shaft_speed_hz for p in self.points],
+                "static_load_measured_N": [p.load for p in self.points],
+                "static_load_direction_measured_deg": [math.degrees(p.load_direction) for p in self.points],
+                "x_m": place[:, 0],
+                "y_m": place[:, 1],
+                "x_m_se": se[:, 0],
+                "y_m_se": se[:, 1],
+                "run": [p.run for p in self.points],
+            }
+        )
+
+    def __str__(self) -> str:
+        radii = [1e6 * float(np.hypot(*p.position)) for p in self.points]
+        text = f"locus: {len(self.points)} positions, {min(radii):.1f} to {max(radii):.1f} um from the centre"
+        return text + (f"; {', '.join(self.status)}" if self.status else "")
+
+
+def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -> Locus:
+    """Measure the mean position of every locus run.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        With runs of kind ``locus``.
+    polygon : ClearancePolygon, optional
+        Gives the bearing centre, and a wall that no position may lie behind.
+
+    Returns
+    -------
+    Locus
+
+    Raises
+    ------
+    RigDataError
+        When the campaign has no locus runs, or half of them or more cannot be used. Fewer are left out, and the status
+        names them.
+    """
+    runs = campaign.of_kind("locus")
+    if not runs:
+        raise RigDataError(
+            Problem("error", "campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
+        )
+    found, refused = _usable(runs)
+    orders, read = list(found), list(found.values())
+    noise = _noise(read)
+    centre = np.zeros(2) if polygon is None else polygon.centre
+    drift = _drift(found, noise, centre)
+    known = np.isfinite(drift.rate).all()
+    drifts, drift_variance = (drift.rate, drift.variance) if known else (np.zeros(2), 0.0)
+    centre_covariance = np.zeros((2, 2)) if polygon is None else polygon.centre_covariance
+    points = []
+    for order, record in zip(orders, read, strict=True):
+        run = runs[order]
+        position = record.position - drifts * order - centre
+        variance = (noise.mean_variance(record.span) + order**2 * drift_variance) * np.eye(2)
+        points.append(
+            LocusPoint(run.id, run.point, record.load, record.direction, position, variance + centre_covariance)
+        )
+    points.sort(key=lambda p: (p.point.static_load, p.point.shaft_speed, _from_down(p.point.static_load_direction)))
+    status = (*_status(points, polygon, drift.rate), *refused)
+    return Locus(tuple(points), np.asarray(centre), drift.rate, status)
+
+
+def _usable(runs: Sequence[Run]) -> tuple[dict[int, _Read], tuple[str, ...]]:
+    """Runs that can be used, by their number in the order of testing, and a condition that names the others."""
+    found: dict[int, _Read] = {}
+    problems: list[Problem] = []
+    for order, run in enumerate(runs):
+        try:
+            found[order] = _read(run)
+        except RigDataError as error:
+            problems += error.problems
+    if 2 * len(found) <= len(runs):
+        raise RigDataError(problems)
+    reasons = {str(p.run): p.what for p in reversed(problems)}
+    return found, ("runs-refused: " + "; ".join(f"{run} ({reasons[run]})" for run in reasons),) if reasons else ()
+
+
+@dataclass(frozen=True)
+class _Read:
+    """One locus run: mean position and load, and block averages (m, 2) for the noise."""
+
+    point: OperatingPoint
+    position: FloatArray
+    load: float
+    direction: float
+    span: float
+    block_time: FloatArray
+    blocks: FloatArray
+
+
+def _from_down(direction: float) -> float:
+    """Angle from straight down, 0 to 2 pi: the order in which a locus is swept."""
+    return (direction + math.pi / 2 + 1e-9) % (2 * math.pi)
+
+
+def _read(run: Run) -> _Read:
+    refuse_flat_channels(run)
+    force, displacement = run.vector("force"), run.vector("displacement")
+    n = min(len(force), len(displacement))
+    good = good_samples(np.hstack([force.values[:n], displacement.values[:n]]))
+    if good.sum() < 50 or good.mean() < 0.5:
+        what = f"locus run {run.id} has only {int(good.sum())} usable samples of {n}"
+        raise RigDataError(Problem("error", run.file, "record", what, "Repeat this direction", run=run.id))
+    time, place = displacement.time[:n][good], displacement.values[:n][good]
+    design = _turning(time, run.point.shaft_speed)
+    mean = np.linalg.lstsq(design, np.hstack([place, force.values[:n][good]]), rcond=None)[0]
+    # what turns with the shaft (runout, unbalance) averages out only over whole turns: take it off
+    still = place - design[:, 1:] @ mean[1:, :2]
+    label = np.floor((time - time[0]) / BLOCK).astype(int)
+    parts = [label == k for k in np.unique(label)]
+    parts = [part for part in parts if part.sum() > 0.5 * np.median([p.sum() for p in parts])]
+    load = mean[0, 2:]
+    return _Read(
+        point=run.point,
+        position=np.asarray(mean[0, :2], dtype=float),
+        load=float(np.hypot(*load)),
+        direction=float(np.arctan2(load[1], load[0])),
+        span=float(time[-1] - time[0]),
+        block_time=np.array([time[part].mean() for part in parts]),
+        blocks=np.array([still[part].mean(axis=0) for part in parts]),
+    )
+
+
+def _turning(time: FloatArray, speed: float) -> FloatArray:
+    """Columns (n, p): one, and cosine and sine of once and twice per turn where the record holds two turns."""
+    columns = [np.ones_like(time)]
+    if speed > 0.0 and speed * (time[-1] - time[0]) > 4.0 * math.pi:
+        for order in (1.0, 2.0):
+            columns += [np.cos(order * speed * time), np.sin(order * speed * time)]
+    return np.column_stack(columns)
+
+
+def _noise(read: list[_Read]) -> NoiseModel:
+    """Noise of the probes, pooled over all runs."""
+    some = read[:: max(1, len(read) // NOISE_RUNS)]
+    series = [
+        NoiseSeries(r.block_time, np.full(len(values), BLOCK), values, np.ones((len(values), 1)))
+        for r in some
+        for values in r.blocks.T
+    ]
+    if max(len(s.time) for s in series) <= 3:
+        # records of a few tenths of a second show no noise over seconds: take the scatter within each run
+        scatter = float(np.mean([np.var(s.values) for s in series])) + 1e-18
+        return NoiseModel(scatter * BLOCK, scatter, DRIFT_RATE)
+    return estimate_noise(series, DRIFT_RATE)
+
+
+@dataclass(frozen=True)
+class _Drift:
+    """Drift per run: `rate` (2,) [m], NaN where nothing was repeated, and the variance [m^2] of either component."""
+
+    rate: FloatArray
+    variance: float
+
+
+def _drift(found: dict[int, _Read], noise: NoiseModel, centre: FloatArray) -> _Drift:
+    """Drift from repeats of one set point.
+
+    Runs are evenly spaced in time as far as anyone knows: the drift is taken as proportional to the run's number. A
+    repeat meets its set point otherwise than the first time: by as much, times its distance from the centre, the shaft
+    may stand elsewhere without any drift.
+    """
+    pairs = []
+    for i, first in found.items():
+        for j, other in found.items():
+            if i < j and _same_set_point(first.point, other.point):
+                miss = math.hypot(
+                    other.load / max(first.load, 1e-300) - 1.0,
+                    math.remainder(other.direction - first.direction, 2 * math.pi),
+                )
+                elsewhere = miss * float(np.hypot(*(first.position - centre)))
+                variance = noise.mean_variance(first.span) + noise.mean_variance(other.span) + elsewhere**2
+                pairs.append((j - i, other.position - first.position, variance))
+    if not pairs:
+        return _Drift(np.full(2, np.nan), np.nan)
+    apart = np.array([p[0] for p in pairs], dtype=float)
+    moved = np.array([p[1] for p in pairs])
+    weight = apart / (apart @ apart)
+    return _Drift(weight @ moved, float(weight**2 @ np.array([p[2] for p in pairs])))
+
+
+def _same_set_point(one: OperatingPoint, other: OperatingPoint) -> bool:
+    turn = abs(math.remainder(one.static_load_direction - other.static_load_direction, 2 * math.pi))
+    same = one.static_load == other.static_load and one.shaft_speed == other.shaft_speed
+    return same and turn < SAME_DIRECTION
+
+
+def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, drift: FloatArray) -> tuple[str, ...]:
+    found = []
+    if polygon is None:
+        found.append("no-centre: positions from the probes' zero, no clearance polygon given")
+    if np.isnan(drift).any():
+        found.append("drift-unknown: no load direction was repeated")
+    missed = [
+        p.run
+        for p in points
+        if abs(p.load - p.point.static_load) > LOAD_MISS * max(p.point.static_load, 1.0)
+        or abs(math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)) > DIRECTION_MISS
+    ]
+    if missed:
+        found.append("load-off-set-point: " + ", ".join(missed))
+    if polygon is not None:
+        behind = [p.run for p in points if _behind(p, polygon)]
+        if behind:
+            found.append("outside-polygon: " + ", ".join(behind))
+    return tuple(found)
+
+
+def _behind(point: LocusPoint, polygon: ClearancePolygon) -> bool:
+    """True where the shaft lies behind a pad's unloaded face by more than any pivot gives."""
+    n = np.column_stack([np.cos(polygon.angles), np.sin(polygon.angles)])
+    return bool(np.nanmax(n @ point.position - 1.5 * polygon.clearance) > 0.0)

@@ -1,0 +1,171 @@
+"""Two clearance polygons of one bearing compared: two push loads, or cold and hot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpjb_ident.clearance.measure import SAME_WARMTH, ClearancePolygon
+from tpjb_ident.clearance.polygon import normals
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+
+RISE = 0.2  # of the lighter push load: less tells nothing of the stiffness
+
+
+@dataclass(frozen=True)
+class RadialStiffness:
+    """Pivot stiffness from two sweeps with different push loads.
+
+    Attributes
+    ----------
+    load : float
+        Middle of the two push loads [N].
+    stiffness, stiffness_se : (n,) ndarray
+        Difference of load over difference of pushed position, per pad [N/m].
+    """
+
+    load: float
+    stiffness: FloatArray
+    stiffness_se: FloatArray
+
+
+def radial_stiffness(light: ClearancePolygon, heavy: ClearancePolygon) -> RadialStiffness:
+    """Secant between two push loads of the same bearing in the same condition.
+
+    Parameters
+    ----------
+    light, heavy : ClearancePolygon
+        Measured with the smaller and the larger push load.
+
+    Returns
+    -------
+    RadialStiffness
+
+    Raises
+    ------
+    ValueError
+        When the push loads are not clearly different.
+    """
+    rise = heavy.push_load - light.push_load
+    if rise <= RISE * light.push_load:
+        loads = f"{light.push_load:.0f} and {heavy.push_load:.0f} N"
+        raise ValueError(f"push loads must differ by a fifth at least, heavy after light; got {loads}")
+    # each about its own centre: a zero that wandered between the runs is no give
+    give = heavy.clearance_pushed - light.clearance_pushed
+    se = np.hypot(heavy.clearance_pushed_se, light.clearance_pushed_se)
+    stiffness = rise / give
+    load = 0.5 * (heavy.push_load + light.push_load)
+    return RadialStiffness(load, np.asarray(stiffness), np.asarray(np.abs(stiffness / give) * se))
+
+
+@dataclass(frozen=True)
+class ClearanceChange:
+    """Growth of the clearance from one condition to another.
+
+    Attributes
+    ----------
+    per_pad, per_pad_se : (n,) ndarray
+        Each polygon about its own centre [m].
+    mean, mean_se : float
+        Over the pads [m]: what `physics.md` calls ``thermal_growth`` when the second polygon is hot.
+    centre_shift : (2,) ndarray
+        How far the centre's reading moved [m]; the probes' zero may have wandered with the temperature.
+    """
+
+    per_pad: FloatArray
+    per_pad_se: FloatArray
+    mean: float
+    mean_se: float
+    centre_shift: FloatArray
+
+
+def clearance_change(before: ClearancePolygon, after: ClearancePolygon) -> ClearanceChange:
+    """How much the clearance at zero load changed, as from cold to hot.
+
+    Parameters
+    ----------
+    before, after : ClearancePolygon
+        Of one bearing: the same pads.
+
+    Returns
+    -------
+    ClearanceChange
+
+    Raises
+    ------
+    ValueError
+        When the polygons have other pad directions.
+    """
+    if before.angles.shape != after.angles.shape or not np.allclose(before.angles, after.angles, atol=1e-6):
+        raise ValueError("both polygons must be of one bearing: their pad directions differ")
+    shift = after.centre - before.centre
+    per_pad = after.clearance - before.clearance
+    se = np.hypot(before.clearance_se, after.clearance_se)
+    known = np.isfinite(per_pad)
+    # pads that do not surround the shaft evenly: a shift of the centre must not pass for growth
+    design = np.column_stack([np.ones(known.sum()), normals(before.angles[known])])
+    mean = np.linalg.lstsq(design, per_pad[known], rcond=None)[0][0]
+    mean_se = float(np.sqrt(np.linalg.inv(design.T @ design)[0, 0] * np.mean(se[known] ** 2)))
+    return ClearanceChange(per_pad, se, float(mean), mean_se, shift)
+
+
+def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> pd.DataFrame:
+    """Every other polygon against one: `clearance_pairs.csv`, one row per pad.
+
+    Parameters
+    ----------
+    base : ClearancePolygon
+        Cold, light push.
+    others : sequence of ClearancePolygon
+        Of the same bearing.
+
+    Returns
+    -------
+    DataFrame
+        ``run``, ``against``, ``compared`` (``push load``: only the push differs; ``condition``: temperature or speed
+        do), ``pad``, ``change_m`` and ``change_m_se`` (clearance at zero push load), and for two push loads
+        ``stiffness_N_per_m`` with ``_se`` at ``load_N``.
+    """
+    import pandas as pd
+
+    rows = []
+    for other in others:
+        change = clearance_change(base, other)
+        light, heavy = sorted((base, other), key=lambda p: p.push_load)
+        same = same_condition(base, other)
+        spring = radial_stiffness(light, heavy) if same and _rises(light, heavy) else None
+        for k in range(len(base.angles)):
+            row = {
+                "run": other.run,
+                "against": base.run,
+                "compared": "push load" if same else "condition",
+                "pad": k + 1,
+                "change_m": change.per_pad[k],
+                "change_m_se": change.per_pad_se[k],
+            }
+            if spring is not None:
+                row |= {
+                    "load_N": spring.load,
+                    "stiffness_N_per_m": spring.stiffness[k],
+                    "stiffness_N_per_m_se": spring.stiffness_se[k],
+                }
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def same_condition(one: ClearancePolygon, other: ClearancePolygon) -> bool:
+    """Whether two sweeps were made at one speed and one temperature (or nobody knows better)."""
+    apart = abs(one.temperature - other.temperature)
+    return one.point.shaft_speed == other.point.shaft_speed and not apart > SAME_WARMTH
+
+
+def _rises(light: ClearancePolygon, heavy: ClearancePolygon) -> bool:
+    return heavy.push_load - light.push_load > RISE * light.push_load

@@ -1,0 +1,230 @@
+"""A clearance sweep, read: averages of the shaft's position with the load that each touched pad carries.
+
+A small load turns once around. Between the directions of two neighbouring pads the shaft lies in the corner
+between them and both carry; just past a pad's direction it slides along that pad's side to the next corner.
+So the force vector says how much each pad carries, and the position says which pads are touched.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.problem import Problem, RigDataError
+from tpjb_ident.clearance.polygon import normals
+from tpjb_ident.slow_records.flat_channels import refuse_flat_channels
+from tpjb_ident.slow_records.glitches import good_samples
+
+if TYPE_CHECKING:
+    from rigdata.campaign import Run
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int_]
+
+BLOCK = 0.1  # [s]; five mains periods
+CONTACT_DEPTH = 1.0e-6  # [m]: a pad counts as touched within this of its farthest position, plus its own give
+SHORTEST = 5  # samples in a piece
+MOVING = 2.0  # robust standard deviations of the speed in corners above which the shaft is still on its way
+LARGEST_GIVE = 6.0e-6  # [m], of a pivot under the push load where no curve says it
+TURN_NEEDED = 2.0 * np.pi * 0.97
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Averages during which a pad was touched: m pieces, each of one pad.
+
+    Attributes
+    ----------
+    time, duration : (m,) ndarray
+        [s]
+    pad : (m,) ndarray of int
+        Index of the pad, from 0.
+    along, across : (m,) ndarray
+        Position on the pad's axes [m], from the probes' zero.
+    load : (m,) ndarray
+        What the pad carries [N].
+    push : float
+        Median of the load's magnitude [N].
+    alone : (m,) ndarray of bool
+        True where no other pad was touched (sliding).
+    """
+
+    time: FloatArray
+    duration: FloatArray
+    pad: IntArray
+    along: FloatArray
+    across: FloatArray
+    load: FloatArray
+    push: float
+    alone: NDArray[np.bool_]
+
+    def take(self, keep: NDArray[np.bool_]) -> Touch:
+        """The averages where `keep` (m,) is true."""
+        return Touch(
+            self.time[keep],
+            self.duration[keep],
+            self.pad[keep],
+            self.along[keep],
+            self.across[keep],
+            self.load[keep],
+            self.push,
+            self.alone[keep],
+        )
+
+
+def read_sweep(run: Run, angles: FloatArray, give: FloatArray | None = None, longest_glitch: int = 60) -> Touch:
+    """Read a run of kind ``clearance``.
+
+    Parameters
+    ----------
+    run : Run
+        The sweep.
+    angles : (n,) ndarray
+        Pad directions [rad].
+    give : (n,) ndarray, optional
+        Deflection of each pivot under the push load [m], where known.
+    longest_glitch : int
+        [samples]
+
+    Returns
+    -------
+    Touch
+
+    Raises
+    ------
+    RigDataError
+        When the load does not go all around or the shaft does not follow it.
+    """
+    refuse_flat_channels(run)
+    force, displacement = run.vector("force"), run.vector("displacement")
+    n = min(len(force), len(displacement))
+    good = good_samples(np.hstack([force.values[:n], displacement.values[:n]]), longest_glitch)
+    if good.sum() < 200:
+        raise _refused(run, f"has only {int(good.sum())} usable samples", "Repeat the sweep")
+    load, position, time = force.values[:n][good], displacement.values[:n][good], displacement.time[:n][good]
+    _check_turn(run, load, position, time)
+    push = float(np.median(np.hypot(*load.T)))
+    depth = CONTACT_DEPTH + (np.full(len(angles), LARGEST_GIVE) if give is None else 1.3 * give)
+    touched = _touched(position, angles, depth)
+    carried = _carried(load, angles, touched)
+    return _blocks(time, position, angles, touched, carried, push, _piece_length(run.point.shaft_speed))
+
+
+def _piece_length(shaft_speed: float) -> float:
+    """Length of the averages [s]: whole turns of a shaft that turns, so that its runout averages out."""
+    turn = 2.0 * np.pi / shaft_speed if shaft_speed > 0.0 else BLOCK
+    return float(turn * max(round(BLOCK / turn), 1))
+
+
+def _refused(run: Run, what: str, cure: str) -> RigDataError:
+    return RigDataError(Problem("error", run.file, "record", f"clearance run {run.id} {what}", cure, run=run.id))
+
+
+def _check_turn(run: Run, load: FloatArray, position: FloatArray, time: FloatArray) -> None:
+    """Refuse a load that does not go around, and a shaft that goes elsewhere than the load."""
+    step = max(1, len(load) // 400)
+    whole = len(load) // step * step
+    load_mean = load[:whole].reshape(-1, step, 2).mean(axis=1)
+    place = position[:whole].reshape(-1, step, 2).mean(axis=1)
+    angle = np.unwrap(np.arctan2(load_mean[:, 1], load_mean[:, 0]))
+    if np.ptp(angle) < TURN_NEEDED:
+        what = f"turns its load through {np.degrees(np.ptp(angle)):.0f} deg only"
+        raise _refused(run, what, "Sweep the load once around, 360 deg or more")
+    place = place - 0.5 * (place.max(axis=0) + place.min(axis=0))
+    lag = np.angle(np.sum((place[:, 0] + 1j * place[:, 1]) * np.exp(-1j * angle)))
+    size = np.hypot(*place.T).mean()
+    together = abs(np.mean((place[:, 0] + 1j * place[:, 1]) * np.exp(-1j * angle))) / max(size, 1e-300)
+    if abs(lag) > np.radians(30.0) or together < 0.7:
+        what = f"has a shaft that does not follow its load ({np.degrees(lag):+.0f} deg away, coherence {together:.2f})"
+        cure = "Check order, axes and polarity of the displacement and force channels"
+        raise _refused(run, what, cure)
+
+
+def _touched(position: FloatArray, angles: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
+    """Which pads (n_samples, n) the shaft touches: it lies within `depth` of where it was farthest out."""
+    out = position @ normals(angles).T
+    farthest = np.quantile(out, 0.995, axis=0)
+    return np.asarray(out > farthest - depth)
+
+
+def _carried(load: FloatArray, angles: FloatArray, touched: NDArray[np.bool_]) -> FloatArray:
+    """Load on every touched pad (n_samples, n) [N]; NaN where the touched pads cannot balance the force."""
+    n = normals(angles)
+    carried = np.full(touched.shape, np.nan)
+    count = touched.sum(axis=1)
+    single = np.flatnonzero(count == 1)
+    pad = np.argmax(touched[single], axis=1)
+    carried[single, pad] = np.sum(load[single] * n[pad], axis=1)
+    for i in range(len(angles)):
+        j = (i + 1) % len(angles)
+        both = np.flatnonzero((count == 2) & touched[:, i] & touched[:, j])
+        share = np.linalg.solve(n[[i, j]].T, load[both].T)
+        # past a pad's own direction its neighbour would have to pull: the pad carries all, friction holds the shaft
+        alone_i, alone_j = share[1] < 0.0, share[0] < 0.0
+        carried[both, i] = np.where(alone_i, load[both] @ n[i], np.maximum(share[0], 0.0))
+        carried[both, j] = np.where(alone_j, load[both] @ n[j], np.maximum(share[1], 0.0))
+    return carried
+
+
+def _blocks(
+    time: FloatArray,
+    position: FloatArray,
+    angles: FloatArray,
+    touched: NDArray[np.bool_],
+    carried: FloatArray,
+    push: float,
+    length: float,
+) -> Touch:
+    """Average per pad over pieces of `length` seconds in which the same pads are touched."""
+    state = touched @ (1 << np.arange(len(angles)))
+    piece = np.floor((time - time[0]) / length).astype(int)
+    cuts = np.flatnonzero((np.diff(state) != 0) | (np.diff(piece) != 0)) + 1
+    starts, stops = np.r_[0, cuts], np.r_[cuts, len(time)]
+    long = (stops - starts) >= SHORTEST
+    starts, stops = starts[long], stops[long]
+    count = (stops - starts).astype(float)
+
+    def means(values: FloatArray) -> FloatArray:
+        total = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(values - values[0], axis=0)])
+        return np.asarray((total[stops] - total[starts]) / count[:, None] + values[0])
+
+    period = float(time[-1] - time[0]) / (len(time) - 1)
+    moment = means(time[:, None])[:, 0]
+    place = means(position)
+    load = means(np.nan_to_num(carried))
+    lost = means(np.isnan(carried).astype(float)) > 0.0
+    usable = touched[starts] & ~lost & _at_rest(moment, place, touched[starts])[:, None]
+    row, pad = np.nonzero(usable)
+    tangent = np.column_stack([-np.sin(angles), np.cos(angles)])
+    return Touch(
+        time=moment[row],
+        duration=count[row] * period,
+        pad=pad,
+        along=np.sum(place[row] * normals(angles)[pad], axis=1),
+        across=np.sum(place[row] * tangent[pad], axis=1),
+        load=load[row, pad],
+        push=push,
+        alone=touched[starts][row].sum(axis=1) == 1,
+    )
+
+
+def _at_rest(time: FloatArray, place: FloatArray, touched: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """True for pieces (m,) in which the shaft lies in a corner, or slides along one pad.
+
+    A shaft that comes to a corner slowly is near the second pad before it touches it: only when it moves no faster
+    than the pivots give does the corner hold it.
+    """
+    corner = touched.sum(axis=1) == 2
+    if corner.sum() < 8:
+        return np.ones(len(time), dtype=bool)
+    step = np.hypot(*np.diff(place, axis=0).T) / np.maximum(np.diff(time), 1e-9)
+    speed = np.maximum(np.r_[step, 0.0], np.r_[0.0, step])
+    ordinary = float(np.median(speed[corner]))
+    spread = 1.4826 * float(np.median(np.abs(speed[corner] - ordinary)))
+    moving = corner & (speed >= ordinary + MOVING * spread)
+    # the piece beside a moving one hides a rest of the way below the noise, and would do so at every corner
+    beside = np.r_[moving[1:], False] | np.r_[False, moving[:-1]]
+    return np.asarray(~corner | ~(moving | beside))

@@ -1,0 +1,147 @@
+"""`tpjb compare`: prediction beside measurement for rigid, Kirk and measured pivots, with a report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tpjb_ident.cli.commands.identify import identify_settings, refuse_untrusted, write_identification
+from tpjb_ident.cli.commands.predict import model_settings
+from tpjb_ident.cli.common.errors import guarded
+from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
+from tpjb_ident.cli.common.options import (
+    BearingOption,
+    CampaignPath,
+    EffectsFile,
+    Method,
+    Norm,
+    Out,
+    Thermal,
+    out_folder,
+)
+from tpjb_ident.cli.common.record import write_record
+from tpjb_ident.cli.common.terminal import Progress, progress, say, table
+from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.runtime.output_folder import output_folder
+from tpjb_ident.runtime.provenance import sha256
+from tpjb_ident.runtime.tables import write_table
+
+if TYPE_CHECKING:
+    from tpjb_ident.compare.comparison import Comparison
+
+Pivots = Annotated[
+    str, typer.Option("--pivots", help='Pivot models to compare: some of "rigid, kirk, kirk-secant, measured".')
+]
+
+
+@guarded
+def compare(
+    campaign: CampaignPath,
+    bearing: BearingOption = None,
+    pivots: Pivots = "rigid, kirk, measured",
+    thermal: Thermal = "adiabatic",
+    effects: EffectsFile = None,
+    method: Method = "mm-eiv",
+    norm: Norm = None,
+    out: Out = None,
+) -> None:
+    """Compare prediction and measurement with rigid, Kirk and measured pivots; writes report.html.
+
+    Also writes comparison, coefficients, estimators, windows, pivot_curves, locus and clearance tables, pivots.toml,
+    and the figures as SVG and PNG.
+    """
+    source = open_campaign(campaign)
+    variants = _variants(pivots)
+    model = model_settings("kirk", thermal, effects)
+    estimator = identify_settings(source, method, norm)
+    drawn, given = open_bearing(source, bearing)
+    from tpjb_ident.compare.comparison import CompareSettings, compare_campaign
+
+    settings = CompareSettings(variants, thermal, model.effects, estimator)
+    inputs = source.fingerprint() | given | ({effects.name: sha256(effects)} if effects else {})
+    options = {"campaign": campaign, "bearing": bearing or source.bearing_name, "pivots": list(variants),
+               "thermal": thermal, "effects": effects, "method": method, "norm": norm}  # fmt: skip
+    target = out_folder(out, "compare")
+    with output_folder(target, "compare", (campaign,)) as folder:
+        with progress("comparing") as show:
+            result = compare_campaign(source, drawn, settings, show)
+            write_comparison(folder, result, options, inputs, show)
+        write_record(folder, target, "compare", options, inputs)
+    show_comparison(result)
+    say(f"Report: {target / 'report.html'}")
+    refuse_comparison(result)
+
+
+def _variants(text: str) -> tuple[str, ...]:
+    import difflib
+
+    from tpjb_ident.compare.comparison import VARIANTS
+
+    names = tuple(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    for name in names:
+        if name not in VARIANTS:
+            near = difflib.get_close_matches(name, VARIANTS, n=1)
+            hint = f"Did you mean {near[0]!r}?" if near else f"Use some of {', '.join(VARIANTS)}."
+            raise BadInputError(f"--pivots: {name!r} is not known. {hint}")
+    if not names:
+        raise BadInputError(f"--pivots: is empty. Use some of {', '.join(VARIANTS)}.")
+    return names
+
+
+def write_comparison(
+    folder: Path, result: Comparison, options: dict[str, Any], inputs: dict[str, str], show: Progress
+) -> None:
+    """Write every table, pivots.toml, the figures and report.html."""
+    from tpjb_ident.compare.pivot_formula import printed_formula
+    from tpjb_ident.compare.positions import locus_frame
+    from tpjb_ident.compare.tables import comparison_frame
+    from tpjb_ident.pivot import pivot_table, write_pivots
+    from tpjb_ident.report.comparison_page import write_comparison_report
+
+    show("writing tables", 0, 2)
+    write_identification(folder, result.identification)
+    write_table(folder, "comparison", comparison_frame(result))
+    if result.curves:
+        formula = printed_formula(result.bearing)
+        write_table(folder, "pivot_curves", pivot_table(result.curves, formula=formula))
+        write_pivots(folder / "pivots.toml", result.curves, result.campaign.id)
+    if result.clearance is not None:
+        write_table(folder, "clearance", result.clearance.to_frame())
+    if result.locus is not None:
+        write_table(folder, "locus", result.locus.to_frame())
+        write_table(folder, "locus_comparison", locus_frame(result))
+    show("drawing figures", 1, 2)
+    named = {name: getattr(value, "name", value) for name, value in options.items()}
+    write_comparison_report(folder, result, named, inputs)
+
+
+def show_comparison(result: Comparison) -> None:
+    """Print the median deviations and the sentences that belong to them."""
+    from tpjb_ident.compare.summary import deviations, summary_sentences
+    from tpjb_ident.rounding import percent
+
+    found = deviations(result)
+    rows = [
+        [v.name, *(percent(d.median) for d in found if d.pivots == v.name)] for v in result.variants
+    ]  # fmt: skip
+    table(f"{result.campaign.id}: predicted / measured - 1, median", ["pivots", "kxx", "kyy", "cxx", "cyy"], rows)
+    for sentence in summary_sentences(result):
+        say(sentence)
+
+
+def refuse_comparison(result: Comparison) -> None:
+    """End with exit code 3 if a point is not to be trusted, on either side.
+
+    Raises
+    ------
+    NotTrustedError
+    """
+    refuse_untrusted(result.identification)
+    bad = [
+        f"{v.name}, {p.point.static_load / 1e3:g} kN" for v in result.variants for p in v.points
+        if not p.prediction.converged
+    ]  # fmt: skip
+    if bad:
+        raise NotTrustedError(f"the model did not converge at {len(bad)} points ({'; '.join(bad[:5])}).")

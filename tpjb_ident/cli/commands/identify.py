@@ -1,0 +1,260 @@
+"""`tpjb identify`: dynamic records in, stiffness and damping with intervals out."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from tpjb_ident.cli.common.errors import guarded
+from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
+from tpjb_ident.cli.common.options import (
+    CampaignPath,
+    Delays,
+    Lines,
+    Method,
+    Norm,
+    Out,
+    Scheduler,
+    WorkerCount,
+    out_folder,
+)
+from tpjb_ident.cli.common.quantities import parse_values
+from tpjb_ident.cli.common.record import write_record
+from tpjb_ident.cli.common.terminal import note_line, progress, say, table
+from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.runtime.output_folder import output_folder
+from tpjb_ident.runtime.tables import write_table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rigdata.campaign import Campaign
+    from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
+    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.dynamic.runs.run_store import RunStore
+
+#: Records [bytes] above which several processes are quicker than one.
+WORTH_PROCESSES = 100 * 2**20
+#: Folder in the output folder in which finished runs wait for the others.
+KEPT = ".tpjb-finished-runs"
+#: What worker processes need, imported once for all of them.
+PRELOAD = ("tpjb_ident.dynamic.runs.run_jobs", "rigdata.readers.hdf5.reader", "rigdata.readers.text.csv", "h5py")
+
+
+@guarded
+def identify(
+    campaign: CampaignPath,
+    method: Method = "mm-eiv",
+    norm: Norm = None,
+    lines: Lines = None,
+    delay: Delays = None,
+    workers: WorkerCount = None,
+    scheduler: Scheduler = None,
+    out: Out = None,
+) -> None:
+    """Identify stiffness and damping with 95 % intervals at every operating point.
+
+    Writes coefficients (chosen method), estimators (every method, statsmodels RLM among them), windows (rejected
+    ones, with reasons) and frequency_fits (K-C and K-C-M over frequency, per load), each as .csv and .parquet. Exit
+    code 3 if a point is not to be trusted.
+    """
+    source = open_campaign(campaign)
+    phasors = phasor_settings(lines, delay or ())
+    settings = replace(identify_settings(source, method, norm), phasors=phasors, keep_weights=False)
+    from tpjb_ident.dynamic.identify import identify as run_identification
+    from tpjb_ident.runtime.workers import open_workers
+
+    count = worker_count(source, workers, scheduler)
+    target = out_folder(out, "identify")
+    with output_folder(target, "identify", (campaign,)) as folder:
+        with (
+            open_workers(count, scheduler, PRELOAD) as team,
+            finished_runs(target) as store,
+            progress("identifying") as show,
+        ):
+            result = run_identification(source, settings, show, team, store)
+        write_identification(folder, result)
+        options = {"campaign": campaign, "method": method, "norm": norm, "lines": lines, "delay": delay}
+        write_record(folder, target, "identify", options, source.fingerprint(), result.remarks())
+    show_coefficients(result)
+    show_frequency_fits(result)
+    for remark in result.remarks():
+        say(f"note: {remark}")
+    say(f"Results: {target}")
+    refuse_untrusted(result)
+
+
+@contextmanager
+def finished_runs(target: Path) -> Iterator[RunStore]:
+    """Give a store of finished runs inside the output folder; only a kill or Ctrl-C leaves it there.
+
+    Results come into the folder whole or not at all; what is kept for a rerun stands apart from them, in a folder of
+    its own, and goes when the command ends, well or with an error.
+    """
+    from tpjb_ident.dynamic.runs.run_store import RunStore
+
+    store = RunStore(target / KEPT)
+    try:
+        yield store
+    except Exception:
+        store.clear()
+        raise
+    store.clear()
+
+
+def worker_count(campaign: Campaign, asked: int | None, scheduler: str | None) -> int | None:
+    """Processes to use: as asked, else one per core where the records are long enough to pay for starting them.
+
+    Raises
+    ------
+    BadInputError
+        Both a number and a scheduler.
+    """
+    if scheduler is not None:
+        if asked is not None:
+            raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")
+        return None
+    if asked is not None:
+        return asked
+    size = sum(path.stat().st_size for path in campaign.files.values() if path.is_file())
+    return None if size > WORTH_PROCESSES else 1
+
+
+def phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:
+    """Build `PhasorSettings` from ``--lines`` and ``--delay``.
+
+    Raises
+    ------
+    BadInputError
+        Not a frequency, not a time, or a quantity that has no direction.
+    """
+    from rigdata.units import UnitError, parse_quantity
+    from tpjb_ident.dynamic.records.extraction import QUANTITIES
+    from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
+
+    driven = () if lines is None else parse_values(lines, "angular speed", "--lines")
+    known: dict[str, float] = {}
+    for text in delays:
+        quantity, _, time = text.partition("=")
+        _known(quantity, QUANTITIES, "--delay")
+        try:
+            known[quantity] = parse_quantity(time, "time")
+        except UnitError as error:
+            raise BadInputError(f"--delay {text!r}: {error}. Write, for instance, --delay force=0.2ms.") from error
+    return PhasorSettings(excitation_lines=tuple(f / (2 * math.pi) for f in driven), delays=known)
+
+
+def identify_settings(campaign: Campaign, method: str, norm: str | None) -> Any:
+    """Build `IdentifySettings` from options, with the campaign's clearance for the amplitude check.
+
+    Raises
+    ------
+    BadInputError
+        Unknown method or norm, or a campaign without dynamic runs.
+    """
+    from tpjb_ident.dynamic.estimators.estimate import METHODS, NORMS
+    from tpjb_ident.dynamic.identify import IdentifySettings
+
+    _known(method, METHODS, "--method")
+    if norm is not None:
+        _known(norm, tuple(NORMS), "--norm")
+        if method != "rlm":
+            raise BadInputError(f"--norm: belongs to --method rlm, not to {method}.")
+    if not campaign.of_kind("dynamic"):
+        raise BadInputError(f"campaign {campaign.id}: has no dynamic runs; there is nothing to identify.")
+    chosen = f"rlm:{norm or 'huber'}" if method == "rlm" else method
+    return IdentifySettings(method=chosen, clearance=_clearance(campaign))
+
+
+def _known(value: str, known: tuple[str, ...], option: str) -> None:
+    if value not in known:
+        near = difflib.get_close_matches(value, known, n=1)
+        hint = f"Did you mean {near[0]!r}?" if near else f"Use one of {', '.join(known)}."
+        raise BadInputError(f"{option}: {value!r} is not known. {hint}")
+
+
+def _clearance(campaign: Campaign) -> float | None:
+    """Smallest assembled clearance [m], None if the campaign carries no bearing that can be read."""
+    from model.bearing import BearingError
+
+    if not campaign.bearing_text:
+        return None
+    try:
+        bearing, _ = open_bearing(campaign, None)
+    except BearingError as error:  # coefficients need no bearing
+        note_line("warning", f"{error} Until then the amplitude is not held against the clearance.")
+        return None
+    return min(pad.assembled_clearance for pad in bearing.pads)
+
+
+def write_identification(folder: Path, result: Identification) -> None:
+    """Write coefficients, estimators, windows and the models over frequency."""
+    write_table(folder, "coefficients", result.to_frame())
+    write_table(folder, "estimators", result.estimators_frame())
+    write_table(folder, "windows", result.windows_frame())
+    write_table(folder, "frequency_fits", result.frequency_frame())
+
+
+def show_coefficients(result: Identification) -> None:
+    """Print K and C of every point with half the width of their intervals."""
+    rows = []
+    for p in result.points:
+        half = p.stiffness.half_width()
+        omega = p.stiffness.omega
+        k, c = p.stiffness.k, p.stiffness.c
+        rows.append([
+            f"{p.point.static_load / 1e3:g}", f"{p.point.excitation_hz:g}",
+            f"{k[0, 0] / 1e6:.1f} ±{half[0] / 1e6:.1f}", f"{k[1, 1] / 1e6:.1f} ±{half[3] / 1e6:.1f}",
+            f"{c[0, 0] / 1e3:.0f} ±{half[4] / omega / 1e3:.0f}", f"{c[1, 1] / 1e3:.0f} ±{half[7] / omega / 1e3:.0f}",
+            f"{100 * p.outlier_fraction:.0f}", "; ".join(str(q) for q in p.quality) or "ok",
+        ])  # fmt: skip
+    columns = ["load kN", "exc. Hz", "kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m", "out %", "quality"]
+    table(f"{result.campaign}: {result.method}, 95 % intervals", columns, rows, words=(7,), whole="coefficients.csv")
+
+
+def show_frequency_fits(result: Identification) -> None:
+    """Print which model over frequency the data of every load support."""
+    rows = []
+    for group in result.frequency_fits():
+        point = group.points[0].point
+        for name, fit in group.fits.items():
+            misfit = f"{100 * fit.misfit:.1f}"
+            verdict = "supported" if name == group.supported else "refused" if fit.refused else "not needed"
+            figures = [f"{fit.chi_square:.1f}", str(fit.dof), f"{fit.probability:.2g}", misfit]
+            rows.append([f"{point.static_load / 1e3:g}", name, *figures, verdict])
+    if rows:
+        columns = ["load kN", "model", "chi-square", "dof", "probability", "misfit %", "verdict"]
+        table("over frequency", columns, rows, words=(1, 6), whole="frequency_fits.csv")
+    refusing = [g.points[0].point.static_load for g in result.frequency_fits() if g.supported not in g.fits]
+    if refusing:
+        loads = ", ".join(f"{load / 1e3:g}" for load in refusing[:6]) + " kN"
+        more = f" and {len(refusing) - 6} more loads" if len(refusing) > 6 else ""
+        say(f"note: at {loads}{more} the data refuse K-C and K-C-M; use the coefficients of each excitation frequency")
+
+
+def refuse_untrusted(result: Identification) -> None:
+    """End with exit code 3 if a point has no answer, or one that is not to be trusted, or no run any more.
+
+    Raises
+    ------
+    NotTrustedError
+    """
+    import numpy as np
+
+    from tpjb_ident.report.condition_words import is_serious
+
+    bad = []
+    for p in result.points:
+        serious = [c.sentence() for c in p.quality if is_serious(c)]
+        if serious or not np.isfinite(p.stiffness.h).all():
+            bad.append(f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz: {'; '.join(serious)}")
+    lost = [c.sentence() for c in result.conditions if is_serious(c)]
+    if lost and not bad:
+        raise NotTrustedError("; ".join(lost))
+    if bad:
+        more = f"\n... and {len(bad) - 5} more" if len(bad) > 5 else ""
+        raise NotTrustedError(f"{len(bad)} of {len(result.points)} points:\n" + "\n".join([*bad[:5], *lost]) + more)

@@ -1,0 +1,134 @@
+"""`tpjb plan`: what a planned campaign could and could not tell, before any test is run."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tpjb_ident.cli.commands.predict import operating_points, pivot_choice
+from tpjb_ident.cli.common.errors import guarded
+from tpjb_ident.cli.common.inputs import refuse_special
+from tpjb_ident.cli.common.options import BearingPath, Out, out_folder
+from tpjb_ident.cli.common.record import write_record
+from tpjb_ident.cli.common.terminal import progress, say, table
+from tpjb_ident.errors import BadInputError
+from tpjb_ident.runtime.output_folder import output_folder
+from tpjb_ident.runtime.provenance import sha256
+from tpjb_ident.runtime.tables import write_table, write_text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from model.bearing import Bearing
+    from model.setup import Setup
+    from tpjb_ident.diagnose.observations.layout import DynamicTest, Layout
+    from tpjb_ident.diagnose.plan.plan import CampaignPlan
+
+
+@guarded
+def plan(
+    bearing: BearingPath,
+    pivots: Annotated[str, typer.Option(help="kirk, rigid or a pivots.toml.")] = "kirk",
+    load: Annotated[str, typer.Option(help="Static loads of the dynamic runs.")] = "2.5, 3.75, 5, 6.25, 7.5, 8.75 kN",
+    load_direction: Annotated[str, typer.Option(help="Where the load pushes the shaft.")] = "-90 deg",
+    speed: Annotated[str, typer.Option(help="Shaft speeds.")] = "22 Hz",
+    excitation: Annotated[str, typer.Option(help="Excitation frequencies, each at every load.")] = "10, 25, 40 Hz",
+    locus: Annotated[int, typer.Option(min=0, max=360, help="Load directions of the shaft locus; 0: none.")] = 20,
+    dry: Annotated[bool, typer.Option(help="Dry load-deflection tests on all pads.")] = True,
+    push: Annotated[float, typer.Option(min=0.0, help="Push load of the clearance sweep [N]; 0: none.")] = 200.0,
+    temperatures: Annotated[bool, typer.Option(help="A temperature sensor in every pad.")] = True,
+    data_sets: Annotated[bool, typer.Option("--data-sets", help="Also: what parts of it could tell, A to E.")] = False,
+    out: Out = None,
+) -> None:
+    """Tell which effects a planned campaign could see, from which size on, and which it would mix up.
+
+    Writes plan.json, effects (detection floor and look-alikes) and isolability (the matrix of separations), each as
+    .csv and .parquet, and the matrix as a picture; with --data-sets also data_sets: what the direct coefficients alone
+    (A), all of h (B), with locus and polygon (C), everything planned (D) and a second speed beside it (E) could tell,
+    and a matrix and a picture of each.
+    """
+    refuse_special(bearing)
+    from model.bearing_file import load_bearing
+    from model.pivots import pivot_laws
+    from model.setup import Setup
+    from tpjb_ident.diagnose.plan.plan import plan as work_out
+    from tpjb_ident.report.plan_page import save_isolability
+
+    drawn = load_bearing(bearing)
+    points = operating_points(load, load_direction, speed, excitation)
+    tests = _layout(drawn, points, (locus, dry, push, temperatures))
+    target = out_folder(out, "plan")
+    options: dict[str, Any] = {
+        "bearing": bearing, "pivots": pivots, "load": load, "load_direction": load_direction, "speed": speed,
+        "excitation": excitation, "locus": locus, "dry": dry, "push": push, "temperatures": temperatures,
+        "data_sets": data_sets,
+    }  # fmt: skip
+    with output_folder(target, "plan") as folder:
+        with progress("planning") as show:
+            show("every effect of the library", 0, 1)
+            setup = Setup(drawn, pivot_laws(pivot_choice(pivots), drawn))
+            found = work_out(setup, tests)
+            plans = {"isolability": found}
+            if data_sets:
+                show("parts of the campaign", 1, 2)
+                plans |= _parts(folder, setup, tests)
+        frame = found.to_frame()
+        write_table(folder, "effects", frame)
+        for name, told in plans.items():
+            write_table(folder, name, told.matrix())
+        save_isolability(folder, plans)
+        write_text(folder / "plan.json", json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n")
+        write_record(folder, target, "plan", options, {bearing.name: sha256(bearing)})
+    _show(found)
+    say(f"Results: {target}")
+
+
+def _parts(folder: Path, setup: Setup, tests: Layout) -> dict[str, CampaignPlan]:
+    """Write the table of data sets; what each could tell with calibration errors free, by file name."""
+    import pandas as pd
+
+    from tpjb_ident.diagnose.plan.data_sets import data_sets
+
+    found = data_sets(setup, tests)
+    write_table(folder, "data_sets", pd.DataFrame([one.to_row() for one in found]))
+    return {f"isolability_{one.name}": one.free for one in found}
+
+
+def _layout(bearing: Bearing, points: Any, static: tuple[int, bool, float, bool]) -> Layout:
+    from tpjb_ident.diagnose.observations.layout import Layout
+    from tpjb_ident.diagnose.plan.planned import around, dry, dynamic
+
+    directions, with_dry, push, sensors = static
+    if not points:
+        raise BadInputError("--load, --excitation: the plan has no dynamic runs. Give at least one of each.")
+    pads = len(bearing.pads)
+    keys = sorted({(p.static_load, p.static_load_direction, p.shaft_speed) for p in points})
+    tests: list[DynamicTest] = []
+    for w, direction, omega in keys:
+        lines = sorted({p.excitation for p in points if (p.static_load, p.shaft_speed) == (w, omega)})
+        tests += dynamic([w], lines, omega, direction, pads if sensors else 0)
+    middle = keys[len(keys) // 2]
+    return Layout(
+        tuple(tests),
+        around(middle[0], directions, middle[2]) if directions else (),
+        dry(range(1, pads + 1)) if with_dry else (),
+        push if push > 0 else None,
+    )
+
+
+def _show(found: CampaignPlan) -> None:
+    rows = []
+    for row in found.to_frame().to_dict("records"):
+        at = float(row["seen_from"])
+        seen = "never" if math.isnan(at) else f"{at:.4g} {row['unit']}"
+        rows.append([row["effect"], f"{row['typical_size_sigma']:.1f}", seen, row["mistaken_for"] or "-"])
+    table(
+        "What this campaign could tell",
+        ["effect", "typical size, sigma", "seen from", "could be mistaken for"], rows, (0, 2, 3),
+    )  # fmt: skip
+    blind = found.below_floor
+    say(f"Below the floor at a size that would not surprise: {', '.join(blind) if blind else 'nothing'}.")
+    say(f"Pairs it could not tell apart at d' = 6: {len(found.confusable)} of {found.pairs}.")

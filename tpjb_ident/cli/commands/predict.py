@@ -1,0 +1,157 @@
+"""`tpjb predict`: a bearing file and operating points in, coefficients, positions and pad data out."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from tpjb_ident.cli.common.errors import guarded
+from tpjb_ident.cli.common.inputs import refuse_special
+from tpjb_ident.cli.common.model_options import HousingTemperature, Physics, parse_physics
+from tpjb_ident.cli.common.options import BearingPath, EffectsFile, Out, Thermal, out_folder
+from tpjb_ident.cli.common.quantities import MAX_VALUES, parse_value, parse_values
+from tpjb_ident.cli.common.record import write_record
+from tpjb_ident.cli.common.terminal import progress, say, table
+from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.runtime.output_folder import output_folder
+from tpjb_ident.runtime.provenance import sha256
+from tpjb_ident.runtime.tables import write_table
+
+NAMED_PIVOTS = ("rigid", "kirk", "kirk-secant")
+THERMAL = ("isothermal", "adiabatic", "tehd")
+
+
+@guarded
+def predict(
+    bearing: BearingPath,
+    load: Annotated[str, typer.Option(help='Static load per bearing: "2.5 kN, 5 kN" or "2.5..8.75:1.25 kN".')] = "5 kN",
+    load_direction: Annotated[str, typer.Option(help="Where the load pushes the shaft, from +X.")] = "-90 deg",
+    speed: Annotated[str, typer.Option(help='Shaft speed: "22 Hz" or "1320 rpm".')] = "22 Hz",
+    excitation: Annotated[
+        str | None, typer.Option(help='Excitation frequencies: "10..50:10 Hz" [default: synchronous].')
+    ] = None,
+    pivots: Annotated[
+        str, typer.Option(help='rigid, kirk, kirk-secant, a pivots.toml, or a stiffness ("5e8 N/m").')
+    ] = "kirk",
+    thermal: Thermal = "adiabatic",
+    effects: EffectsFile = None,
+    physics: Physics = None,
+    housing_temperature: HousingTemperature = None,
+    out: Out = None,
+) -> None:
+    """Predict coefficients, shaft position and pad data.
+
+    Lists and ranges carry units: "2.5 kN, 5 kN", "2.5, 5 kN", "2.5..8.75:1.25 kN" (from..to:step). Every
+    combination of load, direction, speed and excitation is predicted. Writes prediction.csv and .parquet.
+    """
+    points = operating_points(load, load_direction, speed, excitation)
+    choice = pivot_choice(pivots)
+    settings = replace(model_settings(choice, thermal, effects), options=parse_physics(physics, housing_temperature))
+    refuse_special(bearing)
+    from model.bearing_file import load_bearing
+    from tpjb_ident.compare.predictions import predict_points, prediction_frame
+
+    loaded = load_bearing(bearing)
+    target = out_folder(out, "predict")
+    inputs = {p.name: sha256(p) for p in (bearing, effects, choice) if isinstance(p, Path)}
+    options = {"bearing": bearing, "load": load, "load_direction": load_direction, "speed": speed,
+               "excitation": excitation or "synchronous", "pivots": pivots, "thermal": thermal,
+               "effects": effects, "physics": physics, "housing_temperature": housing_temperature}  # fmt: skip
+    with output_folder(target, "predict") as folder:
+        with progress("predicting") as show:
+            predictions = predict_points(loaded, points, settings, show)
+            frame = prediction_frame(predictions)
+        write_table(folder, "prediction", frame)
+        write_record(folder, target, "predict", options, inputs)
+    show_predictions(frame, loaded.name)
+    say(f"Results: {target}")
+    bad = int((~frame["converged"]).sum())
+    if bad:
+        raise NotTrustedError(
+            f"{bad} of {len(frame)} points did not converge; their status says why, their values are NaN."
+        )
+    rough = float(frame["mesh_error"].max())
+    if rough > 0.05:
+        raise NotTrustedError(f"the mesh error reaches {100 * rough:.0f} % of a direct coefficient.")
+
+
+def operating_points(load: str, load_direction: str, speed: str, excitation: str | None) -> list[Any]:
+    """Every combination of the four options as `OperatingPoint`, SI."""
+    loads = parse_values(load, "force", "--load")
+    directions = parse_values(load_direction, "angle", "--load-direction")
+    speeds = parse_values(speed, "angular speed", "--speed")
+    frequencies = parse_values(excitation, "angular speed", "--excitation") if excitation else (0.0,)
+    _positive(loads, "--load", "Give the direction of the load with --load-direction.")
+    _positive(speeds, "--speed", "The shaft turns counter-clockwise.")
+    if excitation:
+        _positive(frequencies, "--excitation", "Leave the option out for synchronous coefficients.")
+    if len(loads) * len(directions) * len(speeds) * len(frequencies) > MAX_VALUES:
+        raise BadInputError(f"more than {MAX_VALUES} operating points. Take larger steps.")
+    from rigdata.operating_point import OperatingPoint
+
+    return [OperatingPoint(*one) for one in itertools.product(loads, directions, speeds, frequencies)]
+
+
+def _positive(values: tuple[float, ...], option: str, cure: str) -> None:
+    if min(values) <= 0:
+        raise BadInputError(f"{option}: must be positive. {cure}")
+
+
+def pivot_choice(text: str) -> str | float | Path:
+    """What --pivots means: a name, a stiffness [N/m], or the path of a file."""
+    if text in NAMED_PIVOTS:
+        return text
+    path = Path(text)
+    if path.is_file():
+        return path
+    if text[:1].isdigit():
+        return parse_value(text, "stiffness", "--pivots")
+    import difflib
+
+    near = difflib.get_close_matches(text, NAMED_PIVOTS, n=1)
+    hint = f"Did you mean {near[0]!r}?" if near else "Use rigid, kirk, kirk-secant, a pivots.toml or a stiffness."
+    raise BadInputError(f"--pivots: {text!r} is no such file and no pivot model. {hint}")
+
+
+def model_settings(pivots: Any, thermal: str, effects: Path | None) -> Any:
+    """Build `ModelSettings` from options.
+
+    Raises
+    ------
+    BadInputError
+        Unknown heat model.
+    """
+    if thermal not in THERMAL:
+        import difflib
+
+        near = difflib.get_close_matches(thermal, THERMAL, n=1)
+        hint = f"Did you mean {near[0]!r}?" if near else f"Use one of {', '.join(THERMAL)}."
+        raise BadInputError(f"--thermal: {thermal!r} is not known. {hint}")
+    from tpjb_ident.compare.predictions import ModelSettings
+
+    refuse_special(effects)
+    chosen: tuple = ()
+    if effects is not None:
+        from model.effects import load_effects
+
+        chosen = load_effects(effects)
+    return ModelSettings(pivots, thermal, chosen)
+
+
+def show_predictions(frame: Any, name: str) -> None:
+    """Print the direct coefficients, at most 20 rows."""
+    columns = ["load kN", "dir deg", "speed Hz", "exc. Hz", "kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m",
+               "h_min µm"]  # fmt: skip
+    rows = [
+        [f"{r.static_load_N / 1e3:g}", f"{r.static_load_direction_deg:g}", f"{r.shaft_speed_Hz:g}",
+         f"{r.excitation_Hz:g}", f"{r.kxx_N_per_m / 1e6:.1f}", f"{r.kyy_N_per_m / 1e6:.1f}",
+         f"{r.cxx_Ns_per_m / 1e3:.1f}", f"{r.cyy_Ns_per_m / 1e3:.1f}", f"{r.min_film_m * 1e6:.1f}"]
+        for r in frame.head(20).itertuples()
+    ]  # fmt: skip
+    table(name, columns, rows)
+    if len(frame) > 20:
+        say(f"... and {len(frame) - 20} more rows in prediction.csv")

@@ -1,0 +1,60 @@
+"""Options that every command has, ``--json`` and ``--quiet``, and the examples under its help."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import typing
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import typer
+
+from tpjb_ident.cli.common.examples import EXAMPLES
+from tpjb_ident.cli.common.loudness import speaking
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document with all results, for other programs.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings and errors only.")]
+
+
+def add_command(app: typer.Typer, command: Callable[..., None], name: str | None = None) -> None:
+    """Register a command with the common options and its examples.
+
+    Parameters
+    ----------
+    app : Typer
+    command : callable
+        Guarded already.
+    name : str, optional
+        Default: the function's own.
+    """
+    name = name or command.__name__
+    app.command(name, epilog=examples_text(name))(spoken(command, name))
+
+
+def spoken(command: Callable[..., None], name: str) -> Callable[..., None]:
+    """Wrap a command so that it takes ``--json`` and ``--quiet`` after its own options."""
+
+    @functools.wraps(command)
+    def wrapper(*args: Any, as_json: bool = False, quiet: bool = False, **kwargs: Any) -> None:
+        with speaking(name, as_json, quiet):
+            command(*args, **kwargs)
+
+    hints = typing.get_type_hints(command, include_extras=True)
+    extra = {"as_json": Json, "quiet": Quiet}
+    signature = inspect.signature(command)
+    parameters = [p.replace(annotation=hints[p.name]) for p in signature.parameters.values()]
+    parameters += [
+        inspect.Parameter(n, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=a) for n, a in extra.items()
+    ]
+    wrapper.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    wrapper.__annotations__ = {**hints, **extra}
+    return wrapper
+
+
+def examples_text(name: str) -> str | None:
+    """Examples of a command, as they stand under its help; None if there are none."""
+    lines = EXAMPLES.get(name)
+    if not lines:
+        return None
+    return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)

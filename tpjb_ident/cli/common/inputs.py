@@ -1,0 +1,83 @@
+"""Opening what a command was given: the campaign, its bearing, and what they were made of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tpjb_ident.errors import BadInputError
+from tpjb_ident.runtime.provenance import sha256
+
+if TYPE_CHECKING:
+    from model.bearing import Bearing
+    from rigdata.campaign import Campaign
+
+HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
+
+
+def campaign_place(path: Path) -> Path:
+    """Return `path`, or the one campaign that lies in it, as in the output folder of `tpjb simulate`.
+
+    Raises
+    ------
+    BadInputError
+        A device or pipe, which would be waited for without end.
+    """
+    refuse_special(path)
+    if not path.is_dir() or (path / "campaign.toml").exists():
+        return path
+    inside = [p for p in sorted(path.iterdir()) if p.suffix.lower() in HDF5 or (p / "campaign.toml").is_file()]
+    return inside[0] if len(inside) == 1 else path
+
+
+def refuse_special(*paths: Path | None) -> None:
+    """Let ordinary files, folders and names of nothing pass; refuse devices and pipes."""
+    for path in paths:
+        if path is not None and path.exists() and not (path.is_file() or path.is_dir()):
+            raise BadInputError(f"{path}: is a device or a pipe, not a file. Give an ordinary file.")
+
+
+def open_campaign(path: Path) -> Campaign:
+    """Open a campaign.
+
+    Raises
+    ------
+    RigDataError
+        It cannot be used; says every reason.
+    """
+    from rigdata import load_campaign
+
+    return load_campaign(campaign_place(path))
+
+
+def open_bearing(campaign: Campaign, given: Path | None) -> tuple[Bearing, dict[str, str]]:
+    """Load the bearing of a campaign, or the one given instead.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    given : Path or None
+        Option --bearing.
+
+    Returns
+    -------
+    bearing : Bearing
+    inputs : dict
+        SHA-256 of the file given; empty if the campaign carries the bearing, whose bytes are known by the campaign.
+
+    Raises
+    ------
+    BadInputError
+        The campaign carries no bearing file and none was given.
+    """
+    from model.bearing_file import load_bearing, parse_bearing
+
+    refuse_special(given)
+    if given is not None:
+        return load_bearing(given), {given.name: sha256(given)}
+    if not campaign.bearing_text:
+        raise BadInputError(
+            f"campaign {campaign.id}: carries no bearing file ({campaign.bearing_name or 'none is named'}). "
+            "Give one with --bearing FILE."
+        )
+    return parse_bearing(campaign.bearing_text, campaign.bearing_name), {}

@@ -1,0 +1,68 @@
+"""`--physics`: names of what the model does beyond the paper's, as `model.options.Options`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from tpjb_ident.cli.common.quantities import parse_value
+from tpjb_ident.errors import BadInputError
+
+#: Name on the command line: what it does.
+PHYSICS = {
+    "conduction": "pads conduct the film's heat away",
+    "journal": "the journal passes heat from hot films to cold ones",
+    "growth": "clearances follow the temperatures of journal, housing and pads",
+    "jfo": "mass-conserving cavitation",
+}
+Physics = Annotated[
+    str | None,
+    typer.Option("--physics", metavar="NAMES", help=f'Beyond the paper\'s model: some of "{", ".join(PHYSICS)}".'),
+]
+HousingTemperature = Annotated[
+    str | None,
+    typer.Option(help='With growth: mean temperature of the housing, "48 degC" [default: the oil supply\'s].'),
+]
+
+
+def parse_physics(names: str | None, housing: str | None) -> Any:
+    """Read `--physics` and `--housing-temperature`.
+
+    Returns
+    -------
+    Options
+
+    Raises
+    ------
+    BadInputError
+        Unknown name, or a housing temperature without growth.
+    """
+    chosen = [part.strip() for part in (names or "").split(",") if part.strip()]
+    for name in chosen:
+        if name not in PHYSICS:
+            import difflib
+
+            near = difflib.get_close_matches(name, PHYSICS, n=1)
+            hint = f"Did you mean {near[0]!r}?" if near else f"Use some of {', '.join(PHYSICS)}."
+            raise BadInputError(f"--physics: {name!r} is not known. {hint}")
+    if housing is not None and "growth" not in chosen:
+        raise BadInputError("--housing-temperature: means nothing without growth. Add --physics growth.")
+    from model.growth import Growth
+    from model.options import CAVITATION, Options
+
+    if "jfo" in chosen and "jfo" not in CAVITATION:
+        raise BadInputError(f"--physics: this model has no cavitation 'jfo', only {', '.join(CAVITATION)}.")
+    growth = None
+    if "growth" in chosen:
+        at = None if housing is None else parse_value(housing, "temperature", "--housing-temperature")
+        try:
+            growth = Growth(housing=at)
+        except ValueError as error:
+            raise BadInputError(f"--housing-temperature: {error}.") from error
+    return Options(
+        conduction="conduction" in chosen,
+        isothermal_journal="journal" in chosen,
+        growth=growth,
+        cavitation="jfo" if "jfo" in chosen else "swift-stieber",
+    )

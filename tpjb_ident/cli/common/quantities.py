@@ -1,0 +1,130 @@
+"""Lists and ranges with units on the command line: ``"2.5 kN, 5 kN"``, ``"2.5..8.75:1.25 kN"``, ``"22 Hz"``.
+
+Grammar::
+
+    values   = item { ("," | ";") item }
+    item     = number [unit] | number [unit] ".." number [unit] ":" number [unit]      (from, to, step)
+
+A number without a unit takes the unit of the next one to its right: ``"2.5, 5, 7.5 kN"``. A range holds its end
+if the steps reach it. A decimal comma is refused: ``2,5 kN`` could mean two loads.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+from tpjb_ident.errors import BadInputError
+
+#: More values than this in one option are a slip of the keyboard.
+MAX_VALUES = 10_000
+_NUMBER = r"[+-]?(?:\d+\.(?!\.)\d*|\d+|\.\d+)(?:[eE][+-]?\d{1,3})?"
+_PART = re.compile(rf"\s*({_NUMBER})\s*([^\d\s.,;:+-][^,;:]*?)?\s*")
+EXAMPLES = {
+    "force": "2.5 kN, 5 kN",
+    "angular speed": "22 Hz",
+    "angle": "-90 deg",
+    "mass": "30 kg",
+}
+
+
+def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
+    """Read a list or range of quantities.
+
+    Parameters
+    ----------
+    text : str
+        As described at the top of this file.
+    dimension : str
+        What they must be: a key of `model.units.SI_UNITS`.
+    option : str
+        Name of the option, for messages.
+
+    Returns
+    -------
+    tuple of float
+        SI values in the order given, radians and rad/s for angles and frequencies.
+
+    Raises
+    ------
+    BadInputError
+        Not readable, no unit, a wrong unit, or a range that does not get from start to end.
+    """
+    if re.search(r"\d,\d", text):
+        raise BadInputError(
+            f"{option}: {text!r} has a comma between digits. Write a decimal point (2.5 kN), or a space after "
+            "the comma of a list (2, 5 kN)."
+        )
+    items = [item for item in re.split(r"[,;]", text) if item.strip()]
+    if not items:
+        raise BadInputError(f'{option}: is empty. Write, for instance, {option} "{_example(dimension)}".')
+    values: list[float] = []
+    unit = ""
+    for item in reversed(items):
+        several, unit = _item(item, unit, dimension, option)
+        values[:0] = several
+        if len(values) > MAX_VALUES:
+            raise BadInputError(f"{option}: {text!r} makes more than {MAX_VALUES} values. Take a larger step.")
+    return tuple(values)
+
+
+def parse_value(text: str, dimension: str, option: str) -> float:
+    """Read one quantity; like `parse_values`.
+
+    Raises
+    ------
+    BadInputError
+        Also if there are several.
+    """
+    values = parse_values(text, dimension, option)
+    if len(values) != 1:
+        raise BadInputError(f"{option}: takes one value, got {len(values)} from {text!r}.")
+    return values[0]
+
+
+def _example(dimension: str) -> str:
+    return EXAMPLES.get(dimension, "1 (with a unit)")
+
+
+def _item(item: str, unit: str, dimension: str, option: str) -> tuple[list[float], str]:
+    """Return the values of one list item and its leftmost unit, for the item before it."""
+    if ".." not in item:
+        value, unit = _quantity(item, unit, dimension, option)
+        return [value], unit
+    head, colon, step_text = item.partition(":")
+    start_text, _, stop_text = head.partition("..")
+    if not colon:
+        raise BadInputError(
+            f'{option}: the range {item.strip()!r} has no step. Write from..to:step, for instance "2.5..8.75:1.25 kN".'
+        )
+    step, unit = _quantity(step_text, unit, dimension, option)
+    stop, unit = _quantity(stop_text, unit, dimension, option)
+    start, unit = _quantity(start_text, unit, dimension, option)
+    return _range(start, stop, step, f"{option}: the range {item.strip()!r}"), unit
+
+
+def _range(start: float, stop: float, step: float, where: str) -> list[float]:
+    if step == 0 or (stop - start) * step < 0:
+        raise BadInputError(
+            f"{where} never reaches its end. Give a step that leads from the first to the second value."
+        )
+    steps = (stop - start) / step
+    if steps > MAX_VALUES:
+        raise BadInputError(f"{where} makes more than {MAX_VALUES} values. Take a larger step.")
+    return [start + i * step for i in range(math.floor(steps + 1e-9) + 1)]
+
+
+def _quantity(text: str, unit: str, dimension: str, option: str) -> tuple[float, str]:
+    from model.units import LONGEST, UnitError, parse_quantity
+
+    match = _PART.fullmatch(text) if len(text) <= LONGEST else None
+    if match is None:
+        raise BadInputError(
+            f"{option}: {text.strip()[:LONGEST]!r} is not a number with a unit. Write, for instance, "
+            f'{option} "{_example(dimension)}".'
+        )
+    unit = match[2] or unit
+    try:
+        return parse_quantity(f"{match[1]} {unit}", dimension, option), unit
+    except UnitError as error:
+        raise BadInputError(f'{error}. Write, for instance, {option} "{_example(dimension)}".') from error

@@ -1,0 +1,1 @@
+"""The model with effects, asked for exactly what a campaign measured."""

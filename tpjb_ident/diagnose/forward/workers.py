@@ -1,0 +1,41 @@
+"""Workers: the same model runs on both cores; answers do not depend on how many there are."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from tpjb_ident.diagnose.forward.forward import ForwardModel
+from tpjb_ident.runtime.executors import cores, in_order, local_workers
+
+
+def _run(forward: ForwardModel, task: Callable[..., Any], *arguments: Any) -> Any:
+    # every job starts from the baseline's equilibria: its answer depends on nothing that ran before it
+    return task(forward.fresh(), *arguments)
+
+
+Map = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterator[Any]]
+
+
+@contextmanager
+def workers(forward: ForwardModel, count: int | None = None) -> Iterator[Map]:
+    """Open workers whose tasks get a `Forward` as their first argument.
+
+    Parameters
+    ----------
+    forward : Forward
+        Warmed up: its equilibria are the common start.
+    count : int, optional
+        Processes; 1 runs everything here. Default: the cores this process may use.
+
+    Yields
+    ------
+    callable
+        ``run(task, [(argument, ..), ..])`` yields ``task(forward, argument, ..)`` in order.
+    """
+    # fork: effects that the user registered are known in the workers too
+    able = "fork" in multiprocessing.get_all_start_methods()
+    with local_workers((count or cores()) if able else 1, start="fork") as opened:
+        yield lambda task, jobs: in_order(opened, _run, [(task, *arguments) for arguments in jobs], shared=forward)

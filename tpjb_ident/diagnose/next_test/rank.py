@@ -1,0 +1,172 @@
+"""Next test: the one more test that would separate explanations that these data cannot tell apart.
+
+For an explanation A and every rival B that the data cannot tell from it, every design x on the list is predicted
+with both, and the expected separation
+
+    d = | L^-1 (f_A(x) - f_B(x)) |
+
+is compared, L L^T being identification noise, fine tolerance and nuisances at x (Buzzi-Ferraris and Forzatti,
+Chem. Eng. Sci. 38 (1983) 225). The nearest rival counts. Beside tests on the rig there are checks of single parameters
+(`checks`). Where one test is not enough, the two that together separate the nearest rival furthest are suggested.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.effects import Effect
+from model.setup import Setup
+from tpjb_ident.diagnose.forward.forward import NoEquilibriumError
+from tpjb_ident.diagnose.forward.nuisance import Certificates, nuisances, whitener
+from tpjb_ident.diagnose.next_test.checks import CHECKS, Check
+from tpjb_ident.diagnose.next_test.designs import Design, designs
+from tpjb_ident.diagnose.observations.layout import Layout
+from tpjb_ident.diagnose.observations.observe import Observations
+
+FloatArray = NDArray[np.float64]
+
+#: Separation [standard deviations] from which a test tells at all, and from which one test is enough: with 5 the wrong
+#: explanation's chi-square exceeds the right one's by 9 in 95 of 100 cases.
+TELLING, ENOUGH = 3.0, 5.0
+#: Difference of chi-square from which one explanation counts as the right one.
+MARGIN = 9.0
+
+
+@dataclass(frozen=True)
+class Separation:
+    """What a design would show.
+
+    Attributes
+    ----------
+    design : Design or Check
+    each : tuple of float
+        Distance of the predictions from that of every rival, in standard deviations.
+    """
+
+    design: Design | Check
+    each: tuple[float, ...]
+
+    @property
+    def expected(self) -> float:
+        """Distance from the nearest rival."""
+        return min(self.each)
+
+
+def options_for(setup: Setup, layout: Layout) -> tuple[Design | Check, ...]:
+    """List all that could be done next: tests on the rig and checks beside it."""
+    return (*designs(setup, layout), *CHECKS)
+
+
+def rank_designs(
+    setup: Setup,
+    one: Sequence[Effect],
+    rivals: Sequence[Sequence[Effect]],
+    options: Sequence[Design | Check],
+    known: Certificates,
+) -> tuple[Separation, ...]:
+    """Expected separation of an explanation from its rivals by every design, best first.
+
+    Parameters
+    ----------
+    setup : Setup
+        Baseline.
+    one : sequence of Effect
+    rivals : sequence of sequence of Effect
+        At least one.
+    options : sequence of Design or Check
+    known : Certificates
+    """
+    out = []
+    for design in options:
+        if isinstance(design, Check):
+            out.append(Separation(design, tuple(design.separation(one, other) for other in rivals)))
+        elif design.fits(one, *rivals):
+            try:
+                out.append(Separation(design, _each(setup, design, one, rivals, known)))
+            except NoEquilibriumError:
+                continue
+    return ranked(out)
+
+
+def _each(
+    setup: Setup, design: Design, one: Sequence[Effect], rivals: Sequence[Sequence[Effect]], known: Certificates
+) -> tuple[float, ...]:
+    seen = design.planned(setup)
+    forward = design.forward(setup, seen)
+    acting = design.acting(one)
+    mine = forward(acting)
+    columns = nuisances(forward, acting, mine, known).columns
+    return tuple(apart(seen, columns, mine - forward(design.acting(other))) for other in rivals)
+
+
+def ranked(tests: Sequence[Separation]) -> tuple[Separation, ...]:
+    """The furthest from the nearest rival first."""
+    return tuple(sorted(tests, key=lambda s: -s.expected))
+
+
+def apart(seen: Observations, columns: FloatArray, difference: FloatArray) -> float:
+    """Whitened length of a difference of two predictions [standard deviations].
+
+    Parameters
+    ----------
+    seen : Observations
+    columns : (n, m) ndarray
+        Nuisances, per standard deviation.
+    difference : (n,) ndarray
+    """
+    return float(np.linalg.norm(np.linalg.solve(whitener(seen, columns), difference)))
+
+
+def chance(separation: float, margin: float = MARGIN) -> float:
+    """Probability that chi-square of the wrong explanation exceeds the right one's by `margin`.
+
+    The difference is normal with mean d^2 and standard deviation 2 d, d being the separation.
+    """
+    from scipy.stats import norm
+
+    return float(norm.cdf((separation**2 - margin) / (2.0 * separation))) if separation > 0.0 else 0.0
+
+
+def suggested(tests: Sequence[Separation]) -> tuple[Separation, ...]:
+    """Return the best test, or the best two together where the best alone would not settle the matter.
+
+    Parameters
+    ----------
+    tests : sequence of Separation
+        As `rank_designs` gives them.
+    """
+    if len(tests) < 2 or tests[0].expected >= ENOUGH:
+        return tuple(tests[:1])
+    return max(itertools.combinations(tests, 2), key=together)
+
+
+def together(tests: Sequence[Separation], now: Sequence[float] = ()) -> float:
+    """Separation from the nearest rival by several tests at once, in standard deviations.
+
+    Parameters
+    ----------
+    tests : sequence of Separation
+        Errors that they share count in each.
+    now : sequence of float, optional
+        Distance from every rival that the data at hand have already.
+    """
+    rows = [t.each for t in tests] + ([tuple(now)] if now else [])
+    return float(np.linalg.norm(rows, axis=0).min())
+
+
+def say(best: Sequence[Separation], one: str, *rivals: str) -> str:
+    """In words: what `suggested` gives, and what it is expected to tell."""
+    other = f"{', '.join(rivals[:-1])} and {rivals[-1]}" if len(rivals) > 1 else rivals[0]
+    words, expected = " and ".join(t.design.words for t in best), together(best)
+    if expected < TELLING:
+        return (
+            f"nothing on the list separates {one} from {other} (best: {words}, {expected:.1f} standard deviations); "
+            "a change of hardware would, such as another oil or another bearing on the same rig"
+        )
+    least = "at least " if len(rivals) > 1 else ""
+    return f"{words}: expected to separate {one} from {other} by {least}{expected:.0f} standard deviations"

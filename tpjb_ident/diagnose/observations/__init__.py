@@ -1,0 +1,1 @@
+"""Everything a campaign offers as one labelled vector with its covariance."""

@@ -1,0 +1,72 @@
+"""Housing: its mass from the manifest, and the stiffness of the cells under it as the records show it.
+
+The housing stands on the load cells: a_h = -omega^2 F_cell / K. Effects on the force side (a wrong mass, a wrong cell
+gain) act through that stiffness, which no manifest states.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from model.setup import Setup
+from tpjb_ident.dynamic.records.run_phasors import run_phasors
+from tpjb_ident.dynamic.records.windows import RecordTooShortError
+
+if TYPE_CHECKING:
+    from rigdata.campaign import Campaign
+
+#: Runs that are looked at: those of the highest frequencies, where the housing shakes most.
+RUNS = 8
+#: Beyond, the housing does not move as far as accelerometers can tell [N/m].
+STIFF = 1e13
+
+
+def with_housing(setup: Setup, campaign: Campaign) -> Setup:
+    """Tell a model the rig's housing mass and cell stiffness; what the campaign does not show stays as assumed."""
+    instruments = setup.instruments
+    if math.isfinite(campaign.housing_mass):
+        instruments = replace(instruments, housing_mass=campaign.housing_mass)
+    found = cell_stiffness(campaign)
+    if found is not None:
+        instruments = replace(instruments, cell_stiffness=found)
+    return setup.change(instruments=instruments)
+
+
+def cell_stiffness(campaign: Campaign) -> tuple[float, float] | None:
+    """Estimate the stiffness between housing and frame in X and Y [N/m].
+
+    Accelerations are regressed on cell forces, -a / omega^2 = F / K, run by run; the median over runs counts.
+
+    Returns
+    -------
+    tuple of float or None
+        None without accelerometers or usable runs.
+    """
+    runs = sorted(campaign.of_kind("dynamic"), key=lambda run: -run.point.excitation)[:RUNS]
+    if not any(c.quantity == "acceleration" for c in campaign.channels.values()):
+        return None
+    mass = campaign.housing_mass if math.isfinite(campaign.housing_mass) else 0.0
+    rows = []
+    for run in runs:
+        try:
+            found = run_phasors(run, mass)
+        except RecordTooShortError:
+            continue
+        if found.acceleration is None:
+            continue
+        force, acceleration = found.cell_force.phasors[:, 0], found.acceleration.phasors[:, 0]
+        power = np.sum(np.abs(force) ** 2, axis=0)
+        slope = np.sum((np.conj(force) * -acceleration / run.point.excitation**2).real, axis=0)
+        # an axis that the run does not excite says nothing
+        rows.append(np.where(power > 0.05 * power.max(), slope / np.maximum(power, 1e-300), np.nan))
+    if not rows:
+        return None
+    table = np.array(rows)
+    if np.any(np.all(np.isnan(table), axis=0)):
+        return None
+    x, y = (float(v) for v in np.nanmedian(table, axis=0))
+    return tuple(1.0 / max(c, 1.0 / STIFF) for c in (x, y))  # type: ignore[return-value]

@@ -1,0 +1,1 @@
+"""What a campaign could and could not tell, before it is run."""

@@ -1,0 +1,191 @@
+"""Plan: what a campaign could and could not tell, before it is run.
+
+Detection floor per effect (the size at which it stands three standard deviations out of noise, tolerance and
+nuisances) and the isolability matrix: how far effect A, at a size seen with d' = 6, stays from everything that B
+can imitate, d_AB = 6 |(I - P_B) s_A| / |s_A|. Below 3 the two are confusable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.setup import Setup
+from tpjb_ident.diagnose.forward.candidates import Candidate, candidates
+from tpjb_ident.diagnose.forward.forward import Forward
+from tpjb_ident.diagnose.forward.nuisance import Certificates, nuisances, whitener
+from tpjb_ident.diagnose.observations.layout import Layout
+from tpjb_ident.diagnose.observations.observe import Observations
+from tpjb_ident.diagnose.plan.planned import planned_observations
+from tpjb_ident.diagnose.search.fit import slope
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+SEEN = 6.0
+CONFUSABLE = 3.0
+
+
+@dataclass(frozen=True)
+class CampaignPlan:
+    """What a layout can tell.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+    detectable : (k,) ndarray
+        Whitened size of every candidate's typical step.
+    separation : (k, k) ndarray
+        d_AB at d' = 6 of A; NaN on the diagonal and where A has no effect at all.
+    """
+
+    candidates: tuple[Candidate, ...]
+    detectable: FloatArray = field(repr=False)
+    separation: FloatArray = field(repr=False)
+
+    @property
+    def floor(self) -> FloatArray:
+        """Smallest change of every parameter that would be seen (3 standard deviations), in its nearly linear form."""
+        with np.errstate(divide="ignore"):  # what cannot be detected has an infinite floor
+            return 3.0 * np.array([c.step for c in self.candidates]) / self.detectable
+
+    @property
+    def confusable(self) -> tuple[tuple[str, str], ...]:
+        """Pairs that the campaign could not tell apart."""
+        n = len(self.candidates)
+        return tuple(
+            (self.candidates[i].label, self.candidates[j].label)
+            for i in range(n)
+            for j in range(i + 1, n)
+            if min(self.separation[i, j], self.separation[j, i]) < CONFUSABLE
+        )
+
+    @property
+    def pairs(self) -> int:
+        """Pairs of candidates that have an effect at all."""
+        n = int(np.sum(self.detectable > 0.0))
+        return n * (n - 1) // 2
+
+    @property
+    def below_floor(self) -> tuple[str, ...]:
+        """Effects that this campaign would not see at their typical size."""
+        return tuple(c.label for c, d in zip(self.candidates, self.detectable, strict=True) if d < 3.0)
+
+    def matrix(self) -> pd.DataFrame:
+        """Isolability matrix: row A at d' = 6 against everything that column B can imitate, in standard deviations."""
+        import pandas as pd
+
+        labels = [c.label for c in self.candidates]
+        frame = pd.DataFrame(self.separation, columns=labels)
+        frame.insert(0, "effect", labels)
+        return frame
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``plan.json``."""
+        rows = self.to_frame().to_dict("records")
+        effects = [{str(k): _finite(v) for k, v in row.items()} for row in rows]
+        return {
+            "schema": "tpjb-plan/1",
+            "effects": effects,
+            "below_floor": list(self.below_floor),
+            "confusable": [list(pair) for pair in self.confusable],
+            "pairs": self.pairs,
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per effect: detection floor and what it could be mistaken for."""
+        import pandas as pd
+
+        rows = []
+        for i, c in enumerate(self.candidates):
+            like = [o.label for j, o in enumerate(self.candidates) if j != i and self.separation[i, j] < CONFUSABLE]
+            at = c.parameter.from_linear(c.neutral + self.floor[i]) if np.isfinite(self.floor[i]) else np.nan
+            rows.append(
+                {
+                    "effect": c.label,
+                    "parameter": c.parameter.name,
+                    "unit": c.parameter.unit,
+                    "typical_size_sigma": self.detectable[i],
+                    "seen_from": at if c.bounds[0] <= c.neutral + self.floor[i] <= c.bounds[1] else np.nan,
+                    "mistaken_for": ", ".join(like),
+                }
+            )
+        return pd.DataFrame(rows)
+
+
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def plan(
+    setup: Setup, layout: Layout, known: Certificates | None = None, pool: Sequence[Candidate] | None = None
+) -> CampaignPlan:
+    """Work out what a layout of tests could tell.
+
+    Raises
+    ------
+    NoEquilibriumError
+        The baseline has none at some point of the layout.
+    """
+    chosen = tuple(pool if pool is not None else candidates(setup.bearing))
+    seen = signatures(setup, layout, chosen, known)
+    return separated(chosen, np.asarray(np.linalg.solve(seen.factor(), seen.columns)))
+
+
+@dataclass(frozen=True)
+class Signatures:
+    """What every candidate does to the observation vector of a layout, beside what hides it.
+
+    Attributes
+    ----------
+    observations : Observations
+        Planned.
+    nuisances : (n, m) ndarray
+        Columns per standard deviation.
+    columns : (n, k) ndarray
+        Change by a typical size of every candidate.
+    """
+
+    observations: Observations
+    nuisances: FloatArray = field(repr=False)
+    columns: FloatArray = field(repr=False)
+
+    def factor(self, free: bool = True) -> FloatArray:
+        """Cholesky factor of the covariance, with or without nuisances."""
+        return whitener(self.observations, self.nuisances if free else self.nuisances[:, :0])
+
+
+def signatures(
+    setup: Setup, layout: Layout, chosen: Sequence[Candidate], known: Certificates | None = None
+) -> Signatures:
+    """Work out the signature of every candidate on a layout.
+
+    Raises
+    ------
+    NoEquilibriumError
+        The baseline has none at some point of the layout.
+    """
+    observations = planned_observations(setup, layout)
+    forward = Forward(setup, layout, observations.elements)
+    base = forward()
+    free = nuisances(forward, (), base, known or Certificates()).columns
+    columns = [
+        slope(forward.fresh(), [c], np.array([c.neutral]), base, 0, 0.5 * c.step) * c.step for c in chosen
+    ]  # fmt: skip
+    return Signatures(observations, free, np.column_stack(columns))
+
+
+def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:
+    """Sizes and separations of whitened signatures (n, k)."""
+    size = np.linalg.norm(white, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):  # a signature of nothing has no direction: NaN
+        unit = white / size
+    cosine = np.clip(unit.T @ unit, -1.0, 1.0)
+    separation = SEEN * np.sqrt(1.0 - cosine**2)
+    np.fill_diagonal(separation, np.nan)
+    return CampaignPlan(tuple(chosen), size, separation)

@@ -1,0 +1,1 @@
+"""From fits to a verdict, and what speaks for it."""

@@ -1,0 +1,1 @@
+"""What is put right between phasors and estimate, and what that leaves uncertain."""

@@ -1,0 +1,139 @@
+"""What is put right between phasors and estimate, point by point, and what that leaves uncertain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.corrections.load_direction import Turn, direction_slopes, run_ratios, turned_back
+from tpjb_ident.dynamic.corrections.mains import (
+    MAINS_CORRECTED,
+    MAINS_ON_LINE,
+    MainsFit,
+    Pickup,
+    corrected_condition,
+    fit_mains,
+    mains_pickup,
+    relative_scatter,
+    with_mains_uncertainty,
+    without_mains,
+)
+from tpjb_ident.dynamic.corrections.static_load import (
+    LoadMiss,
+    load_conditions,
+    load_misses,
+    load_slopes,
+    to_set_point,
+    widened,
+)
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.dynamic.runs.point_source import PointSource
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Corrections of one operating point.
+
+    Attributes
+    ----------
+    miss : LoadMiss
+        How far each run's static load was off.
+    slope : (2, 2) complex ndarray or None
+        dH/d(ln W), where the campaign tells it.
+    turn : Turn or None
+        dH/d(direction of the load), where the runs tell it.
+    mains : MainsFit or None
+    conditions : tuple of Condition
+    """
+
+    miss: LoadMiss
+    slope: ComplexArray | None
+    turn: Turn | None
+    mains: MainsFit | None
+    conditions: tuple[Condition, ...]
+
+    def apply(self, data: PointData) -> PointData:
+        """The point's windows as they would be at the set point and without mains."""
+        cleaned = data if self.mains is None else without_mains(data, self.mains)
+        return _at_set_point(cleaned, self.miss, self.slope, self.turn)
+
+    def widened(self, est: DynamicStiffness) -> DynamicStiffness:
+        """The estimate with what the corrections leave uncertain."""
+        wide = widened(est, self.miss, self.slope)
+        if self.turn is not None:
+            wide = replace(wide, covariance=wide.covariance + self.turn.left)
+        return wide if self.mains is None else with_mains_uncertainty(wide, self.mains)
+
+    def measured_only(self) -> Correction:
+        """The same findings, nothing corrected."""
+        kept = tuple(c for c in self.conditions if c != MAINS_CORRECTED)
+        return replace(self, slope=None, turn=None, mains=None, conditions=kept)
+
+
+def find_corrections(
+    points: list[PointSource],
+    mains_lines: Sequence[ComplexArray | None],
+    probe_axes: FloatArray,
+    first: list[DynamicStiffness],
+) -> list[Correction]:
+    """Work out the corrections of all points of a campaign.
+
+    Parameters
+    ----------
+    points : list of PointSource
+    mains_lines : sequence
+        Displacement at the mains line of every dynamic run, as of `mains_line`.
+    probe_axes : (m,) ndarray
+        Axes of the displacement probes [rad].
+    first : list of DynamicStiffness
+        Estimates without corrections, one per point.
+    """
+    misses, common = load_misses(points)
+    slopes = load_slopes(points, first)
+    turns = _turns(points, first, misses, slopes)
+    struck = [source.found(MAINS_ON_LINE) for source in points]
+    pickup = mains_pickup(mains_lines, probe_axes) if any(struck) else None
+    at_set_point = (
+        _at_set_point(p.load(), miss, slope, turn)
+        for p, miss, slope, turn in zip(points, misses, slopes, turns, strict=True)
+    )
+    scatter = relative_scatter(at_set_point, first) if pickup is not None else np.nan
+    result = []
+    for source, miss, slope, turn, hit in zip(points, misses, slopes, turns, struck, strict=True):
+        mains = None
+        if hit and pickup is not None:
+            mains = fit_mains(_at_set_point(source.load(), miss, slope, turn), pickup, scatter)
+        conditions = load_conditions(miss, common) + _mains_conditions(pickup, mains)
+        result.append(Correction(miss, slope, turn, mains, conditions))
+    return result
+
+
+def _turns(
+    points: list[PointSource],
+    first: list[DynamicStiffness],
+    misses: list[LoadMiss],
+    slopes: list[ComplexArray | None],
+) -> list[Turn | None]:
+    """How H turns with the load, from windows whose load's size is put right; what mains struck tells nothing."""
+    ratios = [
+        run_ratios(to_set_point(source.load(), miss, slope), miss, est, not source.found(MAINS_ON_LINE))
+        for source, miss, slope, est in zip(points, misses, slopes, first, strict=True)
+    ]
+    families = [(p.point.static_load_direction_deg, p.point.shaft_speed_hz) for p in points]
+    return direction_slopes(families, ratios)
+
+
+def _at_set_point(data: PointData, miss: LoadMiss, slope: ComplexArray | None, turn: Turn | None) -> PointData:
+    """The point's windows with forces as under the set load in its set direction."""
+    return to_set_point(replace(data, F=data.F - turned_back(data, miss, turn)), miss, slope)
+
+
+def _mains_conditions(pickup: Pickup | None, mains: MainsFit | None) -> tuple[Condition, ...]:
+    if pickup is None or mains is None:
+        return ()
+    return (corrected_condition(pickup, mains),)

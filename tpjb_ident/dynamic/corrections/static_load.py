@@ -1,0 +1,230 @@
+"""The static load of every run against its set point, and what the miss does to the coefficients.
+
+The load misses its set point a little differently in every run, and coefficients depend on load. The
+cells measure the miss of each run; the campaign's other loads tell the slope dH/d(ln W). So every
+run's forces are brought to the set point before the estimate: F - (dH/dlnW) * miss * D.
+
+What the cells say is taken relative to the campaign's own mean: a gain error of the cells would
+look like a miss of all runs alike, and the set point is met by the actuators' own transducers.
+Misses in direction have a slope of their own, which only the runs' own misses tell: `load_direction`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.operating_point import OperatingPoint
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.runs.point_data import PointData
+
+#: |d ln h / d ln W| that is taken as plausible where the campaign has one load only.
+UNKNOWN_EXPONENT = 0.6
+#: Misses beyond this share are no scatter: the set point or the cells are wrong.
+MAX_MISS = 0.05
+#: The same for its direction [rad].
+MAX_SIDEWAYS = 0.05
+#: Beyond these ratios of the cells to the set points in all runs, a sensitivity or a set point is wrong, not a gain.
+CONTRADICTS = (0.7, 1.4)
+#: Turned by more than this in all runs [rad], cells are inverted or exchanged, or the load acts elsewhere.
+CONTRADICTS_TURN = 0.5
+
+
+@dataclass(frozen=True)
+class LoadMiss:
+    """Relative deviation of each run's static load from its set point.
+
+    Attributes
+    ----------
+    size : (n_runs,) ndarray
+        (W - W_set) / W_set along the load direction, relative to the campaign.
+    sideways : (n_runs,) ndarray
+        The same across it [rad].
+    uncertainty : float
+        Standard error of the campaign's ratio, which is common to all sizes.
+    """
+
+    size: FloatArray
+    sideways: FloatArray
+    uncertainty: float = 0.0
+
+
+class Loaded(Protocol):
+    """Where a point was run, and the mean cell force of its runs (n_runs, 2) [N]: `PointData`, `PointSource`."""
+
+    @property
+    def point(self) -> OperatingPoint:
+        """Set point."""
+
+    @property
+    def mean_loads(self) -> FloatArray:
+        """Mean cell force of every run, (n_runs, 2) [N]."""
+
+
+def load_ratio(data: Loaded) -> ComplexArray:
+    """Measured mean load over set point for every run, as a complex number (size, direction)."""
+    loads = data.mean_loads
+    point = data.point
+    if point.static_load <= 0:
+        return np.full(len(loads), np.nan + 0j)
+    return np.asarray((loads[:, 0] + 1j * loads[:, 1]) / (point.static_load * np.exp(1j * point.static_load_direction)))
+
+
+def load_misses(points: Sequence[Loaded]) -> tuple[list[LoadMiss], complex]:
+    """Misses of all runs relative to the campaign, and the campaign's own ratio (cell gain, rotation).
+
+    The ratio is the mean over the runs without outliers; what it is uncertain by, all misses are.
+    """
+    ratios = [load_ratio(data) for data in points]
+    known = np.concatenate(ratios)
+    known = known[np.isfinite(known)]
+    middle = complex(np.median(known.real), np.median(known.imag)) if len(known) else complex(1.0)
+    if not len(known) or not 0.5 < abs(middle.real) < 2.0:
+        # nothing to correct by such cells, but the ratio itself must be told
+        return [LoadMiss(np.zeros(len(r)), np.zeros(len(r)), 0.0) for r in ratios], middle
+    distance = np.abs(known - middle)
+    inner = known[distance <= 4 * np.median(distance) + 1e-12]
+    common = complex(inner.mean())
+    uncertainty = float(inner.real.std() / np.sqrt(len(inner)))
+    misses = []
+    for ratio in ratios:
+        relative = np.nan_to_num(ratio / common - 1.0)
+        misses.append(LoadMiss(relative.real, relative.imag, uncertainty))
+    return misses, common
+
+
+def load_slopes(points: Sequence[Loaded], first: list[DynamicStiffness]) -> list[ComplexArray | None]:
+    """Slope dH/d(ln W) at every point from the campaign's other loads; None where there are none.
+
+    Stiffness and damping slopes are found at the excitation that was run at several loads and
+    carried over to the others at the same load, direction and speed.
+    """
+    families: dict[tuple[float, ...], list[int]] = {}
+    for i, data in enumerate(points):
+        p = data.point
+        if np.isfinite(first[i].h).all() and p.static_load > 0:
+            key = (p.static_load_direction_deg, p.shaft_speed_hz, p.excitation_hz)
+            families.setdefault(key, []).append(i)
+    slopes: list[ComplexArray | None] = [None] * len(points)
+    for members in families.values():
+        if len(members) >= 2:
+            for i, slope in zip(members, _slopes_over_load(members, points, first)):
+                slopes[i] = slope
+    return [slope if slope is not None else _borrowed(i, points, slopes) for i, slope in enumerate(slopes)]
+
+
+def _slopes_over_load(
+    members: list[int], points: Sequence[Loaded], first: list[DynamicStiffness]
+) -> list[ComplexArray]:
+    members.sort(key=lambda i: points[i].point.static_load)
+    log_load = np.log([points[i].point.static_load for i in members])
+    h = np.array([first[i].h for i in members])
+    return list(_log_gradient(h.real, log_load) + 1j * _log_gradient(h.imag, log_load))
+
+
+def _log_gradient(values: NDArray[np.float64], log_load: NDArray[np.float64]) -> FloatArray:
+    """Slope over ln W; entries that keep their sign are taken as power laws between loads.
+
+    Parameters
+    ----------
+    values : (n, 2, 2) ndarray
+    log_load : (n,) ndarray
+    """
+    order: Literal[1, 2] = 2 if len(log_load) > 2 else 1
+    plain = np.asarray(np.gradient(values, log_load, axis=0, edge_order=order))
+    one_sign = np.abs(np.sign(values).sum(axis=0)) == len(values)
+    logarithm = np.log(np.where(one_sign, np.abs(values), 1.0))
+    power = values * np.gradient(logarithm, log_load, axis=0, edge_order=order)
+    return np.where(one_sign, power, plain)
+
+
+def _borrowed(i: int, points: Sequence[Loaded], slopes: list[ComplexArray | None]) -> ComplexArray | None:
+    """Slope of the nearest excitation at the same load; K and C each keep theirs."""
+    p = points[i].point
+    same = [
+        j
+        for j, slope in enumerate(slopes)
+        if slope is not None
+        and points[j].point.static_load == p.static_load
+        and points[j].point.static_load_direction_deg == p.static_load_direction_deg
+        and points[j].point.shaft_speed_hz == p.shaft_speed_hz
+    ]
+    if not same:
+        return None
+    nearest = min(same, key=lambda j: abs(points[j].point.excitation - p.excitation))
+    slope = slopes[nearest]
+    if slope is None:
+        return None
+    return np.asarray(slope.real + 1j * slope.imag * p.excitation / points[nearest].point.excitation)
+
+
+def to_set_point(data: PointData, miss: LoadMiss, slope: ComplexArray | None) -> PointData:
+    """The point's windows with forces as they would be at the set point."""
+    if slope is None or np.abs(miss.size).max(initial=0.0) > MAX_MISS:
+        return data
+    change = miss.size[data.run_index][:, None] * (data.D @ slope.T)
+    return replace(data, F=data.F - change)
+
+
+def widened(est: DynamicStiffness, miss: LoadMiss, slope: ComplexArray | None) -> DynamicStiffness:
+    """Add what is not known of the miss, or what a known one may have done where the slope is not known."""
+    if not np.isfinite(est.h).all():
+        return est
+    if slope is None:
+        shift = UNKNOWN_EXPONENT * abs(float(miss.size.mean())) * np.abs(est.vector)
+        return replace(est, covariance=est.covariance + np.diag(shift**2))
+    shift = miss.uncertainty * np.concatenate([slope.real.ravel(), slope.imag.ravel()])
+    return replace(est, covariance=est.covariance + np.outer(shift, shift))
+
+
+def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
+    """Point out loads that are off by more than scatter."""
+    found = []
+    worst = float(np.abs(miss.size).max(initial=0.0))
+    if worst > MAX_MISS:
+        found.append(
+            Condition("static-load-off", f"a run's measured static load is {100 * worst:.1f} % off its set point")
+        )
+    sideways = float(np.abs(miss.sideways).max(initial=0.0))
+    if sideways > MAX_SIDEWAYS:
+        found.append(
+            Condition(
+                "static-load-turned",
+                f"a run's measured static load points {np.degrees(sideways):.1f} deg away from its set direction",
+            )
+        )
+    return (*found, *_common_conditions(common))
+
+
+def _common_conditions(common: complex) -> tuple[Condition, ...]:
+    """What all runs share: a gain of the cells, or what no gain explains."""
+    size, turn = abs(common), float(np.angle(common))
+    if not CONTRADICTS[0] <= size <= CONTRADICTS[1]:
+        return (
+            Condition(
+                "cells-contradict-set-points",
+                f"the cells read {size:.3g} times the static load of the set points in all runs: every "
+                "coefficient is off by about as much if their sensitivity is wrong",
+            ),
+        )
+    aside = f"the static load by the cells points {np.degrees(turn):+.1f} deg away from its set direction in all runs"
+    if abs(turn) > CONTRADICTS_TURN:
+        return (Condition("cells-contradict-set-points", f"{aside}: a cell is inverted, or the cells are exchanged"),)
+    found = []
+    if abs(turn) > MAX_SIDEWAYS:
+        found.append(Condition("static-load-turned", aside))
+    if abs(size - 1) > 0.01:
+        found.append(
+            Condition(
+                "cells-against-set-points",
+                f"the cells read {100 * (size - 1):+.2f} % against the set points in all runs alike "
+                "(gain of the cells or of the actuators' transducers)",
+            )
+        )
+    return tuple(found)

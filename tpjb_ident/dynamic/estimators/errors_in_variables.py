@@ -1,0 +1,218 @@
+"""Maximum-likelihood errors-in-variables fit of F = H D, noise covariance taken from the repeats.
+
+Displacements are noisy, and every regression of F on X is pulled towards zero by that. With repeats
+of each direction the noise of (Fx, Fy, X, Y) is known from the data themselves: direction means
+and their pooled 4x4 covariance give a generalised total-least-squares problem with a closed
+solution (Gleser 1981), refined for direction effects by solving its score equation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.estimators.drive_phase import aligned
+from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable
+from tpjb_ident.dynamic.estimators.robust_constants import trimming_limits, trimming_weight
+from tpjb_ident.dynamic.estimators.uncertainty import (
+    DirectionMeans,
+    direction_covariances,
+    direction_effect,
+    information,
+    spread_of,
+)
+
+#: Fewer spare repeats than this cannot give a 4x4 complex covariance worth using.
+MIN_SPARE_REPEATS = 8.0
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """Direction means and the noise of a single window, from good windows only.
+
+    Attributes
+    ----------
+    means : DirectionMeans
+    noise : (4, 4) complex ndarray
+        Covariance of one window's (X, Y, Fx, Fy) about its direction.
+    spare : float
+        Effective windows beyond one per direction.
+    weights : (n,) ndarray
+        Final window weights.
+    wandering : int
+        Directions whose drive phase is not locked; their windows were turned to one phase.
+    """
+
+    means: DirectionMeans
+    noise: ComplexArray
+    spare: float
+    weights: FloatArray
+    wandering: int = 0
+
+
+@dataclass(frozen=True)
+class EivFit:
+    """Result of the fit in the table's scale.
+
+    Attributes
+    ----------
+    h : (2, 2) complex ndarray
+    covariance : (8, 8) ndarray
+    dof : (8,) ndarray
+    chi_square : float
+    attenuation : (2,) ndarray
+        Share that a regression of single windows would lose, weaker displacement direction first.
+    """
+
+    h: ComplexArray
+    covariance: FloatArray
+    dof: FloatArray
+    chi_square: float
+    attenuation: FloatArray
+
+
+def repeats(table: PhasorTable, weights: FloatArray, rounds: int = 2) -> Repeats | None:
+    """Average each direction's good windows and pool their noise.
+
+    Parameters
+    ----------
+    table : PhasorTable
+    weights : (n,) ndarray
+        Window weights of the robust joint fit. They start the search; the final weights come from
+        each window's own distance to its direction mean in (X, Y, Fx, Fy).
+    rounds : int
+        Reweighting rounds.
+
+    Returns
+    -------
+    Repeats or None
+        None when the good repeats are too few for a noise covariance.
+    """
+    good = (weights > 0.2).astype(float)
+    z, wandering = aligned(np.concatenate([table.D, table.F], axis=1), table.direction, good)
+    state = _pooled(z, table, good, 1.0)
+    lower, upper, shrinkage = trimming_limits(8)
+    for _ in range(rounds):
+        if state is None:
+            return None
+        mean, noise, _ = state
+        deviation = z - mean[table.direction]
+        solved = np.linalg.solve(noise, deviation.T)
+        u2 = 2.0 * np.einsum("na,an->n", deviation.conj(), solved).real
+        size = np.bincount(table.direction, weights=good, minlength=len(mean))[table.direction]
+        # A window inside its own mean lies closer to it by (1 - 1/n).
+        inside = np.where(good > 0, 1 - 1 / np.maximum(size, 2.0), 1 + 1 / np.maximum(size, 1.0))
+        good = np.where(size > 0, trimming_weight(u2 / inside, lower, upper), 0.0)
+        state = _pooled(z, table, good, shrinkage)
+    if state is None:
+        return None
+    mean, noise, spare = state
+    count = np.bincount(table.direction, weights=good, minlength=len(mean)).astype(float)
+    kept = count >= 0.5
+    return Repeats(DirectionMeans(mean[kept, :2], mean[kept, 2:], count[kept]), noise, spare, good, wandering)
+
+
+def _pooled(
+    z: ComplexArray, table: PhasorTable, weights: FloatArray, shrinkage: float
+) -> tuple[ComplexArray, ComplexArray, float] | None:
+    """Weighted direction means, pooled covariance, spare count; None when too few."""
+    g = table.n_directions
+    one_hot = np.zeros((g, len(z)))
+    one_hot[table.direction, np.arange(len(z))] = weights
+    count = one_hot.sum(axis=1)
+    mean = one_hot @ z / np.maximum(count, 1e-12)[:, None]
+    spare = float(np.maximum(count - 1, 0.0).sum())
+    if spare < MIN_SPARE_REPEATS or (count > 0.5).sum() < 2:
+        return None
+    deviation = z - mean[table.direction]
+    noise = (weights[:, None] * deviation).T @ deviation.conj() / (spare * shrinkage)
+    # Exact data leave no noise at all, or none but what F = H D lets through; a floor far below any instrument
+    # keeps the algebra alive.
+    noise = noise + (1e-24 + 1e-12 * float(np.trace(noise).real)) * np.eye(4)
+    return mean, noise, spare
+
+
+def eiv_fit(repeats: Repeats, directions_differ: bool = False) -> EivFit:
+    """Errors-in-variables fit of the direction means with their direction effects.
+
+    Parameters
+    ----------
+    repeats : Repeats
+    directions_differ : bool
+        See `PhasorTable`.
+    """
+    means, noise = repeats.means, repeats.noise
+    h = _closed_form(means, noise)
+    window_noise = _residual_noise(h, noise)
+    T, chi_square = direction_effect(means.F - means.D @ h.T, means, window_noise)
+    D_true = means.D
+    if np.any(T):
+        h, D_true = _score_iteration(h, means, noise, T)
+        window_noise = _residual_noise(h, noise)
+    else:
+        D_true = _true_displacement(h, means, noise, T)
+    V = direction_covariances(means, window_noise, T)
+    inverse = np.linalg.inv(V)
+    fisher = information(D_true, D_true, inverse)
+    bread = np.linalg.inv(fisher)
+    small = window_noise / means.count[:, None, None]
+    meat = information(D_true, D_true, inverse @ small @ inverse)
+    residual = means.F - means.D @ h.T
+    score = np.einsum("gac,gc,gb->gab", inverse, residual, D_true.conj()).reshape(-1, 4)
+    parts = np.einsum("gac,gb,gd->gabcd", inverse, D_true.conj(), D_true).reshape(-1, 4, 4)
+    spread = spread_of(score, parts, bread @ meat @ bread.conj().T, chi_square, 2 * repeats.spare, directions_differ)
+    return EivFit(h, spread.covariance, spread.dof, chi_square, _attenuation(means, noise))
+
+
+def _attenuation(means: DirectionMeans, noise: ComplexArray) -> FloatArray:
+    """Noise power over total power of the displacements along their principal directions."""
+    signal = (means.count[:, None] * means.D).T @ means.D.conj() / means.count.sum()
+    total = signal + noise[:2, :2] * (1 - len(means) / means.count.sum())
+    return np.sort(np.linalg.eigvals(np.linalg.solve(total, noise[:2, :2])).real)[::-1]
+
+
+def _closed_form(means: DirectionMeans, noise: ComplexArray) -> ComplexArray:
+    """Signal subspace of the whitened direction means: H = Z_F Z_D^-1."""
+    root = np.linalg.cholesky(noise)
+    z = np.concatenate([means.D, means.F], axis=1)
+    white = np.linalg.solve(root, (np.sqrt(means.count)[:, None] * z).T)
+    U = np.linalg.svd(white, full_matrices=False)[0][:, :2]
+    signal = root @ U
+    h: ComplexArray = np.linalg.solve(signal[:2].T, signal[2:].T).T
+    return h
+
+
+def _residual_noise(h: ComplexArray, noise: ComplexArray) -> ComplexArray:
+    """Covariance of one window's F - h D."""
+    A = np.concatenate([-h, np.eye(2)], axis=1)
+    return np.asarray(A @ noise @ A.conj().T)
+
+
+def _true_displacement(h: ComplexArray, means: DirectionMeans, noise: ComplexArray, T: ComplexArray) -> ComplexArray:
+    """Best estimate of the noise-free displacement: measured minus what the residual says of its error."""
+    A = np.concatenate([-h, np.eye(2)], axis=1)
+    cross = noise[:2] @ A.conj().T
+    V = direction_covariances(means, A @ noise @ A.conj().T, T)
+    residual = means.F - means.D @ h.T
+    solved = np.linalg.solve(V, residual[:, :, None])[:, :, 0]
+    return means.D - (solved @ cross.T) / means.count[:, None]
+
+
+def _score_iteration(
+    h: ComplexArray, means: DirectionMeans, noise: ComplexArray, T: ComplexArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Solve sum_g V_g^-1 (F_g - H D_g) D*_g^H = 0 with D* and V following H."""
+    D_true = means.D
+    for _ in range(50):
+        D_true = _true_displacement(h, means, noise, T)
+        inverse = np.linalg.inv(direction_covariances(means, _residual_noise(h, noise), T))
+        left = information(means.D, D_true, inverse)
+        right = np.einsum("gac,gb,gc->ab", inverse, D_true.conj(), means.F).reshape(4)
+        h_new = np.linalg.solve(left, right).reshape(2, 2)
+        change = np.abs(h_new - h).max() / np.abs(h).max()
+        h = h_new
+        if change < 1e-12:
+            break
+    return h, D_true

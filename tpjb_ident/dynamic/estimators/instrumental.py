@@ -1,0 +1,67 @@
+"""Instrumental variables: reference channels (the actuators' command) against noise on the displacements.
+
+All four measured phasors are regressed, robustly and jointly, on the two references; the noise of
+D then sits on the left-hand side, where it does no harm: H = B_F B_D^-1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.estimators.mm import mm_fit
+from tpjb_ident.dynamic.estimators.ols import ols_fit
+from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable
+
+
+@dataclass(frozen=True)
+class InstrumentalFit:
+    """Result in the table's scale.
+
+    Attributes
+    ----------
+    h : (2, 2) complex ndarray
+    explained : PhasorTable
+        The table with the displacements as the references explain them: the effective regressors.
+    weights : (n,) ndarray
+    conditions : tuple of Condition
+    """
+
+    h: ComplexArray
+    explained: PhasorTable
+    weights: FloatArray
+    conditions: tuple[Condition, ...]
+
+
+def instrumental_fit(table: PhasorTable) -> InstrumentalFit:
+    """Robust instrumental-variables estimate.
+
+    Parameters
+    ----------
+    table : PhasorTable
+        With `reference`.
+
+    Raises
+    ------
+    ValueError
+        The table has no reference.
+    """
+    if table.reference is None:
+        raise ValueError('method "iv" needs reference phasors (n, 2), for instance the actuators\' command')
+    # The fit follows any change of components; what plain least squares leaves of F has little in common with D, and
+    # where it is nothing at all the scatter is badly scaled instead of singular.
+    plain = ols_fit(table.D, table.F)
+    z = np.concatenate([table.D, table.F - table.D @ plain.T], axis=1)
+    fit = mm_fit(table.reference, z, table.direction)
+    B_D, B_left = fit.coefficients[:2], fit.coefficients[2:]
+    h = plain + np.linalg.solve(B_D.T, B_left.T).T
+    # F - h D does not change when D is replaced by its explained part and F by F - h (D - explained).
+    explained_D = table.reference @ B_D.T
+    explained_F = table.F - (table.D - explained_D) @ h.T
+    explained = PhasorTable(
+        explained_D, explained_F, table.direction, table.d_scale, table.f_scale, table.reference, table.valid
+    )
+    return InstrumentalFit(h, explained, fit.weights, fit.conditions)

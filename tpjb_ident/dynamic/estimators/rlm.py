@@ -1,0 +1,214 @@
+"""statsmodels' robust linear model on the stacked real rows of Eq. (15): the paper's choice.
+
+Kept as a reference with its traps guarded: complex input is refused (statsmodels takes it and
+returns false standard errors), the system is scaled before (``conv="coefs"`` has an absolute
+tolerance and never ends in SI units), and reaching the iteration limit is reported (statsmodels
+says nothing). What cannot be guarded: Re and Im of a row get weights of their own, and the
+M-estimator has no breakdown against bad displacements. `mm` exists for that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.estimators.r_matrix import real_rows
+
+#: Names of the norms and the statsmodels class behind each.
+NORMS = {
+    "huber": "HuberT",
+    "tukey": "TukeyBiweight",
+    "bisquare": "TukeyBiweight",
+    "hampel": "Hampel",
+    "andrew": "AndrewWave",
+    "ramsay": "RamsayE",
+    "trimmed": "TrimmedMean",
+    "quartic": "TukeyQuartic",
+    "student": "StudentT",
+    "mquantile": "MQuantileNorm",
+    "least-squares": "LeastSquares",
+}
+
+
+class ComplexInputError(TypeError):
+    """Complex numbers given to a solver of real systems."""
+
+
+@dataclass(frozen=True)
+class RlmSettings:
+    """How statsmodels is to be run.
+
+    Attributes
+    ----------
+    norm : str
+        Key of `NORMS`.
+    scale : str
+        ``"mad"`` (statsmodels' own, constant 0.67448975...), ``"mass"`` (R's MASS::rlm, 0.6745),
+        ``"huber"`` (Huber's proposal 2).
+    max_iterations : int
+    tolerance : float
+        On the largest change of a coefficient, the system being of order one.
+    """
+
+    norm: str = "huber"
+    scale: str = "mad"
+    max_iterations: int = 200
+    tolerance: float = 1e-10
+
+
+@dataclass(frozen=True)
+class RlmSolution:
+    """One real robust regression.
+
+    Attributes
+    ----------
+    params : (p,) ndarray
+    covariance : (p, p) ndarray
+        statsmodels' H1, scaled as it is.
+    weights : (m,) ndarray
+    scale : float
+    iterations : int
+    conditions : tuple of Condition
+    """
+
+    params: FloatArray
+    covariance: FloatArray
+    weights: FloatArray
+    scale: float
+    iterations: int
+    conditions: tuple[Condition, ...]
+
+
+def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | None = None) -> RlmSolution:
+    """Run statsmodels' RLM on a real system, guarded.
+
+    Parameters
+    ----------
+    design : (m, p) real ndarray
+    response : (m,) real ndarray
+    settings : RlmSettings, optional
+
+    Raises
+    ------
+    ComplexInputError
+        Design or response is complex.
+    ValueError
+        Unknown norm or scale (the nearest known one is named).
+    """
+    settings = settings or RlmSettings()
+    if np.iscomplexobj(design) or np.iscomplexobj(response):
+        raise ComplexInputError(
+            "RLM solves real systems; complex data would come back with false standard errors. "
+            "Stack real and imaginary parts first (tpjb_ident.dynamic.estimators.r_matrix.real_rows)"
+        )
+    from statsmodels.robust.robust_linear_model import RLM
+
+    model = RLM(response, design, M=_norm(settings.norm))
+    fit = model.fit(
+        maxiter=settings.max_iterations,
+        tol=settings.tolerance,
+        conv="coefs",
+        scale_est=_scale(settings.scale),
+    )
+    conditions: list[Condition] = []
+    iterations = int(fit.fit_history["iteration"])
+    if iterations >= settings.max_iterations:
+        conditions.append(Condition("iteration-limit", f"RLM stopped after {iterations} iterations"))
+    size = float(np.abs(response).max(initial=0.0))
+    if not fit.scale > 1e-14 * size:
+        conditions.append(Condition("zero-scale", "more than half of the rows fit exactly; no standard errors exist"))
+    return RlmSolution(
+        np.asarray(fit.params),
+        np.asarray(fit.bcov_scaled),
+        np.asarray(fit.weights),
+        float(fit.scale),
+        iterations,
+        tuple(conditions),
+    )
+
+
+def _norm(name: str) -> Any:
+    from statsmodels.robust import norms
+
+    if name not in NORMS:
+        raise ValueError(_unknown("norm", name, list(NORMS)))
+    if name == "student":
+        return norms.StudentT(c=1.0, df=4.0)
+    if name == "mquantile":  # the symmetric one; others estimate quantiles, not H
+        return norms.MQuantileNorm(0.5, norms.HuberT())
+    return getattr(norms, NORMS[name])()
+
+
+def _scale(name: str) -> Any:
+    from statsmodels.robust import scale
+
+    if name == "mad":
+        return "mad"
+    if name == "huber":
+        return scale.HuberScale(d=1.345, tol=1e-13, maxiter=500)  # as MASS::rlm's proposal 2
+    if name == "mass":
+        return _mass_scale
+    raise ValueError(_unknown("scale", name, ["mad", "mass", "huber"]))
+
+
+def _mass_scale(model: Any, residual: FloatArray) -> float:
+    """MASS::rlm divides the median by 0.6745, not by the normal quantile."""
+    return float(np.median(np.abs(residual)) / 0.6745)
+
+
+def _unknown(what: str, name: str, known: list[str]) -> str:
+    import difflib
+
+    near = difflib.get_close_matches(str(name), known, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"unknown {what} {name!r}{hint} Known: {', '.join(known)}"
+
+
+@dataclass(frozen=True)
+class RlmFit:
+    """H from two real robust regressions, one per force axis.
+
+    Attributes
+    ----------
+    h : (2, 2) complex ndarray
+    covariance : (8, 8) ndarray
+    dof : (8,) ndarray
+    weights : (n, 2) ndarray
+        Smaller of the weights of a window's real and imaginary row, per force axis.
+    conditions : tuple of Condition
+    """
+
+    h: ComplexArray
+    covariance: FloatArray
+    dof: FloatArray
+    weights: FloatArray
+    conditions: tuple[Condition, ...]
+
+
+def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = None) -> RlmFit:
+    """Solve Eq. (15) axis by axis with statsmodels.
+
+    Parameters
+    ----------
+    D, F : (n, 2) complex ndarray
+        Of order one.
+    settings : RlmSettings, optional
+    """
+    n = len(D)
+    h = np.zeros((2, 2), dtype=complex)
+    covariance = np.zeros((8, 8))
+    weights = np.ones((n, 2))
+    conditions: tuple[Condition, ...] = ()
+    for axis in range(2):
+        design, response = real_rows(D, F[:, axis])
+        solution = solve_rlm(design, response, settings)
+        h[axis] = solution.params[:2] + 1j * solution.params[2:]
+        rows = np.array([2 * axis, 2 * axis + 1, 4 + 2 * axis, 5 + 2 * axis])
+        covariance[np.ix_(rows, rows)] = solution.covariance
+        weights[:, axis] = np.minimum(solution.weights[:n], solution.weights[n:])
+        conditions += solution.conditions
+    return RlmFit(h, covariance, np.full(8, max(2.0 * n - 4.0, 1.0)), weights, conditions)

@@ -1,0 +1,137 @@
+"""The 2x2 complex dynamic stiffness of a bearing at one frequency, with everything known about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import t as student_t
+
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
+
+#: Order of the eight real unknowns everywhere: Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...
+ENTRIES = ("xx", "xy", "yx", "yy")
+
+
+class Interval(NamedTuple):
+    """Lower and upper bounds of the eight real entries, in the order of the covariance [N/m]."""
+
+    lo: FloatArray
+    hi: FloatArray
+
+
+@dataclass(frozen=True)
+class DynamicStiffness:
+    """What one method says about one operating point.
+
+    Attributes
+    ----------
+    h : (2, 2) complex ndarray
+        Dynamic stiffness K + i omega C [N/m]; NaN when it could not be found (`status` says why).
+    omega : float
+        Excitation frequency [rad/s].
+    covariance : (8, 8) ndarray
+        Random covariance of [Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...], in N^2/m^2.
+    dof : (8,) ndarray
+        Degrees of freedom of each variance, for Student's t; infinite where it is known.
+    method : str
+        ``"ols"``, ``"rlm"``, ``"mm"``, ``"mm-eiv"``, ``"iv"``; a norm after a colon.
+    weights : (n, 2) ndarray
+        Final robust weight per window and force axis.
+    status : tuple of Condition
+        Named conditions, empty when all is well.
+    condition : float
+        Condition number of the displacement directions.
+    chi_square : float
+        Reduced chi-square of the direction means about F = h D against the repeats' own noise; NaN
+        without repeats.
+    spare_equations : int
+        Real equations of the direction means beyond the eight unknowns: degrees of freedom of the
+        chi-square.
+    attenuation : (2,) ndarray
+        Share by which noise on the displacements would pull a plain regression of F on X towards
+        zero, along the weaker displacement direction first; NaN when not known.
+    systematic : (8, 8) ndarray or None
+        Covariance from calibration, common to all points of a campaign.
+    """
+
+    h: ComplexArray
+    omega: float
+    covariance: FloatArray = field(repr=False)
+    dof: FloatArray = field(repr=False)
+    method: str
+    weights: FloatArray = field(repr=False)
+    status: tuple[Condition, ...] = ()
+    condition: float = np.nan
+    chi_square: float = np.nan
+    spare_equations: int = 0
+    attenuation: FloatArray = field(default_factory=lambda: np.full(2, np.nan), repr=False)
+    systematic: FloatArray | None = field(default=None, repr=False)
+
+    @property
+    def direct(self) -> tuple[float, float]:
+        """Mean size of the direct entries of Re h and of Im h [N/m]."""
+        return float(np.mean(np.abs(np.diag(self.h.real)))), float(np.mean(np.abs(np.diag(self.h.imag))))
+
+    @property
+    def k(self) -> FloatArray:
+        """Stiffness matrix Re h [N/m], shape (2, 2)."""
+        return self.h.real
+
+    @property
+    def c(self) -> FloatArray:
+        """Damping matrix Im h / omega [N s/m], shape (2, 2)."""
+        return self.h.imag / self.omega
+
+    @property
+    def vector(self) -> FloatArray:
+        """The eight real entries in the order of the covariance [N/m]."""
+        return np.concatenate([self.h.real.ravel(), self.h.imag.ravel()])
+
+    @property
+    def standard_error(self) -> FloatArray:
+        """Random standard error of the eight entries [N/m]."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def converged(self) -> bool:
+        """Whether there is an answer and its iteration reached its end."""
+        return bool(np.isfinite(self.h).all()) and "iteration-limit" not in self.status
+
+    def half_width(self, level: float = 0.95, systematic: bool = True) -> FloatArray:
+        """Half the width of the interval of the eight entries [N/m].
+
+        Parameters
+        ----------
+        level : float
+            Probability content, in (0, 1).
+        systematic : bool
+            Whether to add the calibration part (Gaussian) to the random one (Student's t).
+        """
+        if not 0.0 < level < 1.0:
+            raise ValueError(f"level must lie in (0, 1), got {level}")
+        quantile = 0.5 + 0.5 * level
+        random = student_t.ppf(quantile, self.dof) * self.standard_error
+        if not systematic or self.systematic is None:
+            return np.asarray(random)
+        calibration = student_t.ppf(quantile, np.inf) * np.sqrt(np.diag(self.systematic))
+        return np.hypot(random, calibration)
+
+    def interval(self, level: float = 0.95, systematic: bool = True) -> Interval:
+        """Interval of the eight entries; see `half_width` for the arguments."""
+        half = self.half_width(level, systematic)
+        return Interval(self.vector - half, self.vector + half)
+
+    def __str__(self) -> str:
+        half = self.half_width().reshape(2, 4)
+        rows = [f"dynamic stiffness at {self.omega / (2 * np.pi):.4g} Hz, {self.method}"]
+        for j, entry in enumerate(ENTRIES):
+            k, c = self.k.ravel()[j], self.c.ravel()[j]
+            rows.append(
+                f"  k{entry} {k: .4e} +- {half[0, j]:.1e} N/m    "
+                f"c{entry} {c: .4e} +- {half[1, j] / self.omega:.1e} N s/m"
+            )
+        rows.extend(f"  {condition.sentence()}" for condition in self.status)
+        return "\n".join(rows)

@@ -1,0 +1,278 @@
+"""From residuals to the 8x8 covariance of H and its degrees of freedom.
+
+Two sources of random error are told apart. *Repeat noise*: windows of one direction scatter about
+their mean. *Direction effects*: the means of the directions scatter about F = H D by more than
+their repeats explain (the static load misses its set point differently in every run, mains sits on
+the line); they do not average out within a run, and intervals that leave them out do not hold.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable
+
+#: Significance from which direction effects take part in weighting the directions.
+CLEAR = 1e-3
+
+
+@dataclass(frozen=True)
+class DirectionMeans:
+    """What the directions say, each averaged over its good windows.
+
+    Attributes
+    ----------
+    D, F : (g, 2) complex ndarray
+    count : (g,) ndarray
+        Effective number of windows behind each.
+    """
+
+    D: ComplexArray
+    F: ComplexArray
+    count: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.count)
+
+
+def complex_to_real_covariance(hermitian: ComplexArray, pseudo: ComplexArray | None = None) -> FloatArray:
+    """Covariance of [Re h, Im h] from E[e e^H] and E[e e^T].
+
+    Parameters
+    ----------
+    hermitian : (m, m) complex ndarray
+    pseudo : (m, m) complex ndarray, optional
+        Zero for circular errors.
+
+    Returns
+    -------
+    (2 m, 2 m) ndarray
+    """
+    P = np.zeros_like(hermitian) if pseudo is None else pseudo
+    real = 0.5 * np.block(
+        [
+            [(hermitian + P).real, (P - hermitian).imag],
+            [(P + hermitian).imag, (hermitian - P).real],
+        ]
+    )
+    return 0.5 * (real + real.T)  # rounding apart, it is symmetric
+
+
+def information(D: ComplexArray, D_star: ComplexArray, inverse: ComplexArray) -> ComplexArray:
+    """Sum over directions of V_g^-1 (x) conj(D*_g) D_g^T, for h ordered xx, xy, yx, yy.
+
+    Parameters
+    ----------
+    D, D_star : (g, 2) complex ndarray
+        Regressors and (for errors in variables) their estimated true values.
+    inverse : (g, 2, 2) complex ndarray
+        V_g^-1.
+    """
+    return np.einsum("gac,gb,gd->abcd", inverse, D_star.conj(), D).reshape(4, 4)
+
+
+def direction_effect(residual: ComplexArray, means: DirectionMeans, noise: ComplexArray) -> tuple[ComplexArray, float]:
+    """Between-direction covariance per unit |D|^2, by moments, never negative.
+
+    Parameters
+    ----------
+    residual : (g, 2) complex ndarray
+        F - H D of the direction means, H from a fit weighted by `count`.
+    means : DirectionMeans
+    noise : (2, 2) complex ndarray
+        Covariance of one window's F - H D.
+
+    Returns
+    -------
+    T : (2, 2) complex ndarray
+        Zero unless the chi-square is beyond doubt (weights fitted to noise cost efficiency).
+        The residual of direction g has covariance noise / count_g + T |D_g|^2.
+    chi_square : float
+        Reduced chi-square of the residuals against repeat noise alone; NaN without spare directions.
+    """
+    g = len(means)
+    if g <= 2:
+        return np.zeros((2, 2), dtype=complex), np.nan
+    moment = (means.count[:, None] * residual).T @ residual.conj()
+    gram = (means.count[:, None] * means.D.conj()).T @ means.D
+    leverage = means.count * np.einsum("ga,ab,gb->g", means.D, np.linalg.inv(gram), means.D.conj()).real
+    power = np.einsum("ga,ga->g", means.D, means.D.conj()).real
+    gain = float(((1 - leverage) * means.count * power).sum())
+    # In coordinates where the repeat noise is the unit matrix, truncation keeps the axes' freedom.
+    root = np.linalg.cholesky(noise)
+    inverse_root = np.linalg.inv(root)
+    white = inverse_root @ moment @ inverse_root.conj().T
+    chi_square = float(np.trace(white).real / (2 * (g - 2)))
+    if chi_square * 4 * (g - 2) < chi2.isf(CLEAR, 4 * (g - 2)):
+        return np.zeros((2, 2), dtype=complex), chi_square
+    values, vectors = np.linalg.eigh(white - (g - 2) * np.eye(2))
+    T_white = (vectors * np.maximum(values, 0.0)) @ vectors.conj().T / gain
+    return root @ T_white @ root.conj().T, chi_square
+
+
+def direction_covariances(means: DirectionMeans, noise: ComplexArray, T: ComplexArray) -> ComplexArray:
+    """V_g = noise / count_g + T |D_g|^2, shape (g, 2, 2)."""
+    power = np.einsum("ga,ga->g", means.D, means.D.conj()).real
+    return noise / means.count[:, None, None] + T * power[:, None, None]
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Covariance of H, told apart by where it comes from.
+
+    Attributes
+    ----------
+    covariance : (8, 8) ndarray
+    dof : (8,) ndarray
+    """
+
+    covariance: FloatArray
+    dof: FloatArray
+
+
+def spread_of(
+    score: ComplexArray,
+    parts: ComplexArray,
+    repeat: ComplexArray,
+    chi_square: float,
+    dof_repeat: float,
+    known_effect: bool = False,
+) -> Spread:
+    """Repeat noise as known, plus what leaving out one direction at a time shows beyond it.
+
+    A direction effect is no circular noise: a static load that is off changes K and hardly C, one entry
+    more than another. So its share is not modelled but taken from the directions themselves
+    (delete-one jackknife, i.e. cluster-robust with its small-sample correction), as far as the
+    chi-square of the direction means says that there is any.
+
+    Parameters
+    ----------
+    score : (g, 4) complex ndarray
+        Contribution of every direction to the estimating equations of h.
+    parts : (g, 4, 4) complex ndarray
+        Contribution of every direction to the matrix of those equations.
+    repeat : (4, 4) complex ndarray
+        E[e e^H] of h from repeat noise alone.
+    chi_square : float
+        Reduced chi-square of the direction means against repeat noise.
+    dof_repeat : float
+    known_effect : bool
+        That directions differ is known from elsewhere; then this point's own chi-square is not asked.
+    """
+    known = complex_to_real_covariance(repeat)
+    g = len(score)
+    spare = 4.0 * (g - 2)
+    if g <= 2 or not (known_effect or chi_square > 1.0):
+        return Spread(known, np.full(8, max(dof_repeat, 1.0)))
+    moved = np.linalg.solve(parts.sum(axis=0) - parts, score[:, :, None])[:, :, 0]
+    moved = np.concatenate([moved.real, moved.imag], axis=1)
+    jackknife = (g - 1) / g * moved.T @ moved
+    # Beyond repeat noise, in coordinates where that is the unit matrix; never negative.
+    root = np.linalg.cholesky(known)
+    white = np.linalg.solve(root, np.linalg.solve(root, jackknife).T)
+    values, vectors = np.linalg.eigh(0.5 * (white + white.T))
+    certain = min(1.0, (chi_square - 1.0) / (chi2.ppf(0.95, spare) / spare - 1.0)) if not known_effect else 1.0
+    extra = root @ (vectors * (certain * np.maximum(values - 1.0, 0.0))) @ vectors.T @ root.T
+    total = known + extra
+    effective = np.maximum((moved**2).sum(axis=0) ** 2 / (moved**4).sum(axis=0) - 1.0, 1.0)
+    dof = mixed_dof(np.diag(total), np.diag(known), dof_repeat, np.maximum(effective, 0.5 * (g - 1)))
+    return Spread(0.5 * (total + total.T), dof)
+
+
+def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_between: FloatArray) -> FloatArray:
+    """Welch-Satterthwaite degrees of freedom of variances made of two parts.
+
+    Parameters
+    ----------
+    total, repeat : (8,) ndarray
+        Whole variance, and what repeat noise alone would give.
+    dof_repeat : float
+    dof_between : (8,) ndarray
+        Degrees of freedom behind either part.
+    """
+    between = np.maximum(total - repeat, 0.0)
+    spread = repeat**2 / max(dof_repeat, 1.0) + between**2 / dof_between
+    with np.errstate(divide="ignore", invalid="ignore"):  # no spread at all: the next line says what then
+        dof = total**2 / spread
+    return np.where(np.isfinite(dof), np.maximum(dof, 1.0), max(dof_repeat, 1.0))
+
+
+def homoscedastic(
+    D: ComplexArray, residual: ComplexArray, weights: FloatArray, correction: float = 1.0
+) -> tuple[FloatArray, FloatArray]:
+    """Covariance and dof of a (weighted) regression without repeats: residuals are all there is.
+
+    Parameters
+    ----------
+    D, residual : (n, 2) complex ndarray
+    weights : (n,) ndarray
+        Robust weights; their sum is the effective number of windows.
+    correction : float
+        Factor on the variance (efficiency of the estimator).
+
+    Returns
+    -------
+    (8, 8) ndarray, (8,) ndarray
+    """
+    spare = max(float(weights.sum()) - 2.0, 1e-12)
+    scatter = (weights[:, None] * residual).T @ residual.conj() / spare
+    inverse = np.linalg.inv((weights[:, None] * D.conj()).T @ D)
+    hermitian = correction * np.kron(scatter, inverse)
+    # Two real residuals per spare complex one; both parts of a row share its scale.
+    return complex_to_real_covariance(hermitian), np.full(8, max(2.0 * spare, 1.0))
+
+
+def with_repeats(
+    table: PhasorTable, h: ComplexArray, weights: FloatArray, correction: float = 1.0
+) -> tuple[FloatArray, FloatArray, float] | None:
+    """Covariance, dof and chi-square of a weighted regression whose directions have repeats.
+
+    Parameters
+    ----------
+    table : PhasorTable
+    h : (2, 2) complex ndarray
+    weights : (n,) ndarray
+    correction : float
+        Factor on the repeat noise (efficiency of the estimator).
+
+    Returns
+    -------
+    tuple or None
+        None when there are fewer than four spare repeats: the residuals alone must do then.
+    """
+    g = table.n_directions
+    one_hot = np.zeros((g, len(table)))
+    one_hot[table.direction, np.arange(len(table))] = weights
+    count = one_hot.sum(axis=1)
+    kept = count > 1e-6
+    residual = table.F - table.D @ h.T
+    mean = one_hot @ np.concatenate([table.D, table.F, residual], axis=1) / np.maximum(count, 1e-12)[:, None]
+    deviation = residual - mean[table.direction, 4:]
+    spare = float(np.maximum(count - 1, 0).sum())
+    noise = (weights[:, None] * deviation).T @ deviation.conj() / max(spare, 1e-12)
+    if spare < 4.0 or np.linalg.eigvalsh(noise)[0] <= 0:
+        return None
+    means = DirectionMeans(mean[kept, :2], mean[kept, 2:4], count[kept])
+    _, chi_square = direction_effect(mean[kept, 4:], means, noise)
+    scaled = means.D * means.count[:, None]
+    parts = _regression_parts(table, weights)
+    bread = np.linalg.inv(parts.sum(axis=0))
+    small = correction * noise / means.count[:, None, None]
+    meat = information(scaled, scaled, np.broadcast_to(small, (len(means), 2, 2)))
+    score = np.einsum("ga,gb->gab", mean[kept, 4:] * means.count[:, None], means.D.conj()).reshape(-1, 4)
+    spread = spread_of(
+        score, parts[kept], bread @ meat @ bread.conj().T, chi_square, 2 * spare, table.directions_differ
+    )
+    return spread.covariance, spread.dof, chi_square
+
+
+def _regression_parts(table: PhasorTable, weights: FloatArray) -> ComplexArray:
+    """Normal matrix of a weighted regression, direction by direction, shape (g, 4, 4)."""
+    gram = np.zeros((table.n_directions, 2, 2), dtype=complex)
+    products = weights[:, None, None] * table.D[:, :, None].conj() * table.D[:, None, :]
+    np.add.at(gram, table.direction, products)
+    return np.asarray(np.kron(np.eye(2), gram))

@@ -1,0 +1,200 @@
+"""Reading a run chunk by chunk and fitting its windows."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tpjb_ident.arrays import FloatArray, IntArray
+from tpjb_ident.dynamic.records.lines import LineSet
+from tpjb_ident.dynamic.records.phasors import SCALE_LIMIT, LineFitter, PhasorBlock, fit_uneven, usual_scale
+from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.dynamic.records.shaft_speed import window_speeds
+from tpjb_ident.dynamic.records.stretches import Stretches, open_stretches
+from tpjb_ident.dynamic.records.windows import plan_windows
+
+QUANTITIES = ("displacement", "force", "acceleration")
+#: Samples of one channel held at a time: few enough for X and Y to stay in a core's cache.
+CHUNK = 2**15
+#: Time stamps may stray this share of a sample from the even grid before they are used one by one.
+MAX_JITTER = 0.02
+
+
+def extract(
+    run: Any, housing_mass: float, settings: PhasorSettings, lines: LineSet, follow: FloatArray | None = None
+) -> RunPhasors:
+    """Fit all windows of a run.
+
+    Parameters
+    ----------
+    run : rigdata.campaign.Run
+    housing_mass : float
+        [kg]
+    settings : PhasorSettings
+    lines : LineSet
+    follow : (n_windows,) ndarray, optional
+        Shaft speed of every window [Hz]: 1X and its harmonics then take each window's own.
+    """
+    length, count = plan_windows(run.length, run.sample_rate, lines, settings.windows)
+    present = {c.quantity for c in run.channels.values()}
+    quantities = tuple(q for q in QUANTITIES if q in present or q != "acceleration")
+    work = _Work(length, run.sample_rate, lines, follow, run.point.shaft_speed_hz)
+    parts: list[_Fitted] = []
+    with open_stretches(run, quantities) as stretches:
+        for first, stop in _chunks(length, count):
+            parts.append(work.fit(stretches, first, stop))
+        blocks = {q: _joined([part.blocks[q] for part in parts]) for q in quantities}
+        if len(parts) > 1:
+            _look_again(work, stretches, blocks)
+    starts = np.concatenate([part.start for part in parts])
+    speeds = np.concatenate([part.speeds for part in parts])
+    found = {q: _undelayed(block, lines, settings.delays.get(q, 0.0)) for q, block in blocks.items()}
+    return RunPhasors(
+        run.id,
+        run.point,
+        run.excitation_direction,
+        lines,
+        starts,
+        length / run.sample_rate,
+        found["displacement"],
+        found["force"],
+        found.get("acceleration"),
+        housing_mass,
+        speeds,
+    )
+
+
+def _chunks(length: int, count: int) -> Iterator[tuple[int, int]]:
+    step = max(1, CHUNK // length)
+    for first in range(0, count, step):
+        yield first, min(first + step, count)
+
+
+def _look_again(work: _Work, stretches: Stretches, blocks: dict[str, PhasorBlock]) -> None:
+    """Fit windows anew that are noisier than the run's usual one: a chunk alone may hold nothing to compare with."""
+    usual = {q: usual_scale(block.noise) for q, block in blocks.items()}
+    with np.errstate(invalid="ignore"):  # a window without phasors has no noise and stays as it is
+        loud = [(block.noise > SCALE_LIMIT * usual[q]).any(axis=1) for q, block in blocks.items()]
+    for k in np.flatnonzero(np.any(loud, axis=0)):
+        again = work.fit(stretches, int(k), int(k) + 1, usual)
+        for quantity, block in blocks.items():
+            _put(block, int(k), again.blocks[quantity])
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """Windows of one chunk: phasors by quantity, start [s] and shaft speed [Hz] of every window."""
+
+    blocks: dict[str, PhasorBlock]
+    start: FloatArray
+    speeds: FloatArray
+
+
+class _Work:
+    """What all windows of a run are fitted with."""
+
+    def __init__(
+        self, length: int, rate: float, lines: LineSet, follow: FloatArray | None, nominal_speed: float
+    ) -> None:
+        self.length, self.nominal_speed = length, nominal_speed
+        self.fitter = LineFitter(length, rate, lines.frequencies)
+        self.followers = _Followers(length, rate, lines, follow)
+
+    def fit(self, stretches: Stretches, first: int, stop: int, usual: dict[str, FloatArray] | None = None) -> _Fitted:
+        """Read and fit windows first..stop-1; `usual` is the residual scale that windows of the run have."""
+        stretch = stretches.read(first * self.length, stop * self.length)
+        times = _times(stretch.time, first, stop, self.fitter)
+        blocks = {}
+        for quantity, values in stretch.rows.items():
+            rows = values.reshape(2, stop - first, self.length)
+            blocks[quantity] = _fit_windows(self.fitter, rows, times, None if usual is None else usual[quantity])
+            self.followers.refit(blocks[quantity], rows, times, first)
+        return _Fitted(blocks, times.start, window_speeds(stretch.speed, stop - first, self.nominal_speed))
+
+
+@dataclass(frozen=True)
+class _Times:
+    """Times of some windows.
+
+    Attributes
+    ----------
+    start : (n,) ndarray
+        Of every window [s].
+    stamps : (n, length) ndarray or None
+        Of every sample, where they are not on an even grid.
+    uneven : (m,) ndarray of int
+        Windows that are to be fitted by their stamps.
+    """
+
+    start: FloatArray
+    stamps: FloatArray | None
+    uneven: IntArray
+
+
+def _times(time: FloatArray | None, first: int, stop: int, fitter: LineFitter) -> _Times:
+    counted = (first + np.arange(stop - first)) * fitter.length / fitter.rate
+    if time is None:
+        return _Times(counted, None, np.empty(0, dtype=int))
+    stamps = time.reshape(stop - first, fitter.length)
+    grid = stamps[:, :1] + np.arange(fitter.length) / fitter.rate
+    even = np.abs(stamps - grid).max(axis=1) <= MAX_JITTER / fitter.rate
+    start = np.where(np.isfinite(stamps[:, 0]), stamps[:, 0], counted)
+    return _Times(start, stamps, np.flatnonzero(~even))
+
+
+def _fit_windows(fitter: LineFitter, rows: FloatArray, times: _Times, usual: FloatArray | None) -> PhasorBlock:
+    """Fit windows, those off the even grid by their own time stamps."""
+    block = fitter.fit(rows, times.start, usual)
+    for i in times.uneven:
+        if times.stamps is None:
+            continue
+        good = np.isfinite(times.stamps[i])
+        if good.sum() > 2 * fitter.design.shape[1]:
+            _put(block, int(i), fit_uneven(rows[:, i, good].T, times.stamps[i][good], fitter.frequencies, 0.0))
+    return block
+
+
+class _Followers:
+    """Fitters with each window's own shaft speed; nothing to do where the speed is steady."""
+
+    def __init__(self, length: int, rate: float, lines: LineSet, speeds: FloatArray | None) -> None:
+        self.length, self.rate, self.lines, self.speeds = length, rate, lines, speeds
+
+    def refit(self, block: PhasorBlock, rows: FloatArray, times: _Times, first: int) -> None:
+        """Fit every window once more with its own speed, where the speeds are known."""
+        if self.speeds is None:
+            return
+        usual = usual_scale(block.noise)
+        for i in range(rows.shape[1]):
+            speed = float(self.speeds[first + i])
+            if np.isfinite(speed) and i not in times.uneven:
+                _put(block, i, self._at(speed).fit(rows[:, i : i + 1], times.start[i : i + 1], usual))
+
+    @functools.lru_cache(maxsize=64)  # noqa: B019 -- lives as long as the run's extraction
+    def _at(self, speed: float) -> LineFitter:
+        return LineFitter(self.length, self.rate, self.lines.at_speed(speed).frequencies)
+
+
+def _put(block: PhasorBlock, i: int, single: PhasorBlock) -> None:
+    block.phasors[i], block.mean[i] = single.phasors[0], single.mean[0]
+    block.noise[i], block.lost[i] = single.noise[0], single.lost[0]
+
+
+def _undelayed(block: PhasorBlock, lines: LineSet, delay: float) -> PhasorBlock:
+    if delay == 0.0:
+        return block
+    advance = np.exp(2j * np.pi * lines.frequencies * delay)
+    return PhasorBlock(block.phasors * advance[None, :, None], block.mean, block.noise, block.lost)
+
+
+def _joined(parts: list[PhasorBlock]) -> PhasorBlock:
+    return PhasorBlock(
+        np.concatenate([p.phasors for p in parts]),
+        np.concatenate([p.mean for p in parts]),
+        np.concatenate([p.noise for p in parts]),
+        np.concatenate([p.lost for p in parts]),
+    )

@@ -1,0 +1,242 @@
+"""Second thoughts about the lines of a run, from a first fit: whether their frequencies are right.
+
+Set points are not frequencies: the shaft creeps and the generator has a clock of its own. The phase
+advance from window to window tells a frequency error to a fraction of the line's width.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.records.lines import LineSet, known_lines
+from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
+
+#: Name of the condition that a shaft's changing speed gives rise to.
+DRIFT = "speed drifts"
+#: Phase advance over a run [cycles] that a frequency may be off before the fit is repeated.
+MAX_SLIP = 0.01
+#: Phase advance within a window [cycles] up to which a line's frequency can be put right in the phasors themselves:
+#: what the fit has lost of its amplitude (4e-5) is the same for all channels.
+MAX_RETUNED = 0.005
+#: Phase [cycles] by which the shaft may run ahead or behind within one window.
+MAX_WINDOW_SLIP = 0.005
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What to do better in a second fit.
+
+    Attributes
+    ----------
+    lines : LineSet
+    follow : (n_windows,) ndarray or None
+        Shaft speeds to follow window by window [Hz].
+    conditions : tuple of Condition
+    """
+
+    lines: LineSet
+    follow: FloatArray | None
+    conditions: tuple[Condition, ...]
+
+
+def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
+    """The fit as it would be with slightly other frequencies, without reading the run again.
+
+    Over a window a line that is off by df turns by pi df T on average; the rest is where its phase is counted from.
+
+    Parameters
+    ----------
+    result : RunPhasors
+    lines : LineSet
+        The same lines at other frequencies.
+
+    Returns
+    -------
+    RunPhasors or None
+        None where a line is off by too much, or is another one.
+    """
+    names = [[line.name for line in each.excitation + each.nuisance] for each in (result.lines, lines)]
+    if names[0] != names[1]:
+        return None
+    shift = lines.frequencies - result.lines.frequencies
+    if np.abs(shift).max() * result.length > MAX_RETUNED:
+        return None
+    turn = np.exp(-2j * np.pi * np.multiply.outer(result.start + 0.5 * result.length, shift))[:, :, None]
+    acceleration = result.acceleration
+    return replace(
+        result,
+        lines=lines,
+        displacement=replace(result.displacement, phasors=result.displacement.phasors * turn),
+        cell_force=replace(result.cell_force, phasors=result.cell_force.phasors * turn),
+        acceleration=None if acceleration is None else replace(acceleration, phasors=acceleration.phasors * turn),
+    )
+
+
+def frequency_slip(phasors: ComplexArray, start: FloatArray, noise: float) -> float:
+    """Frequency error that the phase advance of window phasors shows [Hz].
+
+    Parameters
+    ----------
+    phasors : (n, 2) complex ndarray
+        One line, referred to the start of the run.
+    start : (n,) ndarray
+        [s]
+    noise : float
+        Standard error of a phasor component; a line weaker than ten times this tells nothing.
+
+    Returns
+    -------
+    float
+        0.0 where nothing can be told.
+    """
+    good = np.isfinite(phasors).all(axis=1)
+    if good.sum() < 3:
+        return 0.0
+    z, t = phasors[good], start[good]
+    size = float(np.median(np.linalg.norm(z, axis=1)))
+    if not size > 10 * noise:
+        return 0.0
+    # Phase steps between neighbours, each weighted by what both show: robust through the median.
+    steps = np.angle(np.einsum("ni,ni->n", z[1:], z[:-1].conj())) / (2 * np.pi * np.diff(t))
+    slip = float(np.median(steps))
+    spread = 1.4826 * float(np.median(np.abs(steps - slip)))
+    return slip if abs(slip) > 4 * spread / np.sqrt(len(steps)) else 0.0
+
+
+def tuned(
+    run: Any, result: RunPhasors, driven: tuple[float, ...], speed: float, settings: PhasorSettings
+) -> Tuning | None:
+    """Compare a first fit with what it assumed; None where it was good enough.
+
+    Parameters
+    ----------
+    run : rigdata.campaign.Run
+    result : RunPhasors
+        The first fit.
+    driven : tuple of float
+        Excitation frequencies as set [Hz].
+    speed : float
+        Shaft speed assumed [Hz].
+    settings : PhasorSettings
+    """
+    exact, off_set_point = _excitations(result, driven, run.sample_rate)
+    slip = _shaft_slip(result, run.sample_rate)
+    span = result.start[-1] - result.start[0] + result.length
+    follow = _drifting(result, run.sample_rate)
+    if not off_set_point and follow is None and abs(slip) * span <= 5 * MAX_SLIP:
+        return None
+    extra = tuple(line.frequency for line in result.lines.nuisance if line.name == "found")
+    lines = known_lines(exact, speed + slip, run.sample_rate, settings.lines, extra)
+    drift: tuple[Condition, ...] = ()
+    if follow is not None:
+        drift = (
+            Condition(
+                DRIFT,
+                f"shaft speed between {np.nanmin(follow):.4g} and {np.nanmax(follow):.4g} Hz; followed by window",
+            ),
+        )
+    return Tuning(lines, follow, off_set_point + drift)
+
+
+def _excitations(
+    result: RunPhasors, driven: tuple[float, ...], rate: float
+) -> tuple[tuple[float, ...], tuple[Condition, ...]]:
+    """Excitation frequencies as the phases show them."""
+    span = result.start[-1] - result.start[0] + result.length
+    noise = _typical(result.cell_force.noise) / np.sqrt(result.length * rate)
+    slips = [
+        frequency_slip(result.cell_force.phasors[:, i], result.start, noise)
+        for i in range(len(result.lines.excitation))
+    ]
+    off = [s if abs(s) * span > MAX_SLIP else 0.0 for s in slips]
+    exact = tuple(line.frequency + s for line, s in zip(result.lines.excitation, off))
+    if not any(off):
+        return exact, ()
+    found, stated = ", ".join(f"{f:.5g}" for f in exact), ", ".join(f"{f:g}" for f in driven)
+    return exact, (
+        Condition(
+            "excitation off set point",
+            f"excitation found at {found} Hz, set point {stated} Hz; the found one was used for the fit",
+        ),
+    )
+
+
+def _shaft_line(result: RunPhasors) -> int | None:
+    """Which line is 1X; None where it is not fitted apart."""
+    names = [line.name for line in result.lines.nuisance]
+    return len(result.lines.excitation) + names.index("1X") if "1X" in names else None
+
+
+def _shaft_slip(result: RunPhasors, rate: float) -> float:
+    index = _shaft_line(result)
+    if index is None:
+        return 0.0
+    return frequency_slip(result.displacement.phasors[:, index], result.start, _phasor_noise(result, rate))
+
+
+def _phasor_noise(result: RunPhasors, rate: float) -> float:
+    """Standard error of a component of a window's displacement phasor."""
+    return _typical(result.displacement.noise) / np.sqrt(result.length * rate)
+
+
+def _drifting(result: RunPhasors, rate: float) -> FloatArray | None:
+    """Window speeds, where the shaft's phase runs away within a window.
+
+    The runout tells them ten times better than a tachometer, whose own noise looks like a drift.
+    """
+    told = speeds_from_runout(result, rate)
+    speeds, doubt = (result.speeds, 0.0) if told is None else told
+    known = speeds[np.isfinite(speeds)]
+    if len(known) < 2 or np.ptp(known) / 2 <= max(MAX_WINDOW_SLIP / result.length, 4 * doubt):
+        return None
+    return speeds
+
+
+def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, float] | None:
+    """Shaft speed in every window from the turning of its 1X phasor.
+
+    Runout and unbalance draw the same 1X from window to window; between the middles of two windows its phase
+    advances by what the shaft is ahead of the frequency fitted.
+
+    Parameters
+    ----------
+    result : RunPhasors
+        A fit with one speed for all windows.
+    rate : float
+        Sample rate [Hz].
+
+    Returns
+    -------
+    speeds : (n,) ndarray
+        [Hz]; NaN where a window gave no phasor.
+    doubt : float
+        Standard error of one of them [Hz].
+    None
+        Where 1X is too weak, or on another line.
+    """
+    index = _shaft_line(result)
+    if index is None or len(result.start) < 3:
+        return None
+    z = result.displacement.phasors[:, index]
+    good = np.flatnonzero(np.isfinite(z).all(axis=1))
+    noise = _phasor_noise(result, rate)
+    size = float(np.median(np.linalg.norm(z[good], axis=1))) if len(good) else 0.0
+    if len(good) < 3 or not size > 10 * noise:
+        return None
+    t = result.start[good]
+    steps = np.angle(np.einsum("ni,ni->n", z[good][1:], z[good][:-1].conj())) / (2 * np.pi * np.diff(t))
+    speeds = np.full(len(result.start), np.nan)
+    speeds[good] = result.lines.frequencies[index] + np.concatenate(
+        [steps[:1], 0.5 * (steps[1:] + steps[:-1]), steps[-1:]]
+    )
+    return speeds, noise / size / (2 * np.pi * float(np.median(np.diff(t))))
+
+
+def _typical(noise: FloatArray) -> float:
+    finite = noise[np.isfinite(noise)]
+    return float(np.median(finite)) if len(finite) else 0.0

@@ -1,0 +1,293 @@
+"""Phasors of the excitation lines, window by window, by a joint least-squares fit of all known lines.
+
+Convention: a channel is Re{ z exp(+i omega t) } with t = 0 at the start of the run, so that windows
+of one run are repeats of one phasor as long as the drive is locked to the recorder's clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.dynamic.records.wave_blocks import BLOCK, WaveBlocks
+from tpjb_ident.dynamic.records.windows import line_design
+
+#: A sample is a glitch beyond this many robust standard deviations of the fit's residual.
+GLITCH_LIMIT = 5.5
+#: A window this many times noisier than its run's median is looked at again.
+SCALE_LIMIT = 1.5
+#: Samples left out on either side of a glitch.
+GLITCH_MARGIN = 3
+#: A window that has lost more than this share of its samples gives no phasor.
+MAX_LOST = 0.5
+#: Change of a residual over the usual one at which least absolute deviations have settled.
+SETTLED = 0.02
+_LAD_ROUNDS = 15
+_ROUNDS = 12
+#: Outlying samples up to this share are told by leaving them out, again and again, until fit and verdict agree.
+FEW = 0.1
+_FEW_ROUNDS = 8
+
+
+@dataclass(frozen=True)
+class PhasorBlock:
+    """Phasors of one vector quantity in some windows of one run.
+
+    Attributes
+    ----------
+    phasors : (n_windows, n_lines, 2) complex ndarray
+        X and Y at every line, SI; NaN where a window gave none.
+    mean : (n_windows, 2) ndarray
+        Mean of the quantity, SI.
+    noise : (n_windows, 2) ndarray
+        Robust standard deviation of what the lines leave.
+    lost : (n_windows,) ndarray
+        Share of the samples left out (glitches, missing values).
+    """
+
+    phasors: ComplexArray
+    mean: FloatArray
+    noise: FloatArray
+    lost: FloatArray
+
+
+class LineFitter:
+    """Joint fit of lines on equal windows of an even grid: one pseudo-inverse for all of them.
+
+    Parameters
+    ----------
+    length : int
+        Samples per window.
+    rate : float
+        [Hz].
+    frequencies : (n_lines,) ndarray
+        [Hz].
+    """
+
+    def __init__(self, length: int, rate: float, frequencies: FloatArray) -> None:
+        self.length, self.rate = length, rate
+        self.frequencies = np.asarray(frequencies, dtype=float)
+        self.design = line_design(np.arange(length) / rate, self.frequencies)
+        # Lines that a window tells apart leave a well-conditioned Gram matrix; its size is a dozen.
+        self._gram_inverse = np.linalg.pinv(self.design.T @ self.design, rcond=1e-12, hermitian=True)
+        self._blocks = WaveBlocks(length, rate, self.frequencies) if length >= 2 * BLOCK else None
+        # The scale of the residual needs no more than a few hundred samples.
+        self._stride = max(1, length // 512)
+
+    def fit(self, rows: FloatArray, start: FloatArray, usual: FloatArray | None = None) -> PhasorBlock:
+        """Fit windows of a vector record.
+
+        Parameters
+        ----------
+        rows : (2, n_windows, length) ndarray
+            SI samples, X and Y; NaN where missing.
+        start : (n_windows,) ndarray
+            Time of each window's first sample [s] after the start of the run.
+        usual : (2,) ndarray, optional
+            Residual scale that windows of the run have; default the median of those given.
+        """
+        n = rows.shape[1]
+        stack = rows.reshape(2 * n, self.length)
+        offset = _mean_of_present(stack[:, :: self._stride])
+        residual = stack - offset
+        coefficients = self._solve_and_subtract(residual)
+        size = np.abs(coefficients).sum(axis=1)
+        largest = _by_window(_largest(residual))
+        scale = _by_window(1.4826 * np.median(np.abs(residual[:, :: self._stride]), axis=1))
+        usual = usual_scale(scale) if usual is None else usual
+        # A long glitch pulls the whole fit and hides in the window's own scale: the run's tells.
+        # A NaN in the window makes both comparisons false: refit those too.
+        # (The rounding of a noise-free record is no glitch either.)
+        rounding = 1e-10 * _by_window(size)
+        clean = (largest <= np.maximum(GLITCH_LIMIT * scale, rounding)) & (
+            scale <= np.maximum(SCALE_LIMIT * usual, rounding)
+        )
+        clean = clean.all(axis=1)
+        lost = np.zeros(n)
+        coefficients = coefficients.reshape(2, n, -1).transpose(1, 0, 2).copy()
+        offset = _by_window(offset[:, 0])
+        for i in np.flatnonzero(~clean):
+            pair = rows[:, i].T - offset[i]
+            quick = self._without_few(residual.reshape(2, n, -1)[:, i], coefficients[i], scale[i], usual)
+            coefficients[i], scale[i], lost[i] = _refit(self.design, pair, usual) if quick is None else quick
+        mean = coefficients[:, :, 2 * len(self.frequencies)] + offset
+        return PhasorBlock(self._phasors(coefficients, start), mean, scale, lost)
+
+    def _solve_and_subtract(self, rows: FloatArray) -> FloatArray:
+        """Coefficients of every row, (k, n_columns); the rows become residuals."""
+        if self._blocks is None:
+            coefficients = (rows @ self.design) @ self._gram_inverse
+            rows -= coefficients @ self.design.T
+        else:
+            coefficients = self._blocks.project(rows) @ self._gram_inverse
+            self._blocks.subtract(rows, coefficients)
+        return coefficients
+
+    def _without_few(
+        self, residual: FloatArray, coefficients: FloatArray, scale: FloatArray, usual: FloatArray
+    ) -> tuple[FloatArray, FloatArray, float] | None:
+        """Leave the few outlying samples out of a long window's fit until no verdict changes; None where it cannot.
+
+        Their rows are taken off the normal equations: no need to go through all samples again.
+
+        Parameters
+        ----------
+        residual : (2, length) ndarray
+            Of the fit to all samples.
+        coefficients : (2, n_columns) ndarray
+        scale, usual : (2,) ndarray
+            Residual scale of this window, and of the run's.
+
+        Returns
+        -------
+        (2, n_columns) ndarray, (2,) ndarray, float
+            As of `_refit`.
+        """
+        if self._blocks is None or not (scale <= SCALE_LIMIT * usual).all():
+            return None
+        gram = np.linalg.inv(self._gram_inverse)
+        size, found, left_out = np.abs(residual), coefficients, None
+        for _ in range(_FEW_ROUNDS):
+            previous, left_out = left_out, _beside(size > GLITCH_LIMIT * scale[:, None])
+            if previous is not None and np.array_equal(previous, left_out):
+                return found, scale, len(left_out) / self.length
+            if len(left_out) > FEW * self.length:
+                return None
+            rows = self.design[left_out]
+            # the residual of the left-out samples is what they contributed beyond the fit
+            change = residual[:, left_out] @ rows @ np.linalg.inv(gram - rows.T @ rows)
+            found = coefficients - change
+            size = np.abs(residual + change @ self.design.T)
+            scale = 1.4826 * np.median(size, axis=1)
+        return None
+
+    def _phasors(self, coefficients: FloatArray, start: FloatArray) -> ComplexArray:
+        n = 2 * len(self.frequencies)
+        local = coefficients[:, :, 0:n:2] + 1j * coefficients[:, :, 1:n:2]
+        return to_run_origin(local.transpose(0, 2, 1), self.frequencies, start)
+
+
+def _beside(outlying: NDArray[np.bool_]) -> IntArray:
+    """Columns of (2, n) that are outlying in X or Y, or next to such a one: a glitch's flanks lie below the limit."""
+    return np.flatnonzero(np.convolve(outlying.any(axis=0), np.ones(2 * GLITCH_MARGIN + 1), mode="same") > 0)
+
+
+def _largest(rows: FloatArray) -> FloatArray:
+    """Largest modulus in every row; NaN where one is missing."""
+    return np.maximum(rows.max(axis=1), -rows.min(axis=1))
+
+
+def _by_window(values: FloatArray) -> FloatArray:
+    """From (2 n,), all X before all Y, to (n, 2)."""
+    return np.ascontiguousarray(values.reshape(2, -1).T)
+
+
+def usual_scale(scale: FloatArray) -> FloatArray:
+    """Median over the windows with a scale, X and Y; infinite where none has."""
+    known = scale[np.isfinite(scale).all(axis=1)]
+    return np.median(known, axis=0) if len(known) else np.full(2, np.inf)
+
+
+def _mean_of_present(rows: FloatArray) -> FloatArray:
+    """Mean of the finite values of every row, (n, 1); zero where a row has none."""
+    present = np.isfinite(rows)
+    total = np.where(present, rows, 0.0).sum(axis=1, keepdims=True)
+    return np.asarray(total / np.maximum(present.sum(axis=1, keepdims=True), 1))
+
+
+def to_run_origin(local: ComplexArray, frequencies: FloatArray, start: FloatArray) -> ComplexArray:
+    """Turn phasors from the windows' own starts to the start of the run.
+
+    Parameters
+    ----------
+    local : (n_windows, n_lines, 2) complex ndarray
+    frequencies : (n_lines,) ndarray
+        [Hz].
+    start : (n_windows,) ndarray
+        [s].
+    """
+    return local * np.exp(-2j * np.pi * np.multiply.outer(start, frequencies))[:, :, None]
+
+
+def fit_uneven(values: FloatArray, time: FloatArray, frequencies: FloatArray, origin: float) -> PhasorBlock:
+    """Fit one window with its own time stamps (jitter, gaps).
+
+    Parameters
+    ----------
+    values : (n, 2) ndarray
+        SI; NaN where missing.
+    time : (n,) ndarray
+        [s].
+    frequencies : (n_lines,) ndarray
+        [Hz].
+    origin : float
+        Time of the start of the run [s].
+    """
+    offset = _mean_of_present(values.T)[:, 0]
+    local_time = time - time[0]
+    coefficients, scale, lost = _refit(line_design(local_time, frequencies), values - offset, np.full(2, np.inf))
+    n = 2 * len(frequencies)
+    local = (coefficients[:, 0:n:2] + 1j * coefficients[:, 1:n:2]).T[None]
+    return PhasorBlock(
+        to_run_origin(local, frequencies, np.array([time[0] - origin])),
+        (coefficients[:, n] + offset)[None],
+        scale[None],
+        np.array([lost]),
+    )
+
+
+def _refit(design: FloatArray, values: FloatArray, usual: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Robust fit of one window: find the glitches, then plain least squares without them.
+
+    Least absolute deviations (by reweighting) stand a quarter of the window being wrong; bisquare
+    steps with no more than the run's usual scale sharpen that into a clear verdict per sample.
+
+    Returns
+    -------
+    (2, n_columns) ndarray, (2,) ndarray, float
+        Coefficients of X and Y, residual scale, share of samples lost. NaN when too few are left.
+    """
+    present = np.isfinite(values).all(axis=1)
+    nothing = np.full((2, design.shape[1]), np.nan), np.full(2, np.nan)
+    if present.mean() < 1 - MAX_LOST or present.sum() <= 2 * design.shape[1]:
+        return *nothing, float(1 - present.mean())
+    full, y = design[present], values[present]
+    weights, size = np.ones(len(y)), np.full_like(y, np.inf)
+    for _ in range(_LAD_ROUNDS):
+        previous, size = size, np.abs(y - full @ _quick_solution(full, y, weights))
+        if (np.abs(size - previous).max(axis=0) <= SETTLED * np.median(size, axis=0)).all():
+            break  # nothing moves any more that could make a verdict
+        relative = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).max(axis=1)
+        weights = 1 / np.maximum(relative, 0.1)
+    scale = np.zeros(2)
+    for _ in range(_ROUNDS):
+        size = np.abs(y - full @ _quick_solution(full, y, weights))
+        scale = np.minimum(1.4826 * np.median(size, axis=0), SCALE_LIMIT * usual)
+        u = (size / np.maximum(scale, np.finfo(float).tiny)).max(axis=1) / GLITCH_LIMIT
+        previous, weights = weights, np.maximum(1 - u**2, 0.0) ** 2
+        if weights.mean() < 1 - MAX_LOST or np.abs(weights - previous).max() < 1e-3:
+            break
+    if weights.mean() < 1 - MAX_LOST:
+        return *nothing, 1.0
+    bad = np.zeros((1, len(values)), dtype=bool)
+    bad[0, present] = u > 1
+    keep = np.array(present)
+    keep[_beside(bad)] = False
+    lost = float(1 - keep.mean())
+    if lost > MAX_LOST:
+        return *nothing, lost
+    return _least_squares(design[keep], values[keep]).T, scale, lost
+
+
+def _quick_solution(design: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Weighted least squares by normal equations: good enough for the verdict on samples, and several times quicker."""
+    weighted = design * weights[:, None]
+    return np.asarray(np.linalg.pinv(weighted.T @ design, rcond=1e-12, hermitian=True) @ (weighted.T @ values))
+
+
+def _least_squares(design: FloatArray, values: FloatArray) -> FloatArray:
+    solution: FloatArray = np.linalg.lstsq(design, values, rcond=None)[0]
+    return solution

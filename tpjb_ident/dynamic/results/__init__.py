@@ -1,0 +1,1 @@
+"""What an identification says about every operating point, and its tables."""

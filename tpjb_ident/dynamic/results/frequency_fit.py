@@ -1,0 +1,175 @@
+"""Models over frequency: K-C (h = K + i omega C) and K-C-M (h = K - omega^2 M + i omega C).
+
+Generalised least squares over the excitation frequencies of one load, with the 8x8 covariance of every
+point; chi-square says which model the data support. A tilting-pad bearing owes neither: its pads are
+dynamic, and when K-C-M is refused too the raw H is the answer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import chi2
+
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.results.point_result import PointResult
+
+#: A model is refused below this probability of its chi-square.
+REFUSED = 0.01
+MODELS = {"K-C": 8, "K-C-M": 12}
+
+
+@dataclass(frozen=True)
+class FrequencyFit:
+    """One model over the frequencies of one load.
+
+    Attributes
+    ----------
+    model : {"K-C", "K-C-M"}
+    K, C, M : (2, 2) ndarray
+        [N/m], [N s/m], [kg]; M is zero for K-C.
+    covariance : (p, p) ndarray
+        Of [kxx, kxy, kyx, kyy, cxx, .., (mxx, ..)], not inflated by chi-square.
+    chi_square : float
+    dof : int
+    n_frequencies : int
+    omega_range : tuple of float
+        Lowest and highest frequency [rad/s]; outside it the fit is extrapolation.
+    misfit : float
+        Largest ||h_model - h|| / ||h|| over the frequencies: what using the model costs.
+    """
+
+    model: str
+    K: FloatArray
+    C: FloatArray
+    M: FloatArray
+    covariance: FloatArray = field(repr=False)
+    chi_square: float
+    dof: int
+    n_frequencies: int
+    omega_range: tuple[float, float]
+    misfit: float
+
+    @property
+    def probability(self) -> float:
+        """Probability of a chi-square this large if the model were true; NaN without spare data."""
+        return float(chi2.sf(self.chi_square, self.dof)) if self.dof > 0 else float("nan")
+
+    @property
+    def refused(self) -> bool:
+        """Whether the data refuse the model."""
+        return self.dof > 0 and self.probability < REFUSED
+
+    @property
+    def standard_error(self) -> FloatArray:
+        """Of the parameters; inflated by the root of the reduced chi-square where that exceeds one."""
+        inflation = max(1.0, self.chi_square / self.dof) if self.dof > 0 else 1.0
+        return np.sqrt(np.diag(self.covariance) * inflation)
+
+    def h(self, omega: float) -> np.ndarray:
+        """Dynamic stiffness of the model at `omega` [rad/s], (2, 2) complex."""
+        return np.asarray(self.K - omega**2 * self.M + 1j * omega * self.C)
+
+
+def fit_over_frequency(estimates: list[DynamicStiffness], model: str) -> FrequencyFit:
+    """Fit one model to the dynamic stiffnesses of one load.
+
+    Parameters
+    ----------
+    estimates : list of DynamicStiffness
+        At different frequencies.
+    model : {"K-C", "K-C-M"}
+
+    Raises
+    ------
+    ValueError
+        Unknown model, or fewer frequencies than it needs (1 for K-C, 2 for K-C-M).
+    """
+    if model not in MODELS:
+        raise ValueError(f"unknown model {model!r}; known: {', '.join(MODELS)}")
+    usable = [e for e in estimates if np.isfinite(e.h).all() and np.isfinite(e.covariance).all()]
+    omegas = np.array([e.omega for e in usable])
+    needed = 1 if model == "K-C" else 2
+    if len(np.unique(omegas)) < needed:
+        raise ValueError(f"{model} needs {needed} frequencies with an answer, got {len(np.unique(omegas))}")
+    # Natural scales keep the normal equations well conditioned: N/m, per omega, per omega^2.
+    middle = float(np.sqrt(omegas.min() * omegas.max()))
+    size = float(np.mean([np.abs(e.h).max() for e in usable]))
+    normal, right, total = np.zeros((MODELS[model],) * 2), np.zeros(MODELS[model]), 0.0
+    for est in usable:
+        design = _design(est.omega / middle, model)
+        y = est.vector / size
+        inverse = np.linalg.inv(est.covariance / size**2)
+        normal += design.T @ inverse @ design
+        right += design.T @ inverse @ y
+        total += float(y @ inverse @ y)
+    x = np.linalg.solve(normal, right)
+    chi_square = max(total - float(x @ right), 0.0)
+    scale = size * np.repeat([1.0, 1 / middle, 1 / middle**2][: len(x) // 4], 4)
+    parameters = (x * scale).reshape(-1, 2, 2)
+    mass = parameters[2] if model == "K-C-M" else np.zeros((2, 2))
+    modelled = [parameters[0] - e.omega**2 * mass + 1j * e.omega * parameters[1] for e in usable]
+    misfit = max(float(np.linalg.norm(m - e.h) / np.linalg.norm(e.h)) for m, e in zip(modelled, usable))
+    return FrequencyFit(
+        model,
+        parameters[0],
+        parameters[1],
+        mass,
+        np.linalg.inv(normal) * np.outer(scale, scale),
+        chi_square,
+        8 * len(usable) - len(x),
+        len(usable),
+        (float(omegas.min()), float(omegas.max())),
+        misfit,
+    )
+
+
+def _design(omega: float, model: str) -> FloatArray:
+    """Rows Re h, Im h; columns K, C (and M) entry by entry."""
+    eye, zero = np.eye(4), np.zeros((4, 4))
+    rows = [[eye, zero], [zero, omega * eye]]
+    if model == "K-C-M":
+        rows[0].append(-(omega**2) * eye)
+        rows[1].append(zero)
+    return np.block(rows)
+
+
+@dataclass(frozen=True)
+class LoadFits:
+    """All models of one load, direction and speed.
+
+    Attributes
+    ----------
+    points : tuple of PointResult
+        The frequencies behind it.
+    fits : dict of str to FrequencyFit
+    supported : str
+        The simplest model that the data do not refuse; ``"raw H"`` when they refuse all.
+    """
+
+    points: tuple[PointResult, ...] = field(repr=False)
+    fits: dict[str, FrequencyFit]
+    supported: str
+
+
+def fits_per_load(points: tuple[PointResult, ...]) -> list[LoadFits]:
+    """Fit every load that was run at two excitation frequencies or more.
+
+    Points with mains on the excitation line take part: their intervals say what they are worth.
+    """
+    groups: dict[tuple[float, ...], list[PointResult]] = {}
+    for p in points:
+        key = (p.point.static_load, p.point.static_load_direction_deg, p.point.shaft_speed_hz)
+        if np.isfinite(p.stiffness.h).all():
+            groups.setdefault(key, []).append(p)
+    result = []
+    for members in groups.values():
+        estimates = [p.stiffness for p in members]
+        if len({round(e.omega, 6) for e in estimates}) < 2:
+            continue
+        fits = {model: fit_over_frequency(estimates, model) for model in MODELS}
+        accepted = [name for name, fit in fits.items() if fit.dof > 0 and not fit.refused]
+        result.append(LoadFits(tuple(members), fits, accepted[0] if accepted else "raw H"))
+    return result

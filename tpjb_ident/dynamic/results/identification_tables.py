@@ -1,0 +1,138 @@
+"""Rows of the tables that an identification becomes; the names are promised to scripts (docs/results.md)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
+from tpjb_ident.dynamic.estimators.stiffness import ENTRIES, DynamicStiffness
+from tpjb_ident.dynamic.results.frequency_fit import FrequencyFit, LoadFits
+from tpjb_ident.dynamic.results.point_result import PointResult
+
+POINT_COLUMNS = ("static_load_N", "static_load_direction_deg", "shaft_speed_Hz", "excitation_Hz")
+_UNITS = {"k": "N_per_m", "c": "Ns_per_m", "m": "kg"}
+_FIT_FIGURES = (
+    "model",
+    "supported",
+    "n_frequencies",
+    "excitation_lowest_Hz",
+    "excitation_highest_Hz",
+    "chi_square",
+    "dof",
+    "probability",
+    "largest_misfit",
+)
+_FIT_VALUES = tuple(f"{symbol}{entry}_{unit}" for symbol, unit in _UNITS.items() for entry in ENTRIES)
+FIT_COLUMNS = (*POINT_COLUMNS[:3], *_FIT_FIGURES, *(c for name in _FIT_VALUES for c in (name, f"{name}_se")))
+WINDOW_COLUMNS = ("run", "time_s", "excitation_direction_deg", "weight", "reason", *POINT_COLUMNS)
+
+
+def point_columns(p: PointResult) -> dict[str, float]:
+    """Key of a point."""
+    point = p.point
+    values = (point.static_load, point.static_load_direction_deg, point.shaft_speed_hz, point.excitation_hz)
+    return dict(zip(POINT_COLUMNS, values))
+
+
+def estimate_row(p: PointResult, est: DynamicStiffness, group: LoadFits | None) -> dict[str, Any]:
+    """One method's answer at one point, with everything needed to believe it or not.
+
+    Parameters
+    ----------
+    p : PointResult
+    est : DynamicStiffness
+        One of the point's.
+    group : LoadFits or None
+        Models over frequency of the point's load, where it was run at several frequencies.
+    """
+    row: dict[str, Any] = dict(point_columns(p))
+    row["static_load_measured_N"] = p.static_load_measured
+    row.update(coefficient_columns(est))
+    weights = est.weights.min(axis=1)
+    conditions = p.quality if est is p.stiffness else est.status
+    row.update(
+        method=est.method,
+        n_records=p.n_records,
+        n_windows=p.n_windows,
+        condition_number=est.condition,
+        outlier_fraction=float((weights < REJECTED_WEIGHT).mean()),
+        quality="; ".join(str(c) for c in conditions) or "ok",
+        quality_detail="; ".join(c.sentence() for c in conditions),
+        n_windows_rejected=int((weights < REJECTED_WEIGHT).sum()),
+        coherence=p.coherence,
+        amplitude_m=p.amplitude,
+        amplitude_over_clearance=p.amplitude / p.clearance if p.clearance else np.nan,
+        amplitude_slope=np.nan if p.linearity is None else p.linearity.stiffening,
+        amplitude_slope_se=np.nan if p.linearity is None else p.linearity.standard_error,
+        chi_square=est.chi_square,
+        attenuation=float(est.attenuation[0]),
+        inertia_corrected=p.inertia_corrected,
+        baseline_subtracted=False,  # the rig without its bearing is not part of a campaign
+        **_model_columns(group),
+        x_m=p.position[0],
+        y_m=p.position[1],
+        x_m_se=p.position_se[0],
+        y_m_se=p.position_se[1],
+    )
+    row.update({f"temperature_{pad}_K": value for pad, value in p.temperatures.items()})
+    return row
+
+
+def _model_columns(group: LoadFits | None) -> dict[str, Any]:
+    """Which model over frequency the data of the point's load support, and its chi-square."""
+    fit = None if group is None else group.fits.get(group.supported)
+    return {
+        "frequency_model": "single line" if group is None else group.supported,
+        "frequency_chi_square": np.nan if fit is None else fit.chi_square,
+        "frequency_dof": 0 if fit is None else fit.dof,
+    }
+
+
+def fit_row(group: LoadFits, fit: FrequencyFit) -> dict[str, Any]:
+    """One model over frequency of one load."""
+    row: dict[str, Any] = {name: point_columns(group.points[0])[name] for name in POINT_COLUMNS[:3]}
+    row.update(
+        model=fit.model,
+        supported=group.supported,
+        n_frequencies=fit.n_frequencies,
+        excitation_lowest_Hz=fit.omega_range[0] / (2 * np.pi),
+        excitation_highest_Hz=fit.omega_range[1] / (2 * np.pi),
+        chi_square=fit.chi_square,
+        dof=fit.dof,
+        probability=fit.probability,
+        largest_misfit=fit.misfit,
+    )
+    errors = np.concatenate([fit.standard_error, np.zeros(12 - len(fit.standard_error))])
+    values = np.concatenate([fit.K.ravel(), fit.C.ravel(), fit.M.ravel()])
+    for name, value, error in zip(_FIT_VALUES, values, errors):
+        row[name], row[f"{name}_se"] = value, error
+    return row
+
+
+def coefficient_columns(est: DynamicStiffness) -> dict[str, float]:
+    """K and C with their intervals under the names of ``coefficients.csv``.
+
+    Returns
+    -------
+    dict
+        For every coefficient the value, ``_lo``, ``_hi`` (95 %, random and calibration together), ``_se`` (random
+        standard error) and ``_se_systematic`` (calibration), and half the width of the 95 % interval of either part,
+        ``_random95`` and ``_systematic95``.
+    """
+    half, random, se = est.half_width(0.95), est.half_width(0.95, systematic=False), est.standard_error
+    systematic = np.zeros(8) if est.systematic is None else np.sqrt(np.diag(est.systematic))
+    row: dict[str, float] = {}
+    for symbol, offset, factor in (("k", 0, 1.0), ("c", 4, 1 / est.omega)):
+        for j, entry in enumerate(ENTRIES):
+            name, i = f"{symbol}{entry}_{_UNITS[symbol]}", offset + j
+            value = est.vector[i]
+            row[name] = value * factor
+            row[f"{name}_lo"] = (value - half[i]) * factor
+            row[f"{name}_hi"] = (value + half[i]) * factor
+            row[f"{name}_se"] = se[i] * factor
+            row[f"{name}_se_systematic"] = systematic[i] * factor
+            row[f"{name}_random95"] = random[i] * factor
+            row[f"{name}_systematic95"] = float(np.sqrt(max(half[i] ** 2 - random[i] ** 2, 0.0))) * factor
+    return row

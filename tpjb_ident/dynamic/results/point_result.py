@@ -1,0 +1,104 @@
+"""What a campaign says about one operating point, with everything needed to believe it or not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from rigdata.operating_point import OperatingPoint
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.corrections.static_load import LoadMiss
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.results.amplitude import AmplitudeSlope
+
+
+@dataclass(frozen=True)
+class WindowVerdict:
+    """One window that lost its weight.
+
+    Attributes
+    ----------
+    run : str
+    time : float
+        Start of the window in its run [s].
+    weight : float
+    direction : float
+        Excitation direction [rad]; NaN where the manifest gives none.
+    reason : str
+        What gave it away.
+    """
+
+    run: str
+    time: float
+    weight: float
+    direction: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class PointResult:
+    """Dynamic stiffness of one operating point.
+
+    Attributes
+    ----------
+    point : OperatingPoint
+        Set points.
+    stiffness : DynamicStiffness
+        By the default method.
+    by_method : dict of str to DynamicStiffness
+    static_load_measured : float
+        Mean load that the cells show [N].
+    position, position_se : (2,) ndarray
+        Mean displacement (from the probes' zero) over the runs and its standard error [m].
+    temperatures : dict of int to float
+        Mean film temperature per pad [K].
+    n_records, n_windows : int
+    outlier_fraction : float
+        Share of windows with (nearly) no weight.
+    coherence : float
+        Smaller of the two force axes' multiple coherences with the displacements.
+    amplitude : float
+        Largest displacement amplitude of a direction [m].
+    quality : tuple of Condition
+        Everything that a reader of the numbers should know; empty when all is well.
+    rejected : tuple of WindowVerdict
+    runs : tuple of str
+    load_miss : LoadMiss or None
+        How far each run's static load was off.
+    linearity : AmplitudeSlope or None
+        Change of h with amplitude, where directions were run at several.
+    inertia_corrected : bool
+        Whether the housing's inertia was added to the cells' force.
+    clearance : float or None
+        Assembled clearance, where the campaign carries a bearing [m].
+    """
+
+    point: OperatingPoint
+    stiffness: DynamicStiffness
+    by_method: dict[str, DynamicStiffness] = field(repr=False)
+    static_load_measured: float
+    position: FloatArray = field(repr=False)
+    position_se: FloatArray = field(repr=False)
+    temperatures: dict[int, float] = field(repr=False)
+    n_records: int
+    n_windows: int
+    outlier_fraction: float
+    coherence: float
+    amplitude: float
+    quality: tuple[Condition, ...]
+    rejected: tuple[WindowVerdict, ...] = field(repr=False)
+    runs: tuple[str, ...] = field(repr=False)
+    load_miss: LoadMiss | None = field(default=None, repr=False)
+    linearity: AmplitudeSlope | None = field(default=None, repr=False)
+    inertia_corrected: bool = False
+    clearance: float | None = field(default=None, repr=False)
+
+    @property
+    def condition_number(self) -> float:
+        """Condition number of the displacement directions."""
+        return self.stiffness.condition
+
+    @property
+    def attenuation(self) -> FloatArray:
+        """What noise on the displacements would do to a plain regression; see `DynamicStiffness`."""
+        return self.stiffness.attenuation

@@ -1,0 +1,171 @@
+"""Figures and flags that say how far a point's coefficients can be trusted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.results.point_result import WindowVerdict
+from tpjb_ident.dynamic.runs.point_data import PointData
+
+#: Coefficients are linear below this share of the clearance.
+MAX_AMPLITUDE = 0.05
+
+
+def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatArray) -> float:
+    """Multiple coherence of the forces with the displacements, smaller axis.
+
+    Parameters
+    ----------
+    D, F : (n, 2) complex ndarray
+    h : (2, 2) complex ndarray
+    weights : (n,) ndarray
+
+    Returns
+    -------
+    float
+        1 - (unexplained power) / (power), in the good windows; NaN without an answer.
+    """
+    good = np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1) & (weights > 0)
+    if not good.any() or not np.isfinite(h).all():
+        return float("nan")
+    w = weights[good, None]
+    residual = F[good] - D[good] @ h.T
+    power = (w * np.abs(F[good]) ** 2).sum(axis=0)
+    return float(np.min(1 - (w * np.abs(residual) ** 2).sum(axis=0) / power))
+
+
+def amplitude(data: PointData, weights: FloatArray) -> float:
+    """Largest displacement amplitude (major half-axis of the orbit) of any run's mean phasor [m]."""
+    largest = 0.0
+    for i in range(len(data.runs)):
+        mine = (data.run_index == i) & (weights > 0) & np.isfinite(data.D).all(axis=1)
+        if mine.any():
+            z = np.average(data.D[mine], axis=0, weights=weights[mine])
+            sizes = np.linalg.svd(np.stack([z.real, z.imag]), compute_uv=False)
+            largest = max(largest, float(sizes[0]))
+    return largest
+
+
+def rejected_windows(data: PointData, h: ComplexArray, weights: FloatArray) -> tuple[WindowVerdict, ...]:
+    """Windows without weight, each with the reason that shows in its own numbers."""
+    found = []
+    answered = bool(np.isfinite(h).all())
+    for i in np.flatnonzero(weights < REJECTED_WEIGHT):
+        run = data.runs[data.run_index[i]]
+        k = int(i - np.searchsorted(data.run_index, data.run_index[i]))
+        direction = float("nan") if run.direction is None else run.direction
+        reason = _reason(data, run.displacement.lost[k], run.cell_force.lost[k], int(i), weights, answered)
+        found.append(WindowVerdict(run.run, float(run.start[k]), float(weights[i]), direction, reason))
+    return tuple(found)
+
+
+def _reason(data: PointData, lost_d: float, lost_f: float, i: int, weights: FloatArray, answered: bool) -> str:
+    for name, lost in (("displacement", lost_d), ("force", lost_f)):
+        if lost > 0.5:
+            return f"{100 * lost:.0f} % of the {name} samples missing or glitched"
+    if not (np.isfinite(data.D[i]).all() and np.isfinite(data.F[i]).all()):
+        return "missing values"
+    if not answered:
+        return "the point has no answer"
+    siblings = (data.run_index == data.run_index[i]) & (weights >= REJECTED_WEIGHT)
+    if not siblings.any():
+        return "whole run disagrees with the other directions"
+    moves = {
+        "displacement": _shift(data.D[i], data.D[siblings]),
+        "force": _shift(data.F[i], data.F[siblings]),
+    }
+    worst = max(moves, key=lambda name: moves[name])
+    return f"{worst} phasor {100 * moves[worst]:.1f} % away from its repeats"
+
+
+def _shift(z: ComplexArray, repeats: ComplexArray) -> float:
+    mean = repeats.mean(axis=0)
+    return float(np.linalg.norm(z - mean) / max(float(np.linalg.norm(mean)), np.finfo(float).tiny))
+
+
+def flags(
+    data: PointData, stiffness: DynamicStiffness, coherence: float, amplitude: float, clearance: float | None
+) -> tuple[Condition, ...]:
+    """Conditions that the point's figures give rise to.
+
+    Parameters
+    ----------
+    data : PointData
+    stiffness : DynamicStiffness
+    coherence : float
+    amplitude : float
+        [m]
+    clearance : float or None
+        [m]
+    """
+    found = []
+    if not coherence >= MIN_COHERENCE and np.isfinite(stiffness.h).all():
+        found.append(Condition("low-coherence", f"coherence {coherence:.3f} < {MIN_COHERENCE}"))
+    if clearance and amplitude > MAX_AMPLITUDE * clearance:
+        share = 100 * amplitude / clearance
+        found.append(Condition("large-amplitude", f"amplitude {share:.1f} % of the clearance > 5 %"))
+    found += _missing(data)
+    if len(data.runs) and data.runs[0].acceleration is None and np.isfinite(stiffness.h).all():
+        found.append(Condition("inertia-not-corrected", "no accelerometers: the housing's inertia stays in F"))
+    if _feeds_motion(stiffness):
+        found.append(
+            Condition(
+                "negative-damping",
+                "the film would feed the motion instead of damping it: check polarity, axes and sign of forces",
+            )
+        )
+    return tuple(found)
+
+
+def _complete(data: PointData) -> BoolArray:
+    """Windows that have phasors."""
+    return np.asarray(np.isfinite(data.D).all(axis=1) & np.isfinite(data.F).all(axis=1))
+
+
+def _missing(data: PointData) -> list[Condition]:
+    """Windows without phasors, pointed out when they are many or a whole run's."""
+    whole = _complete(data)
+    empty = [run.run for i, run in enumerate(data.runs) if not whole[data.run_index == i].any()]
+    if empty:
+        return [Condition("run-without-data", f"no usable window in {', '.join(empty)}")]
+    if whole.mean() < 0.9:
+        return [Condition("windows-missing", f"{int((~whole).sum())} of {len(whole)} windows gave no phasors")]
+    return []
+
+
+def _feeds_motion(stiffness: DynamicStiffness) -> bool:
+    """Whether the dissipative part of H (its skew-Hermitian part) is negative beyond doubt."""
+    h = stiffness.h
+    if not np.isfinite(h).all():
+        return False
+    dissipative = (h - h.conj().T) / 2j
+    doubt = 3 * float(stiffness.standard_error[4:].max())
+    return bool(np.linalg.eigvalsh(dissipative)[0] < -doubt)
+
+
+def directional_pattern(data: PointData, weights: FloatArray) -> Condition | None:
+    """Point out rejected windows that gather in some directions: physics may do that, glitches do not.
+
+    A binomial test per run: more rejected windows than chance gives once in a thousand, in a run
+    with at least three of them.
+    """
+    from scipy.stats import binom
+
+    whole = _complete(data)
+    bad = (weights < REJECTED_WEIGHT) & whole
+    total = int(bad.sum())
+    named = []
+    for i, run in enumerate(data.runs):
+        mine = (data.run_index == i) & whole
+        n, hits = int(mine.sum()), int(bad[mine].sum())
+        others = (total - hits + 0.5) / (int(whole.sum()) - n + 1.0)
+        if hits >= 3 and hits > 0.4 * n and binom.sf(hits - 1, n, min(others, 1.0)) < 1e-3:
+            angle = "" if run.direction is None else f" at {np.degrees(run.direction):.0f} deg"
+            named.append(f"{run.run}{angle} ({hits} of {n})")
+    if not named:
+        return None
+    return Condition("directional-rejection", f"rejected windows gather in {', '.join(named)}: look before discarding")

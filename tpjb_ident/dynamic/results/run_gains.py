@@ -1,0 +1,132 @@
+"""Runs of an operating point in which one probe or cell has another gain than in the others.
+
+The search is that of `tpjb check`, `tpjb_ident.check.one_gain`; here it works on the phasors of all windows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.problem import RigDataError
+from rigdata.vector import inverse_directions
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.check.gain_evidence import PointReadings
+from tpjb_ident.check.one_gain import wrong_gains
+from tpjb_ident.check.run_gains import gain_in_words, swept_centre
+from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.dynamic.runs.point_data import PointData
+
+#: Name of the condition.
+RUN_GAIN_OFF = "run-gain-off"
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """The two probes and the two cells of a rig.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Probes, then cells.
+    probe_plane, cell_plane : (2, 2) ndarray
+        From two readings to X and Y.
+    centre : tuple of float or None
+        What each probe reads at the bearing's centre [m].
+    """
+
+    names: tuple[str, ...]
+    probe_plane: NDArray[np.float64]
+    cell_plane: NDArray[np.float64]
+    centre: tuple[float | None, float | None]
+
+
+def channel_pairs(campaign: Any) -> Pairs | None:
+    """Probes and cells of a campaign; None where it has not two of each in different directions."""
+    of = {q: [c for c in campaign.channels.values() if c.quantity == q] for q in ("displacement", "force")}
+    if any(len(channels) != 2 for channels in of.values()):
+        return None
+    probe_plane, cell_plane = (inverse_directions(tuple(float(c.axis) for c in channels)) for channels in of.values())
+    if not np.isfinite(probe_plane).all() or not np.isfinite(cell_plane).all():
+        return None
+    names = tuple(c.name for channels in of.values() for c in channels)
+    first, second = (_centre(campaign, name, names[2:], cell_plane) for name in names[:2])
+    return Pairs(names, probe_plane, cell_plane, (first, second))
+
+
+def _centre(campaign: Any, probe: str, cells: Sequence[str], plane: FloatArray) -> float | None:
+    found = []
+    for run in campaign.of_kind("clearance"):
+        try:
+            readings = [run.record(name).values for name in (probe, *cells)]
+        except RigDataError:  # a damaged sweep is no matter of the dynamic runs
+            continue
+        if len({len(values) for values in readings}) == 1:
+            found.append(swept_centre(np.stack(readings[1:], axis=1) @ plane.T, readings[0]))
+    known = [centre for centre in found if centre is not None]
+    return float(np.median(known)) if known else None
+
+
+def with_gain_doubts(result: PointResult, data: PointData, pairs: Pairs | None) -> PointResult:
+    """The point, with a condition that names runs in which one channel has a gain of its own.
+
+    Parameters
+    ----------
+    result : PointResult
+    data : PointData
+        Its windows as measured, nothing corrected.
+    pairs : Pairs or None
+        None says nothing.
+    """
+    if pairs is None:
+        return result
+    medians = [_medians(data, k) for k in range(len(data.runs))]
+    kept = [k for k, values in enumerate(medians) if all(np.isfinite(v).all() for v in values)]
+    if not kept:
+        return result
+    found = wrong_gains(_readings(data, [medians[k] for k in kept], kept, pairs))
+    told = []
+    for one in sorted(found, key=lambda f: f.run):
+        names = [pairs.names[i] for i in one.channels]
+        told.append(f"{data.runs[kept[one.run]].run}: {names[0]} {gain_in_words(one, names)}")
+    if not told:
+        return result
+    return replace(result, quality=merged(result.quality, (Condition(RUN_GAIN_OFF, "; ".join(told)),)))
+
+
+def _medians(data: PointData, k: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Displacement, cell force and oil force of one run, X and Y, medians over its windows; NaN where it has none."""
+    mine = data.run_index == k
+    run, line = data.runs[k], data.lines[k]
+    blocks = (data.D[mine], run.cell_force.phasors[:, line], data.F[mine])
+    good = np.logical_and.reduce([np.isfinite(block).all(axis=1) for block in blocks])
+    if not good.any():
+        nothing = np.full(2, np.nan + 0j)
+        return nothing, nothing, nothing
+    first, second, third = (np.median(b[good].real, axis=0) + 1j * np.median(b[good].imag, axis=0) for b in blocks)
+    return first, second, third
+
+
+def _readings(
+    data: PointData,
+    medians: Sequence[tuple[ComplexArray, ComplexArray, ComplexArray]],
+    kept: Sequence[int],
+    pairs: Pairs,
+) -> PointReadings:
+    displacement, cells, force = (np.stack([values[i] for values in medians]) for i in range(3))
+    to_probes, to_cells = np.linalg.inv(pairs.probe_plane).T, np.linalg.inv(pairs.cell_plane).T
+    return PointReadings(
+        probes=displacement @ to_probes,
+        cells=cells @ to_cells,
+        inertia=force - cells,
+        probe_means=data.mean_positions[list(kept)] @ to_probes,
+        cell_means=data.mean_loads[list(kept)] @ to_cells,
+        probe_plane=pairs.probe_plane,
+        cell_plane=pairs.cell_plane,
+        centre=pairs.centre,
+    )

@@ -1,0 +1,1 @@
+"""All dynamic runs of a campaign: read by jobs, kept, grouped by operating point."""

@@ -1,0 +1,50 @@
+"""Dynamic runs that cannot be used: left out and named, while the others of their operating point count.
+
+A file that is missing or damaged, a channel that is dead: the run says nothing, and nothing else suffers from that. A
+point keeps its answer as long as other runs excite it; one that loses all of its runs is told as lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rigdata.operating_point import OperatingPoint
+from tpjb_ident.conditions import Condition
+
+#: Condition of a run whose accelerometer is dead.
+DEAD_ACCELEROMETER = "accelerometer-dead"
+#: Runs named one by one; more are counted.
+LISTED = 6
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A dynamic run that takes no part.
+
+    Attributes
+    ----------
+    run : str
+    point : OperatingPoint
+        Its set points.
+    error : Exception
+        Why, as `RigDataError` or `RecordTooShortError`.
+    """
+
+    run: str
+    point: OperatingPoint
+    error: Exception
+
+    @property
+    def reason(self) -> str:
+        """The first reason, in one line."""
+        return str(self.error).partition("\n")[0]
+
+
+def named_runs(left: Sequence[LeftOut], of: int) -> tuple[Condition, ...]:
+    """What the campaign has to say: which of its `of` dynamic runs take no part, and why."""
+    if not left:
+        return ()
+    told = "; ".join(f"{one.run} ({one.reason})" for one in left[:LISTED])
+    more = f"; and {len(left) - LISTED} more" if len(left) > LISTED else ""
+    return (Condition("runs-left-out", f"{len(left)} of {of} dynamic runs take no part: {told}{more}"),)

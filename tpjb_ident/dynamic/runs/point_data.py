@@ -1,0 +1,108 @@
+"""All windows of one operating point, gathered from its runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigdata.operating_point import OperatingPoint
+from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.dynamic.records.run_phasors import RunPhasors
+
+
+@dataclass(frozen=True)
+class PointData:
+    """Windows of all runs at one operating point and one excitation line.
+
+    Attributes
+    ----------
+    point : OperatingPoint
+    runs : tuple of RunPhasors
+    lines : tuple of int
+        Which line of each run is meant.
+    D, F, A : (n, 2) complex ndarray
+        Displacement [m], oil force [N], housing acceleration [m/s^2] (zero where not measured).
+    run_index : (n,) ndarray of int
+        Windows of one run are repeats of one excitation.
+    """
+
+    point: OperatingPoint
+    runs: tuple[RunPhasors, ...]
+    lines: tuple[int, ...]
+    D: ComplexArray
+    F: ComplexArray
+    A: ComplexArray
+    run_index: IntArray
+
+    @property
+    def omega(self) -> float:
+        """Excitation frequency as set [rad/s]."""
+        return self.point.excitation
+
+    @property
+    def mean_loads(self) -> FloatArray:
+        """Mean cell force of every run, shape (n_runs, 2) [N]."""
+        return np.array([finite_mean(run.cell_force.mean) for run in self.runs])
+
+    @property
+    def mean_positions(self) -> FloatArray:
+        """Mean displacement of every run, shape (n_runs, 2) [m]."""
+        return np.array([finite_mean(run.displacement.mean) for run in self.runs])
+
+
+def finite_mean(rows: FloatArray) -> FloatArray:
+    """Mean of the complete rows, (2,); NaN where there is none."""
+    good = rows[np.isfinite(rows).all(axis=1)]
+    return good.mean(axis=0) if len(good) else np.full(2, np.nan)
+
+
+def gather(runs: list[RunPhasors]) -> list[PointData]:
+    """Group runs by operating point; a record with several excitation lines feeds several points."""
+    lines = [(run.point, tuple(line.frequency for line in run.lines.excitation)) for run in runs]
+    return [point_data(point, [(runs[k], i) for k, i in members]) for point, members in group(lines)]
+
+
+def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[OperatingPoint, list[tuple[int, int]]]]:
+    """Operating points in order, each with the places of its runs and which line of the run is meant.
+
+    Parameters
+    ----------
+    runs : list of (OperatingPoint, tuple of float)
+        Set points and excitation frequencies as fitted [Hz] of every run.
+    """
+    groups: dict[tuple[float, ...], tuple[OperatingPoint, list[tuple[int, int]]]] = {}
+    for k, (stated, frequencies) in enumerate(runs):
+        for i, frequency in enumerate(frequencies):
+            point = _point_of(stated, frequency)
+            key = (
+                point.static_load,
+                point.static_load_direction_deg,
+                point.shaft_speed_hz,
+                point.excitation_hz,
+            )
+            groups.setdefault(key, (point, []))[1].append((k, i))
+    return [groups[key] for key in sorted(groups)]
+
+
+def _point_of(stated: OperatingPoint, frequency: float) -> OperatingPoint:
+    """Operating point of one line; the set point's frequency where the line belongs to it."""
+    nominal = stated.excitation_hz
+    if abs(frequency - nominal) <= 0.02 * max(nominal, 1e-9):
+        return stated
+    rounded = 2 * np.pi * round(frequency, 3)
+    return OperatingPoint(stated.static_load, stated.static_load_direction, stated.shaft_speed, rounded)
+
+
+def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> PointData:
+    """Windows of a point's runs, each with the line that is meant."""
+    runs = tuple(run for run, _ in members)
+    lines = tuple(i for _, i in members)
+    D = [run.displacement.phasors[:, i] for run, i in zip(runs, lines)]
+    F = [run.oil_force(i) for run, i in zip(runs, lines)]
+    A = [
+        np.zeros_like(d) if run.acceleration is None else run.acceleration.phasors[:, i]
+        for run, i, d in zip(runs, lines, D)
+    ]
+    index = np.repeat(np.arange(len(runs)), [len(d) for d in D])
+    return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), np.concatenate(A), index)

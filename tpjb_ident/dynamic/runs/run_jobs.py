@@ -1,0 +1,165 @@
+"""Turning all runs of a campaign to phasors: one job per run, wherever the workers are.
+
+A job carries the run's description and reads the file itself, so that little travels out and a few phasors
+travel back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rigdata.problem import RigDataError
+from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
+from tpjb_ident.dynamic.records.stretches import kept_open
+from tpjb_ident.dynamic.records.windows import RecordTooShortError
+from tpjb_ident.dynamic.runs.dead_channels import dead_accelerometers
+from tpjb_ident.dynamic.runs.left_out import LeftOut
+from tpjb_ident.dynamic.runs.run_result import RunResult
+from tpjb_ident.dynamic.runs.run_shelf import RunShelf
+from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
+from tpjb_ident.runtime.executors import InProcessWorkers, Workers, each_finished
+
+Progress = Callable[[str, int, int], None]
+#: Samples from which a run's temperatures are taken.
+TEMPERATURE_SAMPLES = 2**17
+
+
+def all_runs(
+    campaign: Any,
+    settings: PhasorSettings,
+    progress: Progress,
+    workers: Workers | None = None,
+    store: RunStore | None = None,
+) -> RunShelf:
+    """Phasors and temperatures of every dynamic run, put away on a shelf that the caller closes.
+
+    A run that cannot be used is left out, and the shelf names it.
+
+    Parameters
+    ----------
+    campaign : rigdata.campaign.Campaign
+    settings : PhasorSettings
+    progress : callable
+        Called as progress(text, done, total).
+    workers : Workers, optional
+        Who reads the runs; the numbers are the same.
+    store : RunStore, optional
+        Where finished runs are kept, and taken from if nothing has changed since.
+
+    Raises
+    ------
+    RecordTooShortError, rigdata.problem.RigDataError
+        Of the first run, in order, where none can be used.
+    LostJobsError
+        Workers were lost again and again.
+    """
+    runs = campaign.of_kind("dynamic")
+    mass = campaign.housing_mass
+    progress(runs[0].id if runs else "", 0, len(runs))
+    shelf = RunShelf(runs, mass, lambda run: one_run(run, mass, settings), store)
+    done = 0
+
+    def finished(index: int, answer: tuple[str, RunResult | LeftOut | None]) -> None:
+        nonlocal done
+        mark, result = answer
+        if isinstance(result, LeftOut):
+            shelf.leave_out(index, result)
+        else:
+            if store is not None and result is not None and mark:
+                store.keep(mark, result)
+            shelf.put(index, result, mark)
+        done += 1
+        progress(runs[index].id, done, len(runs))
+
+    jobs = ((_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs)
+    try:
+        each_finished(workers or InProcessWorkers(), unless_known, list(jobs), finished)
+        shelf.leave_out_the_odd_ones()
+        if runs and not shelf.places:
+            raise shelf.left_out[0].error
+    except BaseException:
+        shelf.close()
+        raise
+    return shelf
+
+
+def unless_known(
+    run: Any, housing_mass: float, settings: PhasorSettings, known: str | None
+) -> tuple[str, RunResult | LeftOut | None]:
+    """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
+
+    The fingerprint is "" where the record changed while it was read: such a result must not be kept. Where nothing
+    is kept anywhere (`known` is None) it is not asked for.
+    """
+    try:
+        return _unless_known(run, housing_mass, settings, known)
+    except (RigDataError, RecordTooShortError) as error:
+        return "", LeftOut(run.id, run.point, error)
+
+
+def _unless_known(
+    run: Any, housing_mass: float, settings: PhasorSettings, known: str | None
+) -> tuple[str, RunResult | None]:
+    if known is None:
+        return "", one_run(run, housing_mass, settings)
+    mark = fingerprint(run, housing_mass, settings)
+    if mark and mark == known:
+        return mark, None
+    before = _state(run)
+    result = one_run(run, housing_mass, settings)
+    return (mark if before == _state(run) else ""), result
+
+
+def _state(run: Any) -> tuple[int, int] | None:
+    path = getattr(getattr(run, "reader", None), "path", None)
+    if path is None:
+        return None
+    try:
+        state = path.stat()
+    except OSError:  # it has vanished: reading says so, with a better message
+        return None
+    return state.st_size, state.st_mtime_ns
+
+
+def _anywhere(run: Any) -> Any:
+    """The run with its file's absolute path: workers may stand in another folder."""
+    reader: Any = getattr(run, "reader", None)
+    if reader is None or reader.path.is_absolute():
+        return run
+    return replace(run, reader=replace(reader, path=reader.path.absolute()))
+
+
+def one_run(run: Any, housing_mass: float, settings: PhasorSettings) -> RunResult:
+    """Phasors and temperatures of one run."""
+    with kept_open(run):
+        try:
+            phasors = run_phasors(run, housing_mass, settings)
+        except RecordTooShortError as error:
+            raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
+        conditions = merged(phasors.conditions, dead_accelerometers(run, phasors), _mended(run))
+        return RunResult(replace(phasors, conditions=conditions), mean_temperatures(run))
+
+
+def _mended(run: Any) -> tuple[Condition, ...]:
+    """What the reader had to mend in the record."""
+    problems = run.reader.problems() if hasattr(run, "reader") else ()
+    told = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
+    return (Condition("record-damaged", "; ".join(told)),) if told else ()
+
+
+def mean_temperatures(run: Any) -> dict[int, float]:
+    """Mean temperature per pad over a run [K]; pads with several sensors give their mean."""
+    found: dict[int, list[float]] = {}
+    for sensor in run.temperatures():
+        if sensor.pad is None:
+            continue
+        values = run.record(sensor.channel, 0, TEMPERATURE_SAMPLES).values
+        known = values[np.isfinite(values)]
+        if len(known):
+            found.setdefault(sensor.pad, []).append(float(known.mean()))
+    return {pad: float(np.mean(values)) for pad, values in sorted(found.items())}

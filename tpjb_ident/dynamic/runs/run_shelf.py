@@ -1,0 +1,218 @@
+"""Finished runs of one identification: a digest of each in memory, the phasors on disk once they are many.
+
+What compares runs over the whole campaign (loads, mains, grouping) needs a few numbers of each; the phasors of all
+windows are needed one operating point at a time. So memory does not grow with the campaign: what a small one leaves
+stays in memory, the rest waits in the store of finished runs, or in a temporary folder where there is none.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from rigdata.operating_point import OperatingPoint
+from rigdata.problem import Problem, RigDataError
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.records.mains_line import mains_line
+from tpjb_ident.dynamic.records.phasors import PhasorBlock
+from tpjb_ident.dynamic.records.run_data import RunPhasors
+from tpjb_ident.dynamic.runs.left_out import DEAD_ACCELEROMETER, LeftOut
+from tpjb_ident.dynamic.runs.point_data import finite_mean
+from tpjb_ident.dynamic.runs.run_result import RunResult
+from tpjb_ident.dynamic.runs.run_store import RunStore
+
+#: Bytes of phasors that stay in memory.
+ROOM = 8 * 2**20
+#: Fingerprint of what this process itself has put into its temporary folder.
+_OWN = "this process"
+
+
+@dataclass(frozen=True)
+class RunDigest:
+    """What is known of a run without its windows.
+
+    Attributes
+    ----------
+    run : str
+    point : OperatingPoint
+    excitations : tuple of float
+        Frequencies as fitted [Hz].
+    conditions : tuple of Condition
+    mean_load : (2,) ndarray
+        [N]
+    mains : (2,) complex ndarray or None
+        Displacement at the mains line, where it stands apart [m].
+    temperatures : dict of int to float
+        Mean per pad [K].
+    """
+
+    run: str
+    point: OperatingPoint
+    excitations: tuple[float, ...]
+    conditions: tuple[Condition, ...]
+    mean_load: FloatArray
+    mains: ComplexArray | None
+    temperatures: dict[int, float]
+
+
+def digest(result: RunResult) -> RunDigest:
+    """Sum up a finished run."""
+    phasors = result.phasors
+    return RunDigest(
+        phasors.run,
+        phasors.point,
+        tuple(line.frequency for line in phasors.lines.excitation),
+        phasors.conditions,
+        finite_mean(phasors.cell_force.mean),
+        mains_line(phasors),
+        result.temperatures,
+    )
+
+
+def slim(phasors: RunPhasors) -> RunPhasors:
+    """The run without the phasors of nuisance lines: estimates need those of the excitation alone."""
+    n = len(phasors.lines.excitation)
+
+    def cut(block: PhasorBlock) -> PhasorBlock:
+        return replace(block, phasors=block.phasors[:, :n].copy())
+
+    acceleration = phasors.acceleration
+    return replace(
+        phasors,
+        displacement=cut(phasors.displacement),
+        cell_force=cut(phasors.cell_force),
+        acceleration=None if acceleration is None else cut(acceleration),
+    )
+
+
+def _bytes(phasors: RunPhasors) -> int:
+    blocks = [b for b in (phasors.displacement, phasors.cell_force, phasors.acceleration) if b is not None]
+    arrays = [a for b in blocks for a in (b.phasors, b.mean, b.noise, b.lost)]
+    return sum(a.nbytes for a in (*arrays, phasors.start, phasors.speeds))
+
+
+class RunShelf:
+    """Puts finished runs away and gives them back.
+
+    Parameters
+    ----------
+    runs : sequence of rigdata.campaign.Run
+    housing_mass : float
+        [kg]
+    again : callable
+        Makes the result of a run once more, where it was lost: another command into the same folder clears the store.
+    store : RunStore, optional
+        What it holds is not put anywhere else.
+    room : int, optional
+        Bytes that stay in memory; default `ROOM`.
+    """
+
+    def __init__(
+        self,
+        runs: Sequence[Any],
+        housing_mass: float,
+        again: Callable[[Any], RunResult],
+        store: RunStore | None = None,
+        room: int | None = None,
+    ) -> None:
+        self._runs, self._mass, self._again, self._store = runs, housing_mass, again, store
+        self._room = ROOM if room is None else room
+        self._digests: dict[int, RunDigest] = {}
+        self._left: dict[int, LeftOut] = {}
+        self._memory: dict[int, RunPhasors] = {}
+        self._marks: dict[int, str] = {}
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+
+    def __enter__(self) -> RunShelf:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Forget the runs, and take the temporary folder away."""
+        self._memory.clear()
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
+
+    @property
+    def places(self) -> list[int]:
+        """Of the runs that can be used, in the campaign's order: what `take` takes."""
+        return sorted(self._digests)
+
+    @property
+    def digests(self) -> list[RunDigest]:
+        """Of the runs that can be used, in the order of `places`."""
+        return [self._digests[i] for i in self.places]
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """Runs that take no part, in the campaign's order."""
+        return tuple(self._left[i] for i in sorted(self._left))
+
+    def leave_out(self, index: int, why: LeftOut) -> None:
+        """Note that a run takes no part."""
+        self._left[index] = why
+        self._digests.pop(index, None)
+        self._memory.pop(index, None)
+
+    def leave_out_the_odd_ones(self) -> None:
+        """Leave out runs with a dead accelerometer, where most of the others show that there is an acceleration."""
+        dead = [i for i, one in self._digests.items() if DEAD_ACCELEROMETER in one.conditions]
+        if 2 * len(dead) < len(self._digests):
+            for i in dead:
+                run = self._runs[i]
+                (told,) = (c for c in self._digests[i].conditions if c == DEAD_ACCELEROMETER)
+                cure = "Check sensor, cable and amplifier; repeat the run"
+                problem = Problem("error", run.file, "", told.detail, cure, run.id)
+                self.leave_out(i, LeftOut(run.id, run.point, RigDataError(problem)))
+
+    def put(self, index: int, result: RunResult | None, mark: str = "") -> None:
+        """Put a finished run away.
+
+        Parameters
+        ----------
+        index : int
+            Of the run.
+        result : RunResult or None
+            None where the store had it already.
+        mark : str
+            Fingerprint under which the store keeps it; "" if it does not.
+        """
+        run = self._runs[index]
+        if result is None and self._store is not None:
+            result = self._store.load(run, mark, self._mass)
+        if result is None:  # cleared by another command since
+            result, mark = self._again(run), ""
+        self._digests[index] = digest(result)
+        phasors = slim(result.phasors)
+        size = _bytes(phasors)
+        if size <= self._room:
+            self._room -= size
+            self._memory[index] = phasors
+        elif self._store is not None and mark:
+            self._marks[index] = mark
+        else:
+            self._own().keep(_OWN, replace(result, phasors=phasors))
+
+    def take(self, index: int) -> RunPhasors:
+        """Phasors of a run's excitation lines."""
+        if index in self._memory:
+            return self._memory[index]
+        run, mark = self._runs[index], self._marks.get(index, "")
+        store = self._store if mark and self._store is not None else self._own()
+        found = store.load(run, mark or _OWN, self._mass)
+        return slim((found or self._again(run)).phasors)
+
+    def _own(self) -> RunStore:
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="tpjb-runs-")
+        return RunStore(Path(self._folder.name) / "runs")

@@ -1,0 +1,189 @@
+"""Finished runs kept beside the results until all are done: a rerun after a kill goes on where it stopped.
+
+How a stale result is kept out: a kept run counts only if its fingerprint is found again. The fingerprint is the
+SHA-256 of everything that the run's phasors depend on: every stored byte of its record, its entry in the manifest
+with the calibration of all channels, the housing's mass, the settings, the versions of the numerical packages and
+the sources of the code that reads and fits. It is computed anew, from the files, for every run of a rerun (which is
+several times quicker than reading and fitting it); nothing is concluded from names, sizes or dates. A record that
+changes while it is read is not kept. Files are written whole or not at all, and one that cannot be read is no
+result. No pickles: a folder of results may come from anybody.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import shutil
+import zipfile
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.records.lines import Line, LineSet
+from tpjb_ident.dynamic.records.phasors import PhasorBlock
+from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.dynamic.runs.run_result import RunResult
+from tpjb_ident.runtime.provenance import sha256, versions
+from tpjb_ident.runtime.tables import write_atomic
+
+_BLOCKS = ("displacement", "cell_force", "acceleration")
+_PARTS = ("phasors", "mean", "noise", "lost")
+
+
+def fingerprint(run: Any, housing_mass: float, settings: PhasorSettings) -> str:
+    """SHA-256 of everything that a run's phasors depend on; "" where the run has no file of its own, or none any more.
+
+    Parameters
+    ----------
+    run : rigdata.campaign.Run
+    housing_mass : float
+        [kg]
+    settings : PhasorSettings
+    """
+    reader = getattr(run, "reader", None)
+    if reader is None:
+        return ""
+    try:
+        record = reader.stored_hash() if hasattr(reader, "stored_hash") else sha256(reader.path)
+    except OSError:  # whoever reads it next says what is wrong with it
+        return ""
+    entry = (run.id, run.kind, run.point, run.excitation_direction, dict(run.channels), reader)
+    described = (dict(getattr(reader, "channels", {})), housing_mass, settings)
+    text = "\n".join([record, repr(entry), repr(described), code_stamp()])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@functools.cache
+def code_stamp() -> str:
+    """SHA-256 of the versions of all packages and of the sources of reading and fitting."""
+    digest = hashlib.sha256(json.dumps(versions(), sort_keys=True).encode())
+    import rigdata
+
+    for folder in (Path(__file__).parents[1], Path(rigdata.__file__).parent):
+        for source in sorted(folder.rglob("*.py")):
+            digest.update(source.relative_to(folder).as_posix().encode() + b"\0" + source.read_bytes())
+    return digest.hexdigest()
+
+
+class RunStore:
+    """A folder of finished runs.
+
+    Parameters
+    ----------
+    folder : Path
+        Made when the first run is kept.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def _file(self, run_id: str) -> Path:
+        return self.folder / f"{hashlib.sha256(run_id.encode()).hexdigest()[:32]}.npz"
+
+    def known(self, run_id: str) -> str:
+        """Fingerprint under which a run is kept, "" if it is not."""
+        found = self._read(run_id)
+        return "" if found is None else str(found[0]["fingerprint"])
+
+    def _read(self, run_id: str) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
+        try:
+            # opened here: numpy leaves a file open that it cannot understand
+            with self._file(run_id).open("rb") as file, np.load(file, allow_pickle=False) as stored:
+                arrays = {name: stored[name] for name in stored.files}
+            meta = json.loads(str(arrays.pop("meta")))
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            return None  # not there, cut off, or not ours: the run is simply done again
+        return (meta, arrays) if isinstance(meta, dict) and meta.get("run") == run_id else None
+
+    def keep(self, mark: str, result: RunResult) -> None:
+        """Keep a finished run under its fingerprint `mark`."""
+        phasors = result.phasors
+        arrays: dict[str, Any] = {"start": phasors.start, "speeds": phasors.speeds}
+        for name in _BLOCKS:
+            block = getattr(phasors, name)
+            if block is not None:
+                arrays.update({f"{name}.{part}": getattr(block, part) for part in _PARTS})
+        meta = {
+            "fingerprint": mark,
+            "run": phasors.run,
+            "length": phasors.length,
+            "lines": _packed_lines(phasors.lines),
+            "conditions": _packed(phasors.conditions),
+            "temperatures": {str(pad): value for pad, value in result.temperatures.items()},
+        }
+        text = np.array(json.dumps(meta))
+        with suppress(FileNotFoundError):  # another run into the same folder has ended and cleared it
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_atomic(self._file(phasors.run), lambda path: np.savez(path, meta=text, **arrays))
+
+    def load(self, run: Any, mark: str, housing_mass: float) -> RunResult | None:
+        """Give a kept run back; None if it is not there, or not under this fingerprint.
+
+        Parameters
+        ----------
+        run : rigdata.campaign.Run
+        mark : str
+            Its fingerprint as computed now.
+        housing_mass : float
+            [kg]
+        """
+        found = self._read(run.id)
+        if not mark or found is None or found[0]["fingerprint"] != mark:
+            return None
+        meta, arrays = found
+        blocks = {
+            name: PhasorBlock(*(arrays[f"{name}.{part}"] for part in _PARTS))
+            for name in _BLOCKS
+            if f"{name}.phasors" in arrays
+        }
+        phasors = RunPhasors(
+            run.id,
+            run.point,
+            run.excitation_direction,
+            _unpacked_lines(meta["lines"]),
+            arrays["start"],
+            meta["length"],
+            blocks["displacement"],
+            blocks["cell_force"],
+            blocks.get("acceleration"),
+            housing_mass,
+            arrays["speeds"],
+            _unpacked(meta["conditions"]),
+        )
+        return RunResult(phasors, {int(pad): value for pad, value in meta["temperatures"].items()})
+
+    def clear(self) -> None:
+        """Forget everything; the folder that it lies in goes too if nothing else is there."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+        with suppress(OSError):  # other results are in it
+            self.folder.parent.rmdir()
+
+
+def _packed(conditions: tuple[Condition, ...]) -> list[list[str]]:
+    return [[str(c), c.detail] for c in conditions]
+
+
+def _unpacked(stored: list[list[str]]) -> tuple[Condition, ...]:
+    return tuple(Condition(name, detail) for name, detail in stored)
+
+
+def _packed_lines(lines: LineSet) -> dict[str, Any]:
+    return {
+        "excitation": [[line.name, line.frequency, line.wander] for line in lines.excitation],
+        "nuisance": [[line.name, line.frequency, line.wander] for line in lines.nuisance],
+        "conditions": _packed(lines.conditions),
+        "speed": lines.speed,
+    }
+
+
+def _unpacked_lines(stored: dict[str, Any]) -> LineSet:
+    return LineSet(
+        tuple(Line(*line) for line in stored["excitation"]),
+        tuple(Line(*line) for line in stored["nuisance"]),
+        _unpacked(stored["conditions"]),
+        stored["speed"],
+    )

@@ -1,0 +1,11 @@
+"""What the package raises when it must refuse: one base, known to the command line."""
+
+from __future__ import annotations
+
+
+class BadInputError(Exception):
+    """Something the user gave cannot be used; the message says file, place, what is wrong, what to do."""
+
+
+class NotTrustedError(Exception):
+    """The command ran and wrote its results, but the answer is not to be trusted; the message says why."""

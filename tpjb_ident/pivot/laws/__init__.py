@@ -1,0 +1,1 @@
+"""Load-deflection laws of a pivot, their fit and the choice among them."""

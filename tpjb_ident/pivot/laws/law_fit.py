@@ -1,0 +1,302 @@
+"""One law fitted to one pad's blocks: damped Gauss-Newton in whitened residuals, with the Laplace evidence.
+
+What is measured is x = x0 + delta(W) - a exp(-F / F0): the reading at zero load x0 is unknown (the probes' gap
+voltage), W = F (1 -+ mu) is the load that reaches the pivot when friction holds back the share mu (minus
+loading, plus unloading), and the last term is the way that the shaft has still to go until it is fully in
+contact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpjb_ident.pivot.laws.laws import Law
+
+FloatArray = NDArray[np.float64]
+
+OFFSET, FRICTION, SCALE = 0, 1, 2  # places of the parameters that every law has; the shape follows
+CONTACT_GAP = 3.0e-6  # [m], plausible size of the missing contact (prior standard deviation)
+CONTACT_LOAD_SPREAD = 0.6  # of ln F0 about a tenth of the largest load
+ITERATIONS = 60  # a law far from its prior, such as an exponent of 0.4, takes 40
+LONGEST_STEP = 1.0  # in any shape parameter or logarithm
+CONVERGED = 3e-3  # change of the misfit (chi-square) that no longer matters
+
+
+@dataclass(frozen=True)
+class FitData:
+    """What a law is fitted to.
+
+    Attributes
+    ----------
+    load, deflection : (m,) ndarray
+        Along the pad direction [N], [m]; the deflection counts from an unknown zero.
+    branch : (m,) ndarray
+        +1 loading, -1 unloading.
+    whitener : (m, m) ndarray
+        Inverse Cholesky factor of the covariance of the deflections [1/m].
+    reference_load : float
+        W_r of the laws [N].
+    friction : (float, float)
+        Prior mean and standard deviation of the share held back by friction.
+    """
+
+    load: FloatArray
+    deflection: FloatArray
+    branch: FloatArray
+    whitener: FloatArray
+    reference_load: float
+    friction: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class LawFit:
+    """A law with its parameters and their covariance.
+
+    Attributes
+    ----------
+    law : Law
+        The shape.
+    reference_load : float
+        W_r [N].
+    contact : bool
+        Whether a contact loss a exp(-F / F0) was fitted.
+    theta : (p,) ndarray
+        x0 [m], mu, ln s, shape parameters, and with contact a [m], ln F0.
+    covariance : (p, p) ndarray
+        Of `theta`.
+    log_evidence : float
+        Logarithm of the marginal likelihood (Laplace), up to a constant common to all laws.
+    chi_square, freedom : float, int
+        Whitened misfit and its degrees of freedom.
+    """
+
+    law: Law
+    reference_load: float
+    contact: bool
+    theta: FloatArray
+    covariance: FloatArray
+    log_evidence: float
+    chi_square: float
+    freedom: int
+
+    @property
+    def name(self) -> str:
+        """Name of the law."""
+        return self.law.name
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of `theta`."""
+        contact = ("contact gap [m]", "ln contact load") if self.contact else ()
+        return ("zero reading [m]", "friction share", "ln scale", *self.law.parameters, *contact)
+
+    @property
+    def shape(self) -> FloatArray:
+        """Shape parameters q (k,)."""
+        return self.theta[SCALE + 1 : SCALE + 1 + len(self.law.parameters)]
+
+    def deflection(self, load: FloatArray) -> FloatArray:
+        """Deflection (n,) [m] of the pivot alone at pad loads (n,) [N]."""
+        u = np.maximum(load, 0.0) / self.reference_load
+        return np.asarray(np.exp(self.theta[SCALE]) * self.reference_load * self.law.phi(u, self.shape)[0])
+
+    def compliance(self, load: FloatArray) -> FloatArray:
+        """Tangent compliance d delta / dW (n,) [m/N]."""
+        u = np.maximum(load, 0.0) / self.reference_load
+        return np.asarray(np.exp(self.theta[SCALE]) * self.law.psi(u, self.shape)[0])
+
+    def log_compliance_gradient(self, load: FloatArray) -> FloatArray:
+        """Derivative (n, p) of ln(compliance) with respect to `theta`."""
+        value, shape = self.law.psi(np.maximum(load, 0.0) / self.reference_load, self.shape)
+        return self._gradient(value, shape)
+
+    def log_deflection_gradient(self, load: FloatArray) -> FloatArray:
+        """Derivative (n, p) of ln(deflection) with respect to `theta`."""
+        value, shape = self.law.phi(np.maximum(load, 0.0) / self.reference_load, self.shape)
+        return self._gradient(value, shape)
+
+    def _gradient(self, value: FloatArray, shape: FloatArray) -> FloatArray:
+        gradient = np.zeros((len(value), len(self.theta)))
+        gradient[:, SCALE] = 1.0
+        gradient[:, SCALE + 1 : SCALE + 1 + shape.shape[1]] = shape / np.maximum(value, 1e-300)[:, None]
+        return gradient
+
+    def missing_compliance(self, load: FloatArray) -> FloatArray:
+        """What incomplete contact adds to the measured compliance (n,) [m/N]."""
+        if not self.contact:
+            return np.zeros_like(load)
+        gap, load_0 = self.theta[-2], np.exp(self.theta[-1])
+        return np.asarray(gap / load_0 * np.exp(-load / load_0))
+
+    def reading(self, load: FloatArray, branch: FloatArray) -> FloatArray:
+        """Expected displacement reading (n,) [m] at applied loads (n,) [N], contact loss included."""
+        return self.reading_gradient(load, branch)[0]
+
+    def reading_gradient(self, load: FloatArray, branch: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Expected reading (n,) [m] and its derivative (n, p) with respect to `theta`."""
+        return _predict(self.law, self.theta, self.contact, load, branch, self.reference_load)
+
+
+def _predict(
+    law: Law, theta: FloatArray, contact: bool, load: FloatArray, branch: FloatArray, reference: float
+) -> tuple[FloatArray, FloatArray]:
+    """Reading (m,) and its Jacobian (m, p)."""
+    k = len(law.parameters)
+    q = theta[SCALE + 1 : SCALE + 1 + k]
+    scale = np.exp(theta[SCALE])
+    u = np.maximum(load * (1.0 - theta[FRICTION] * branch), 0.0) / reference
+    phi, phi_q = law.phi(u, q)
+    psi, _ = law.psi(u, q)
+    jacobian = np.zeros((len(load), len(theta)))
+    jacobian[:, OFFSET] = 1.0
+    jacobian[:, FRICTION] = -scale * psi * load * branch
+    jacobian[:, SCALE] = scale * reference * phi
+    jacobian[:, SCALE + 1 : SCALE + 1 + k] = scale * reference * phi_q
+    value = theta[OFFSET] + scale * reference * phi
+    if contact:
+        load_0 = np.exp(theta[-1])
+        decay = np.exp(-load / load_0)
+        value = value - theta[-2] * decay
+        jacobian[:, -2] = -decay
+        jacobian[:, -1] = -theta[-2] * decay * load / load_0
+    return np.asarray(value), jacobian
+
+
+@dataclass(frozen=True)
+class _Prior:
+    """Gaussian prior and bounds of all parameters; flat ones have zero precision."""
+
+    mean: FloatArray
+    precision: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    def log_determinant(self) -> float:
+        """Of the part that is not flat."""
+        proper = np.diag(self.precision) > 0.0
+        return float(np.linalg.slogdet(self.precision[np.ix_(proper, proper)])[1])
+
+
+@dataclass(frozen=True)
+class ShapePrior:
+    """Gaussian prior of a law's shape parameters: mean (k,) and precision (k, k)."""
+
+    mean: FloatArray
+    precision: FloatArray
+
+
+def _prior(law: Law, contact: bool, data: FitData, known: ShapePrior | None) -> _Prior:
+    k = len(law.parameters)
+    p = SCALE + 1 + k + (2 if contact else 0)
+    mean, precision = np.zeros(p), np.zeros((p, p))
+    low, high = np.full(p, -np.inf), np.full(p, np.inf)
+    mean[FRICTION], precision[FRICTION, FRICTION] = data.friction[0], data.friction[1] ** -2
+    low[FRICTION], high[FRICTION] = -0.2, 0.2
+    shape = slice(SCALE + 1, SCALE + 1 + k)
+    mean[shape] = law.prior_mean if known is None else known.mean
+    precision[shape, shape] = law.prior_precision if known is None else known.precision
+    low[shape], high[shape] = law.bounds
+    if contact:
+        largest = float(np.max(data.load))
+        precision[-2, -2] = CONTACT_GAP**-2
+        low[-2] = 0.0
+        mean[-1], precision[-1, -1] = np.log(0.1 * largest), CONTACT_LOAD_SPREAD**-2
+        low[-1], high[-1] = np.log(0.01 * largest), np.log(largest)
+    return _Prior(mean, precision, low, high)
+
+
+def fit_law(
+    law: Law, contact: bool, data: FitData, known: ShapePrior | None = None, start: FloatArray | None = None
+) -> LawFit:
+    """Fit one law by its posterior mode.
+
+    Parameters
+    ----------
+    law : Law
+        The shape.
+    contact : bool
+        Whether to fit a contact loss beside it.
+    data : FitData
+        Blocks and their covariance.
+    known : ShapePrior, optional
+        What is known of the shape beforehand; default: what the law itself says is plausible.
+    start : (p,) ndarray, optional
+        Parameters to start from.
+
+    Returns
+    -------
+    LawFit
+    """
+    prior = _prior(law, contact, data, known)
+    theta = _start(prior, contact, data) if start is None else np.clip(start, prior.low, prior.high)
+    unit = np.ones(len(theta))
+    unit[OFFSET] = np.ptp(data.deflection)  # metres and pure numbers in one matrix: scale the metres
+    if contact:
+        unit[-2] = CONTACT_GAP
+    whitened = data.whitener @ data.deflection
+    theta, hessian, chi_square = _descend(law, contact, data, prior, theta, unit, whitened)
+    gap = theta - prior.mean
+    quadratic = float(gap @ prior.precision @ gap)
+    # the offset's unit enters every law alike; the others' units cancel against the prior's determinant
+    log_hessian = float(np.linalg.slogdet(hessian)[1]) - 2.0 * float(np.sum(np.log(unit[1:])))
+    evidence = 0.5 * (prior.log_determinant() - log_hessian - chi_square - quadratic)
+    covariance = np.linalg.inv(hessian) * np.outer(unit, unit)
+    return LawFit(
+        law, data.reference_load, contact, theta, covariance, evidence, chi_square, len(data.load) - len(theta)
+    )
+
+
+def _start(prior: _Prior, contact: bool, data: FitData) -> FloatArray:
+    """Prior shape; a straight line through the upper loads, where contact is complete, for scale and zero."""
+    theta = prior.mean.copy()
+    upper = data.load >= 0.3 * np.max(data.load)
+    slope, zero = np.polyfit(data.load[upper], data.deflection[upper], 1)
+    theta[SCALE] = np.log(max(slope, 1e-3 * np.ptp(data.deflection) / np.ptp(data.load)))
+    theta[OFFSET] = zero
+    if contact:
+        theta[-2] = 0.3 * CONTACT_GAP
+    return theta
+
+
+def _descend(
+    law: Law, contact: bool, data: FitData, prior: _Prior, theta: FloatArray, unit: FloatArray, whitened: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Levenberg-Marquardt to the posterior mode: theta, Hessian in units of `unit`, chi-square."""
+    precision = prior.precision * np.outer(unit, unit)
+
+    def state(at: FloatArray) -> tuple[float, float, FloatArray, FloatArray]:
+        value, jacobian = _predict(law, at, contact, data.load, data.branch, data.reference_load)
+        residual = whitened - data.whitener @ value
+        gap = (at - prior.mean) / unit
+        chi_square = float(residual @ residual)
+        return chi_square + float(gap @ precision @ gap), chi_square, residual, data.whitener @ (jacobian * unit)
+
+    damping = 1e-3
+    cost, chi_square, residual, jacobian = state(theta)
+    for _ in range(ITERATIONS):
+        hessian = jacobian.T @ jacobian + precision
+        gradient = jacobian.T @ residual - precision @ ((theta - prior.mean) / unit)
+        # a parameter that stands at its bound and wants to go on takes no part in the step
+        held = ((theta <= prior.low) & (gradient < 0.0)) | ((theta >= prior.high) & (gradient > 0.0))
+        damped = hessian + damping * np.diag(np.diag(hessian))
+        damped[held] = damped[:, held] = 0.0
+        damped[held, held] = 1.0
+        step = np.linalg.solve(damped, np.where(held, 0.0, gradient)) * unit
+        # shapes and logarithms: a contact gap near zero leaves its decay load free to run away
+        step *= min(1.0, LONGEST_STEP / max(float(np.max(np.abs(step[SCALE:] / unit[SCALE:]))), 1e-300))
+        trial = np.clip(theta + step, prior.low, prior.high)
+        trial_state = state(trial)
+        if trial_state[0] <= cost:
+            gain = cost - trial_state[0]
+            theta, (cost, chi_square, residual, jacobian) = trial, trial_state
+            damping = max(damping * 0.2, 1e-9)
+            if gain < CONVERGED:
+                break
+        else:
+            damping *= 8.0
+            if damping > 1e9:
+                break
+    return theta, jacobian.T @ jacobian + precision, chi_square

@@ -1,0 +1,183 @@
+"""Short averages of a dry-pivot record: what the curve is fitted to.
+
+Averaging 0.1 s keeps all that a slow test can tell, takes the mains out, and leaves some hundred numbers
+whose covariance can be written down in full. Averages on ramps are shorter, so that the curve is straight
+within each.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpjb_ident.pivot.records.steps import Hold
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int_]
+
+TURN = 0.02  # of the load range: a smaller way back is noise
+MOST_BLOCKS = 220  # the covariance is a full matrix: keep it small
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Averages over m pieces of record, in order of time.
+
+    Attributes
+    ----------
+    time, duration : (m,) ndarray
+        Middle and length [s].
+    load, displacement : (m, 2) ndarray
+        Mean vectors in the bearing frame [N], [m].
+    load_spread : (m,) ndarray
+        Standard deviation of the mean load that comes from sample noise [N].
+    rate : (m,) ndarray
+        Rate of change of the load's magnitude [N/s]; zero on holds.
+    hold : (m,) ndarray of int
+        Number of the hold, from 0; -1 on ramps.
+    branch : (m,) ndarray of int
+        +1 while the load goes up or after it went up, -1 down.
+    """
+
+    time: FloatArray
+    duration: FloatArray
+    load: FloatArray
+    displacement: FloatArray
+    load_spread: FloatArray
+    rate: FloatArray
+    hold: IntArray
+    branch: IntArray
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def take(self, keep: NDArray[np.bool_]) -> Blocks:
+        """The blocks where `keep` (m,) is true."""
+        return Blocks(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
+
+
+@dataclass(frozen=True)
+class Samples:
+    """One dry record on one time base, missing values and glitches left out.
+
+    Attributes
+    ----------
+    time : (n,) ndarray
+        Seconds.
+    load, displacement : (n, 2) ndarray
+        Bearing frame [N], [m].
+    along : (n,) ndarray
+        Load along the pad direction [N].
+    lost : float
+        Share of the samples that was left out.
+    """
+
+    time: FloatArray
+    load: FloatArray
+    displacement: FloatArray
+    along: FloatArray
+    lost: float
+
+
+def cut_blocks(samples: Samples, holds: tuple[Hold, ...], length: float) -> Blocks:
+    """Average a record piece by piece.
+
+    Parameters
+    ----------
+    samples : Samples
+        The record.
+    holds : tuple of Hold
+        Where the load stands still; every hold gets pieces of its own.
+    length : float
+        Length of a piece on a hold [s]; half of it on ramps. Stretched for long records.
+
+    Returns
+    -------
+    Blocks
+    """
+    span = float(samples.time[-1] - samples.time[0])
+    held = sum(hold.duration for hold in holds)
+    length = length * max(1.0, (held + 2.0 * (span - held)) / length / MOST_BLOCKS)
+    edges, number = _edges(samples, holds, length)
+    first = np.searchsorted(samples.time, edges[:, 0], side="left")
+    last = np.searchsorted(samples.time, edges[:, 1], side="left")
+    count = last - first
+    # a piece that lost most of its samples to a glitch or a gap would carry a false weight
+    period = span / max(len(samples.time) - 1, 1)
+    whole = count >= np.maximum(3, 0.5 * (edges[:, 1] - edges[:, 0]) / period)
+    first, last, count, number = first[whole], last[whole], count[whole], number[whole]
+
+    def means(values: FloatArray) -> FloatArray:
+        total = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(values - values[0], axis=0)])
+        return np.asarray((total[last] - total[first]) / count[:, None] + values[0])
+
+    time = means(samples.time[:, None])[:, 0]
+    along = means(samples.along[:, None])[:, 0]
+    rate = np.where(number >= 0, 0.0, np.gradient(along, time) if len(time) > 1 else 0.0)
+    return Blocks(
+        time=time,
+        duration=np.asarray(count * period),
+        load=means(samples.load),
+        displacement=means(samples.displacement),
+        load_spread=_sample_noise(samples.along) / np.sqrt(count),
+        rate=np.asarray(rate),
+        hold=number,
+        branch=_branches(number, along, holds),
+    )
+
+
+def _edges(samples: Samples, holds: tuple[Hold, ...], length: float) -> tuple[FloatArray, IntArray]:
+    """Start and stop of every piece (m, 2) [s] and its hold number (m,)."""
+    pieces: list[tuple[float, float, int]] = []
+    position = float(samples.time[0])
+    end = float(samples.time[-1])
+    for number, hold in enumerate(holds):
+        pieces += _split(position, hold.start, 0.5 * length, -1)
+        pieces += _split(hold.start, hold.stop, length, number)
+        position = hold.stop
+    pieces += _split(position, end, 0.5 * length, -1)
+    table = np.array(pieces, dtype=float).reshape(-1, 3)
+    return table[:, :2], table[:, 2].astype(int)
+
+
+def _split(start: float, stop: float, length: float, number: int) -> list[tuple[float, float, int]]:
+    """Equal pieces of about `length` between two moments."""
+    if stop - start < 0.4 * length:
+        return []
+    n = max(1, round((stop - start) / length))
+    cuts = np.linspace(start, stop, n + 1)
+    return [(float(a), float(b), number) for a, b in itertools.pairwise(cuts)]
+
+
+def _branches(number: IntArray, along: FloatArray, holds: tuple[Hold, ...]) -> IntArray:
+    """+1 loading, -1 unloading."""
+    of_hold = np.array([hold.branch for hold in holds] + [0], dtype=int)
+    return np.asarray(np.where(number >= 0, of_hold[number], _directions(along)))
+
+
+def _directions(load: FloatArray) -> IntArray:
+    """Sense of the load's way (m,): it turns only when the load has come back by `TURN` of its range."""
+    if not len(load):  # a logger too slow for a single piece
+        return np.zeros(0, dtype=int)
+    turn = TURN * float(np.ptp(load))
+    off = load - load[0]
+    now = 1 if off[int(np.argmax(np.abs(off) > turn))] >= 0.0 else -1
+    sense = np.full(len(load), now)
+    farthest = 0
+    for k in range(len(load)):
+        if now * (load[k] - load[farthest]) >= 0.0:
+            farthest = k
+        elif now * (load[farthest] - load[k]) > turn:
+            now = -now
+            sense[farthest + 1 :] = now
+            farthest = k
+    return sense
+
+
+def _sample_noise(load: FloatArray) -> float:
+    """White noise of single load samples [N], from differences: ramps and levels drop out."""
+    second = np.diff(load, 2)
+    return 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0)

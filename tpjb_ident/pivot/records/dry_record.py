@@ -1,0 +1,159 @@
+"""A dry-pivot run made ready: glitches out, holds found, averaged, projected on its pad."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdata.problem import Problem, RigDataError
+from tpjb_ident.pivot.records.blocks import Blocks, Samples, cut_blocks
+from tpjb_ident.pivot.records.pickup import Pickup, measure_pickup
+from tpjb_ident.pivot.records.projection import Projection, pad_axes, project
+from tpjb_ident.pivot.records.settings import PivotSettings
+from tpjb_ident.pivot.records.steps import Hold, find_holds
+from tpjb_ident.slow_records.flat_channels import refuse_flat_channels
+from tpjb_ident.slow_records.glitches import good_samples
+
+if TYPE_CHECKING:
+    from rigdata.calibration import Channel
+    from rigdata.campaign import Run
+
+FloatArray = NDArray[np.float64]
+
+FEWEST_SAMPLES = 50
+MOST_LOST = 0.5  # share of samples lost to gaps and glitches above which a record is refused
+FEWEST_BLOCKS = 8
+UNDITHERED = 0.3  # share of samples that differ from the one before, below which noise does not reach a step
+
+
+@dataclass(frozen=True)
+class DryRecord:
+    """One dry run of one pad.
+
+    Attributes
+    ----------
+    run : Run
+        Where it came from.
+    pad : int
+        Number, from 1.
+    angle : float
+        Direction of the pad [rad].
+    holds : tuple of Hold
+        Empty for a continuous ramp.
+    blocks : Blocks
+        Averages in the bearing frame.
+    projection : Projection
+        The same on the pad's axes.
+    lost : float
+        Share of samples left out.
+    quantisation : float
+        Standard deviation [m] of what the converter's steps add to a whole hold; zero where noise smears them.
+    pickup : Pickup or None
+        Mains line in every probe and cell; None where the record is too short to show it.
+    """
+
+    run: Run
+    pad: int
+    angle: float
+    holds: tuple[Hold, ...]
+    blocks: Blocks
+    projection: Projection
+    lost: float
+    quantisation: float
+    pickup: Pickup | None = None
+
+
+def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> DryRecord:
+    """Read one dry run.
+
+    Parameters
+    ----------
+    run : Run
+        Of kind ``dry_pivot``.
+    pad_angles : (n_pads,) ndarray
+        Directions of the pads [rad], pad #1 first.
+    settings : PivotSettings
+        Block length, longest glitch.
+
+    Returns
+    -------
+    DryRecord
+
+    Raises
+    ------
+    RigDataError
+        When the run names no pad or one that the bearing lacks, or holds too little to work with.
+    """
+    if run.pad is None or not 1 <= run.pad <= len(pad_angles):
+        raise refusal(
+            run, "pad", f"names pad {run.pad}, the bearing has pads 1 to {len(pad_angles)}", "Correct the manifest"
+        )
+    angle = float(pad_angles[run.pad - 1])
+    refuse_flat_channels(run)
+    samples, pickup = _samples(run, angle, settings)
+    load_range = float(np.ptp(samples.along))
+    if load_range <= 0.0 or np.ptp(samples.displacement, axis=0).max() <= 0.0:
+        what = "does not move: a dead or disconnected channel"
+        raise refusal(run, "force or displacement", what, "Check the channels of this run")
+    holds = find_holds(samples.time, samples.along)
+    blocks = cut_blocks(samples, holds, settings.block)
+    if len(blocks) < FEWEST_BLOCKS:
+        what = f"gives only {len(blocks)} usable averages of {settings.block:g} s"
+        raise refusal(run, "record", what, "Record for longer, or set a shorter block")
+    on_pad, steps = project(blocks, angle), _quantisation(samples)
+    return DryRecord(run, run.pad, angle, holds, blocks, on_pad, samples.lost, steps, pickup)
+
+
+def _samples(run: Run, angle: float, settings: PivotSettings) -> tuple[Samples, Pickup | None]:
+    """Both vectors on one time base, glitches left out; the mains line of the channels behind them."""
+    force, displacement = run.vector("force"), run.vector("displacement")
+    n = min(len(force), len(displacement))
+    load, position, time = force.values[:n], displacement.values[:n], np.asarray(displacement.time[:n])
+    good = good_samples(np.hstack([load, position]), settings.longest_glitch) & np.isfinite(time)
+    lost = 1.0 - float(np.mean(good)) if n else 1.0
+    if n < FEWEST_SAMPLES or lost > MOST_LOST:
+        what = f"has {n} samples, of which {100 * lost:.0f} % are missing or glitches"
+        raise refusal(run, "record", what, "Repeat the test")
+    pickup = _pickup(run, {"force": load, "displacement": position}, good)
+    time, load, position = time[good], load[good], position[good]
+    if np.any(np.diff(time) <= 0.0):
+        # a logger that repeats or shuffles time stamps: order is what averages need
+        order = np.argsort(time, kind="stable")
+        time, load, position = time[order], load[order], position[order]
+    return Samples(time, load, position, np.asarray(load @ pad_axes(angle)[0]), lost), pickup
+
+
+def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: NDArray[np.bool_]) -> Pickup | None:
+    """Mains line per channel. Two channels per vector: only then the vector holds each of them as it was."""
+    channels = axial_channels(run)
+    if any(sum(c.quantity == quantity for c in channels.values()) != 2 for quantity in vectors):
+        return None
+    values = {name: vectors[c.quantity] @ pad_axes(c.axis or 0.0)[0] for name, c in channels.items()}
+    return measure_pickup(values, good, run.sample_rate)
+
+
+def axial_channels(run: Run) -> dict[str, Channel]:
+    """Probes and cells of a run, by name."""
+    return {n: c for n, c in run.channels.items() if c.quantity in ("force", "displacement") and c.axis is not None}
+
+
+def _quantisation(samples: Samples) -> float:
+    """Error of a level [m] that stands between two steps of the converter, where no noise dithers it."""
+    worst = 0.0
+    for column in samples.displacement.T:
+        moves = np.abs(np.diff(column))
+        # two channels turned into X and Y leave rounding residues: those are no steps
+        real = moves > 1e-6 * np.ptp(column)
+        if real.any() and real.mean() < UNDITHERED:
+            worst = max(worst, float(np.min(moves[real])) / math.sqrt(6.0))
+    return worst
+
+
+def refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
+    """Error that names the run, the place, the trouble and the cure."""
+    return RigDataError(Problem("error", run.file, place, f"run {run.id} {what}", cure, run=run.id))

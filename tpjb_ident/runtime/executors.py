@@ -1,0 +1,358 @@
+"""Where jobs run: here, in processes of this machine, on a Dask cluster. The answers are the same everywhere.
+
+A job is a module-level function and its arguments. It depends on nothing else, so that it may run anywhere, and
+once more where a worker was lost with it. Whoever has work to spread takes a `Workers` and asks `in_order`:
+
+```python
+with open_workers(count=4) as workers:   # of runtime.workers; or open_workers(scheduler="tcp://host:8786")
+    for answer in in_order(workers, task, [(argument,), ..]):
+        ...
+```
+"""
+
+from __future__ import annotations
+
+import collections
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+import traceback
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing.connection import wait as wait_for_end
+from typing import Any, Protocol
+
+Task = Callable[..., Any]
+Job = tuple[Any, ...]
+#: Jobs handed out per worker before the first comes back: enough that nobody waits, few enough to cancel.
+AHEAD = 4
+#: Losses in a row, without any job done between them, after which the workers are given up.
+MAX_LOSSES = 3
+#: Seconds without any job done after which somebody looks whether there are workers at all.
+STALLED = 60.0
+
+
+class LostJobsError(ValueError):
+    """Workers were lost again and again with the jobs they had."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job: its value, or the error that it ended with.
+
+    Attributes
+    ----------
+    value : object
+    error : Exception or None
+    warned : tuple
+        Warnings of a job that ran elsewhere, as (message, category, file, line).
+    """
+
+    value: Any = None
+    error: Exception | None = None
+    warned: tuple[tuple[str, type[Warning], str, int], ...] = ()
+
+    def get(self) -> Any:
+        """Return the value; warn as the job did and raise what it raised."""
+        for message, category, file, line in self.warned:
+            warnings.warn_explicit(message, category, file, line)
+        if self.error is not None:
+            raise self.error
+        return self.value
+
+
+class Workers(Protocol):
+    """A place where jobs run."""
+
+    @property
+    def count(self) -> int:
+        """Jobs that run at a time."""
+
+    def outcomes(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[tuple[int, Outcome]]:
+        """Run ``task(*job)`` for every job; yield (index of the job, outcome) as they end, in any order.
+
+        Parameters
+        ----------
+        task : callable
+            Of a module, so that other processes find it.
+        jobs : sequence of tuple
+        shared : object, optional
+            Given to every job as its first argument; a worker unpacks it once, so a task must not change it.
+
+        Raises
+        ------
+        LostJobsError
+        """
+
+
+def in_order(
+    workers: Workers,
+    task: Task,
+    jobs: Sequence[Job],
+    shared: Any = None,
+) -> Iterator[Any]:
+    """Yield the values of all jobs in their order; raise the error of the first job, in order, that has one.
+
+    Parameters
+    ----------
+    workers : Workers
+    task, jobs, shared
+        As of `Workers.outcomes`.
+    """
+    early: dict[int, Outcome] = {}
+    due = 0
+    for index, outcome in workers.outcomes(task, jobs, shared):
+        early[index] = outcome
+        while due in early:
+            yield early.pop(due).get()
+            due += 1
+
+
+def each_finished(
+    workers: Workers, task: Task, jobs: Sequence[Job], finished: Callable[[int, Any], None], shared: Any = None
+) -> None:
+    """Hand every value to ``finished(index, value)`` as its job ends; nothing is held back to be put in order.
+
+    When all jobs before the first one in order that has an error have ended, that error is raised.
+
+    Parameters
+    ----------
+    workers : Workers
+    task, jobs, shared
+        As of `Workers.outcomes`.
+    finished : callable
+    """
+    ended = bytearray(len(jobs))
+    errors: dict[int, Outcome] = {}
+    due = 0
+    for index, outcome in workers.outcomes(task, jobs, shared):
+        ended[index] = 1
+        if outcome.error is not None:
+            errors[index] = outcome
+        else:
+            finished(index, outcome.get())
+        while due < len(jobs) and ended[due]:
+            if due in errors:
+                errors[due].get()
+            due += 1
+
+
+class InProcessWorkers:
+    """Every job in this process, one after the other."""
+
+    count = 1
+
+    def outcomes(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[tuple[int, Outcome]]:
+        """See `Workers`."""
+        first = () if shared is None else (shared,)
+        for index, job in enumerate(jobs):
+            try:
+                outcome = Outcome(task(*first, *job))
+            except Exception as error:  # whoever asked gets it from the outcome
+                outcome = Outcome(error=error)
+            yield index, outcome
+
+
+class PoolWorkers:
+    """Jobs spread by any `concurrent.futures.Executor`; one that breaks is replaced and its jobs are run again.
+
+    Parameters
+    ----------
+    opened : callable
+        Makes the executor.
+    count : int
+        Jobs that it runs at a time.
+    alive : callable, optional
+        Whether anybody is there to work; asked when nothing has come back for a minute.
+    """
+
+    def __init__(self, opened: Callable[[], Executor], count: int, alive: Callable[[], bool] | None = None) -> None:
+        self._opened, self.count, self._alive = opened, count, alive
+        self._executor: Executor | None = None
+
+    def close(self, wait: bool = True) -> None:
+        """End the executor; with it the jobs that have not begun."""
+        if self._executor is not None:
+            if isinstance(self._executor, ProcessPoolExecutor):
+                self._executor.shutdown(wait=wait, cancel_futures=True)
+            else:  # others need not know that argument
+                self._executor.shutdown(wait=wait)
+        self._executor = None
+
+    def outcomes(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[tuple[int, Outcome]]:
+        """See `Workers`."""
+        packed = None if shared is None else pickle.dumps(shared, protocol=5)
+        waiting = collections.deque(enumerate(jobs))
+        flying: dict[Future[Outcome], tuple[int, Job]] = {}
+        losses = 0
+        try:
+            while waiting or flying:
+                lost, cause = self._launch(task, packed, waiting, flying)
+                done = self._ended(flying) if cause is None else set()
+                for future in done:
+                    entry = flying.pop(future)
+                    try:
+                        outcome = future.result()
+                    except Exception as error:  # every executor has its own way to say that a worker is gone
+                        lost.append(entry)
+                        cause = error
+                    else:
+                        losses = 0
+                        yield entry[0], outcome
+                if cause is not None:
+                    losses += 1
+                    self._recover(cause, losses, lost, flying)
+                    waiting.extendleft(sorted(lost, reverse=True, key=lambda entry: entry[0]))
+        finally:
+            for future in flying:
+                future.cancel()
+
+    def _ended(self, flying: dict[Future[Outcome], tuple[int, Job]]) -> set[Future[Outcome]]:
+        """Wait until a job ends."""
+        while True:
+            done = wait(flying, timeout=STALLED, return_when=FIRST_COMPLETED).done
+            if done:
+                return done
+            if self._alive is not None and not self._alive():
+                raise LostJobsError(f"all workers are gone, and none came back within {STALLED:g} s. Start some again")
+
+    def _launch(
+        self,
+        task: Task,
+        packed: bytes | None,
+        waiting: collections.deque[tuple[int, Job]],
+        flying: dict[Future[Outcome], tuple[int, Job]],
+    ) -> tuple[list[tuple[int, Job]], Exception | None]:
+        """Hand out jobs until every worker has enough; tell what was lost on the way, and why."""
+        while waiting and len(flying) < AHEAD * self.count:
+            entry = waiting.popleft()
+            try:
+                if self._executor is None:
+                    self._executor = self._opened()
+                flying[self._executor.submit(_attempt, task, packed, entry[1])] = entry
+            except Exception as error:  # broken since the last look, or closed
+                return [entry], error
+        return [], None
+
+    def _recover(
+        self,
+        cause: Exception,
+        losses: int,
+        lost: list[tuple[int, Job]],
+        flying: dict[Future[Outcome], tuple[int, Job]],
+    ) -> None:
+        """Prepare another attempt: a broken pool takes all its jobs with it."""
+        if losses >= MAX_LOSSES:
+            raise LostJobsError(
+                f"workers were lost {losses} times in a row, last with {type(cause).__name__}: {cause}. "
+                "Is memory short? Use fewer workers, or look at the workers' own messages"
+            ) from cause
+        if isinstance(cause, BrokenExecutor):
+            lost += flying.values()
+            flying.clear()
+            self.close(wait=False)
+
+
+def _attempt(task: Task, packed: bytes | None, job: Job) -> Outcome:
+    """Run a job on a worker; whatever it raises or warns of travels back as a value."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("default")  # the process that asked decides what a warning means
+        try:
+            first = () if packed is None else (_unpacked(packed),)
+            value, error = task(*first, *job), None
+        except Exception as raised:  # as in `InProcessWorkers`
+            value, error = None, _portable(raised)
+    return Outcome(value, error, tuple((str(w.message), w.category, w.filename, w.lineno) for w in caught))
+
+
+_last_shared: dict[bytes, Any] = {}
+
+
+def _unpacked(packed: bytes) -> Any:
+    if packed not in _last_shared:
+        _last_shared.clear()
+        _last_shared[packed] = pickle.loads(packed)
+    return _last_shared[packed]
+
+
+def _portable(error: Exception) -> Exception:
+    """The error with its traceback as a note, or its text where it cannot travel."""
+    text = "".join(traceback.format_exception(error))
+    try:
+        error.add_note(f"on a worker:\n{text}")
+        pickle.loads(pickle.dumps(error))
+    except Exception:  # classes fail to unpickle in their own ways
+        return RuntimeError(text)
+    return error
+
+
+def _begin_worker() -> None:
+    """Leave Ctrl-C to the parent, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end_with(sentinel: Any) -> None:
+    wait_for_end([sentinel])
+    os._exit(1)  # nobody is left to hear of it
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)  # Linux only
+    return len(affinity(0)) if affinity is not None else (os.cpu_count() or 1)
+
+
+@contextmanager
+def local_workers(count: int, start: str | None = None, preload: Sequence[str] = ()) -> Iterator[Workers]:
+    """Open processes on this machine; one alone is this process itself.
+
+    Parameters
+    ----------
+    count : int
+    start : {"forkserver", "spawn", "fork"}, optional
+        How processes begin. The default forks from a clean process where that exists (a fork of this one, with
+        its threads, can hang); ``"fork"`` takes along what was registered here, as users' own effects are.
+    preload : sequence of str
+        Modules that the clean process imports once for all workers.
+
+    Yields
+    ------
+    Workers
+    """
+    if count <= 1:
+        yield InProcessWorkers()
+        return
+    known = multiprocessing.get_all_start_methods()
+    context = multiprocessing.get_context(start or ("forkserver" if "forkserver" in known else "spawn"))
+    if context.get_start_method() == "forkserver":
+        context.set_forkserver_preload(["tpjb_ident.runtime.executors", *preload])
+    pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker), count)
+    with _one_thread_each():
+        try:
+            yield pool
+        finally:
+            pool.close()
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Processes share the cores already: linear algebra with threads of its own would only be in the way."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            with suppress(KeyError):
+                del os.environ[name]
+            if value is not None:
+                os.environ[name] = value
