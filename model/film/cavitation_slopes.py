@@ -59,8 +59,8 @@ def jfo_slopes(
 
 @compiled
 def _rupture_line(grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, band: FloatArray) -> FloatArray:
-    """Where between two nodes the film ruptures: `model.film.reynolds` does the same; here what flows is kept in
-    balance.""" nt, nz = faces.along.shape[0], faces.across.shape[1]
+    """Where between two nodes the film ruptures: as in `model.film.reynolds`; here what flows is kept in balance."""
+    nt, nz = faces.along.shape[0], faces.across.shape[1]
     width = nz - grid.first
     weight = grid.area.copy()
     for i in range(2, nt):

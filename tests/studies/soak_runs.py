@@ -46,8 +46,8 @@ def one_round(path: Path) -> str:
     from model.bearing_file import parse_bearing
     from model.predict import predict
     from rigdata import load_campaign
-from tpjb_ident.check.campaign import check_campaign
-        from tpjb_ident.compare.static_tests import measure_static
+    from tpjb_ident.check.campaign import check_campaign
+    from tpjb_ident.compare.static_tests import measure_static
     from tpjb_ident.dynamic.identify import IdentifySettings, identify
 
     campaign = load_campaign(path)
