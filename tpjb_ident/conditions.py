@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from rigdata.problem import Severity
+from tpjb_ident.condition_kinds import condition_kind
+
 
 class Condition(str):
-    """A short name that compares like a string, with a sentence that explains it.
+    """A name of the registry that compares like a string, with a sentence on what was found.
 
     Parameters
     ----------
     name : str
-        The name by which scripts test for it, e.g. ``"iteration-limit" in est.status``.
+        One of `tpjb_ident.condition_kinds.KINDS`; scripts test for it, e.g. ``"iteration-limit" in est.status``.
     detail : str
         What was found, with its figure and the limit.
+
+    Raises
+    ------
+    UnknownConditionError
+        The registry does not know the name; the message says the nearest one.
     """
 
     __slots__ = ("detail",)
@@ -19,12 +29,22 @@ class Condition(str):
 
     def __new__(cls, name: str, detail: str = "") -> Condition:
         """Make a condition from its name and its sentence."""
-        condition = super().__new__(cls, name)
+        condition = super().__new__(cls, condition_kind(name).name)
         condition.detail = detail
         return condition
 
     def __reduce__(self) -> tuple[type[Condition], tuple[str, str]]:
         return Condition, (str(self), self.detail)
+
+    @property
+    def severity(self) -> Severity:
+        """How grave it is: "error" forbids trust, "warning" needs a look, "note" is for information."""
+        return condition_kind(self).severity
+
+    @property
+    def meaning(self) -> str:
+        """What it means to the reader, and what to do."""
+        return condition_kind(self).meaning
 
     def sentence(self) -> str:
         """Name and detail in one line."""
@@ -38,3 +58,24 @@ def merged(*groups: tuple[Condition, ...]) -> tuple[Condition, ...]:
         for condition in group:
             seen.setdefault(str(condition), condition)
     return tuple(seen.values())
+
+
+def untrusted(conditions: Iterable[Condition]) -> tuple[Condition, ...]:
+    """Those that forbid trust in the number that they belong to: a command that has one ends with exit code 3.
+
+    Parameters
+    ----------
+    conditions : iterable of Condition
+        Of a point, a curve, a polygon, a locus or a campaign.
+    """
+    return tuple(condition for condition in conditions if condition.severity == "error")
+
+
+def sentences(conditions: Iterable[Condition]) -> tuple[str, ...]:
+    """Every condition as one line, name and detail.
+
+    Parameters
+    ----------
+    conditions : iterable of Condition
+    """
+    return tuple(condition.sentence() for condition in conditions)

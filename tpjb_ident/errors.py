@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 
-class BadInputError(Exception):
+class TpjbError(ValueError):
+    """Base of every refusal of this package: what was given cannot be used; the message says why and what to do."""
+
+
+class BadInputError(TpjbError):
     """Something the user gave cannot be used; the message says file, place, what is wrong, what to do."""
 
 

@@ -69,7 +69,7 @@ def test_positions_from_the_bearing_centre(campaign, polygon):
         error = point.position - true_position(point.load_direction, point.load)
         assert np.all(np.abs(error) < 4.5 * np.sqrt(np.diag(point.covariance)))
         assert np.abs(error).max() < 1e-6
-    assert any(s.startswith("drift-unknown") for s in found.status)
+    assert "drift-unknown" in found.status
     frame = found.to_frame()
     needed = ["static_load_direction_deg", "x_m", "y_m", "x_m_se", "y_m_se"]
     assert set(needed) <= set(frame.columns)
@@ -79,7 +79,7 @@ def test_positions_from_the_bearing_centre(campaign, polygon):
 
 def test_without_a_polygon_positions_are_raw_and_say_so(campaign, polygon, raw):
     assert raw.centre.tolist() == [0.0, 0.0]
-    assert any(s.startswith("no-centre") for s in raw.status)
+    assert "no-centre" in raw.status
     both = measure_locus(campaign, polygon)
     shift = raw.points[2].position - both.points[2].position
     assert shift == pytest.approx(both.centre)
@@ -123,7 +123,7 @@ def test_loads_off_their_set_point_are_named(tmp_path):
     heavier = Fault("wrong_load", run="l-*-02", value=1.2)
     source = made(tmp_path / "c.h5", locus_points(4), faults=(heavier,), clearance=())
     found = measure_locus(source)
-    status = next(s for s in found.status if s.startswith("load-off-set-point"))
+    status = next(s.detail for s in found.status if s == "load-off-set-point")
     assert "-02" in status
     assert "-01" not in status
 
@@ -131,7 +131,7 @@ def test_loads_off_their_set_point_are_named(tmp_path):
 def test_a_position_behind_the_wall_is_named(tmp_path):
     source = made(tmp_path / "c.h5", locus_points(4), k=0.2 * K)
     found = measure_locus(source, measure_clearance(source, ANGLES))
-    assert any(s.startswith("outside-polygon") for s in found.status)
+    assert "outside-polygon" in found.status
 
 
 def test_no_locus_is_an_error(tmp_path):

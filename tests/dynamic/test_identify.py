@@ -10,7 +10,6 @@ import pytest
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import Fault, Noise, RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
 from tests.studies.bench_phasors import HeldRun
-from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
 from tpjb_ident.dynamic.records.extraction import extract
 from tpjb_ident.dynamic.records.line_tuning import speeds_from_runout
@@ -261,16 +260,6 @@ def test_a_noisy_tachometer_is_no_drift():
         drift = 0.0
 
     assert "speed drifts" not in run_phasors(Run("a", 3, sample_rate=1000.0, seconds=20.0), 30.0).conditions
-
-
-def test_conditions_compare_by_name_and_survive_pickling():
-    import pickle
-
-    c = Condition("low-coherence", "coherence 0.5 < 0.9")
-    assert c == "low-coherence"
-    again = pickle.loads(pickle.dumps(c))
-    assert (again, again.detail) == (c, c.detail)
-    assert c.sentence() == "low-coherence: coherence 0.5 < 0.9"
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ def test_a_stiffness_says_its_parts_and_their_errors():
     text = str(est)
     assert text.startswith("dynamic stiffness at 7.958 Hz, mm\n  kxx  2.0000e+00 +- 2.0e+00 N/m    cxx  1.4000e-02")
     assert "kyy  1.5000e+00 +- 7.8e+00 N/m    cyy  1.8000e-02 +- 3.1e-01 N s/m" in text
-    assert str(stiff(status=(Condition("odd", "why"),))).endswith("\n  odd: why")
+    assert str(stiff(status=(Condition("misfit", "why"),))).endswith("\n  misfit: why")
 
 
 def test_an_interval_is_students_with_what_is_systematic_added_as_squares():

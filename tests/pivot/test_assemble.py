@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rigdata.problem import RigDataError
+from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot.assemble import Choice, assemble_curve
 from tpjb_ident.pivot.bad_holds import GROUPS_ON_RAMP, bad_blocks
 from tpjb_ident.pivot.fit import LAWS, MODEL_ERROR, REFERENCE_SHARE, UNKNOWN_ZERO, _fit_data
@@ -191,10 +192,10 @@ def test_a_bad_block_spoils_its_hold_and_a_ramp_has_blocks_for_steps():
     good[20] = False
     made = curve(good=(good,))
     np.testing.assert_array_equal(made.steps.weight, np.arange(10) != 3)
-    assert made.status == ("bad-steps: 1 left out",)
+    assert sentences(made.status) == ("bad-steps: 1 left out",)
     ramp = curve(record(held=False), good=(good,))
     assert len(ramp.steps) == 60
-    assert ramp.status == ("bad-steps: 1 left out", "no-holds: drift cannot be told from deflection")
+    assert sentences(ramp.status) == ("bad-steps: 1 left out", "no-holds: drift cannot be told from deflection")
 
 
 def test_certificates_of_channels_that_share_a_direction():
@@ -213,7 +214,7 @@ def test_certificates_of_channels_that_share_a_direction():
 def test_scatter_beyond_the_noise_widens_the_interval_by_birges_ratio():
     calm, wild = curve(fits=(law(chi_square=57.0),)), curve(fits=(law(chi_square=570.0),))
     np.testing.assert_allclose(wild.law.covariance, 10.0 * calm.law.covariance)
-    assert wild.status == ("misfit: the scatter exceeds the noise",)
+    assert sentences(wild.status) == ("misfit: the scatter exceeds the noise",)
     np.testing.assert_allclose(calm.law.covariance, 1e-12 * np.eye(3))
     exact = replace(law(chi_square=9.0), freedom=0)
     assert curve(fits=(exact,)).status == ()
@@ -242,7 +243,7 @@ CONTACT = (3e-6, math.log(500.0))
 def test_every_condition_has_its_name(changes, status):
     import re
 
-    found = curve(**changes).status
+    found = sentences(curve(**changes).status)
     assert any(re.search(status, said) for said in found), found
 
 

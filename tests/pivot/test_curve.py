@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
+from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot import pads_table, pivot_table, pivots_text, write_pivots
 from tpjb_ident.pivot.contact import contact_onset, contact_onset_se
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
@@ -158,7 +159,7 @@ def test_impossible_loads_are_refused(bad):
 
 
 def test_it_says_what_it_is():
-    text = str(curve(status=("bad-steps: 1 left out",)))
+    text = str(curve(status=(Condition("bad-steps", "1 left out"),)))
     assert "pad 1" in text
     assert "hertz-line" in text
     assert "bad-steps" in text
@@ -249,7 +250,7 @@ def test_steps_show_what_the_law_says_with_its_way_into_contact():
 
 def test_one_row_per_pad_says_what_the_curve_holds():
     frame = pads_table(
-        [curve(), curve(pad=2, onset_load=1800.0, onset_load_se=60.0, status=("contact-incomplete: x",))]
+        [curve(), curve(pad=2, onset_load=1800.0, onset_load_se=60.0, status=(Condition("contact-incomplete", "x"),))]
     )
     assert frame["includes_housing"].all()
     assert frame["onset_N"].tolist() == [0.0, 1800.0]

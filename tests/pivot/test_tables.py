@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot.curve import EXTRAPOLATION_SPREAD, PivotCurve, PivotSteps
 from tpjb_ident.pivot.fit import LAWS
 from tpjb_ident.pivot.hysteresis import Hysteresis, measure_loop
@@ -168,8 +169,8 @@ def test_tables_of_nothing_are_refused():
 def test_one_row_tells_all_of_a_pad():
     loop = Hysteresis(0.5, 0.05, 0.02, 0.004, (500.0, 4500.0))
     fits = (law(contact=True), law("hertz-point"), law())
-    made = curve(fits, (0.5, 0.2, 0.3), hysteresis=loop, status=("a", "b"), runs=("p-1", "p-2"),
-                 relative_calibration=0.004)  # fmt: skip
+    status = (Condition("misfit", "a"), Condition("samples-lost"))
+    made = curve(fits, (0.5, 0.2, 0.3), hysteresis=loop, status=status, runs=("p-1", "p-2"), relative_calibration=0.004)
     row = pads_table([made]).iloc[0]
     assert row.law == "linear"
     assert row.law_share == pytest.approx(0.8)
@@ -179,7 +180,7 @@ def test_one_row_tells_all_of_a_pad():
     assert row.load_off_pad_deg_se == pytest.approx(math.degrees(0.001))
     assert row.displacement_off_pad_deg == pytest.approx(math.degrees(0.1))
     assert row.displacement_off_pad_deg_se == pytest.approx(math.degrees(0.01))
-    assert (row.runs, row.status, row.relative_calibration) == ("p-1, p-2", "a; b", 0.004)
+    assert (row.runs, row.status, row.relative_calibration) == ("p-1, p-2", "misfit: a; samples-lost", 0.004)
 
 
 def test_the_toml_reaches_from_next_to_nothing_to_far_beyond():

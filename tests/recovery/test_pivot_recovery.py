@@ -28,6 +28,7 @@ from tests.studies.pivot_cases import (
 )
 from tpjb_ident.clearance.locus import measure_locus
 from tpjb_ident.clearance.measure import measure_clearance
+from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot import PivotSettings, fit_pivots
 
 SAMPLES = Path(__file__).resolve().parents[2].parent / "shared" / "samples"
@@ -48,7 +49,7 @@ def test_one_campaign(tmp_path, kind):
         assert abs(curve.load_direction_offset - stated) < 5 * curve.load_direction.se + 1e-3
         upper = curve.pad in (3, 4)
         assert (curve.onset_load > 0.0) is upper
-        assert any(s.startswith("contact-incomplete") for s in curve.status) is upper
+        assert ("contact-incomplete" in curve.status) is upper
         if upper:
             assert curve.onset_load == pytest.approx(true_onset(law, facts["contact_gap_m"]), rel=0.2)
             assert curve.valid_from == curve.onset_load
@@ -147,7 +148,7 @@ def test_a_refused_run_can_be_left_out(tmp_path):
     source, _ = campaign(tmp_path / "c.h5", bearing("sphere", 3), 3, faults=(fault,))
     curves = fit_pivots(source, ANGLES, PivotSettings(on_refusal="skip"))
     assert [c.pad for c in curves] == [1, 3, 4, 5]
-    assert all(any(s.startswith("runs-refused: p-2-up") for s in c.status) for c in curves)
+    assert all(any(s.startswith("runs-refused: p-2-up") for s in sentences(c.status)) for c in curves)
 
 
 def test_a_pad_that_the_bearing_lacks(tmp_path):
@@ -165,7 +166,7 @@ def test_any_load_programme(tmp_path, name):
     error = np.log(curve.stiffness(LOADS) * law.compliance(LOADS))
     assert np.all(np.abs(error) < 4 * curve.relative_stiffness_se(LOADS))
     assert np.abs(error).max() < 0.03
-    assert any(s.startswith("no-holds") for s in curve.status) is (name == "ramp")
+    assert ("no-holds" in curve.status) is (name == "ramp")
     assert (curve.hysteresis is not None) is (name == "cycle")
 
 
@@ -217,7 +218,7 @@ def test_bad_steps_are_left_out(tmp_path):
     slip = Fault("glitch", "p-1-up", "X1*", value=-1.5e-6, start=start, length=1.0)
     source, _ = campaign(tmp_path / "c.h5", [law] * 5, 21, faults=(slip,))
     curve = fit_pivots(source, ANGLES)[0]
-    assert any(s.startswith("bad-steps") for s in curve.status)
+    assert "bad-steps" in curve.status
     assert curve.steps.weight[4] == 0.0
     error = np.log(curve.stiffness(LOADS) * law.compliance(LOADS))
     assert np.all(np.abs(error) < 4 * curve.relative_stiffness_se(LOADS))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.clearance.measure import ClearancePolygon
+from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.slow_records.flat_channels import refuse_flat_channels
 from tpjb_ident.slow_records.glitches import good_samples
 from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
@@ -70,14 +71,14 @@ class Locus:
         Reading of the bearing centre that was taken off [m]; zero where none is known.
     drift : (2,) ndarray
         Drift taken off, per run in the order of testing [m]; NaN where no direction was repeated.
-    status : tuple of str
+    status : tuple of Condition
         Named conditions.
     """
 
     points: tuple[LocusPoint, ...]
     centre: FloatArray
     drift: FloatArray
-    status: tuple[str, ...] = field(default=())
+    status: tuple[Condition, ...] = ()
 
     def to_frame(self) -> pd.DataFrame:
         """Table of `locus.csv` (outputs.md)."""
@@ -103,7 +104,7 @@ class Locus:
     def __str__(self) -> str:
         radii = [1e6 * float(np.hypot(*p.position)) for p in self.points]
         text = f"locus: {len(self.points)} positions, {min(radii):.1f} to {max(radii):.1f} um from the centre"
-        return text + (f"; {', '.join(self.status)}" if self.status else "")
+        return text + (f"; {', '.join(sentences(self.status))}" if self.status else "")
 
 
 def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -> Locus:
@@ -152,7 +153,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     return Locus(tuple(points), np.asarray(centre), drift.rate, status)
 
 
-def _usable(runs: Sequence[Run]) -> tuple[dict[int, _Read], tuple[str, ...]]:
+def _usable(runs: Sequence[Run]) -> tuple[dict[int, _Read], tuple[Condition, ...]]:
     """Runs that can be used, by their number in the order of testing, and a condition that names the others."""
     found: dict[int, _Read] = {}
     problems: list[Problem] = []
@@ -164,7 +165,8 @@ def _usable(runs: Sequence[Run]) -> tuple[dict[int, _Read], tuple[str, ...]]:
     if 2 * len(found) <= len(runs):
         raise RigDataError(problems)
     reasons = {str(p.run): p.what for p in reversed(problems)}
-    return found, ("runs-refused: " + "; ".join(f"{run} ({reasons[run]})" for run in reasons),) if reasons else ()
+    listed = "; ".join(f"{run} ({reasons[run]})" for run in reasons)
+    return found, (Condition("runs-refused", listed),) if reasons else ()
 
 
 @dataclass(frozen=True)
@@ -277,12 +279,12 @@ def _same_set_point(one: OperatingPoint, other: OperatingPoint) -> bool:
     return same and turn < SAME_DIRECTION
 
 
-def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, drift: FloatArray) -> tuple[str, ...]:
+def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, drift: FloatArray) -> tuple[Condition, ...]:
     found = []
     if polygon is None:
-        found.append("no-centre: positions from the probes' zero, no clearance polygon given")
+        found.append(Condition("no-centre", "positions from the probes' zero, no clearance polygon given"))
     if np.isnan(drift).any():
-        found.append("drift-unknown: no load direction was repeated")
+        found.append(Condition("drift-unknown", "no load direction was repeated"))
     missed = [
         p.run
         for p in points
@@ -290,11 +292,11 @@ def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, drift: F
         or abs(math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)) > DIRECTION_MISS
     ]
     if missed:
-        found.append("load-off-set-point: " + ", ".join(missed))
+        found.append(Condition("load-off-set-point", ", ".join(missed)))
     if polygon is not None:
         behind = [p.run for p in points if _behind(p, polygon)]
         if behind:
-            found.append("outside-polygon: " + ", ".join(behind))
+            found.append(Condition("outside-polygon", ", ".join(behind)))
     return tuple(found)
 
 

@@ -14,6 +14,7 @@ from tpjb_ident.clearance.polygon import Centre, CentreRule, corners, find_centr
 from tpjb_ident.clearance.probe_gains import gain_ratio
 from tpjb_ident.clearance.side_fit import SideFit, fit_sides
 from tpjb_ident.clearance.sweep import Touch, read_sweep
+from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.slow_records.noise import NoiseModel
 
@@ -66,7 +67,7 @@ class ClearancePolygon:
         Mean of the run's temperature channels [K]; NaN without any. Tells hot from cold.
     centre_rule : str
         How the centre was chosen.
-    status : tuple of str
+    status : tuple of Condition
         Named conditions.
     """
 
@@ -88,7 +89,7 @@ class ClearancePolygon:
     noise: NoiseModel = field(repr=False)
     temperature: float = np.nan
     centre_rule: CentreRule = "least-absolute"
-    status: tuple[str, ...] = ()
+    status: tuple[Condition, ...] = ()
 
     def to_frame(self) -> pd.DataFrame:
         """Table of `clearance.csv` (outputs.md): one row per pad, SI, angles in degrees."""
@@ -116,14 +117,14 @@ class ClearancePolygon:
     @property
     def regular(self) -> bool:
         """Whether all clearances are one and the same, within their errors or half a micrometre."""
-        return not any(s.startswith("irregular") for s in self.status)
+        return "irregular" not in self.status
 
     def __str__(self) -> str:
         pads = ", ".join(
             f"{1e6 * c:.2f} ({1e6 * s:.2f})" for c, s in zip(self.clearance, self.clearance_se, strict=True)
         )
         text = f"clearance polygon {self.run}: per pad {pads} um (se), pushed by {self.push_load:.0f} N"
-        return text + (f"; {', '.join(self.status)}" if self.status else "")
+        return text + (f"; {', '.join(sentences(self.status))}" if self.status else "")
 
 
 def measure_clearance(
@@ -236,7 +237,7 @@ def _polygon(
     )
 
 
-def _gains_differ(run: Run, found: ClearancePolygon) -> tuple[str, ...]:
+def _gains_differ(run: Run, found: ClearancePolygon) -> tuple[Condition, ...]:
     """One probe reads more than the other: sizes do not tell, the angles between the sides do."""
     probes = [c for c in run.channels.values() if c.quantity == "displacement" and c.axis is not None]
     if len(probes) != 2:
@@ -248,17 +249,19 @@ def _gains_differ(run: Run, found: ClearancePolygon) -> tuple[str, ...]:
         return ()
     share = f"{100 * abs(ratio.value):.1f} % (se {100 * ratio.se:.1f} %)"
     more = "more" if ratio.value > 0 else "less"
-    return (f"probe-gains-differ: the sides stand as if {first.name} read {share} {more} than {second.name}",)
+    detail = f"the sides stand as if {first.name} read {share} {more} than {second.name}"
+    return (Condition("probe-gains-differ", detail),)
 
 
-def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[str, ...]:
+def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[Condition, ...]:
     """The push lies outside what the dry tests measured: true of most sweeps, and to be said."""
     outside = [c for c in curves or () if bool(c.is_extrapolated(push))]
     if not outside:
         return ()
     pads = ", ".join(str(c.pad) for c in outside)
     lowest = min(c.valid_from for c in outside)
-    return (f"give-extrapolated: pushed with {push:.0f} N, dry tests of pads {pads} hold from {lowest:.0f} N on",)
+    detail = f"pushed with {push:.0f} N, dry tests of pads {pads} hold from {lowest:.0f} N on"
+    return (Condition("give-extrapolated", detail),)
 
 
 def mean_temperature(run: Run) -> float:
@@ -281,23 +284,24 @@ def coldest_run(runs: Sequence[Run]) -> Run:
     return min(fit, key=lambda run: run.point.static_load)
 
 
-def _status(fit: SideFit, clearance: FloatArray, se: FloatArray, reached: int) -> tuple[str, ...]:
+def _status(fit: SideFit, clearance: FloatArray, se: FloatArray, reached: int) -> tuple[Condition, ...]:
     found = []
     if reached < len(clearance):
         missing = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(clearance)))
-        found.append(f"pads-not-reached: {missing}")
+        found.append(Condition("pads-not-reached", missing))
     if np.isnan(fit.scale):
-        found.append("give-from-sweep: no pivot curves, zero load extrapolated from the sweep alone")
+        found.append(Condition("give-from-sweep", "no pivot curves, zero load extrapolated from the sweep alone"))
     elif abs(fit.scale - 1.0) > max(IRREGULAR * fit.scale_se, DISAGREES):
-        found.append(f"pivots-disagree: they give {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say")
+        detail = f"they give {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say"
+        found.append(Condition("pivots-disagree", detail))
     spread = np.abs(clearance - np.nanmedian(clearance))
     # below half a micrometre a difference between pads is of no consequence, however well it is measured
     odd = np.flatnonzero(spread > np.maximum(IRREGULAR * se, 0.5e-6))
     if len(odd):
-        found.append("irregular: pads " + ", ".join(str(k + 1) for k in odd))
+        found.append(Condition("irregular", "pads " + ", ".join(str(k + 1) for k in odd)))
     turn = np.nanmean(fit.tilt)
     if abs(turn) > IRREGULAR * np.sqrt(np.nanmean(fit.tilt_se**2) / reached) and abs(turn) > 5e-3:
-        found.append(f"frame-turned: all sides by {np.degrees(turn):+.2f} deg")
+        found.append(Condition("frame-turned", f"all sides by {np.degrees(turn):+.2f} deg"))
     if fit.misfit > 4.0:
-        found.append("misfit: the scatter exceeds the noise")
+        found.append(Condition("misfit", "the scatter exceeds the noise"))
     return tuple(found)

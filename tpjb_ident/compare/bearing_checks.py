@@ -47,10 +47,9 @@ def _of_sweep(run: Run, bearing: Bearing) -> list[Problem]:
     measured = float(np.nanmean(polygon.clearance))
     found = []
     for condition in polygon.status:
-        name, _, detail = condition.partition(": ")
-        if name == "probe-gains-differ":
+        if condition == "probe-gains-differ":
             cure = "Check the sensitivities of both probes"
-            found.append(Problem("warning", run.file, f"channels {names}", detail, cure, run.id))
+            found.append(Problem("warning", run.file, f"channels {names}", condition.detail, cure, run.id))
     if not SCALE[0] * drawn < measured < SCALE[1] * drawn:
         what = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
         cure = "Check the sensitivities of the probes, and whether it is this bearing's file"

@@ -63,7 +63,7 @@ def measure_static(campaign: Campaign, bearing: Bearing, with_pivots: bool = Tru
         curves = fit_pivots(campaign, angles, PivotSettings(on_refusal="few"))
     clearance, left = _clearance(campaign, angles, curves)
     locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
-    left += [told for part in (*curves[:1], locus) if part is not None for told in _refused(part.status)]
+    left += [c for part in (*curves[:1], locus) if part is not None for c in part.status if c == "runs-refused"]
     return StaticTests(curves, clearance, locus, tuple(left))
 
 
@@ -83,8 +83,3 @@ def _clearance(
             left.append(Condition("runs-refused", f"{bad.id} ({error.problems[0]})"))
             runs.remove(bad)
     return None, left
-
-
-def _refused(status: tuple[str, ...]) -> list[Condition]:
-    parts = (condition.partition(": ") for condition in status)
-    return [Condition(name, detail) for name, _, detail in parts if name == "runs-refused"]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot.contact import contact_onset, contact_onset_se
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
 from tpjb_ident.pivot.hysteresis import Hysteresis, measure_loop
@@ -177,33 +178,34 @@ def _calibration(channels: Mapping[str, Channel], angle: float) -> float:
 
 def _status(
     choice: Choice, steps: PivotSteps, settings: PivotSettings, onset: float, refused: tuple[str, ...]
-) -> tuple[str, ...]:
+) -> tuple[Condition, ...]:
     law = choice.fits[0]
     found = []
     if np.any(steps.weight == 0.0):
-        found.append(f"bad-steps: {int(np.sum(steps.weight == 0.0))} left out")
+        found.append(Condition("bad-steps", f"{int(np.sum(steps.weight == 0.0))} left out"))
     if abs(choice.directions[0][0].angle) > settings.angle_warning:
-        found.append(f"load-off-pad: {choice.directions[0][0]}")
+        found.append(Condition("load-off-pad", str(choice.directions[0][0])))
     aside = choice.directions[0][1]
     if abs(aside.angle) > 0.5 * settings.displacement_angle_limit:
-        found.append(f"moves-aside: the shaft goes {aside}")
+        found.append(Condition("moves-aside", f"the shaft goes {aside}"))
     if onset > 0.0:
-        found.append(f"contact-incomplete: below {onset:.0f} N")
+        found.append(Condition("contact-incomplete", f"below {onset:.0f} N"))
     if onset >= float(np.max(steps.load)):
-        found.append("contact-never-complete")
+        found.append(Condition("contact-never-complete"))
     shares: dict[str, float] = {}
     for fit, weight in zip(choice.fits, choice.weights, strict=True):
         shares[fit.name] = shares.get(fit.name, 0.0) + float(weight)
     if shares[law.name] < CLEAR_CHOICE:
-        found.append("law-undecided: " + ", ".join(f"{name} {share:.2f}" for name, share in shares.items()))
+        listed = ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
+        found.append(Condition("law-undecided", listed))
     if law.name == "spline":
-        found.append("no-physical-law")
+        found.append(Condition("no-physical-law"))
     if _misfits(law):
-        found.append("misfit: the scatter exceeds the noise")
+        found.append(Condition("misfit", "the scatter exceeds the noise"))
     if not any(record.holds for record in choice.records):
-        found.append("no-holds: drift cannot be told from deflection")
+        found.append(Condition("no-holds", "drift cannot be told from deflection"))
     if any(record.lost > MANY_LOST for record in choice.records):
-        found.append("samples-lost")
+        found.append(Condition("samples-lost"))
     if refused:
-        found.append("runs-refused: " + "; ".join(refused))
+        found.append(Condition("runs-refused", "; ".join(refused)))
     return tuple(found)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import optimize, special
 
+from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.pivot.hysteresis import Hysteresis
 from tpjb_ident.pivot.laws.law_fit import FRICTION, OFFSET, SCALE, LawFit
 from tpjb_ident.pivot.records.projection import Direction
@@ -84,7 +85,7 @@ class PivotCurve:
     relative_calibration : float
         Standard uncertainty of the stiffness from probe and cell certificates, relative; not in the bands,
         because it is common to everything that the same channels measure.
-    status : tuple of str
+    status : tuple of Condition
         Named conditions; empty when all is well.
     runs : tuple of str
         Where it came from.
@@ -103,7 +104,7 @@ class PivotCurve:
     displacement_direction: Direction
     hysteresis: Hysteresis | None = None
     relative_calibration: float = 0.0
-    status: tuple[str, ...] = ()
+    status: tuple[Condition, ...] = ()
     runs: tuple[str, ...] = ()
     includes_housing: bool = True
 
@@ -278,7 +279,7 @@ class PivotCurve:
         if self.hysteresis is not None:
             lines.append(f"  {self.hysteresis}")
         if self.status:
-            lines.append("  status: " + ", ".join(self.status))
+            lines.append("  status: " + ", ".join(sentences(self.status)))
         return "\n".join(lines)
 
 

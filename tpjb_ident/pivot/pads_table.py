@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot.curve import PivotCurve
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def pads_table(curves: Sequence[PivotCurve]) -> pd.DataFrame:
                 "includes_housing": curve.includes_housing,
                 "relative_calibration": curve.relative_calibration,
                 "runs": ", ".join(curve.runs),
-                "status": "; ".join(curve.status) or "ok",
+                "status": "; ".join(sentences(curve.status)) or "ok",
             }
         )
     return pd.DataFrame(rows)

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tpjb_ident.report.condition_words import meaning
 from tpjb_ident.report.page import Table
 from tpjb_ident.report.plots.style import VARIANT_LABEL
 from tpjb_ident.rounding import fixed, percent, signed, with_interval
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.compare.pivot_formula import Formula
+    from tpjb_ident.conditions import Condition
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.results.point_result import PointResult
     from tpjb_ident.pivot import PivotCurve
@@ -72,19 +72,15 @@ def predicted_table(frame: pd.DataFrame) -> Table:
 
 def flag_table(comparison: Comparison) -> Table:
     """Every flag of points, pivot curves, polygon and locus, in plain words; what says the same stands in one row."""
-    rows: list[list[str]] = []
-    for p in comparison.identification.points:
-        rows += [[point_label(p), str(c), getattr(c, "detail", ""), meaning(c)] for c in p.quality]
-    rows += [["campaign", str(c), c.detail, meaning(c)] for c in comparison.identification.conditions]
-    parts: list[tuple[str, Sequence[str]]] = [(f"pivot of pad #{c.pad}", c.status) for c in comparison.curves]
+    identified = comparison.identification
+    parts: list[tuple[str, Sequence[Condition]]] = [(point_label(p), p.quality) for p in identified.points]
+    parts.append(("campaign", identified.conditions))
+    parts += [(f"pivot of pad #{c.pad}", c.status) for c in comparison.curves]
     if comparison.clearance is not None:
         parts.append(("clearance", comparison.clearance.status))
     if comparison.locus is not None:
         parts.append(("locus", comparison.locus.status))
-    for where, status in parts:
-        for condition in status:
-            name, _, detail = condition.partition(":")
-            rows.append([where, name, detail.strip(), meaning(condition)])
+    rows = [[where, str(c), c.detail, c.meaning] for where, status in parts for c in status]
     return Table("Flags", ["flag", "what it means", "where", "found"], _gathered(rows), frozenset(range(4)))
 
 

@@ -25,6 +25,7 @@ from tpjb_ident.cli.common.options import (
 from tpjb_ident.cli.common.quantities import parse_values
 from tpjb_ident.cli.common.record import write_record
 from tpjb_ident.cli.common.terminal import note_line, progress, say, table
+from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.tables import write_table
@@ -245,14 +246,12 @@ def refuse_untrusted(result: Identification) -> None:
     """
     import numpy as np
 
-    from tpjb_ident.report.condition_words import is_serious
-
     bad = []
     for p in result.points:
-        serious = [c.sentence() for c in p.quality if is_serious(c)]
+        serious = sentences(untrusted(p.quality))
         if serious or not np.isfinite(p.stiffness.h).all():
             bad.append(f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz: {'; '.join(serious)}")
-    lost = [c.sentence() for c in result.conditions if is_serious(c)]
+    lost = sentences(untrusted(result.conditions))
     if lost and not bad:
         raise NotTrustedError("; ".join(lost))
     if bad:

@@ -11,6 +11,7 @@ from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
 from tpjb_ident.cli.common.options import BearingOption, CampaignPath, Out, out_folder
 from tpjb_ident.cli.common.record import write_record
 from tpjb_ident.cli.common.terminal import note_line, progress, say, table
+from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.tables import write_table
@@ -63,9 +64,9 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
         say(str(found))
     for part in (polygon, found):
         for condition in part.status if part is not None else ():
-            note_line("note", condition)
+            note_line("note", condition.sentence())
     for sentence in dict.fromkeys([*(c.sentence() for c in static.left_out), *refused]):
-        if found is None or sentence not in found.status:
+        if found is None or sentence not in sentences(found.status):
             note_line("note", sentence)
     for other in others:
         say(str(other))
@@ -74,6 +75,9 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
         raise NotTrustedError(
             "no clearance run can be used: positions count from the probes' zero, not from the centre."
         )
+    bad = [c.sentence() for part in (polygon, found) if part is not None for c in untrusted(part.status)]
+    if bad:
+        raise NotTrustedError("; ".join(bad))
 
 
 def other_polygons(

@@ -9,6 +9,7 @@ from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
 from tpjb_ident.cli.common.options import BearingOption, CampaignPath, Out, out_folder
 from tpjb_ident.cli.common.record import write_record
 from tpjb_ident.cli.common.terminal import note_line, progress, say, table
+from tpjb_ident.conditions import untrusted
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.tables import write_table
@@ -45,17 +46,16 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
     show_curves(curves, source.id, formula)
     say(f"Results: {target}")
     from tpjb_ident.compare.bearing_checks import bearing_problems
-    from tpjb_ident.report.condition_words import is_serious
 
     for problem in bearing_problems(source, drawn):  # what is wrong with the probes is wrong with the curves
         note_line("warning", str(problem))
-    for condition in dict.fromkeys(c for curve in curves for c in curve.status if c.startswith(ABOUT_ALL)):
-        note_line("note", condition)
+    for sentence in dict.fromkeys(c.sentence() for curve in curves for c in curve.status if c in ABOUT_ALL):
+        note_line("note", sentence)
     for curve in curves:
         for condition in curve.status:
-            if not condition.startswith(ABOUT_ALL):
-                note_line("note", f"pad {curve.pad}: {condition}")
-    bad = [f"pad {c.pad}: {condition}" for c in curves for condition in c.status if is_serious(condition)]
+            if condition not in ABOUT_ALL:
+                note_line("note", f"pad {curve.pad}: {condition.sentence()}")
+    bad = [f"pad {c.pad}: {condition.sentence()}" for c in curves for condition in untrusted(c.status)]
     without = sorted({run.pad or 0 for run in source.of_kind("dry_pivot")} - {curve.pad for curve in curves})
     bad += [f"pad {pad}: has no curve, its records were refused" for pad in without]
     if bad:

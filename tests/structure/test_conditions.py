@@ -1,0 +1,62 @@
+"""Every condition is in one registry: its name, how grave it is, what it means."""
+
+from __future__ import annotations
+
+import ast
+import pickle
+from pathlib import Path
+
+import pytest
+
+from tpjb_ident.condition_kinds import ERRORS, KINDS, NOTES, WARNINGS, UnknownConditionError
+from tpjb_ident.conditions import Condition, merged, sentences, untrusted
+
+PACKAGE = Path(__file__).parents[2] / "tpjb_ident"
+
+
+def stated_names(source):
+    """Names that a module states in calls of `Condition(..)`."""
+    for node in ast.walk(ast.parse(source)):
+        made = isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Condition" and node.args
+        if made and isinstance(getattr(node.args[0], "value", None), str):
+            yield node.args[0].value
+
+
+def test_every_condition_of_the_code_is_in_the_registry_and_the_registry_holds_no_other():
+    code = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
+    stated = {name for source in code.values() for name in stated_names(source)}
+    assert len(stated) > 50
+    assert stated - set(KINDS) == set()
+    elsewhere = "".join(source for path, source in code.items() if path.name != "condition_kinds.py")
+    by_line = {name for name in KINDS if name.endswith(" on excitation line")}  # named after the line
+    assert {name for name in set(KINDS) - by_line if f'"{name}"' not in elsewhere} == set()
+
+
+def test_a_condition_has_one_severity_and_says_what_to_do():
+    assert len(KINDS) == len(ERRORS) + len(WARNINGS) + len(NOTES)
+    assert all(kind.meaning.endswith(".") for kind in KINDS.values())
+    assert Condition("ill-conditioned").severity == "error"
+    assert Condition("large-amplitude", "7 %").severity == "warning"
+    assert Condition("no-centre").severity == "note"
+    assert "mains frequency" in Condition("mains on excitation line").meaning
+
+
+def test_an_unknown_name_is_refused_and_the_nearest_is_named():
+    with pytest.raises(UnknownConditionError, match=r"'ill-conditoned' is not known\. Did you mean 'ill-conditioned'"):
+        Condition("ill-conditoned")
+    with pytest.raises(UnknownConditionError, match=r"condition_kinds\.py lists them"):
+        Condition("qqq")
+
+
+def test_only_errors_forbid_trust():
+    mixed = (Condition("no-centre"), Condition("zero-scale", "29 of 40"), Condition("misfit"))
+    assert untrusted(mixed) == ("zero-scale",)
+    assert sentences(untrusted(mixed)) == ("zero-scale: 29 of 40",)
+    assert untrusted(()) == ()
+    assert merged(mixed, (Condition("misfit", "again"),)) == ("no-centre", "zero-scale", "misfit")
+
+
+def test_conditions_compare_by_name_and_survive_pickling():
+    condition = Condition("low-coherence", "coherence 0.5 < 0.9")
+    again = pickle.loads(pickle.dumps(condition))
+    assert (again, again.detail, again.severity) == ("low-coherence", condition.detail, "error")

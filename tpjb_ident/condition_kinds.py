@@ -1,0 +1,168 @@
+"""The registry of conditions: every name that a result may say of itself, how grave it is, what it means, what to do.
+
+A new condition is one line here. `tpjb_ident.conditions.Condition` refuses a name that is not listed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rigdata.near_names import nearest_name
+from rigdata.problem import Severity
+
+
+class UnknownConditionError(LookupError):
+    """A condition that is not in the registry: a mistake of the code, not of its input."""
+
+
+@dataclass(frozen=True)
+class ConditionKind:
+    """What is known of a condition by its name alone.
+
+    Attributes
+    ----------
+    name : str
+        As it is printed and as scripts test for it.
+    severity : {"error", "warning", "note"}
+        With an error the number is not to be trusted, and the command ends with exit code 3; a warning needs a look;
+        a note is for information.
+    meaning : str
+        What it means to the reader, and what to do.
+    """
+
+    name: str
+    severity: Severity
+    meaning: str
+
+
+#: With one of these a number is not to be trusted: the command ends with exit code 3.
+ERRORS = {
+    "cells-contradict-set-points": "In all runs the load cells read many times more or less than the set points, "
+    "or a load in quite another direction; the coefficients are then off by as much. Check sensitivity, "
+    "full_scale, excitation, polarity and axes of the cells.",
+    "contact-never-complete": "The shaft never came into full contact: this curve is not the pivot's stiffness.",
+    "fewer-than-two-directions": "All displacements lie along one line; a 2x2 matrix needs two directions. Excite "
+    "in another direction too.",
+    "ill-conditioned": "The displacement directions are almost parallel, so errors are strongly amplified. Excite "
+    "in directions that move the shaft differently.",
+    "iteration-limit": "The estimator stopped before it settled.",
+    "low-coherence": "Much of the force is not explained by the displacement: noise, or a wrong channel.",
+    "many-windows-rejected": "More than 40 % of the windows were rejected as outliers. Look at the records.",
+    "negative-damping": "A direct damping came out negative: a film takes energy. Look for a wrong polarity, "
+    "swapped channels or a delay.",
+    "no-residual": "As many windows as unknowns: the numbers solve them exactly and have no interval. Record more.",
+    "no-robust-start": "No robust start was found; outliers may have pulled the answer.",
+    "outside-polygon": "Some positions lie outside the clearance polygon, where the shaft cannot be. Check the probes.",
+    "point-lost": "None of the runs at an operating point can be used: it has no coefficients.",
+    "probes-contradict-clearance": "The probes' readings cannot be lengths in this bearing: a sensitivity is "
+    "several times off, and the coefficients with it. Check the sensitivities of the probes, and the bearing "
+    "file.",
+    "zero-scale": "The residuals are zero: the records are no measurement, or repeat one another exactly.",
+}
+#: The number holds as far as its interval goes; somebody should look.
+WARNINGS = {
+    "1X on excitation line": "The excitation stands on the running speed: unbalance and runout cannot be told "
+    "from it. Excite beside the running speed.",
+    "2X on excitation line": "The excitation stands on twice the running speed: runout cannot be told from it.",
+    "accelerometer-dead": "An accelerometer reads one value throughout: the housing's inertia along it stays in "
+    "the force. Check it, or set the channel to ignore.",
+    "calibration-uncertainty-unstated": "The manifest states no calibration uncertainty for some channels; the "
+    "intervals hold random errors only for them. State `uncertainty` in the manifest.",
+    "cells-against-set-points": "The load cells and the set points disagree alike in all runs: the gain of one or "
+    "of the other is off.",
+    "directional-rejection": "Rejected windows gather in some excitation directions: that is how physics looks, "
+    "not glitches. Look at these runs before relying on the point.",
+    "frame-turned": "All sides of the polygon are turned alike: probes or pads stand at other angles than stated.",
+    "harmonic on excitation line": "A harmonic of another excitation falls on this one. Excite the two apart.",
+    "inertia-not-corrected": "Without accelerometers the housing's inertia stays in the force: small at low "
+    "frequency, growing with its square.",
+    "irregular": "The pads' clearances differ by more than their errors: worn, damaged or wrongly assembled pads.",
+    "large-amplitude": "The vibration is more than 5 % of the clearance: the film is no longer linear. Excite less.",
+    "load-off-set-point": "The measured load of some runs misses its set point in size or direction.",
+    "mains on excitation line": "The excitation stands on the mains frequency: pick-up cannot be told from "
+    "signal, and the interval allows for it. Excite beside the mains frequency.",
+    "methods-disagree": "Other estimators give another answer beyond both intervals, as they do where glitches or "
+    "displacement noise pull them. See estimators.csv.",
+    "misfit": "The points scatter more than their noise: something moved during the test.",
+    "moves-aside": "The shaft slides far across the pad while it is pressed: only the part along the pad counts, "
+    "but look at the pad's fit and at the probes.",
+    "no-holds": "The load never stood still, so drift cannot be told from deflection.",
+    "no-reference": "The runs do not state two excitation directions, so they cannot serve as instruments.",
+    "no-repeats": "Too few repeats per direction to measure the noise: displacement noise is not corrected for. "
+    "Record longer.",
+    "nonlinear-amplitude": "The coefficients change with the amplitude of vibration: they hold for this one only.",
+    "pads-not-reached": "The sweep never touched some pads; their clearance is unknown.",
+    "pivots-disagree": "In the sweep the pivots give another amount than the dry tests say.",
+    "probe-gains-differ": "The sides of the clearance polygon stand at other angles to each other than the pads "
+    "do, as where one probe reads more than the other. Check both sensitivities.",
+    "record-damaged": "A record had to be mended when it was read, and part of it is lost. Copy it again from the rig.",
+    "run-gain-off": "In one run a probe or cell reads some per cent more or less than in the others of this "
+    "point. Check its amplifier, range and cable there; leave the run out or repeat it.",
+    "run-left-out": "A run at this point cannot be used and takes no part; the others stand.",
+    "run-without-data": "A run gave no usable window and takes no part.",
+    "runs-left-out": "Some runs cannot be used and take no part; the others stand.",
+    "runs-refused": "Some static tests cannot be used, or are not what they claim to be; they take no part.",
+    "samples-lost": "Many samples of the record were missing or disturbed.",
+    "static-load-off": "The measured static load of a run misses its set point.",
+    "static-load-turned": "The measured static load of a run, or of all, points elsewhere than its set point says.",
+    "tach off set point": "The tachometer contradicts the set point of the speed; the set point was used.",
+    "windows-missing": "Parts of the records gave no phasors and take no part.",
+}
+#: For information.
+NOTES = {
+    "bad-steps": "Some load steps were left out because the record was disturbed there.",
+    "contact-incomplete": "At low load the shaft is not fully in contact with this pad; the curve holds above the "
+    "load named.",
+    "drift-unknown": "No load direction was repeated, so a drift of the probes cannot be told from a position. "
+    "Repeat the first direction at the end.",
+    "drive-not-locked": "The excitation's phase wandered between windows; they were turned to one phase first.",
+    "excitation off set point": "The excitation was found at another frequency than the manifest says; the found "
+    "one was used to fit.",
+    "give-extrapolated": "The sweep pushes with less than the dry tests did: what the pivots give is "
+    "extrapolated, and the sweep itself corrects it.",
+    "give-from-sweep": "There are no pivot curves: what the pivots give under the push load was extrapolated.",
+    "law-undecided": "Several laws fit about equally well; the band holds their difference.",
+    "load-off-pad": "The load is off the pad's direction; it was projected.",
+    "mains corrected": "Pick-up on the mains frequency was estimated from the other runs and taken off.",
+    "no-centre": "Without a clearance run positions count from the probes' zero, not from the bearing centre.",
+    "no-physical-law": "No contact law describes the points; a smooth monotone curve stands in.",
+    "no-spare-direction": "With two directions only, the interval holds how repeats differ, not how runs do. "
+    "Excite in a third direction.",
+    "speed drifts": "The shaft speed moved during the record; its lines were followed window by window.",
+    "unexpected lines": "The records hold lines that the manifest does not explain; they were fitted along.",
+}
+#: Lines that may stand on the excitation beside those above: higher harmonics, and lines found in the record.
+WARNINGS |= {
+    f"{line} on excitation line": "Another line stands on the excitation, and cannot be told from it. Excite elsewhere."
+    for line in (
+        *(f"{n}X" for n in range(3, 11)),
+        *(f"{kind} {n}" for kind in ("mains", "harmonic") for n in range(2, 11)),
+        "found",
+    )
+}
+_BY_SEVERITY: tuple[tuple[Severity, dict[str, str]], ...] = (("error", ERRORS), ("warning", WARNINGS), ("note", NOTES))
+#: Every condition by its name.
+KINDS = {
+    name: ConditionKind(name, severity, meaning) for severity, kinds in _BY_SEVERITY for name, meaning in kinds.items()
+}
+
+
+def condition_kind(name: str) -> ConditionKind:
+    """Look a condition up.
+
+    Parameters
+    ----------
+    name : str
+        As it is printed.
+
+    Raises
+    ------
+    UnknownConditionError
+        It is not in the registry; the message names the nearest one.
+    """
+    kind = KINDS.get(str(name))
+    if kind is None:
+        near = nearest_name(name, KINDS)
+        hint = f"Did you mean {near!r}?" if near else "tpjb_ident/condition_kinds.py lists them."
+        raise UnknownConditionError(f"condition {str(name)!r} is not known. {hint}")
+    return kind
