@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tpjb_ident.clearance.measure import SAME_WARMTH, ClearancePolygon
 from tpjb_ident.clearance.polygon import normals
+from tpjb_ident.schema import TANGENT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -154,8 +155,8 @@ def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> p
             if spring is not None:
                 row |= {
                     "load_N": spring.load,
-                    "stiffness_N_per_m": spring.stiffness[k],
-                    "stiffness_N_per_m_se": spring.stiffness_se[k],
+                    TANGENT: spring.stiffness[k],
+                    f"{TANGENT}_se": spring.stiffness_se[k],
                 }
             rows.append(row)
     return pd.DataFrame(rows)

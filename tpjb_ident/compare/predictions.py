@@ -11,6 +11,7 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.model_guard import check_model
+from tpjb_ident.schema import KINDS
 
 check_model()
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 #: Called with what is being done, how many are done, of how many.
 Progress = Callable[[str, int, int], None]
-ENTRIES = ("xx", "xy", "yx", "yy")
 
 
 @dataclass(frozen=True)
@@ -144,14 +144,13 @@ def point_columns(point: OperatingPoint) -> dict[str, float]:
         "static_load_N": point.static_load,
         "static_load_direction_deg": point.static_load_direction_deg,
         "shaft_speed_Hz": point.shaft_speed_hz,
-        "excitation_Hz": OperatingPoint(0.0, 0.0, 0.0, _excitation(point)).excitation_hz,
+        "excitation_Hz": round(_excitation(point) / (2 * math.pi), 9),
     }
 
 
 def coefficient_names(kind: str) -> tuple[str, ...]:
     """Column names of the four stiffnesses (``"k"``) or dampings (``"c"``), row by row."""
-    unit = "N_per_m" if kind == "k" else "Ns_per_m"
-    return tuple(f"{kind}{entry}_{unit}" for entry in ENTRIES)
+    return KINDS[kind].columns
 
 
 def prediction_frame(predictions: Sequence[PointPrediction], mesh_error: bool = True) -> pd.DataFrame:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tpjb_ident.export.matlab import write_mat
-from tpjb_ident.export.points import COLUMNS, ENTRIES, KEYS, ExportError, StaticPoint, static_points
+from tpjb_ident.export.points import COLUMNS, ExportError, StaticPoint, static_points
 from tpjb_ident.export.ross import ross_text, write_ross
 from tpjb_ident.export.rotor_programs import write_ansys, write_dyrobes, write_xltrc
 from tpjb_ident.export.structural import sep005
@@ -26,8 +26,6 @@ WRITERS: dict[str, Callable[[Path, tuple[StaticPoint, ...], str], None]] = {
 
 __all__ = [
     "COLUMNS",
-    "ENTRIES",
-    "KEYS",
     "WRITERS",
     "ExportError",
     "StaticPoint",

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tpjb_ident.export.points import ENTRIES, FloatArray, StaticPoint
+from tpjb_ident.export.points import FloatArray, StaticPoint
 from tpjb_ident.runtime.tables import printable, write_atomic
+from tpjb_ident.schema import ENTRIES
 
 
 def write_mat(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:

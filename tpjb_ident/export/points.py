@@ -9,16 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, STATIC_COLUMNS
+
 if TYPE_CHECKING:
     import pandas as pd
 
 FloatArray = NDArray[np.float64]
-ENTRIES = ("xx", "xy", "yx", "yy")
-KEYS = ("static_load_N", "static_load_direction_deg", "shaft_speed_Hz")
-COLUMNS = {
-    **{f"k{e}": f"k{e}_N_per_m" for e in ENTRIES},
-    **{f"c{e}": f"c{e}_Ns_per_m" for e in ENTRIES},
-}
+COLUMNS = {name[:3]: name for name in COEFFICIENT_COLUMNS}
 
 
 class ExportError(ValueError):
@@ -74,7 +71,7 @@ def static_points(frame: pd.DataFrame) -> tuple[tuple[StaticPoint, ...], tuple[s
     ExportError
         A column is missing, a point stands twice, or nothing is left.
     """
-    needed = [*KEYS, "excitation_Hz", *COLUMNS.values()]
+    needed = [*POINT_COLUMNS, *COLUMNS.values()]
     missing = [name for name in needed if name not in frame.columns]
     if missing:
         raise ExportError(f"the table has no column {missing[0]}. Give a coefficients.csv or prediction.csv of tpjb.")
@@ -85,7 +82,7 @@ def static_points(frame: pd.DataFrame) -> tuple[tuple[StaticPoint, ...], tuple[s
     if not finite.any():
         raise ExportError("no point of the table has finite coefficients. Identify or predict again.")
     points = []
-    for keys, group in frame[finite].groupby(list(KEYS), sort=True):
+    for keys, group in frame[finite].groupby(list(STATIC_COLUMNS), sort=True):
         ordered = group.sort_values("excitation_Hz")
         if ordered["excitation_Hz"].duplicated().any():
             raise ExportError(f"the point {keys[0]:g} N stands twice at one frequency. Export one method at a time.")

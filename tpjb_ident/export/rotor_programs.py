@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tpjb_ident.export.points import ENTRIES, FloatArray, StaticPoint
+from tpjb_ident.export.points import FloatArray, StaticPoint
 from tpjb_ident.runtime.tables import printable, write_text
+from tpjb_ident.schema import ENTRIES
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.schema import SECANT, TANGENT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,12 +72,12 @@ def _rows(curve: PivotCurve, loads: FloatArray, formula: Formula | None, level: 
         "pad": curve.pad,
         "force_N": loads,
         "deflection_m": curve.deflection(loads),
-        "stiffness_N_per_m": stiffness,
-        "stiffness_N_per_m_lo": lo,
-        "stiffness_N_per_m_hi": hi,
-        "secant_N_per_m": secant,
-        "secant_N_per_m_lo": secant_lo,
-        "secant_N_per_m_hi": secant_hi,
+        TANGENT: stiffness,
+        f"{TANGENT}_lo": lo,
+        f"{TANGENT}_hi": hi,
+        SECANT: secant,
+        f"{SECANT}_lo": secant_lo,
+        f"{SECANT}_hi": secant_hi,
         "law": curve.law.name,
         "extrapolated": curve.is_extrapolated(loads),
         "contact_complete": loads >= curve.onset_load,
@@ -84,7 +85,7 @@ def _rows(curve: PivotCurve, loads: FloatArray, formula: Formula | None, level: 
     if formula is not None:
         printed = np.array([formula(curve.pad, float(load)) for load in loads])
         columns |= {
-            "formula_secant_N_per_m": printed[:, 0],
+            f"formula_{SECANT}": printed[:, 0],
             "formula_tangent_N_per_m": printed[:, 1],
             "ratio_secant": secant / printed[:, 0],
             "ratio_secant_lo": secant_lo / printed[:, 0],

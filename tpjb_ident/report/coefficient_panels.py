@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.plots.fig17_coefficient import coefficient
-from tpjb_ident.report.plots.series import CROSS, DIRECT, UNITS, longest_series, where
+from tpjb_ident.report.plots.series import CROSS, DIRECT, longest_series, where
+from tpjb_ident.schema import KINDS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +35,7 @@ def coefficient_panels(table: pd.DataFrame) -> list[Panel]:
             continue
         for names, kind in ((DIRECT, "Stiffness and damping"), (CROSS, "Cross-coupled stiffness and damping")):
             for name in names:
-                title = f"{name} ({UNITS[name[0]][3]}) over {over}, at {where(series, over)}"
+                title = f"{name} ({KINDS[name[0]].quantity}) over {over}, at {where(series, over)}"
                 figure = coefficient(table, name, over=over)
                 panels.append(panel(f"{name}-over-{over}", title, figure, f"{kind} over {over}"))
     return panels

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tpjb_ident.report.page import Table
 from tpjb_ident.report.plots.style import VARIANT_LABEL
 from tpjb_ident.rounding import fixed, percent, signed, with_interval
+from tpjb_ident.schema import DAMPING, ENTRIES, KINDS, STIFFNESS, coefficient_column
 
 if TYPE_CHECKING:
     from tpjb_ident.clearance.measure import ClearancePolygon
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.point_result import PointResult
     from tpjb_ident.pivot import PivotCurve
 
-ENTRIES = ("xx", "xy", "yx", "yy")
+DIRECT = ("kxx", "kyy", "cxx", "cyy")
 #: Loads at which pivot stiffness is tabled [N].
 PIVOT_LOADS = (2000.0, 4000.0)
 
@@ -43,29 +44,27 @@ def measured_table(result: Identification) -> Table:
         share = f"{100 * p.outlier_fraction:.0f} %"
         flags = ", ".join(str(c) for c in p.quality) or "ok"
         rows.append([point_label(p), *cells, str(p.n_windows), share, flags])
-    columns = [
-        "point", *(f"k{e}, MN/m" for e in ENTRIES), *(f"c{e}, kN s/m" for e in ENTRIES), "windows", "outliers", "flags",
-    ]  # fmt: skip
+    named = [f"{kind.symbol}{e}, {kind.display_unit}" for kind in (STIFFNESS, DAMPING) for e in ENTRIES]
+    columns = ["point", *named, "windows", "outliers", "flags"]
     return Table(f"Measured ({result.method})", columns, rows, frozenset({0, len(columns) - 1}))
 
 
 def predicted_table(frame: pd.DataFrame) -> Table:
     """Direct coefficients predicted with every pivot model, and how far off each is."""
-    names = {"kxx": ("N_per_m", 1e6), "kyy": ("N_per_m", 1e6), "cxx": ("Ns_per_m", 1e3), "cyy": ("Ns_per_m", 1e3)}
     rows = []
     ordered = frame.sort_values(["static_load_N", "excitation_Hz"], kind="stable")
     for _, row in ordered.iterrows():
         cells = []
-        for name, (suffix, scale) in names.items():
-            cells.append(fixed(row[f"{name}_{suffix}_predicted"] / scale))
-            cells.append(percent(row[f"{name}_{suffix}_ratio"] - 1.0))
+        for name in DIRECT:
+            column = coefficient_column(name)
+            cells.append(fixed(row[f"{column}_predicted"] / KINDS[name[0]].display_scale))
+            cells.append(percent(row[f"{column}_ratio"] - 1.0))
         remark = "beyond the measured pivot load" if row["pivot_extrapolated"] else row["status"]
         label = f"{row['static_load_N'] / 1e3:g} kN, {row['excitation_Hz']:g} Hz"
         rows.append([label, VARIANT_LABEL[row["pivots"]], *cells, remark or ""])
-    units = {"k": "MN/m", "c": "kN s/m"}
     columns = ["point", "pivots"]
-    for name in names:
-        columns += [f"{name}, {units[name[0]]}", "off by"]
+    for name in DIRECT:
+        columns += [f"{name}, {KINDS[name[0]].display_unit}", "off by"]
     columns.append("remark")
     return Table("Predicted", columns, rows, frozenset({0, 1, len(columns) - 1}))
 

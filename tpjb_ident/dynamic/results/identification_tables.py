@@ -10,9 +10,8 @@ from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES, DynamicStiffness
 from tpjb_ident.dynamic.results.frequency_fit import FrequencyFit, LoadFits
 from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.schema import DAMPING, KINDS, POINT_COLUMNS, STATIC_COLUMNS, STIFFNESS
 
-POINT_COLUMNS = ("static_load_N", "static_load_direction_deg", "shaft_speed_Hz", "excitation_Hz")
-_UNITS = {"k": "N_per_m", "c": "Ns_per_m", "m": "kg"}
 _FIT_FIGURES = (
     "model",
     "supported",
@@ -24,8 +23,8 @@ _FIT_FIGURES = (
     "probability",
     "largest_misfit",
 )
-_FIT_VALUES = tuple(f"{symbol}{entry}_{unit}" for symbol, unit in _UNITS.items() for entry in ENTRIES)
-FIT_COLUMNS = (*POINT_COLUMNS[:3], *_FIT_FIGURES, *(c for name in _FIT_VALUES for c in (name, f"{name}_se")))
+_FIT_VALUES = tuple(column for kind in KINDS.values() for column in kind.columns)
+FIT_COLUMNS = (*STATIC_COLUMNS, *_FIT_FIGURES, *(c for name in _FIT_VALUES for c in (name, f"{name}_se")))
 WINDOW_COLUMNS = ("run", "time_s", "excitation_direction_deg", "weight", "reason", *POINT_COLUMNS)
 
 
@@ -92,7 +91,7 @@ def _model_columns(group: LoadFits | None) -> dict[str, Any]:
 
 def fit_row(group: LoadFits, fit: FrequencyFit) -> dict[str, Any]:
     """One model over frequency of one load."""
-    row: dict[str, Any] = {name: point_columns(group.points[0])[name] for name in POINT_COLUMNS[:3]}
+    row: dict[str, Any] = {name: point_columns(group.points[0])[name] for name in STATIC_COLUMNS}
     row.update(
         model=fit.model,
         supported=group.supported,
@@ -124,9 +123,9 @@ def coefficient_columns(est: DynamicStiffness) -> dict[str, float]:
     half, random, se = est.half_width(0.95), est.half_width(0.95, systematic=False), est.standard_error
     systematic = np.zeros(8) if est.systematic is None else np.sqrt(np.diag(est.systematic))
     row: dict[str, float] = {}
-    for symbol, offset, factor in (("k", 0, 1.0), ("c", 4, 1 / est.omega)):
+    for kind, offset, factor in ((STIFFNESS, 0, 1.0), (DAMPING, 4, 1 / est.omega)):
         for j, entry in enumerate(ENTRIES):
-            name, i = f"{symbol}{entry}_{_UNITS[symbol]}", offset + j
+            name, i = kind.column(entry), offset + j
             value = est.vector[i]
             row[name] = value * factor
             row[f"{name}_lo"] = (value - half[i]) * factor

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.series import AXES, UNITS, as_table, longest_series
+from tpjb_ident.report.plots.series import AXES, as_table, longest_series
 from tpjb_ident.report.plots.style import LIGHT, add_legend, new_picture
+from tpjb_ident.schema import KINDS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,9 +58,9 @@ def direct_coefficients(
     ValueError
         When no bearing was measured at two loads or frequencies.
     """
-    suffix, scale, unit, _ = UNITS[part]
+    kind = KINDS[part]
     column, axis_scale, axis_label = AXES[over]
-    figure, axes = new_picture(axis_label, f"{'stiffness' if part == 'k' else 'damping'}, {unit}", title=title)
+    figure, axes = new_picture(axis_label, f"{kind.quantity}, {kind.display_unit}", title=title)
     drawn = False
     for (name, source), colour in zip(bearings.items(), COLOURS * len(bearings), strict=False):
         series = longest_series(as_table(source), over)
@@ -69,8 +70,8 @@ def direct_coefficients(
         rows = series.drop_duplicates(column).sort_values(column)
         for entry in entries:
             marker, dashes, face = ENTRY_STYLE[entry]
-            key = f"{part}{entry}_{suffix}"
-            value, low, high = (rows[f"{key}{end}"].to_numpy(float) / scale for end in ("", "_lo", "_hi"))
+            key = kind.column(entry)
+            value, low, high = (rows[f"{key}{end}"].to_numpy(float) / kind.display_scale for end in ("", "_lo", "_hi"))
             axes.errorbar(
                 rows[column] / axis_scale, value, yerr=np.abs([value - low, high - value]), marker=marker,
                 markersize=5, markerfacecolor=LIGHT[face or colour], color=LIGHT[colour], linestyle=dashes,

@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.series import AXES, DIRECT, UNITS, longest_series
+from tpjb_ident.report.plots.series import AXES, DIRECT, longest_series
 from tpjb_ident.report.plots.style import LIGHT, VARIANT_LABEL, VARIANT_STYLE, add_legend, new_picture
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, coefficient_column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,15 +47,16 @@ def coefficient(
     ValueError
         For an unknown coefficient, or when nothing varies over `over`.
     """
-    if len(name) != 3 or name[0] not in UNITS or set(name[1:]) - {"x", "y"}:
-        raise ValueError(f"name must be one of kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy; got {name!r}")
+    known = [column[:3] for column in COEFFICIENT_COLUMNS]
+    if name not in known:
+        raise ValueError(f"name must be one of {', '.join(known)}; got {name!r}")
     series = longest_series(_table(comparison), over)
     if series is None:
         raise ValueError(f"the campaign has no two points that differ in {over} alone")
-    suffix, scale, unit, _ = UNITS[name[0]]
+    kind = KINDS[name[0]]
+    scale, key = kind.display_scale, coefficient_column(name)
     column, axis_scale, axis_label = AXES[over]
-    figure, axes = new_picture(axis_label, f"{name}, {unit}", title=title)
-    key = f"{name}_{suffix}"
+    figure, axes = new_picture(axis_label, f"{name}, {kind.display_unit}", title=title)
     for variant in dict.fromkeys(series["pivots"]):
         rows = series[series["pivots"] == variant].sort_values(column)
         _line(axes, rows, column, axis_scale, f"{key}_predicted", scale, str(variant))

@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, coefficient_column
+
 if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.diagnose.diagnose import Diagnosis
 
-ENTRIES = ("kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy")
+ENTRIES = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
 COLUMNS = ("model", "entry", "static_load_N", "excitation_Hz", "z")
 TWO_SIDED_95 = 1.959964
 
@@ -65,7 +67,7 @@ def _of_comparison(table: pd.DataFrame) -> pd.DataFrame:
 
     frames = []
     for entry in ENTRIES:
-        key = f"{entry}_{'N_per_m' if entry[0] == 'k' else 'Ns_per_m'}"
+        key = coefficient_column(entry)
         sigma = (table[f"{key}_hi"] - table[f"{key}_lo"]) / (2 * TWO_SIDED_95)
         frames.append(
             pd.DataFrame(

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tpjb_ident.schema import STATIC_COLUMNS
+
 if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.dynamic.results.identification import Identification
 
-#: Suffix in the tables, divisor and unit of the axis, and name, of stiffness and damping.
-UNITS = {"k": ("N_per_m", 1e6, "MN/m", "stiffness"), "c": ("Ns_per_m", 1e3, "kN s/m", "damping")}
 AXES = {
     "load": ("static_load_N", 1e3, "static load, kN"),
     "frequency": ("excitation_Hz", 1.0, "excitation frequency, Hz"),
 }
 DIRECT = ("kxx", "kyy", "cxx", "cyy")
 CROSS = ("kxy", "kyx", "cxy", "cyx")
-STATIC = ["static_load_direction_deg", "shaft_speed_Hz"]
 
 
 def as_table(source: Identification | pd.DataFrame) -> pd.DataFrame:
@@ -30,7 +29,7 @@ def as_table(source: Identification | pd.DataFrame) -> pd.DataFrame:
 def longest_series(table: pd.DataFrame, axis: str) -> pd.DataFrame | None:
     """Rows of the longest series over load (at one frequency) or over frequency (at one load); None if none varies."""
     column = AXES[axis][0]
-    fixed = ["excitation_Hz" if axis == "load" else "static_load_N", *STATIC]
+    fixed = ["excitation_Hz" if axis == "load" else "static_load_N", *STATIC_COLUMNS[1:]]
     best, length = None, 1
     for _, group in table.groupby(fixed, sort=True):
         if group[column].nunique() > length:

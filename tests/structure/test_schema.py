@@ -1,0 +1,59 @@
+"""One schema of columns: the documentation lists it, and the tables hold nothing beside it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tests.command_line import tpjb
+from tpjb_ident import schema
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+
+
+def headed(name: str) -> str:
+    """Text of the section whose heading names a table first."""
+    found = re.search(rf"^## `{name}`.*?\n(.*?)(?=^## |\Z)", PAGE, flags=re.M | re.S)
+    assert found, f"docs/results.md has no section `{name}`"
+    return found[1]
+
+
+@pytest.mark.parametrize("table", sorted(set(schema.TABLES) - {"estimators", "clearance_runs"}))
+def test_the_documentation_lists_the_columns_of_the_schema(table):
+    """Mend a failure by pasting what `schema.markdown(table)` gives."""
+    assert schema.markdown(table) in headed(table)
+
+
+def test_every_ending_is_explained():
+    used = {ending for columns in schema.TABLES.values() for column in columns for ending in column.endings}
+    assert used <= set(schema.ENDINGS)
+    for ending, meaning in schema.ENDINGS.items():
+        assert f"| `{ending}` | {meaning} |" in PAGE
+
+
+def test_a_unit_in_a_name_is_the_column_s_unit():
+    written = {"N/m": "N_per_m", "N s/m": "Ns_per_m"}
+    for columns in schema.TABLES.values():
+        for column in columns:
+            if column.unit and not column.name.startswith("x_m_") and not column.name.startswith("y_m_"):
+                assert column.name.endswith(f"_{written.get(column.unit, column.unit)}"), column.name
+
+
+@pytest.mark.parametrize("column", ["kxx_N_per_mm", "temperature_K_2", "pad3_load", "kxz_N_per_m"])
+def test_a_name_that_is_none_is_found(column):
+    assert schema.unknown_columns("coefficients", [column]) == [column]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["identify", "locus"])
+def test_tables_on_disk_hold_columns_of_the_schema_only(command, small_campaign, tmp_path):
+    result = tpjb(command, small_campaign, "--out", tmp_path / "o")
+    assert result.exit_code == 0, result.output
+    tables = sorted((tmp_path / "o").glob("*.csv"))
+    assert tables
+    for path in tables:
+        assert schema.unknown_columns(path.stem, list(pd.read_csv(path, nrows=1))) == [], path.name

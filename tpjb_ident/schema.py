@@ -1,0 +1,324 @@
+"""Every column of the tables on disk, once: name, quantity, unit, meaning; and which table holds which.
+
+The names are promised to scripts (docs/results.md, whose lists a test holds to this file). A name ends in its unit;
+what is derived from a column (an interval's ends, a standard error) adds its own ending behind the unit.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+ENTRIES = ("xx", "xy", "yx", "yy")
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A kind of coefficient: stiffness, damping or mass.
+
+    Attributes
+    ----------
+    symbol, quantity : str
+        ``"k"``, ``"stiffness"``.
+    suffix, unit : str
+        Of the columns, and how the unit is written.
+    display_unit, display_scale : str, float
+        What people read, and its size in SI.
+    meaning : str
+    """
+
+    symbol: str
+    quantity: str
+    suffix: str
+    unit: str
+    display_unit: str
+    display_scale: float
+    meaning: str
+
+    def column(self, entry: str) -> str:
+        """Name of the column of one entry, ``"xx"`` to ``"yy"``."""
+        return f"{self.symbol}{entry}_{self.suffix}"
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all four, row by row."""
+        return tuple(self.column(entry) for entry in ENTRIES)
+
+
+STIFFNESS = Coefficient("k", "stiffness", "N_per_m", "N/m", "MN/m", 1e6, "Re h at the excitation frequency")
+DAMPING = Coefficient("c", "damping", "Ns_per_m", "N s/m", "kN s/m", 1e3, "Im h / omega at the excitation frequency")
+MASS = Coefficient("m", "mass", "kg", "kg", "kg", 1.0, "apparent mass of K - omega^2 M")
+KINDS = {kind.symbol: kind for kind in (STIFFNESS, DAMPING, MASS)}
+#: Columns of K and C, row by row.
+COEFFICIENT_COLUMNS = (*STIFFNESS.columns, *DAMPING.columns)
+#: Columns that say which operating point a row is about: static point first.
+STATIC_COLUMNS = ("static_load_N", "static_load_direction_deg", "shaft_speed_Hz")
+POINT_COLUMNS = (*STATIC_COLUMNS, "excitation_Hz")
+#: Of pivot curves: tangent and secant.
+TANGENT, SECANT = f"stiffness_{STIFFNESS.suffix}", f"secant_{STIFFNESS.suffix}"
+
+
+def coefficient_column(name: str) -> str:
+    """Column of a coefficient.
+
+    Parameters
+    ----------
+    name : str
+        ``"kxx"`` .. ``"myy"``.
+
+    Raises
+    ------
+    KeyError
+        No such coefficient.
+    """
+    return KINDS[name[0]].column(name[1:])
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table.
+
+    Attributes
+    ----------
+    name : str
+        As in the file; ``N`` stands for a pad's number, ``{e}`` for an entry ``xx`` .. ``yy``.
+    quantity, unit : str
+        ``"length"``, ``"m"``; no unit for text, counts, shares and truth values.
+    meaning : str
+    endings : tuple of str
+        What also exists behind this name: ``"_lo"``, ``"_hi"``, ``"_se"``, ..
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    meaning: str
+    endings: tuple[str, ...] = ()
+
+    def pattern(self) -> str:
+        """Regular expression of the names that this column stands for."""
+        name = re.escape(self.name).replace(r"\{e\}", "(xx|xy|yx|yy)").replace("padN", r"pad\d+")
+        name = name.replace("_N_K", r"_\d+_K")
+        return name + ("(" + "|".join(re.escape(e) for e in self.endings) + ")?" if self.endings else "")
+
+
+ENDINGS = {
+    "_lo": "lower end of the 95 % interval, random and calibration errors together",
+    "_hi": "its upper end",
+    "_se": "standard error, random part alone",
+    "_se_systematic": "standard error from the calibration",
+    "_random95": "half of the random part's 95 % interval",
+    "_systematic95": "half of the calibration's 95 % interval",
+    "_predicted": "what the model gives",
+    "_difference": "predicted - measured",
+    "_ratio": "predicted / measured; empty where the measured interval holds zero",
+}
+_ALL = ("_lo", "_hi", "_se", "_se_systematic", "_random95", "_systematic95")
+_AGAINST = ("_lo", "_hi", "_predicted", "_difference", "_ratio")
+
+
+def _coefficients(endings: tuple[str, ...], *kinds: Coefficient) -> tuple[Column, ...]:
+    return tuple(Column(kind.column("{e}"), kind.quantity, kind.unit, kind.meaning, endings) for kind in kinds)
+
+
+STATIC = (
+    Column("static_load_N", "force", "N", "static load, set point, per bearing"),
+    Column("static_load_direction_deg", "angle", "deg", "where it pushes the shaft, counter-clockwise from x"),
+    Column("shaft_speed_Hz", "frequency", "Hz", "set point of the shaft speed"),
+)
+POINT = (*STATIC, Column("excitation_Hz", "frequency", "Hz", "frequency of the excitation"))
+MEASURED_LOAD = Column("static_load_measured_N", "force", "N", "mean load that the cells show")
+QUALITY = Column("quality", "text", "", 'named conditions, "ok" if there are none')
+RUN = Column("run", "text", "", "id of the run")
+PAD = Column("pad", "count", "", "number of the pad, from 1")
+STATUS = Column("status", "text", "", "named conditions of the solution or the curve")
+CONVERGED = Column("converged", "truth value", "", "whether the model's solution converged")
+PIVOTS = Column("pivots", "text", "", "pivot model: rigid, kirk, kirk-secant or measured")
+
+
+def _position(endings: tuple[str, ...]) -> tuple[Column, ...]:
+    return tuple(Column(f"{a}_m", "length", "m", f"{a} of the shaft centre", endings) for a in "xy")
+
+
+_ESTIMATES = (
+    *POINT,
+    MEASURED_LOAD,
+    *_coefficients(_ALL, STIFFNESS, DAMPING),
+    Column("method", "text", "", "estimator"),
+    Column("n_records", "count", "", "runs that took part"),
+    Column("n_windows", "count", "", "record windows that took part"),
+    Column("condition_number", "number", "", "of the displacement directions"),
+    Column("outlier_fraction", "share", "", "windows without weight"),
+    QUALITY,
+    Column("quality_detail", "text", "", "the same with what was found"),
+    Column("n_windows_rejected", "count", "", "windows without weight"),
+    Column("coherence", "share", "", "force explained by the displacement, the smaller axis"),
+    Column("amplitude_m", "length", "m", "largest displacement amplitude of a direction"),
+    Column("amplitude_over_clearance", "share", "", "the same over the smallest assembled clearance"),
+    Column("amplitude_slope", "share", "", "change of h when the amplitude doubles, where several were run", ("_se",)),
+    Column("chi_square", "number", "", "of the directions against their repeats"),
+    Column("attenuation", "share", "", "what displacement noise would take off a plain regression"),
+    Column("inertia_corrected", "truth value", "", "whether the housing's inertia was added to the cells' force"),
+    Column("baseline_subtracted", "truth value", "", "whether a rig without bearing was taken off"),
+    Column("frequency_model", "text", "", "what the load's frequencies support: K-C, K-C-M, raw H, or a single line"),
+    Column("frequency_chi_square", "number", "", "of that model"),
+    Column("frequency_dof", "count", "", "its degrees of freedom"),
+    *_position(("_se",)),
+    Column("temperature_N_K", "temperature", "K", "mean film temperature of pad N"),
+)
+_CLEARANCE = (
+    PAD,
+    Column("clearance_m", "length", "m", "assembled clearance at zero push load", ("_se",)),
+    Column("clearance_pushed_m", "length", "m", "the same as measured, under the push load", ("_se",)),
+    Column("pad_angle_deg", "angle", "deg", "where the pad stands by the bearing file"),
+    Column("fitted_angle_deg", "angle", "deg", "where its side of the polygon stands", ("_se",)),
+    Column("corner_x_m", "length", "m", "x of the corner after the pad's side"),
+    Column("corner_y_m", "length", "m", "y of that corner"),
+    Column("push_load_N", "force", "N", "load of the sweep"),
+    STATIC[2],
+    Column("temperature_K", "temperature", "K", "mean temperature during the sweep"),
+    RUN,
+)
+_LOCUS = (
+    *STATIC,
+    MEASURED_LOAD,
+    Column("static_load_direction_measured_deg", "angle", "deg", "direction that the cells show"),
+    *_position(("_se",)),
+    RUN,
+)
+#: Columns of every table by file name.
+TABLES: dict[str, tuple[Column, ...]] = {
+    "coefficients": _ESTIMATES,
+    "estimators": _ESTIMATES,
+    "windows": (
+        RUN,
+        Column("time_s", "time", "s", "start of the window in its run"),
+        Column("excitation_direction_deg", "angle", "deg", "direction of the excitation"),
+        Column("weight", "share", "", "final robust weight"),
+        Column("reason", "text", "", "what gave it away"),
+        *POINT,
+    ),
+    "frequency_fits": (
+        *STATIC,
+        Column("model", "text", "", "K-C or K-C-M"),
+        Column("supported", "text", "", "the simplest model that the load's data do not refuse"),
+        Column("n_frequencies", "count", "", "excitation frequencies"),
+        Column("excitation_lowest_Hz", "frequency", "Hz", "lowest of them"),
+        Column("excitation_highest_Hz", "frequency", "Hz", "highest of them"),
+        Column("chi_square", "number", "", "of the model"),
+        Column("dof", "count", "", "degrees of freedom"),
+        Column("probability", "share", "", "of a chi-square as large by chance"),
+        Column("largest_misfit", "share", "", "of h: what using the model costs"),
+        *_coefficients(("_se",), STIFFNESS, DAMPING, MASS),
+    ),
+    "pivot_curves": (
+        PAD,
+        Column("force_N", "force", "N", "load on the pad"),
+        Column("deflection_m", "length", "m", "pivot, pad back and housing seat together"),
+        Column(TANGENT, "stiffness", "N/m", "tangent, what small vibrations feel", ("_lo", "_hi")),
+        Column(SECANT, "stiffness", "N/m", "secant, force over deflection", ("_lo", "_hi")),
+        Column("law", "text", "", "law of the curve"),
+        Column("extrapolated", "truth value", "", "outside the measured loads"),
+        Column("contact_complete", "truth value", "", "the shaft is fully in contact at this load"),
+        Column(f"formula_{SECANT}", "stiffness", "N/m", "Kirk and Reedy as printed"),
+        Column("formula_tangent_N_per_m", "stiffness", "N/m", "its tangent"),
+        Column("ratio_secant", "share", "", "measured / formula, secants", ("_lo", "_hi")),
+        Column("ratio_tangent", "share", "", "measured / formula, tangents", ("_lo", "_hi")),
+    ),
+    "pivot_pads": (
+        PAD,
+        Column("law", "text", "", "law of the curve"),
+        Column("law_share", "share", "", "its posterior share among the laws"),
+        Column("valid_from_N", "force", "N", "lowest load that was measured"),
+        Column("valid_to_N", "force", "N", "highest load that was measured"),
+        Column("onset_N", "force", "N", "load from which the shaft is in contact; 0: from the start", ("_se",)),
+        Column("load_off_pad_deg", "angle", "deg", "angle of the load off the pad's direction", ("_se",)),
+        Column("displacement_off_pad_deg", "angle", "deg", "angle of the displacement off it", ("_se",)),
+        Column("loop_energy_J", "energy", "J", "between loading and unloading; empty without unloading", ("_se",)),
+        Column("loss_factor", "share", "", "of that loop", ("_se",)),
+        Column("includes_housing", "truth value", "", "the curve holds the housing's seat"),
+        Column("relative_calibration", "share", "", "standard error of the whole curve's scale"),
+        Column("runs", "text", "", "runs that took part"),
+        STATUS,
+    ),
+    "locus": _LOCUS,
+    "clearance": _CLEARANCE,
+    "clearance_runs": _CLEARANCE,
+    "clearance_pairs": (
+        RUN,
+        Column("against", "text", "", "run that it is held against"),
+        Column("compared", "text", "", "push load (only that differs) or condition"),
+        PAD,
+        Column("change_m", "length", "m", "of the clearance at zero push load", ("_se",)),
+        Column("load_N", "force", "N", "mean push load of the two"),
+        Column(TANGENT, "stiffness", "N/m", "of the pivot between the two push loads", ("_se",)),
+    ),
+    "prediction": (
+        *POINT,
+        *_coefficients((), STIFFNESS, DAMPING),
+        *_position(()),
+        Column("padN_load_N", "force", "N", "load of pad N"),
+        Column("padN_tilt_rad", "angle", "rad", "its tilt"),
+        Column("padN_deflection_m", "length", "m", "of its pivot"),
+        Column("padN_max_pressure_Pa", "pressure", "Pa", "largest pressure on it"),
+        Column("padN_max_temperature_degC", "temperature", "degC", "largest film temperature on it"),
+        Column("padN_min_film_m", "length", "m", "least film on it"),
+        Column("max_pressure_Pa", "pressure", "Pa", "largest of all pads"),
+        Column("max_temperature_degC", "temperature", "degC", "largest of all pads"),
+        Column("min_film_m", "length", "m", "least of all pads"),
+        Column("power_loss_W", "power", "W", "friction of all films"),
+        CONVERGED,
+        Column("idle_pads", "text", "", "pads that carry nothing"),
+        Column("mesh_error", "share", "", "estimated error of the direct coefficients from the mesh"),
+        STATUS,
+    ),
+    "comparison": (
+        PIVOTS,
+        *POINT,
+        MEASURED_LOAD,
+        *_coefficients(_AGAINST, STIFFNESS, DAMPING),
+        Column("x_m_predicted", "length", "m", "x of the shaft centre, predicted"),
+        Column("y_m_predicted", "length", "m", "y of it"),
+        CONVERGED,
+        Column("pivot_extrapolated", "truth value", "", "a pad presses its pivot harder than the dry test did"),
+        QUALITY,
+        STATUS,
+    ),
+    "locus_comparison": (
+        PIVOTS,
+        *_LOCUS,
+        Column("x_m_predicted", "length", "m", "x of the shaft centre, predicted"),
+        Column("y_m_predicted", "length", "m", "y of it"),
+    ),
+}
+
+
+def unknown_columns(table: str, names: list[str]) -> list[str]:
+    """Names that the schema does not know in a table.
+
+    Parameters
+    ----------
+    table : str
+        File name without suffix, a key of `TABLES`.
+    names : list of str
+    """
+    known = re.compile("|".join(column.pattern() for column in TABLES[table]))
+    return [name for name in names if not known.fullmatch(name)]
+
+
+def markdown(table: str) -> str:
+    """Rows of the documentation's table of one file: name, unit, meaning.
+
+    Parameters
+    ----------
+    table : str
+        A key of `TABLES`.
+    """
+    rows = ["| column | unit | meaning |", "|---|---|---|"]
+    for column in TABLES[table]:
+        names = ", ".join(f"`{name}`" for name in (column.name.replace("{e}", "xx"), *column.endings))
+        dots = " .. `" + column.name.replace("{e}", "yy") + "`" if "{e}" in column.name else ""
+        first, _, rest = names.partition(", ")
+        named = first + dots + (f", {rest}" if rest else "")
+        rows.append(f"| {named} | {column.unit} | {column.meaning} |")
+    return "\n".join(rows)
