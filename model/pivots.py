@@ -8,6 +8,7 @@ vibrations too, which is what the paper compares.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -363,13 +364,37 @@ def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ..
     tables = data.get("pads")
     if not isinstance(tables, list) or not tables:
         raise BearingError(f"{path.name}: no [[pads]] table. Write it anew with `tpjb pivot CAMPAIGN`.")
-    housing = bool(data.get("includes_housing", True))
-    laws = dict(_read_pad(table, path.name, housing) for table in tables)
+    return measured_pivots(tables, path.name, pads, bool(data.get("includes_housing", True)))
+
+
+def measured_pivots(
+    tables: Sequence[Any], source: str, pads: int | None = None, includes_housing: bool = True
+) -> tuple[PivotLaw, ...]:
+    """Make pivot laws of the pads' tables, pad #1 first.
+
+    Parameters
+    ----------
+    tables : sequence of mapping
+        As the ``[[pads]]`` of a ``pivots.toml``: ``pad``, ``force_N`` and ``deflection_m`` (n,), and where they are
+        known ``valid_from_N``, ``valid_to_N`` and ``law``.
+    source : str
+        What is named in messages.
+    pads : int, optional
+        Pads of the bearing; default: as many as the tables name.
+    includes_housing : bool
+        The curves hold the compliance of pivot AND housing.
+
+    Raises
+    ------
+    BearingError
+        A pad left out, or a curve that does not rise.
+    """
+    laws = dict(_read_pad(table, source, includes_housing) for table in tables)
     wanted = pads or max(laws)
     missing = sorted(set(range(1, wanted + 1)) - set(laws))
     if missing or max(laws) > wanted:
         raise BearingError(
-            f"{path.name}: has pads {sorted(laws)}, needs 1 to {wanted}. Measure pad #{(missing or [wanted])[0]} too."
+            f"{source}: has pads {sorted(laws)}, needs 1 to {wanted}. Measure pad #{(missing or [wanted])[0]} too."
         )
     return tuple(laws[k] for k in range(1, wanted + 1))
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.model_guard import check_model
 
 check_model()
 
-from model.pivots import PivotLaw, load_pivots  # noqa: E402  (only once it is known to be ours)
+from model.pivots import PivotLaw, measured_pivots  # noqa: E402  (only once it is known to be ours)
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
@@ -33,7 +31,8 @@ def measured_laws(curves: Sequence[PivotCurve], n_pads: int, source: str = "") -
     model.bearing.BearingError
         A pad has no curve.
     """
-    from tpjb_ident.pivot import write_pivots
+    from tpjb_ident.pivot.pivots_toml import pad_table
 
-    with tempfile.TemporaryDirectory(prefix="tpjb-") as folder:
-        return load_pivots(write_pivots(Path(folder) / "pivots.toml", curves, source), n_pads)
+    if not curves:
+        raise ValueError("curves must hold at least one PivotCurve")
+    return measured_pivots([pad_table(curve) for curve in curves], source or "the dry tests", n_pads)

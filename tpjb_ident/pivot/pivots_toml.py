@@ -10,11 +10,13 @@ import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.schema import TANGENT
 
 FloatArray = NDArray[np.float64]
 
@@ -53,7 +55,7 @@ def pivots_text(curves: Sequence[PivotCurve], source: str) -> str:
         "includes_housing = true",
     ]
     for curve in sorted(curves, key=lambda c: c.pad):
-        lines += ["", *_pad_lines(curve)]
+        lines += ["", "[[pads]]", *(f"{name} = {_toml(value)}" for name, value in pad_table(curve).items())]
     return "\n".join(lines) + "\n"
 
 
@@ -88,34 +90,57 @@ def write_pivots(path: str | Path, curves: Sequence[PivotCurve], source: str) ->
     return target
 
 
-def _pad_lines(curve: PivotCurve) -> list[str]:
+def pad_table(curve: PivotCurve) -> dict[str, Any]:
+    """Numbers of one pad as they stand in the file, rounded: what is made of them is what a reader of the file makes.
+
+    Parameters
+    ----------
+    curve : PivotCurve
+
+    Returns
+    -------
+    dict
+        Pad, law, loads [N] between which it was measured, and the dense table, (161,) each: ``force_N``,
+        ``deflection_m``, ``stiffness_N_per_m``, ``stiffness_relative_se``.
+    """
     loads = table_loads(curve)
     positive = loads[1:]
     stiffness = curve.stiffness(positive)
-    return [
-        "[[pads]]",
-        f"pad = {curve.pad}",
-        f"law = {_quoted(curve.law.name)}",
-        f"valid_from_N = {curve.valid_from:.6g}",
-        f"valid_to_N = {curve.valid_to:.6g}",
-        f"relative_calibration = {curve.relative_calibration:.4g}",
-        f"force_N = {_array(loads, 9)}",
-        f"deflection_m = {_array(np.r_[0.0, curve.deflection(positive)], 9)}",
-        # at zero load Hertz's laws have no stiffness at all: the first value belongs to the first positive
-        # load
-        f"stiffness_N_per_m = {_array(np.r_[stiffness[0], stiffness], 7)}",
-        f"stiffness_relative_se = {_array(np.r_[0.0, curve.relative_stiffness_se(positive)], 3)}",
-    ]
+    return {
+        "pad": curve.pad,
+        "law": curve.law.name,
+        "valid_from_N": _Number(f"{curve.valid_from:.6g}"),
+        "valid_to_N": _Number(f"{curve.valid_to:.6g}"),
+        "relative_calibration": _Number(f"{curve.relative_calibration:.4g}"),
+        "force_N": _rounded(loads, 9),
+        "deflection_m": _rounded(np.r_[0.0, curve.deflection(positive)], 9),
+        # at zero load Hertz's laws have no stiffness at all: the first value belongs to the first positive load
+        TANGENT: _rounded(np.r_[stiffness[0], stiffness], 7),
+        "stiffness_relative_se": _rounded(np.r_[0.0, curve.relative_stiffness_se(positive)], 3),
+    }
 
 
-def _array(values: FloatArray, digits: int) -> str:
-    return "[" + ", ".join(_float(v, digits) for v in values) + "]"
+class _Number(float):
+    """A number that keeps the digits it was written with."""
+
+    def __new__(cls, text: str) -> _Number:
+        number = super().__new__(cls, text)
+        number.text = text
+        return number
+
+    text: str
 
 
-def _float(value: float, digits: int) -> str:
-    text = f"{value:.{digits}g}"
+def _rounded(values: FloatArray, digits: int) -> list[_Number]:
+    texts = (f"{value:.{digits}g}" for value in values)
     # TOML tells integers from floats: a reader of floats should meet only floats
-    return text if any(c in text for c in ".en") else text + ".0"
+    return [_Number(text if any(c in text for c in ".en") else text + ".0") for text in texts]
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(number.text for number in value) + "]"
+    return value.text if isinstance(value, _Number) else _quoted(value) if isinstance(value, str) else str(value)
 
 
 def _quoted(text: str) -> str:
