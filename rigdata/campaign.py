@@ -13,6 +13,7 @@ from pathlib import Path
 from rigdata.calibration import Channel
 from rigdata.manifest import MAX_MANIFEST, Manifest, parse_manifest
 from rigdata.manifest_runs import RunEntry
+from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import RunReader
 from rigdata.run import Run
@@ -72,10 +73,8 @@ class Campaign:
         for run in self.runs:
             if run.id == run_id:
                 return run
-        import difflib
-
-        close = difflib.get_close_matches(run_id, [r.id for r in self.runs], n=1)
-        cure = f"Did you mean {close[0]!r}?" if close else f"There are {len(self.runs)} runs; see campaign.runs"
+        close = nearest_name(run_id, [r.id for r in self.runs])
+        cure = f"Did you mean {close!r}?" if close else f"There are {len(self.runs)} runs; see campaign.runs"
         raise RigDataError(Problem("error", self.path.name, "", f"no run has the id {run_id!r}", cure))
 
     def of_kind(self, kind: str) -> tuple[Run, ...]:

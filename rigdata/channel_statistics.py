@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rigdata.arrays import FloatArray
+
 _OVERFLOW = 1e30
 _LEVELS = 100
 

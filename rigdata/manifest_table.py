@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from typing import Any
 
+from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, Severity
 from rigdata.toml_lines import Path, place_of
 from rigdata.units import UnitError, parse_quantity
@@ -33,8 +33,8 @@ def _printable(text: str) -> str:
 def nearest(name: str, known: Iterable[str]) -> str:
     """Name the nearest of `known`, as the cure for an unknown `name`."""
     names = list(known)
-    close = difflib.get_close_matches(name[:60].lower(), names, n=1, cutoff=0.4)
-    return f"Did you mean {close[0]!r}?" if close else f"Known: {', '.join(names)}"
+    close = nearest_name(name.lower(), names, cutoff=0.4)
+    return f"Did you mean {close!r}?" if close else f"Known: {', '.join(names)}"
 
 
 class Findings:

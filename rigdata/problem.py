@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from rigdata.errors import RigError
+
 Severity = Literal["error", "warning", "note"]
 
 
@@ -52,7 +54,7 @@ def _escaped(character: str) -> str:
     return character if character == "\n" else character.encode("unicode_escape").decode("ascii")
 
 
-class RigDataError(ValueError):
+class RigDataError(RigError):
     """A campaign, manifest or record file that cannot be used; carries every problem found."""
 
     def __init__(self, problems: Problem | Iterable[Problem]) -> None:

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import FloatArray, RunReader
+from rigdata.readers.base import RunReader
 from rigdata.record import Record, VectorRecord
 from rigdata.vector import solve_vector
 

@@ -13,6 +13,8 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
+from rigdata.errors import RigError
+
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _TOKEN = re.compile(r"\s*(?:([A-Za-z_Ω%]{1,24})(?:(?:\^|\*\*)?([+-]?[1-6]))?(?![0-9])|([*/()])|(1)(?![0-9]))")
 _MAX_UNIT = 48
@@ -56,7 +58,7 @@ _ALIASES_BY_DIMENSION = {
 }
 
 
-class UnitError(ValueError):
+class UnitError(RigError):
     """A quantity that cannot be read, or has the wrong dimension."""
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rigdata.arrays import FloatArray
+
 #: Below this smallest singular value two directions count as one (about 3 deg apart).
 _COLLINEAR = 0.035
 

@@ -57,10 +57,10 @@ __all__ = sorted([*_HOMES, "__version__"])
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
-        import difflib
+        from rigdata.near_names import nearest_name
 
-        near = difflib.get_close_matches(name, _HOMES, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
+        near = nearest_name(name, _HOMES)
+        hint = f"; did you mean {near!r}?" if near else ""
         raise AttributeError(f"module 'tpjb_ident' has no attribute {name!r}{hint}")
     home = _HOMES[name]
     if home.startswith("model"):

@@ -1,13 +1,11 @@
-"""Array types of the package's annotations."""
+"""Array types of the package's annotations: double precision throughout."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating[Any]]
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
-IntArray = NDArray[np.integer[Any]]
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+IntArray = NDArray[np.int_]
 BoolArray = NDArray[np.bool_]

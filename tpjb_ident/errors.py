@@ -7,6 +7,10 @@ class TpjbError(ValueError):
     """Base of every refusal of this package: what was given cannot be used; the message says why and what to do."""
 
 
+class ArgumentError(TpjbError):
+    """An argument of a function cannot be used: wrong shape, wrong range, an unknown name."""
+
+
 class BadInputError(TpjbError):
     """Something the user gave cannot be used; the message says file, place, what is wrong, what to do."""
 

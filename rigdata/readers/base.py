@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigdata.arrays import FloatArray
 from rigdata.problem import Problem
 
-FloatArray = NDArray[np.float64]
 #: A channel longer than this is refused: slices of it would be asked for by mistake [samples].
 MAX_SAMPLES = 2**31
 #: One request for more samples of one channel than this is refused (it would be 4 GB) [samples].

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import MAX_REQUEST, FloatArray, rate_of_time
+from rigdata.readers.base import MAX_REQUEST, rate_of_time
 
 #: Two clocks whose samples lie this share of a step apart count as one.
 _SAME = 0.01

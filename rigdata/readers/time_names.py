@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
-from numpy.typing import NDArray
+from rigdata.arrays import FloatArray
 
 _WORDS = "time|zeit|temps|tempo|tiempo|uhrzeit|timestamps?|elapsed ?time|relative ?time"
 # a lone t is a time, T and T1 are thermometers
@@ -22,6 +21,6 @@ def is_time(name: str) -> bool:
     return bool(_TIME.match(name.strip()))
 
 
-def seconds(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
+def seconds(values: FloatArray, unit: str) -> FloatArray:
     """Times in seconds; an unknown unit counts as seconds."""
     return values * _FACTORS.get(unit.strip().strip("[]()"), 1.0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigdata.readers.base import FloatArray
+from rigdata.arrays import FloatArray
 from rigdata.readers.series import Series
 from rigdata.survey.channel_guess import ChannelGuess
 from rigdata.survey.exports import Export

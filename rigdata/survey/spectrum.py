@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.readers.base import FloatArray
+from rigdata.arrays import FloatArray
 
 #: A line must stand this far out of the median of its neighbourhood to be named.
 _STANDS_OUT = 8.0

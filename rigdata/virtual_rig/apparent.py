@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.running import answer
 from rigdata.virtual_rig.sensing import felt_direction
-from rigdata.virtual_rig.truth import ComplexArray, FloatArray
 
 
 def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instruments) -> ComplexArray:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.virtual_rig.motion import RunPhysics, SlowMotion
 from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import DryTest, PlannedRun
-from rigdata.virtual_rig.truth import FloatArray, RigTruth, VirtualRigError
+from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
 
 SETTLING = 0.1  # time constant of an overshoot [s]
 UPPER = 0.3  # sine of a pivot's angle above which its pad counts as an upper one

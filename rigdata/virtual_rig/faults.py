@@ -6,7 +6,6 @@ after the converter), a run (the test was done or noted wrongly) and a file.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -14,9 +13,11 @@ from typing import Literal
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
+from rigdata.near_names import nearest_name
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.sensing import Readings
-from rigdata.virtual_rig.truth import FloatArray, VirtualRigError
+from rigdata.virtual_rig.truth import VirtualRigError
 
 Place = Literal["sensor", "record", "run", "file"]
 
@@ -93,8 +94,8 @@ class Fault:
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
-            near = difflib.get_close_matches(self.kind, KINDS, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else f"; there are {', '.join(KINDS)}"
+            near = nearest_name(self.kind, KINDS)
+            hint = f"; did you mean {near!r}?" if near else f"; there are {', '.join(KINDS)}"
             raise VirtualRigError(f"no fault {self.kind!r}{hint}")
         for needed, kinds in (
             ("channel", NEEDS_CHANNEL), ("value", NEEDS_VALUE), ("other", NEEDS_OTHER),

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig.apparent import apparent_stiffness
 from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig
-from rigdata.virtual_rig.truth import FloatArray
 
 PIVOT_LOADS = np.arange(250.0, 8001.0, 250.0)
 

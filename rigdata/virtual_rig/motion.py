@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigdata.virtual_rig.truth import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 
 
 class Motion(Protocol):
@@ -148,6 +147,6 @@ class RunPhysics:
         What a truth file tells of the run: plain numbers, strings and lists.
     """
 
-    time: NDArray[np.float64] = field(repr=False)
+    time: FloatArray = field(repr=False)
     motion: Motion = field(repr=False)
     facts: Mapping[str, object]

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len
 
+from rigdata.arrays import FloatArray
 from rigdata.virtual_rig.instruments import Sensor
 from rigdata.virtual_rig.noise import ChannelNoise, Noise, stream
-
-FloatArray = NDArray[np.float64]
 
 
 def channel_noise(sensors: tuple[Sensor, ...], noise: Noise, time: FloatArray, seed: int, run: str) -> FloatArray:

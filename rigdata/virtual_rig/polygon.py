@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.virtual_rig.motion import RunPhysics, SlowMotion
 from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import ClearanceSweep, PlannedRun
-from rigdata.virtual_rig.truth import FloatArray, RigTruth, VirtualRigError
+from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
 
 
 def clearance_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> RunPhysics:

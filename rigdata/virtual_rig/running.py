@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.motion import Line, RunPhysics, SteadyMotion
 from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import PlannedRun
-from rigdata.virtual_rig.truth import ComplexArray, RigTruth, VirtualRigError, load_vector
+from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, load_vector
 
 
 def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, noise: Noise, seed: int) -> RunPhysics:

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import RunPhysics
 from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.noise_signals import channel_noise
-from rigdata.virtual_rig.truth import FloatArray
 
 
 @dataclass(frozen=True)

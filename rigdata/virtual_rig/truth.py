@@ -13,12 +13,10 @@ from math import pi
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.errors import RigError
 from rigdata.operating_point import OperatingPoint
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 StiffnessLaw = Callable[[OperatingPoint], Any]
 PositionLaw = Callable[[OperatingPoint], Any]
@@ -28,7 +26,7 @@ DeflectionLaw = Callable[[int, FloatArray], Any]
 FIVE_PADS = tuple(np.radians([-90.0, -18.0, 54.0, 126.0, 198.0]).tolist())
 
 
-class VirtualRigError(ValueError):
+class VirtualRigError(RigError):
     """The virtual rig was asked for something it cannot do; says what and how to mend it."""
 
 

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.problem import Severity
+from tpjb_ident.arrays import ComplexArray
 from tpjb_ident.check.answers import Answer, misfit_of, solve_stiffness
 from tpjb_ident.check.gain_evidence import PointReadings, leverage
 from tpjb_ident.check.one_gain import gain_of_run
@@ -20,8 +20,6 @@ from tpjb_ident.check.run_gains import channel_names
 from tpjb_ident.check.set_points import to_plane
 from tpjb_ident.check.wiring import repairs
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 #: A run that differs by this share stands apart in any case, where the others agree to the second share.
 _OUTLIER, _AGREE = 0.08, 0.03
 #: Differences below this share are no fault: loads and temperatures differ from run to run.

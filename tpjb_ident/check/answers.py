@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.calibration import Channel
+from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.set_points import excited, oil_force, to_plane
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.problem import Severity
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.findings import Reporter
 
 _MIN_CYCLES = 5.0
 
 
-def check_clock(report: Reporter, time: NDArray[np.float64]) -> None:
+def check_clock(report: Reporter, time: FloatArray) -> None:
     """Judge the times of a run.
 
     Parameters
@@ -55,7 +55,7 @@ def _check_length(report: Reporter, samples: int, rate: float) -> None:
         report.say("short", "warning", "time", what, f"Record at least {_MIN_CYCLES:g} cycles")
 
 
-def _check_gaps(report: Reporter, steps: NDArray[np.float64], step: float) -> None:
+def _check_gaps(report: Reporter, steps: FloatArray, step: float) -> None:
     """A late sample of a jittering clock is no gap: there the next step is short."""
     gaps = np.flatnonzero(steps > 1.9 * step)
     if len(gaps) == 0:

@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import ComplexArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.set_points import excited, plane_vector
 from tpjb_ident.check.wiring import repairs
 
-ComplexArray = NDArray[np.complex128]
 #: Runs needed before one can be told apart.
 _MIN_RUNS = 4
 #: A load that differs by this share (or this angle, as a share of the load) from the others' is no scatter.

@@ -13,10 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from tpjb_ident.arrays import ComplexArray, FloatArray
+
 #: Stiffness, damping and static load of one run may differ from the others' by this share, one standard deviation:
 #: oil gets warmer, loads are set by hand.
 HONEST = 0.01

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
+
 _GLITCH = 6.0
 #: A line whose amplitude may change needs this distance from all others [1 / record length].
 _PARTED = 2.5
@@ -93,9 +93,7 @@ def _design(time: FloatArray, frequencies: Sequence[float], growing: Sequence[fl
     return np.stack(columns, axis=1)
 
 
-def _robust(
-    design: FloatArray, values: FloatArray, good: NDArray[np.bool_]
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+def _robust(design: FloatArray, values: FloatArray, good: BoolArray) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Least squares per column, glitches left out; what is left is zero where nothing was used."""
     used = good
     for _ in range(4):
@@ -111,7 +109,7 @@ def _robust(
     return coefficients, np.where(used, rest, 0.0), used
 
 
-def _solve(design: FloatArray, values: FloatArray, used: NDArray[np.bool_]) -> FloatArray:
+def _solve(design: FloatArray, values: FloatArray, used: BoolArray) -> FloatArray:
     """Normal equations: sines of well parted lines are nearly orthogonal, and einsum starts no threads."""
     gram = np.einsum("nk,nl->kl", design, design)
     right = np.einsum("nk,nm->km", design, np.where(used, values, 0.0))

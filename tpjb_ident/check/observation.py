@@ -8,19 +8,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.clock import check_clock
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.lines import Lines, fit_lines, strongest_line
 from tpjb_ident.check.rotation import turning_frequency
 from tpjb_ident.check.signals import check_signal, needed
 
-FloatArray = NDArray[np.float64]
 #: Samples read at a time; signs and lines are judged on the first block [samples].
 BLOCK = 2**19
 _FITTED = 2**16

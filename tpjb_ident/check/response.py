@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
+from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.agreement import check_agreement
 from tpjb_ident.check.answers import Answer, answer_of, misfit_of, robust_stiffness
 from tpjb_ident.check.observation import Observation
@@ -21,8 +22,6 @@ from tpjb_ident.check.run_gains import check_gains, point_readings, probe_centre
 from tpjb_ident.check.set_points import excited, to_plane
 from tpjb_ident.check.wiring import name_fault
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 #: Where half of the runs differ by more than this share there is no one answer to judge.
 _NO_ANSWER = 0.08
 _DEFINITE = 0.05

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from tpjb_ident.arrays import FloatArray
+
 #: The speed is looked for within this share of the stated one; the check of the speed channel warns from there on.
 _WITHIN = 0.03
 #: Nearer to another line than this, a speed cannot be found [1 / record length].

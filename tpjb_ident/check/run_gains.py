@@ -6,16 +6,15 @@ import math
 from collections.abc import Collection, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.calibration import Channel
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.answers import Answer
 from tpjb_ident.check.gain_evidence import PointReadings
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.one_gain import WrongGain, wrong_gains
 from tpjb_ident.check.set_points import to_plane
 
-FloatArray = NDArray[np.float64]
 #: Median of the amplitude of a noise line, in standard deviations of its real part (Rayleigh).
 _MEDIAN = math.sqrt(2 * math.log(2))
 #: Sectors into which the directions of a sweep's load are sorted, and share of them that must be met.

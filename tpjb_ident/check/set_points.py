@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
 from rigdata.vector import inverse_directions
+from tpjb_ident.arrays import ComplexArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.wiring import guess_wiring, repairs
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 _ANGLE_WARNING, _ANGLE_ERROR = 10.0, 30.0
 _SPEED_STILL = 2 * math.pi * 0.5
 _LINE_OVER_FLOOR = 8.0

@@ -6,16 +6,15 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.problem import Severity
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.pad_labels import check_labels
 from tpjb_ident.check.response import definiteness, mirrored
 from tpjb_ident.check.set_points import angle_between, to_plane
 from tpjb_ident.check.wiring import guess_wiring, name_fault
 
-FloatArray = NDArray[np.float64]
 _ANGLE_WARNING, _ANGLE_ERROR = 10.0, 30.0
 #: Cosine of the angle between load and motion; rigs move sideways by up to a quarter of the way.
 _FOLLOWS = math.cos(math.radians(40.0))

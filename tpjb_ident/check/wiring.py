@@ -6,15 +6,13 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.calibration import Channel
 from rigdata.vector import solve_vector
+from tpjb_ident.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 
-
-def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple[str, NDArray[np.float64]]]:
+def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple[str, FloatArray]]:
     """Every simple mending of two channels' readings, as a matrix on them, with the fault in words.
 
     Parameters

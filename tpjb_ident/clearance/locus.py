@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.slow_records.flat_channels import refuse_flat_channels
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from rigdata.campaign import Campaign, Run
 
-FloatArray = NDArray[np.float64]
 
 DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
 BLOCK = 0.1  # [s], for learning the noise

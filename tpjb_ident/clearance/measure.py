@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.problem import Problem, RigDataError
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.polygon import Centre, CentreRule, corners, find_centre, normals
 from tpjb_ident.clearance.probe_gains import gain_ratio
 from tpjb_ident.clearance.side_fit import SideFit, fit_sides
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign, Run
     from rigdata.operating_point import OperatingPoint
 
-FloatArray = NDArray[np.float64]
 
 FEWEST_BLOCKS = 4  # per pad
 SAME_WARMTH = 4.0  # [K]

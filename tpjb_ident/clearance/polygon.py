@@ -20,9 +20,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.errors import ArgumentError
+
 CentreRule = Literal["least-absolute", "least-squares"]
 
 EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
@@ -74,12 +75,12 @@ def find_centre(
 
     Raises
     ------
-    ValueError
+    ArgumentError
         When fewer than three pads are given or they do not surround the shaft.
     """
     design = np.column_stack([normals(angles), np.ones(len(angles))])
     if len(angles) < 3 or np.linalg.cond(design) > 1e3:
-        raise ValueError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
+        raise ArgumentError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
     error = EQUAL_WITHIN * np.sqrt(np.maximum(np.diag(covariance), 1e-20))
     weights = np.ones(len(angles))
     solution: FloatArray = np.zeros(3)

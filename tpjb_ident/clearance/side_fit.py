@@ -16,15 +16,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.clearance.polygon import normals
 from tpjb_ident.clearance.sweep import Touch
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
 TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
@@ -69,7 +66,7 @@ class SideFit:
     misfit: float
 
 
-def known_give(curves: Sequence[PivotCurve], pad: NDArray[np.int_], load: FloatArray) -> FloatArray:
+def known_give(curves: Sequence[PivotCurve], pad: IntArray, load: FloatArray) -> FloatArray:
     """Deflection (m,) [m] of pads (m,) (index from 0) at loads (m,) [N]; zero for pads without a curve."""
     give = np.zeros(len(load))
     for curve in curves:
@@ -101,7 +98,7 @@ class _System:
     touch: Touch
     place: FloatArray
     whitener: FloatArray
-    pads: NDArray[np.int_]
+    pads: IntArray
     count: int
     noise: NoiseModel
 

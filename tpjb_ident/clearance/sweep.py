@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.problem import Problem, RigDataError
+from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.clearance.polygon import normals
 from tpjb_ident.slow_records.flat_channels import refuse_flat_channels
 from tpjb_ident.slow_records.glitches import good_samples
@@ -21,8 +21,6 @@ from tpjb_ident.slow_records.glitches import good_samples
 if TYPE_CHECKING:
     from rigdata.campaign import Run
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int_]
 
 BLOCK = 0.1  # [s]; five mains periods
 CONTACT_DEPTH = 1.0e-6  # [m]: a pad counts as touched within this of its farthest position, plus its own give
@@ -59,9 +57,9 @@ class Touch:
     across: FloatArray
     load: FloatArray
     push: float
-    alone: NDArray[np.bool_]
+    alone: BoolArray
 
-    def take(self, keep: NDArray[np.bool_]) -> Touch:
+    def take(self, keep: BoolArray) -> Touch:
         """The averages where `keep` (m,) is true."""
         return Touch(
             self.time[keep],
@@ -143,14 +141,14 @@ def _check_turn(run: Run, load: FloatArray, position: FloatArray, time: FloatArr
         raise _refused(run, what, cure)
 
 
-def _touched(position: FloatArray, angles: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
+def _touched(position: FloatArray, angles: FloatArray, depth: FloatArray) -> BoolArray:
     """Which pads (n_samples, n) the shaft touches: it lies within `depth` of where it was farthest out."""
     out = position @ normals(angles).T
     farthest = np.quantile(out, 0.995, axis=0)
     return np.asarray(out > farthest - depth)
 
 
-def _carried(load: FloatArray, angles: FloatArray, touched: NDArray[np.bool_]) -> FloatArray:
+def _carried(load: FloatArray, angles: FloatArray, touched: BoolArray) -> FloatArray:
     """Load on every touched pad (n_samples, n) [N]; NaN where the touched pads cannot balance the force."""
     n = normals(angles)
     carried = np.full(touched.shape, np.nan)
@@ -173,7 +171,7 @@ def _blocks(
     time: FloatArray,
     position: FloatArray,
     angles: FloatArray,
-    touched: NDArray[np.bool_],
+    touched: BoolArray,
     carried: FloatArray,
     push: float,
     length: float,
@@ -211,7 +209,7 @@ def _blocks(
     )
 
 
-def _at_rest(time: FloatArray, place: FloatArray, touched: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _at_rest(time: FloatArray, place: FloatArray, touched: BoolArray) -> BoolArray:
     """True for pieces (m,) in which the shaft lies in a corner, or slides along one pad.
 
     A shaft that comes to a corner slowly is near the second pad before it touches it: only when it moves no faster

@@ -11,6 +11,7 @@ from tpjb_ident.compare.measured_pivots import measured_laws
 from tpjb_ident.compare.predictions import ModelSettings, PointPrediction, Progress, predict_points
 from tpjb_ident.compare.static_tests import measure_static
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
+from tpjb_ident.errors import TpjbError
 from tpjb_ident.model_guard import check_model
 
 check_model()
@@ -29,7 +30,7 @@ VARIANTS = ("rigid", "kirk", "kirk-secant", "measured")
 DEFAULT_VARIANTS = ("rigid", "kirk", "measured")
 
 
-class ComparisonError(ValueError):
+class ComparisonError(TpjbError):
     """The campaign does not hold what a comparison needs; says what and what to do."""
 
 

@@ -6,14 +6,13 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tpjb_ident.arrays import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.compare.comparison import Comparison, Variant
-
-FloatArray = NDArray[np.float64]
 
 
 def measured_locus(comparison: Comparison) -> FloatArray:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Instruments, RigTruth
 from tpjb_ident.compare.predictions import ModelSettings
+from tpjb_ident.errors import TpjbError
 from tpjb_ident.model_guard import check_model
 
 check_model()
@@ -40,7 +41,7 @@ INSTRUMENT_ERRORS = {
 SENSOR_POSITION = 0.75
 
 
-class ModelConvergenceError(ValueError):
+class ModelConvergenceError(TpjbError):
     """The model finds no equilibrium at a point of the plan."""
 
 

@@ -31,6 +31,7 @@ from tpjb_ident.dynamic.runs.point_source import point_sources
 from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.runs.run_shelf import RunShelf
 from tpjb_ident.dynamic.runs.run_store import RunStore
+from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.executors import Workers
 
 
@@ -95,7 +96,7 @@ def identify(
 
     Raises
     ------
-    ValueError
+    BadInputError
         The campaign has no dynamic run, or an unknown method is asked for.
     rigdata.problem.RigDataError
         None of the records can be read. Single ones are left out and named in the result's conditions.
@@ -105,7 +106,7 @@ def identify(
     settings = settings or IdentifySettings()
     runs = campaign.of_kind("dynamic")
     if not runs:
-        raise ValueError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
+        raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     tell = progress or (lambda text, done, total: None)
     with all_runs(campaign, settings.phasors, tell, workers, store) as shelf:
         return assemble(campaign, shelf, settings, tell)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from tpjb_ident.errors import TpjbError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, STATIC_COLUMNS
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ FloatArray = NDArray[np.float64]
 COLUMNS = {name[:3]: name for name in COEFFICIENT_COLUMNS}
 
 
-class ExportError(ValueError):
+class ExportError(TpjbError):
     """The table cannot be exported; says which column or point and what to do."""
 
 

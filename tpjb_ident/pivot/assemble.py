@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot.contact import contact_onset, contact_onset_se
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
@@ -24,8 +24,6 @@ from tpjb_ident.slow_records.noise import NoiseModel
 if TYPE_CHECKING:
     from rigdata.calibration import Channel
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 MISFIT_PROBABILITY = 1e-4
 CLEAR_CHOICE = 0.5  # posterior share below which the law counts as undecided

@@ -10,17 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.pivot.laws.law_fit import FitData, LawFit, fit_law
 from tpjb_ident.pivot.laws.laws import Law
 from tpjb_ident.pivot.records.dry_record import DryRecord
 from tpjb_ident.pivot.records.settings import PivotSettings
 from tpjb_ident.slow_records.noise import NoiseModel
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int_]
 MakeData = Callable[[Sequence[DryRecord], Sequence[BoolArray], NoiseModel, PivotSettings], FitData]
 
 MOST_BAD = 0.3  # share of the groups that may be dropped

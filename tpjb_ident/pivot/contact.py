@@ -9,11 +9,8 @@ pivot's alone; below the onset it is extrapolated.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tpjb_ident.pivot.laws.law_fit import LawFit
-
-FloatArray = NDArray[np.float64]
 
 
 def contact_onset(fit: LawFit, tolerance: float) -> float:

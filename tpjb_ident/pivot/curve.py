@@ -6,18 +6,17 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import optimize, special
 
+from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition, sentences
+from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.hysteresis import Hysteresis
 from tpjb_ident.pivot.laws.law_fit import FRICTION, OFFSET, SCALE, LawFit
 from tpjb_ident.pivot.records.projection import Direction
 
 EXTRAPOLATION_SPREAD = 0.04  # of ln(stiffness) per e-fold of load beyond the points: no law is quite the pivot's own
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int_]
 
 
 @dataclass(frozen=True)
@@ -127,7 +126,7 @@ class PivotCurve:
         """Pad load [N] at deflections [m] (the inverse of `deflection`)."""
         wanted = np.asarray(deflection, dtype=float)
         if np.any(~(wanted >= 0.0)):
-            raise ValueError("deflection must be zero or positive, and not NaN")
+            raise ArgumentError("deflection must be zero or positive, and not NaN")
         return np.array([self._invert(float(x)) for x in wanted.ravel()]).reshape(wanted.shape)
 
     def _invert(self, deflection: float) -> float:
@@ -222,7 +221,7 @@ class PivotCurve:
         value = centre - self.law.theta[OFFSET]
         return tuple(np.asarray(part).reshape(values.shape) for part in (value, value - half, value + half))  # type: ignore[return-value]
 
-    def is_extrapolated(self, load: ArrayLike) -> NDArray[np.bool_]:
+    def is_extrapolated(self, load: ArrayLike) -> BoolArray:
         """True where a load lies outside what was measured with full contact."""
         values = _loads(load)
         return np.asarray((values < self.valid_from) | (values > self.valid_to))
@@ -253,7 +252,7 @@ class PivotCurve:
 
     def _quantile(self, level: float) -> float:
         if not 0.0 < level < 1.0:
-            raise ValueError(f"level must lie between 0 and 1, got {level}")
+            raise ArgumentError(f"level must lie between 0 and 1, got {level}")
         return float(special.ndtri(0.5 + 0.5 * level))
 
     def __str__(self) -> str:
@@ -286,5 +285,5 @@ class PivotCurve:
 def _loads(load: ArrayLike) -> FloatArray:
     values = np.asarray(load, dtype=float)
     if np.any(~(values >= 0.0)):
-        raise ValueError("load must be zero or positive, and not NaN: a pivot can only be pressed")
+        raise ArgumentError("load must be zero or positive, and not NaN: a pivot can only be pressed")
     return values

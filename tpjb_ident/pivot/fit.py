@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.problem import Problem, RigDataError
+from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.pivot.assemble import Choice, assemble_curve
 from tpjb_ident.pivot.bad_holds import bad_blocks
 from tpjb_ident.pivot.curve import PivotCurve
@@ -28,8 +28,6 @@ from tpjb_ident.slow_records.noise import NoiseModel
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 REFERENCE_SHARE = 0.4  # reference load of the laws, as a share of the largest load
 MODEL_ERROR = 3e-4  # of the deflection: what averaging over a curved law leaves; matters in computed records only

@@ -6,10 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int_]
+from tpjb_ident.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from tpjb_ident.errors import TpjbError
 from tpjb_ident.runtime.executors import PoolWorkers, Workers
 from tpjb_ident.runtime.provenance import versions
 
@@ -19,7 +20,7 @@ PATIENCE = 20.0
 _SAME = ("tpjb-ident", "numpy", "scipy", "h5py", "statsmodels", "numba")
 
 
-class ClusterError(ValueError):
+class ClusterError(TpjbError):
     """The cluster cannot be used; the message says why and what to do."""
 
 

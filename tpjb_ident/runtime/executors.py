@@ -27,6 +27,8 @@ from dataclasses import dataclass
 from multiprocessing.connection import wait as wait_for_end
 from typing import Any, Protocol
 
+from tpjb_ident.errors import TpjbError
+
 Task = Callable[..., Any]
 Job = tuple[Any, ...]
 #: Jobs handed out per worker before the first comes back: enough that nobody waits, few enough to cancel.
@@ -37,7 +39,7 @@ MAX_LOSSES = 3
 STALLED = 60.0
 
 
-class LostJobsError(ValueError):
+class LostJobsError(TpjbError):
     """Workers were lost again and again with the jobs they had."""
 
 

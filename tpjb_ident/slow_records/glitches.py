@@ -9,11 +9,9 @@ ramp.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from tpjb_ident.arrays import BoolArray, FloatArray
 
 ROUNDING = 1e-9  # of the reading, for a component that does not move at all
 SMALLEST = 1e-4  # of the range: in a computed record without noise rounding is no glitch

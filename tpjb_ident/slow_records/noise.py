@@ -16,10 +16,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import optimize
 
-FloatArray = NDArray[np.float64]
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.errors import BadInputError
 
 DRIFT_OVER_FLICKER = 0.7  # [1/sqrt(s)], drift rate to be expected over the square root of the 1/f power density
 BEND = 0.5  # of a drift: half of what its rate at either end differs by from that in the middle, standard deviation
@@ -182,12 +182,12 @@ def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float, learn_drift
 
     Raises
     ------
-    ValueError
+    BadInputError
         When no series has more blocks than signal columns.
     """
     usable = [s for s in series if len(s.time) > s.mean.shape[1] + 2]
     if not usable:
-        raise ValueError("no series is long enough to learn noise from: record longer holds")
+        raise BadInputError("no series is long enough to learn noise from: record longer holds")
     white = float(np.median([_white_level(s) for s in usable]))
     unit = np.sqrt(white)
     rotated = [_Rotated(alike, unit) for alike in _by_shape(usable)]

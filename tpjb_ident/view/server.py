@@ -6,6 +6,7 @@ import html
 from collections.abc import Callable
 from typing import Any
 
+from tpjb_ident.errors import TpjbError
 from tpjb_ident.runtime.tables import printable
 from tpjb_ident.view.session import Session
 
@@ -13,7 +14,7 @@ from tpjb_ident.view.session import Session
 LOOPBACK = "127.0.0.1"
 
 
-class ViewError(ValueError):
+class ViewError(TpjbError):
     """The page cannot be served; says why and what to do."""
 
 

@@ -7,16 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
+from tpjb_ident.arrays import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from rigdata.campaign import Campaign
     from tpjb_ident.dynamic.results.identification import Identification
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ that names the file.
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,8 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
+from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import FloatArray, rate_of_time, undescribed
+from rigdata.readers.base import rate_of_time, undescribed
 from rigdata.readers.series import Columns, Series, on_one_clock
 
 #: Suffix -> module of this package, extra that brings its library.
@@ -154,8 +155,8 @@ class ForeignReader:
         values = self._columns().values
         for name in names:
             if name not in values:
-                close = difflib.get_close_matches(name, list(values), n=1)
-                cure = f"Did you mean {close[0]!r}?" if close else f"It holds: {', '.join(values)[:200]}"
+                close = nearest_name(name, values)
+                cure = f"Did you mean {close!r}?" if close else f"It holds: {', '.join(values)[:200]}"
                 raise self._error(f"channel {name}", "is missing in the file", cure)
         return [np.asarray(values[name][start:stop], dtype=float) for name in names]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rigdata.readers.base import FloatArray
+from rigdata.arrays import FloatArray
 from rigdata.readers.series import Series, equidistant
 from rigdata.readers.time_names import is_time, seconds
 

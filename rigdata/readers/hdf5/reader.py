@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, FloatArray, rate_of_time, undescribed
+from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, rate_of_time, undescribed
 from rigdata.readers.hdf5.content_hash import group_hash, is_plain
 from rigdata.readers.hdf5.heaps import broken_heap, too_long_text
 from rigdata.readers.hdf5.links import has_link, resolve

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
@@ -11,10 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.manifest import CsvSpec
+from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import FloatArray, rate_of_time, undescribed
+from rigdata.readers.base import rate_of_time, undescribed
 from rigdata.readers.text.csv_table import Source, Table, read_table
 from rigdata.readers.text.dialect import Dialect, DialectFinder
 
@@ -150,8 +151,8 @@ class CsvReader:
         for name in names:
             if name not in table.columns:
                 known = [n for n in self.names() if n]
-                close = difflib.get_close_matches(name, known, n=1)
-                cure = f"Did you mean {close[0]!r}?" if close else f"The columns are: {', '.join(known)[:200]}"
+                close = nearest_name(name, known)
+                cure = f"Did you mean {close!r}?" if close else f"The columns are: {', '.join(known)[:200]}"
                 raise self._error(f"channel {name}", "is missing in the file", cure)
         return [table.columns[n][start:stop] for n in names]
 

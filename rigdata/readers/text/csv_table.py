@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import MAX_SAMPLES, FloatArray
+from rigdata.readers.base import MAX_SAMPLES
 from rigdata.readers.numbers import MISSING, is_missing, is_number, number_pattern
 from rigdata.readers.text.byte_stream import (
     AsciiOnly,

@@ -12,8 +12,9 @@ from typing import Any, TextIO, TypeVar
 
 import typer
 
+from rigdata.errors import RigError
 from tpjb_ident.cli.common.terminal import error_line, note_line
-from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.errors import NotTrustedError, TpjbError
 
 BUG, BAD_INPUT, NOT_TRUSTED = 1, 2, 3
 INTERRUPTED = 130
@@ -59,7 +60,7 @@ class _Sink:
 
 def bad_input_message(error: Exception) -> str | None:
     """Say what is wrong with the input; None if `error` is no fault of the input."""
-    if isinstance(error, BadInputError) or _is_refusal(error):
+    if _is_refusal(error):
         return str(error)
     if isinstance(error, OSError) and error.strerror:
         place = f"{error.filename}: " if error.filename else ""
@@ -72,9 +73,12 @@ def bad_input_message(error: Exception) -> str | None:
 
 
 def _is_refusal(error: Exception) -> bool:
-    """Whether one of our own error classes says so: RigDataError, BearingError, EffectError, UnitError, .."""
-    home = type(error).__module__.split(".")[0]
-    return home in ("rigdata", "model", "tpjb_ident") and isinstance(error, ValueError)
+    """Whether it says so itself: of each of the three packages the command line knows one base of all refusals."""
+    if isinstance(error, (TpjbError, RigError)):
+        return True
+    model = sys.modules.get("model.errors")  # not loaded: then it is none of the model's
+    base = ValueError if model is None else model.ModelError
+    return isinstance(error, base) and type(error).__module__.startswith("model.")
 
 
 def _show_warning(

@@ -8,19 +8,18 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from model.effects import Effect, apply_effects
 from model.setup import Setup
 from model.static_tests import dry_curve, polygon_sides
 from model.statics.equilibrium import Equilibrium
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.memory import Memory, NoEquilibriumError, Reading, StaticPoint
 from tpjb_ident.diagnose.observations.layout import DryTest, DynamicTest, Layout
 from tpjb_ident.diagnose.observations.observe import Element
 
 __all__ = ["Forward", "ForwardModel", "NoEquilibriumError"]
 
-FloatArray = NDArray[np.float64]
 Change = Callable[[Setup], Setup]
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from model.predict import Prediction, predict_setup
 from model.setup import Instruments, Setup
 from model.statics.equilibrium import Equilibrium
+from tpjb_ident.errors import TpjbError
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -22,7 +23,7 @@ Key = tuple[Setup, StaticPoint, tuple[float, ...]]
 _PLAIN = Instruments()
 
 
-class NoEquilibriumError(ValueError):
+class NoEquilibriumError(TpjbError):
     """The model found no equilibrium at an operating point of the campaign."""
 
 

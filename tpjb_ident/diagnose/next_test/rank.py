@@ -17,18 +17,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from model.effects import Effect
 from model.setup import Setup
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.forward import NoEquilibriumError
 from tpjb_ident.diagnose.forward.nuisance import Certificates, nuisances, whitener
 from tpjb_ident.diagnose.next_test.checks import CHECKS, Check
 from tpjb_ident.diagnose.next_test.designs import Design, designs
 from tpjb_ident.diagnose.observations.layout import Layout
 from tpjb_ident.diagnose.observations.observe import Observations
-
-FloatArray = NDArray[np.float64]
 
 #: Separation [standard deviations] from which a test tells at all, and from which one test is enough: with 5 the wrong
 #: explanation's chi-square exceeds the right one's by 9 in 95 of 100 cases.

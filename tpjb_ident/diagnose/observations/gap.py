@@ -6,12 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnose.observations.observe import Element, Observations
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 def residuals(observations: Observations, prediction: FloatArray) -> FloatArray:

@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.dynamic.results.identification import Identification
 
-FloatArray = NDArray[np.float64]
 #: Harmonics of the load's direction that a locus of many directions is described by.
 HARMONICS = 3
 

@@ -13,15 +13,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from model.setup import Setup
+from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnose.forward.candidates import Candidate, candidates
 from tpjb_ident.diagnose.observations.layout import Layout
 from tpjb_ident.diagnose.observations.observe import Element
 from tpjb_ident.diagnose.plan.plan import CampaignPlan, Signatures, separated, signatures
 
-BoolArray = NDArray[np.bool_]
 DIRECT = frozenset({"kxx", "kyy", "cxx", "cyy"})
 FAMILIES = {
     "B": frozenset({"h"}),
@@ -128,7 +127,7 @@ def part_of(layout: Layout, name: str) -> Layout:
     }[name]
 
 
-def _usual(lines: NDArray[np.float64]) -> float:
+def _usual(lines: FloatArray) -> float:
     """The frequency that is there at the most loads, the middle one among equals."""
     found, counts = np.unique(lines, return_counts=True)
     most = found[counts == counts.max()]

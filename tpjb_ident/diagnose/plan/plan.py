@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from model.setup import Setup
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.candidates import Candidate, candidates
 from tpjb_ident.diagnose.forward.forward import Forward
 from tpjb_ident.diagnose.forward.nuisance import Certificates, nuisances, whitener
@@ -26,7 +26,6 @@ from tpjb_ident.diagnose.search.fit import slope
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
 SEEN = 6.0
 CONFUSABLE = 3.0
 

@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.observations.observe import ENTRY_NAMES, Element
 from tpjb_ident.diagnose.search.sensor_map import sensor_map_columns
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.candidates import Candidate
 from tpjb_ident.diagnose.search.directions import Direction
 from tpjb_ident.diagnose.search.fit import Fit, Misfit
 from tpjb_ident.diagnose.search.problem import Problem
 from tpjb_ident.diagnose.search.structure import Structure, patterns, residual_structure
 
-FloatArray = NDArray[np.float64]
 #: Limits of the variance scale that a residual may choose: calibration errors never shrink, scatter may be larger
 #: than stated.
 SCALE = (1.0, 4.0)

@@ -9,15 +9,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnose.observations.observe import ENTRY_NAMES, Observations
 from tpjb_ident.diagnose.search.directions import coordinate
 from tpjb_ident.diagnose.search.problem import Problem
 from tpjb_ident.diagnose.search.sensor_map import MAP_NAMES, sensor_map_columns
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 #: Root mean square gap [sigma] below which gains within their certificates are all there is to see.
 NOTABLE = 3.0
 #: Share from which a constant map counts as the story.

@@ -6,8 +6,8 @@ import functools
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnose.forward.candidates import Candidate
 from tpjb_ident.diagnose.forward.nuisance import Nuisances
 from tpjb_ident.diagnose.observations.observe import Observations
@@ -16,8 +16,6 @@ from tpjb_ident.diagnose.observations.tolerance import Tolerance
 from tpjb_ident.diagnose.search.directions import Direction, directions
 from tpjb_ident.diagnose.search.fit import Fit, Misfit
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 #: Share of the static load below which a pad hardly carries: its attitude, and so its temperature, is not unique.
 HARDLY = 0.10
 

@@ -6,14 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.candidates import Candidate
 from tpjb_ident.diagnose.forward.forward import ForwardModel
 from tpjb_ident.diagnose.forward.workers import Map
 from tpjb_ident.diagnose.search.fit import Fit, Misfit, slope
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

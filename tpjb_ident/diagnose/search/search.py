@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.candidates import Candidate
 from tpjb_ident.diagnose.forward.workers import Map
 from tpjb_ident.diagnose.search.examine import Examination, examine
@@ -17,7 +17,6 @@ from tpjb_ident.diagnose.search.problem import Problem
 from tpjb_ident.diagnose.search.screen import Score, screen
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 
-FloatArray = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 #: How often another explanation may take the place of one effect of the model.
 SWAPS = 2

@@ -10,11 +10,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.observations.observe import ENTRY_NAMES, Element
 
-FloatArray = NDArray[np.float64]
 #: Order of the columns of `sensor_map_columns`.
 MAP_NAMES = tuple(f"{side}{entry}" for side in ("force ", "displacement ") for entry in ENTRY_NAMES)
 

@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnose.search.directions import Direction
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 #: Draws of the parametric bootstrap.
 DRAWS = 1000
 #: Share of a pattern beside the fitted effects below which nothing is left to test.

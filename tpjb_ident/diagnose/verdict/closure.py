@@ -13,14 +13,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.candidates import Candidate
 from tpjb_ident.diagnose.search.problem import Problem
 from tpjb_ident.diagnose.search.search import Search
 
-FloatArray = NDArray[np.float64]
 DRAWS = 300
 #: Amplitudes of the Gaussian process that are tried, in stated model tolerances.
 AMPLITUDES = np.geomspace(0.03, 100.0, 15)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import BoolArray
 from tpjb_ident.diagnose.forward.candidates import Candidate
 from tpjb_ident.diagnose.observations.gap import gap, gap_by_observable, noise_floor
 from tpjb_ident.diagnose.observations.observe import Observations
@@ -16,8 +16,6 @@ from tpjb_ident.diagnose.search.search import Search
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.diagnose.verdict.localise import localise
 from tpjb_ident.diagnose.verdict.verdict import FoundEffect, FoundParameter, RankedCandidate, Verdict, VerdictName
-
-BoolArray = NDArray[np.bool_]
 
 
 def decide(problem: Problem, found: Search, settings: DiagnoseSettings) -> Verdict:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnose.observations.gap import residuals
 from tpjb_ident.diagnose.observations.observe import Observations
 from tpjb_ident.diagnose.verdict.verdict import Disagreement
-
-FloatArray = NDArray[np.float64]
 
 
 def localise(observations: Observations, prediction: FloatArray, most: int = 12) -> tuple[Disagreement, ...]:
@@ -37,7 +35,7 @@ def localise(observations: Observations, prediction: FloatArray, most: int = 12)
     return tuple(rows[:most])
 
 
-def _regions(observations: Observations, mine: NDArray[np.bool_]):  # type: ignore[no-untyped-def]
+def _regions(observations: Observations, mine: BoolArray):  # type: ignore[no-untyped-def]
     """Halves of the range of the coordinate that varies most among the elements, or single pads."""
     elements = observations.elements
     for coordinate, unit, factor in (("pad", "", 1.0), ("load", "N", 1.0), ("direction", "deg", 180 / math.pi)):

@@ -188,7 +188,7 @@ def _ridge(design: FloatArray, answer: FloatArray) -> tuple[FloatArray, FloatArr
         covariance = np.linalg.inv(information + prior)
         found = covariance @ (design.T @ (weight * answer))
         spent = float(np.trace(information @ covariance))
-    return found, covariance
+    return found, np.asarray(covariance, dtype=float)
 
 
 def _turn(ratio: RunRatios, basis: ComplexArray, fits: list[tuple[FloatArray, FloatArray]]) -> Turn:

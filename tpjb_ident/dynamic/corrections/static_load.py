@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arrays import ComplexArray, FloatArray
@@ -128,7 +127,7 @@ def _slopes_over_load(
     return list(_log_gradient(h.real, log_load) + 1j * _log_gradient(h.imag, log_load))
 
 
-def _log_gradient(values: NDArray[np.float64], log_load: NDArray[np.float64]) -> FloatArray:
+def _log_gradient(values: FloatArray, log_load: FloatArray) -> FloatArray:
     """Slope over ln W; entries that keep their sign are taken as power laws between loads.
 
     Parameters

@@ -154,7 +154,7 @@ def eiv_fit(repeats: Repeats, directions_differ: bool = False) -> EivFit:
     else:
         D_true = _true_displacement(h, means, noise, T)
     V = direction_covariances(means, window_noise, T)
-    inverse = np.linalg.inv(V)
+    inverse = np.asarray(np.linalg.inv(V), dtype=complex)
     fisher = information(D_true, D_true, inverse)
     bread = np.linalg.inv(fisher)
     small = window_noise / means.count[:, None, None]
@@ -207,10 +207,10 @@ def _score_iteration(
     D_true = means.D
     for _ in range(50):
         D_true = _true_displacement(h, means, noise, T)
-        inverse = np.linalg.inv(direction_covariances(means, _residual_noise(h, noise), T))
+        inverse = np.asarray(np.linalg.inv(direction_covariances(means, _residual_noise(h, noise), T)), dtype=complex)
         left = information(means.D, D_true, inverse)
         right = np.einsum("gac,gb,gc->ab", inverse, D_true.conj(), means.F).reshape(4)
-        h_new = np.linalg.solve(left, right).reshape(2, 2)
+        h_new = np.asarray(np.linalg.solve(left, right), dtype=complex).reshape(2, 2)
         change = np.abs(h_new - h).max() / np.abs(h).max()
         h = h_new
         if change < 1e-12:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.near_names import nearest_name
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, repeats
@@ -19,6 +20,7 @@ from tpjb_ident.dynamic.estimators.rlm import NORMS, RlmSettings, rlm_fit
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.estimators.uncertainty import homoscedastic, with_repeats
 from tpjb_ident.dynamic.estimators.whole_directions import readmitted
+from tpjb_ident.errors import ArgumentError
 
 METHODS = ("ols", "rlm", "mm", "mm-eiv", "iv")
 #: Condition number of the displacement directions beyond which entries cannot be told apart.
@@ -65,23 +67,21 @@ def estimate_dynamic_stiffness(
 
     Raises
     ------
-    ValueError
+    ArgumentError
         Shapes that do not fit, an unknown method or norm, omega not positive.
     """
     if method not in METHODS:
-        import difflib
-
-        near = difflib.get_close_matches(str(method), METHODS, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(f"unknown method {method!r}{hint} Known: {', '.join(METHODS)}")
+        near = nearest_name(method, METHODS)
+        hint = f"; did you mean {near!r}?" if near else ""
+        raise ArgumentError(f"unknown method {method!r}{hint} Known: {', '.join(METHODS)}")
     if norm is not None and method != "rlm":
-        raise ValueError(f'norm={norm!r} belongs to method="rlm", not to {method!r}')
+        raise ArgumentError(f'norm={norm!r} belongs to method="rlm", not to {method!r}')
     frequency = float(_si(omega, "rad/s", "omega"))
     if not (np.isfinite(frequency) and frequency > 0):
-        raise ValueError(f"omega must be a positive number of rad/s, got {omega}")
+        raise ArgumentError(f"omega must be a positive number of rad/s, got {omega}")
     instruments = None if reference is None else getattr(reference, "magnitude", reference)
     if method == "iv" and reference is None:
-        raise ValueError('method "iv" needs reference phasors (n, 2), for instance the actuators\' command')
+        raise ArgumentError('method "iv" needs reference phasors (n, 2), for instance the actuators\' command')
     table = phasor_table(_si(D, "m", "D"), _si(F, "N", "F"), direction, instruments)
     return estimate_table(table, frequency, method, RlmSettings(norm or "huber"))
 
@@ -114,7 +114,7 @@ def _si(value: Any, unit: str, name: str) -> Any:
     try:
         return value.to(unit).magnitude
     except Exception as error:  # pint's own class depends on the registry the value came from
-        raise ValueError(f"{name} must be convertible to {unit}, got {value.units}") from error
+        raise ArgumentError(f"{name} must be convertible to {unit}, got {value.units}") from error
 
 
 def _obstacle(table: PhasorTable) -> Condition | None:

@@ -15,6 +15,7 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.mm import mm_fit
 from tpjb_ident.dynamic.estimators.ols import ols_fit
 from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable
+from tpjb_ident.errors import ArgumentError
 
 
 @dataclass(frozen=True)
@@ -46,11 +47,11 @@ def instrumental_fit(table: PhasorTable) -> InstrumentalFit:
 
     Raises
     ------
-    ValueError
+    ArgumentError
         The table has no reference.
     """
     if table.reference is None:
-        raise ValueError('method "iv" needs reference phasors (n, 2), for instance the actuators\' command')
+        raise ArgumentError('method "iv" needs reference phasors (n, 2), for instance the actuators\' command')
     # The fit follows any change of components; what plain least squares leaves of F has little in common with D, and
     # where it is nothing at all the scatter is badly scaled instead of singular.
     plain = ols_fit(table.D, table.F)

@@ -19,5 +19,4 @@ def ols_fit(D: ComplexArray, F: ComplexArray) -> ComplexArray:
     (2, 2) complex ndarray
         H; both force equations share the displacements, so Eq. (15) falls into two problems of two unknowns.
     """
-    solution: ComplexArray = np.linalg.lstsq(D, F, rcond=None)[0]
-    return solution.T
+    return np.asarray(np.linalg.lstsq(D, F, rcond=None)[0], dtype=complex).T

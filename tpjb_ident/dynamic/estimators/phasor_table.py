@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.dynamic.estimators.r_matrix import r_matrix, shared_block
+from tpjb_ident.errors import ArgumentError
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class PhasorTable:
 def phasor_table(
     D: ArrayLike, F: ArrayLike, direction: ArrayLike | None = None, reference: ArrayLike | None = None
 ) -> PhasorTable:
-    """Check, scale and label the windows.
+    """Build Eq. (15) from the windows, and check, scale and label them.
 
     Parameters
     ----------
@@ -71,22 +73,20 @@ def phasor_table(
 
     Raises
     ------
-    ValueError
+    ArgumentError
         Shapes that do not fit together.
     """
-    displacement, force = np.asarray(D, dtype=complex), np.asarray(F, dtype=complex)
-    if displacement.ndim != 2 or displacement.shape[1:] != (2,) or displacement.shape != force.shape:
-        raise ValueError(f"D and F must both be (n, 2), one row per window; got {displacement.shape} and {force.shape}")
+    displacement, force = shared_block(*r_matrix(D, F))
     n = len(displacement)
     labels = np.arange(n) if direction is None else np.asarray(direction).ravel()
     if len(labels) != n:
-        raise ValueError(f"direction must have one label per window: {n} windows, {len(labels)} labels")
+        raise ArgumentError(f"direction must have one label per window: {n} windows, {len(labels)} labels")
     valid = np.isfinite(displacement).all(axis=1) & np.isfinite(force).all(axis=1)
     instruments = None
     if reference is not None:
         instruments = np.asarray(reference, dtype=complex)
         if instruments.shape != displacement.shape:
-            raise ValueError(f"reference must be {displacement.shape} like D, got {instruments.shape}")
+            raise ArgumentError(f"reference must be {displacement.shape} like D, got {instruments.shape}")
         valid &= np.isfinite(instruments).all(axis=1)
         instruments = instruments[valid]
         instruments = instruments / _scale(instruments)

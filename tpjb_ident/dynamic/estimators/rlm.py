@@ -14,9 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.near_names import nearest_name
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.r_matrix import real_rows
+from tpjb_ident.errors import ArgumentError, TpjbError
 
 #: Names of the norms and the statsmodels class behind each.
 NORMS = {
@@ -34,7 +36,7 @@ NORMS = {
 }
 
 
-class ComplexInputError(TypeError):
+class ComplexInputError(TpjbError, TypeError):
     """Complex numbers given to a solver of real systems."""
 
 
@@ -135,7 +137,7 @@ def _norm(name: str) -> Any:
     from statsmodels.robust import norms
 
     if name not in NORMS:
-        raise ValueError(_unknown("norm", name, list(NORMS)))
+        raise ArgumentError(_unknown("norm", name, list(NORMS)))
     if name == "student":
         return norms.StudentT(c=1.0, df=4.0)
     if name == "mquantile":  # the symmetric one; others estimate quantiles, not H
@@ -152,7 +154,7 @@ def _scale(name: str) -> Any:
         return scale.HuberScale(d=1.345, tol=1e-13, maxiter=500)  # as MASS::rlm's proposal 2
     if name == "mass":
         return _mass_scale
-    raise ValueError(_unknown("scale", name, ["mad", "mass", "huber"]))
+    raise ArgumentError(_unknown("scale", name, ["mad", "mass", "huber"]))
 
 
 def _mass_scale(model: Any, residual: FloatArray) -> float:
@@ -161,10 +163,8 @@ def _mass_scale(model: Any, residual: FloatArray) -> float:
 
 
 def _unknown(what: str, name: str, known: list[str]) -> str:
-    import difflib
-
-    near = difflib.get_close_matches(str(name), known, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    near = nearest_name(name, known)
+    hint = f"; did you mean {near!r}?" if near else ""
     return f"unknown {what} {name!r}{hint} Known: {', '.join(known)}"
 
 

@@ -10,6 +10,7 @@ from scipy.stats import t as student_t
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.errors import ArgumentError
 
 #: Order of the eight real unknowns everywhere: Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...
 ENTRIES = ("xx", "xy", "yx", "yy")
@@ -111,7 +112,7 @@ class DynamicStiffness:
             Whether to add the calibration part (Gaussian) to the random one (Student's t).
         """
         if not 0.0 < level < 1.0:
-            raise ValueError(f"level must lie in (0, 1), got {level}")
+            raise ArgumentError(f"level must lie in (0, 1), got {level}")
         quantile = 0.5 + 0.5 * level
         random = student_t.ppf(quantile, self.dof) * self.standard_error
         if not systematic or self.systematic is None:

@@ -221,7 +221,7 @@ def homoscedastic(
     spare = max(float(weights.sum()) - 2.0, 1e-12)
     scatter = (weights[:, None] * residual).T @ residual.conj() / spare
     inverse = np.linalg.inv((weights[:, None] * D.conj()).T @ D)
-    hermitian = correction * np.kron(scatter, inverse)
+    hermitian = np.asarray(correction * np.kron(scatter, inverse), dtype=complex)
     # Two real residuals per spare complex one; both parts of a row share its scale.
     return complex_to_real_covariance(hermitian), np.full(8, max(2.0 * spare, 1.0))
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.errors import BadInputError
 
 
 @dataclass(frozen=True)
@@ -115,13 +116,13 @@ def known_lines(
 
     Raises
     ------
-    ValueError
+    BadInputError
         No excitation frequency, or one outside (0, 0.45 rate).
     """
     settings = settings or LineSettings()
     top = 0.45 * rate
     if not excitation or not all(0.0 < f < top for f in excitation):
-        raise ValueError(
+        raise BadInputError(
             f"excitation frequencies must lie between 0 and {top:g} Hz (0.45 of the sample rate), got {excitation}"
         )
     driven = tuple(Line("excitation", float(f)) for f in sorted(set(excitation)))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tpjb_ident.arrays import ComplexArray
+from tpjb_ident.errors import BadInputError
 
 
 def oil_force(cell_force: ComplexArray, housing_acceleration: ComplexArray | None, housing_mass: float) -> ComplexArray:
@@ -30,11 +31,11 @@ def oil_force(cell_force: ComplexArray, housing_acceleration: ComplexArray | Non
 
     Raises
     ------
-    ValueError
+    BadInputError
         The mass is not a finite number >= 0.
     """
     if not (np.isfinite(housing_mass) and housing_mass >= 0):
-        raise ValueError(f"housing mass must be finite and not negative, got {housing_mass} kg")
+        raise BadInputError(f"housing mass must be finite and not negative, got {housing_mass} kg")
     if housing_acceleration is None:
         return np.asarray(cell_force, dtype=complex)
     return np.asarray(cell_force + housing_mass * housing_acceleration, dtype=complex)

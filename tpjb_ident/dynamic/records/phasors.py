@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.records.wave_blocks import BLOCK, WaveBlocks
 from tpjb_ident.dynamic.records.windows import line_design
 
@@ -105,7 +104,7 @@ class LineFitter:
         clean = (largest <= np.maximum(GLITCH_LIMIT * scale, rounding)) & (
             scale <= np.maximum(SCALE_LIMIT * usual, rounding)
         )
-        clean = clean.all(axis=1)
+        clean = np.asarray(clean.all(axis=1))
         lost = np.zeros(n)
         coefficients = coefficients.reshape(2, n, -1).transpose(1, 0, 2).copy()
         offset = _by_window(offset[:, 0])
@@ -170,7 +169,7 @@ class LineFitter:
         return to_run_origin(local.transpose(0, 2, 1), self.frequencies, start)
 
 
-def _beside(outlying: NDArray[np.bool_]) -> IntArray:
+def _beside(outlying: BoolArray) -> IntArray:
     """Columns of (2, n) that are outlying in X or Y, or next to such a one: a glitch's flanks lie below the limit."""
     return np.flatnonzero(np.convolve(outlying.any(axis=0), np.ones(2 * GLITCH_MARGIN + 1), mode="same") > 0)
 
@@ -289,5 +288,4 @@ def _quick_solution(design: FloatArray, values: FloatArray, weights: FloatArray)
 
 
 def _least_squares(design: FloatArray, values: FloatArray) -> FloatArray:
-    solution: FloatArray = np.linalg.lstsq(design, values, rcond=None)[0]
-    return solution
+    return np.asarray(np.linalg.lstsq(design, values, rcond=None)[0], dtype=float)

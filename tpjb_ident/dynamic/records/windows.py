@@ -14,6 +14,7 @@ import numpy as np
 
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.dynamic.records.lines import LineSet
+from tpjb_ident.errors import TpjbError
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class WindowSettings:
 MAX_SAMPLES = 2**16
 
 
-class RecordTooShortError(ValueError):
+class RecordTooShortError(TpjbError):
     """The record cannot resolve its lines; `needed` [s] says how long it has to be."""
 
     def __init__(self, message: str, needed: float) -> None:

@@ -15,6 +15,7 @@ from scipy.stats import chi2
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.errors import ArgumentError
 
 #: A model is refused below this probability of its chi-square.
 REFUSED = 0.01
@@ -84,16 +85,16 @@ def fit_over_frequency(estimates: list[DynamicStiffness], model: str) -> Frequen
 
     Raises
     ------
-    ValueError
+    ArgumentError
         Unknown model, or fewer frequencies than it needs (1 for K-C, 2 for K-C-M).
     """
     if model not in MODELS:
-        raise ValueError(f"unknown model {model!r}; known: {', '.join(MODELS)}")
+        raise ArgumentError(f"unknown model {model!r}; known: {', '.join(MODELS)}")
     usable = [e for e in estimates if np.isfinite(e.h).all() and np.isfinite(e.covariance).all()]
     omegas = np.array([e.omega for e in usable])
     needed = 1 if model == "K-C" else 2
     if len(np.unique(omegas)) < needed:
-        raise ValueError(f"{model} needs {needed} frequencies with an answer, got {len(np.unique(omegas))}")
+        raise ArgumentError(f"{model} needs {needed} frequencies with an answer, got {len(np.unique(omegas))}")
     # Natural scales keep the normal equations well conditioned: N/m, per omega, per omega^2.
     middle = float(np.sqrt(omegas.min() * omegas.max()))
     size = float(np.mean([np.abs(e.h).max() for e in usable]))

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.problem import RigDataError
 from rigdata.vector import inverse_directions
@@ -41,8 +40,8 @@ class Pairs:
     """
 
     names: tuple[str, ...]
-    probe_plane: NDArray[np.float64]
-    cell_plane: NDArray[np.float64]
+    probe_plane: FloatArray
+    cell_plane: FloatArray
     centre: tuple[float | None, float | None]
 
 

@@ -11,11 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.pivot.laws.laws import Law
-
-FloatArray = NDArray[np.float64]
 
 OFFSET, FRICTION, SCALE = 0, 1, 2  # places of the parameters that every law has; the shape follows
 CONTACT_GAP = 3.0e-6  # [m], plausible size of the missing contact (prior standard deviation)

@@ -28,9 +28,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from tpjb_ident.arrays import FloatArray
 
 
 class Law(Protocol):

@@ -14,11 +14,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.pivot.laws.law_fit import SCALE, LawFit, ShapePrior
 
-FloatArray = NDArray[np.float64]
 Refit = Callable[[LawFit, ShapePrior], LawFit]
 
 ALIKE = 0.25  # spread of the shape among pads of one make, as a share of what is plausible for any pivot

@@ -11,12 +11,9 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.pivot.records.steps import Hold
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int_]
 
 TURN = 0.02  # of the load range: a smaller way back is noise
 MOST_BLOCKS = 220  # the covariance is a full matrix: keep it small
@@ -54,7 +51,7 @@ class Blocks:
     def __len__(self) -> int:
         return len(self.time)
 
-    def take(self, keep: NDArray[np.bool_]) -> Blocks:
+    def take(self, keep: BoolArray) -> Blocks:
         """The blocks where `keep` (m,) is true."""
         return Blocks(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 

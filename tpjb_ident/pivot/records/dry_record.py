@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.problem import Problem, RigDataError
+from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.pivot.records.blocks import Blocks, Samples, cut_blocks
 from tpjb_ident.pivot.records.pickup import Pickup, measure_pickup
 from tpjb_ident.pivot.records.projection import Projection, pad_axes, project
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from rigdata.calibration import Channel
     from rigdata.campaign import Run
 
-FloatArray = NDArray[np.float64]
 
 FEWEST_SAMPLES = 50
 MOST_LOST = 0.5  # share of samples lost to gaps and glitches above which a record is refused
@@ -128,7 +127,7 @@ def _samples(run: Run, angle: float, settings: PivotSettings) -> tuple[Samples, 
     return Samples(time, load, position, np.asarray(load @ pad_axes(angle)[0]), lost), pickup
 
 
-def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: NDArray[np.bool_]) -> Pickup | None:
+def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: BoolArray) -> Pickup | None:
     """Mains line per channel. Two channels per vector: only then the vector holds each of them as it was."""
     channels = axial_channels(run)
     if any(sum(c.quantity == quantity for c in channels.values()) != 2 for quantity in vectors):

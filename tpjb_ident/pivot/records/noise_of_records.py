@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.pivot.records.blocks import Blocks
 from tpjb_ident.pivot.records.dry_record import DryRecord
 from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
-
-FloatArray = NDArray[np.float64]
 
 
 def noise_within_holds(records: Sequence[DryRecord], drift_rate: float) -> NoiseModel:
@@ -39,7 +37,7 @@ def _with_holds(records: Sequence[DryRecord]) -> Sequence[DryRecord]:
     return [record for record in records if record.holds] or records
 
 
-def noise_about_curve(records: Sequence[DryRecord], good: Sequence[NDArray[np.bool_]], drift_rate: float) -> NoiseModel:
+def noise_about_curve(records: Sequence[DryRecord], good: Sequence[BoolArray], drift_rate: float) -> NoiseModel:
     """Noise about any smooth load-deflection curve: sees the slow part of 1/f noise as well.
 
     Parameters
@@ -64,7 +62,7 @@ def noise_about_curve(records: Sequence[DryRecord], good: Sequence[NDArray[np.bo
     return estimate_noise(series, drift_rate, learn_drift=_any_hold(records))
 
 
-def _smooth_series(record: DryRecord, used: NDArray[np.bool_]) -> list[NoiseSeries]:
+def _smooth_series(record: DryRecord, used: BoolArray) -> list[NoiseSeries]:
     blocks = record.blocks.take(used)
     mean = _smooth_columns(record.projection.load[used], blocks)
     return [

@@ -16,11 +16,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft, ndimage
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
 
 MAINS = (50.0, 60.0)  # [Hz]
 AROUND = 0.35  # [Hz] in which the mains is looked for
@@ -66,7 +64,7 @@ class Mistake:
     agree: int
 
 
-def measure_pickup(values: Mapping[str, FloatArray], good: NDArray[np.bool_], rate: float) -> Pickup | None:
+def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: float) -> Pickup | None:
     """Mains line in the channels of one run.
 
     Parameters

@@ -11,12 +11,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.pivot.records.blocks import Blocks
 from tpjb_ident.slow_records.noise import NoiseModel
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,16 +6,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.problem import Problem, RigDataError
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.pivot.records.dry_record import DryRecord, axial_channels, refusal
 from tpjb_ident.pivot.records.pickup import mistakes
 from tpjb_ident.pivot.records.projection import Direction, displacement_direction, load_direction
 from tpjb_ident.pivot.records.settings import PivotSettings
 from tpjb_ident.slow_records.noise import NoiseModel
-
-FloatArray = NDArray[np.float64]
 
 ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
 ASIDE_SPREAD = 5.0  # robust standard deviations of the campaign's own runs, where they stand less orderly than that

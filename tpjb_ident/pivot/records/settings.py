@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from tpjb_ident.errors import ArgumentError
+
 LAW_NAMES: tuple[str, ...] = ("hertz-line", "hertz-point", "power", "linear", "point-in-series", "bilinear", "spline")
 
 
@@ -66,7 +68,7 @@ class PivotSettings:
     def __post_init__(self) -> None:
         unknown = [name for name in self.laws if name not in LAW_NAMES]
         if unknown or not self.laws:
-            raise ValueError(f"laws must name some of {', '.join(LAW_NAMES)}, got {unknown or 'none'}")
+            raise ArgumentError(f"laws must name some of {', '.join(LAW_NAMES)}, got {unknown or 'none'}")
         for name in ("block", "longest_glitch", "lag_allowance", "contact_tolerance", "drift_rate"):
             if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+                raise ArgumentError(f"{name} must be positive, got {getattr(self, name)}")

@@ -9,11 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int_]
+from tpjb_ident.arrays import BoolArray, FloatArray
 
 STILL = 0.2  # share of the mean rate of change below which the load counts as held
 SETTLED = 4.0  # noise standard deviations within which the load must lie of the hold's own level

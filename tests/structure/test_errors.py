@@ -1,0 +1,47 @@
+"""Every refusal of a package derives from its one base, which the command line knows."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from rigdata.errors import RigError
+from rigdata.near_names import nearest_name
+from rigdata.problem import RigDataError
+from rigdata.units import UnitError
+from tpjb_ident.dynamic.estimators.rlm import ComplexInputError
+from tpjb_ident.errors import TpjbError
+
+ROOT = Path(__file__).parents[2]
+#: Classes that are no refusals: a mistake of the code, and an answer that is not to be trusted.
+NO_REFUSALS = {"UnknownConditionError", "NotTrustedError"}
+
+
+@pytest.mark.parametrize(("package", "base"), [("rigdata", "RigError"), ("tpjb_ident", "TpjbError")])
+def test_every_error_class_of_a_package_has_its_one_base(package, base):
+    bases = {}
+    for path in (ROOT / package).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef) and node.name.endswith("Error"):
+                bases[node.name] = {getattr(b, "id", "") for b in node.bases}
+    assert base in bases
+    strangers = {n for n, of in bases.items() if n not in {base, *NO_REFUSALS} and not of & set(bases)}
+    assert strangers == set()
+
+
+def test_a_caller_may_catch_them_as_value_errors():
+    assert issubclass(TpjbError, ValueError)
+    assert issubclass(RigError, ValueError)
+    assert issubclass(RigDataError, RigError)
+    assert issubclass(UnitError, RigError)
+    assert issubclass(ComplexInputError, (TypeError, TpjbError))
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "near"),
+    [("kirck", ["rigid", "kirk"], "kirk"), ("q", ["rigid", "kirk"], None), (7, ["7a"], "7a"), ("x" * 99, [], None)],
+)
+def test_the_nearest_known_name(name, known, near):
+    assert nearest_name(name, known) == near
