@@ -24,7 +24,7 @@ def test_every_error_class_of_a_package_has_its_one_base(package, base):
     bases = {}
     for path in (ROOT / package).rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ClassDef) and node.name.endswith("Error"):
+            if isinstance(node, ast.ClassDef) and node.name.endswith("Error") and node.bases:
                 bases[node.name] = {getattr(b, "id", "") for b in node.bases}
     assert base in bases
     strangers = {n for n, of in bases.items() if n not in {base, *NO_REFUSALS} and not of & set(bases)}

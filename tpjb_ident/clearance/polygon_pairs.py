@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.measure import SAME_WARMTH, ClearancePolygon
 from tpjb_ident.clearance.polygon import normals
+from tpjb_ident.errors import ArgumentError
 from tpjb_ident.schema import TANGENT
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
 
 RISE = 0.2  # of the lighter push load: less tells nothing of the stiffness
 
@@ -52,13 +52,13 @@ def radial_stiffness(light: ClearancePolygon, heavy: ClearancePolygon) -> Radial
 
     Raises
     ------
-    ValueError
+    ArgumentError
         When the push loads are not clearly different.
     """
     rise = heavy.push_load - light.push_load
     if rise <= RISE * light.push_load:
         loads = f"{light.push_load:.0f} and {heavy.push_load:.0f} N"
-        raise ValueError(f"push loads must differ by a fifth at least, heavy after light; got {loads}")
+        raise ArgumentError(f"push loads must differ by a fifth at least, heavy after light; got {loads}")
     # each about its own centre: a zero that wandered between the runs is no give
     give = heavy.clearance_pushed - light.clearance_pushed
     se = np.hypot(heavy.clearance_pushed_se, light.clearance_pushed_se)
@@ -102,11 +102,11 @@ def clearance_change(before: ClearancePolygon, after: ClearancePolygon) -> Clear
 
     Raises
     ------
-    ValueError
+    ArgumentError
         When the polygons have other pad directions.
     """
     if before.angles.shape != after.angles.shape or not np.allclose(before.angles, after.angles, atol=1e-6):
-        raise ValueError("both polygons must be of one bearing: their pad directions differ")
+        raise ArgumentError("both polygons must be of one bearing: their pad directions differ")
     shift = after.centre - before.centre
     per_pad = after.clearance - before.clearance
     se = np.hypot(before.clearance_se, after.clearance_se)

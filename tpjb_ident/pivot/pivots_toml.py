@@ -13,12 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.schema import TANGENT
-
-FloatArray = NDArray[np.float64]
 
 SCHEMA = "tpjb-pivots/1"
 ROWS = 160
@@ -47,7 +46,7 @@ def pivots_text(curves: Sequence[PivotCurve], source: str) -> str:
         TOML; loads [N], deflections [m], stiffnesses [N/m].
     """
     if not curves:
-        raise ValueError("curves must hold at least one PivotCurve")
+        raise ArgumentError("curves must hold at least one PivotCurve")
     lines = [
         "# Measured pivot laws: pivot and housing together, as the probes on the housing see them.",
         f'schema = "{SCHEMA}"',

@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.schema import SECANT, TANGENT
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
 Formula = Callable[[int, float], tuple[float, float]]
 
 ROWS = 20  # up to the largest measured load
@@ -56,10 +56,10 @@ def pivot_table(
     import pandas as pd
 
     if not curves:
-        raise ValueError("curves must hold at least one PivotCurve")
+        raise ArgumentError("curves must hold at least one PivotCurve")
     grid = load_grid(curves) if loads is None else np.asarray(loads, dtype=float)
     if np.any(~(grid > 0.0)):
-        raise ValueError("loads must be positive: at zero load there is no stiffness to speak of")
+        raise ArgumentError("loads must be positive: at zero load there is no stiffness to speak of")
     return pd.concat([_rows(curve, grid, formula, level) for curve in curves], ignore_index=True)
 
 

@@ -81,7 +81,7 @@ def phasor_table(
     labels = np.arange(n) if direction is None else np.asarray(direction).ravel()
     if len(labels) != n:
         raise ArgumentError(f"direction must have one label per window: {n} windows, {len(labels)} labels")
-    valid = np.isfinite(displacement).all(axis=1) & np.isfinite(force).all(axis=1)
+    valid = np.asarray(np.isfinite(displacement).all(axis=1) & np.isfinite(force).all(axis=1))
     instruments = None
     if reference is not None:
         instruments = np.asarray(reference, dtype=complex)

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.report.plots.style import FONT_SIZE, LIGHT, add_legend, new_picture
 
 if TYPE_CHECKING:
     from rigdata.run import Run
 
-FloatArray = NDArray[np.float64]
 
 STYLE: tuple[tuple[str, Any], ...] = (("blue", "-"), ("red", (0, (5, 2))))
 FEWEST_SEGMENTS = 5

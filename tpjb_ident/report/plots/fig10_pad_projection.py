@@ -10,14 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.report.plots.style import FONT_SIZE, LIGHT, add_legend, label, new_pictures, style_of_pad
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
-
-FloatArray = NDArray[np.float64]
 
 
 def pad_projection(curves: Sequence[PivotCurve], *, title: str | None = None) -> Figure:

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.report.plots.style import LIGHT, add_legend, mark_extrapolated, new_picture, style_of_pad
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
 
-FloatArray = NDArray[np.float64]
 Formula = Callable[[int, float], tuple[float, float]]
 
 POINTS = 120

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.polygon import corners
 from tpjb_ident.report.plots.style import (
     FONT_SIZE,
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
 
-FloatArray = NDArray[np.float64]
 
 POLYGON_STYLE: tuple[tuple[str, Any], ...] = (
     ("ink", "-"),
