@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdata.arrays import FloatArray
 from rigdata.units import (
     UnitError,
     is_bridge_ratio,
@@ -82,7 +83,7 @@ class Channel:
         """Signed SI value per unit of reading."""
         return self.polarity * self.gain
 
-    def to_si(self, reading: NDArray[Any]) -> NDArray[np.float64]:
+    def to_si(self, reading: NDArray[Any]) -> FloatArray:
         """Calibrate readings.
 
         Parameters
@@ -103,7 +104,7 @@ class Channel:
         values += self.zero
         return values
 
-    def to_reading(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_reading(self, values: FloatArray) -> FloatArray:
         """Turn SI values into readings (the inverse of `to_si`)."""
         return (np.asarray(values, dtype=np.float64) - self.zero) / self.slope
 
