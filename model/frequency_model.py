@@ -136,7 +136,7 @@ class FullSet:
     names : tuple of str
         ``x``, ``y`` of the shaft, then ``tilt k`` [rad] and ``give k`` (radial pivot deflection, outward [m]) of
         every pad that carries; a pad on a rigid pivot has no ``give``. With a housing spring in series ``inner x``,
-        ``inner y`` stand between.
+        ``inner y`` stand between; with one that gives in one direction only, ``structure``: how far it gave [m].
     mass, damping, stiffness : (n, n) ndarray
         The shaft's own mass is not in.
     """
@@ -165,7 +165,7 @@ def full_set(prediction: Prediction) -> FullSet:
     setup = prediction.setup
     pads = [m for f in prediction.equilibrium.films if (m := pad_matrices(setup, f)) is not None]
     names = ["x", "y"]
-    if setup.series_compliance:
+    if any(setup.series_compliance):
         names += ["inner x", "inner y"]
     inner = len(names) - 2
     places = []
@@ -185,6 +185,28 @@ def full_set(prediction: Prediction) -> FullSet:
         mass[block] += pad.pad_mass[: count - 2, : count - 2]
     mass[inner : inner + 2, inner : inner + 2] += setup.added_mass * np.eye(2)
     if inner:
-        spring = np.eye(2) / setup.series_compliance
-        stiffness[:4, :4] += np.block([[spring, -spring], [-spring, spring]])
+        return _spring_between(setup.structure, names, (mass, damping, stiffness))
     return FullSet(tuple(names), mass, damping, stiffness)
+
+
+def _spring_between(
+    compliance: FloatArray, names: list[str], matrices: tuple[FloatArray, FloatArray, FloatArray]
+) -> FullSet:
+    """Put the structure's spring between the shaft's readings and the inner coordinates, where it gives at all."""
+    gives, directions = np.linalg.eigh(compliance)
+    soft = gives > 1e-9 * gives[-1]
+    labels = names[2:4] if soft.all() else ["structure"]
+    # what was `inner` is the shaft less what the structure gave: full rank keeps the inner coordinates themselves
+    turn = np.zeros((len(names), len(names) - 2 + len(labels)))
+    turn[:2, :2] = np.eye(2)
+    turn[4:, 2 + len(labels) :] = np.eye(len(names) - 4)
+    if soft.all():
+        turn[2:4, 2:4] = np.eye(2)
+        spring = np.linalg.inv(compliance)
+        own = np.block([[spring, -spring], [-spring, spring]])
+    else:
+        turn[2:4, :2], turn[2:4, 2] = np.eye(2), -directions[:, -1]
+        own = np.diag([0.0, 0.0, 1.0 / gives[-1]])
+    mass, damping, stiffness = (turn.T @ m @ turn for m in matrices)
+    stiffness[: len(own), : len(own)] += own
+    return FullSet((*names[:2], *labels, *names[4:]), mass, damping, stiffness)

@@ -280,14 +280,15 @@ class MeasuredPivot:
         """Return the pivot alone, where a housing of this compliance [m/N] is modelled apart from it.
 
         What is left keeps at least `LEAST_SHARE` of the measured give: a housing softer than the curve it is part of
-        cannot be taken off it. A curve that holds no housing is returned as it is.
+        cannot be taken off it. A curve that holds no housing is returned as it is; of one that does, more than one
+        part of the structure may be taken off.
         """
         if not self.includes_housing:
             return self
         give = np.diff(self.deflection_points)
         alone = np.maximum(give - compliance * np.diff(self.load), LEAST_SHARE * give)
         points = np.concatenate([[0.0], np.cumsum(alone)])
-        return replace(self, deflection_points=points, includes_housing=False)
+        return replace(self, deflection_points=points)
 
 
 def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> PivotLaw:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.bearing import Bearing
-from model.dynamics.reduction import PadMatrices, bearing_impedance, pad_matrices
+from model.dynamics.reduction import PadMatrices, bearing_impedance, friction_regimes, pad_matrices
 from model.effects import Effect, apply_effects
 from model.growth import grown
 from model.options import Options
@@ -292,10 +292,12 @@ def predict_setup(
     lines = np.atleast_1d(omega)
     if equilibrium.converged:
         h = bearing_impedance(setup, equilibrium, lines)
+        regimes = friction_regimes(setup, equilibrium, lines) if setup.friction else ()
     else:
+        regimes = ()
         h = np.full((len(lines), 2, 2), complex(math.nan, math.nan))
     instruments = setup.instruments
-    outside = equilibrium.position + setup.series_compliance * force
+    outside = equilibrium.position + setup.structure @ force
     films = equilibrium.films
     shape = (2, 2) if omega.ndim == 0 else (len(lines), 2, 2)
     return Prediction(
@@ -311,7 +313,7 @@ def predict_setup(
         tilt=np.array([f.tilt for f in films]),
         deflection=np.array([f.deflection for f in films]),
         pad_load=np.array([f.forces.force[0] if f.forces is not None else 0.0 for f in films]),
-        status=equilibrium.status,
+        status=(*equilibrium.status, *regimes),
         equilibrium=equilibrium,
         setup=setup,
     )

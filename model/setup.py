@@ -145,8 +145,16 @@ class Setup:
         Angle of the shaft axis and the direction towards which it leans [rad].
     starvation : float
         Every film starts after this fraction of the arc.
-    series_compliance : float
-        1/stiffness of a spring in series with the whole bearing [m/N].
+    rolling : float
+        Factor on the rotational stiffness of pivots that roll, see `model.statics.tilt_hold`.
+    friction : float
+        Coefficient of friction of pivots that slide.
+    vibration : float
+        Amplitude of the journal's vibration [m]: tells whether it breaks sliding pivots loose.
+    heat_loss : float
+        Share of the dissipation that leaves the films at once.
+    series_compliance : tuple of float
+        xx, xy and yy of the compliance in series with the whole bearing [m/N].
     added_mass : float
         [kg]
     instruments : Instruments
@@ -169,7 +177,11 @@ class Setup:
     pivot_damping: float = 0.0
     misalignment: tuple[float, float] = (0.0, 0.0)
     starvation: float = 0.0
-    series_compliance: float = 0.0
+    rolling: float = 0.0
+    friction: float = 0.0
+    vibration: float = 2e-6
+    heat_loss: float = 0.0
+    series_compliance: tuple[float, float, float] = (0.0, 0.0, 0.0)
     added_mass: float = 0.0
     instruments: Instruments = field(default_factory=Instruments)
     clearance_change: float = 0.0
@@ -196,6 +208,12 @@ class Setup:
     def inlet_temperature(self) -> float:
         """Temperature at which fresh oil enters [degC]."""
         return self.bearing.oil.supply_temperature + self.supply_change
+
+    @property
+    def structure(self) -> FloatArray:
+        """Compliance in series with the whole bearing, (2, 2) [m/N]."""
+        xx, xy, yy = self.series_compliance
+        return np.array([[xx, xy], [xy, yy]])
 
     @property
     def flexible_pads(self) -> bool:

@@ -54,7 +54,8 @@ def dry_curve(setup: Setup, pad: int, load: FloatArray) -> DryCurve:
     """
     law, angle = setup.pivots[pad - 1], setup.bearing.pads[pad - 1].pivot_angle
     normal = np.array([math.cos(angle), math.sin(angle)])
-    true = np.array([law.deflection(float(w)) for w in load]) + setup.series_compliance * np.asarray(load)
+    structure = float(normal @ setup.structure @ normal)
+    true = np.array([law.deflection(float(w)) for w in load]) + structure * np.asarray(load)
     displacement = float(normal @ setup.instruments.displacement_map(0.0).real @ normal)
     force = float(normal @ setup.instruments.force_map(0.0).real @ normal)
     return DryCurve(pad, np.asarray(load) * force, true * displacement)
@@ -101,9 +102,10 @@ def polygon_sides(setup: Setup, push_load: float) -> PolygonSides:
     inverse = np.linalg.inv(setup.instruments.displacement_map(0.0).real)
     rows = []
     for pad, law in zip(setup.bearing.pads, setup.pivots, strict=True):
-        normal = inverse.T @ np.array([math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)])
+        towards = np.array([math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)])
+        normal = inverse.T @ towards
         size = float(np.hypot(*normal))
-        give = law.deflection(push_load) + setup.series_compliance * push_load
+        give = law.deflection(push_load) + float(towards @ setup.structure @ towards) * push_load
         rows.append(
             (
                 pad.assembled_clearance / size,
@@ -140,7 +142,7 @@ def corner_positions(setup: Setup, push_load: float) -> FloatArray:
         pair = np.array([[math.cos(angles[k]), math.sin(angles[k])] for k in (i, j)])
         reach = [setup.bearing.pads[k].assembled_clearance + setup.pivots[k].deflection(share) for k in (i, j)]
         bisector = np.array([math.cos(angles[i] + half), math.sin(angles[i] + half)])
-        out.append(np.linalg.solve(pair, reach) + setup.series_compliance * push_load * bisector)
+        out.append(np.linalg.solve(pair, reach) + push_load * (setup.structure @ bisector))
     return np.asarray(np.array(out) @ setup.instruments.displacement_map(0.0).real.T)
 
 

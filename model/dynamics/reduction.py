@@ -14,9 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from model.dynamics.pivot_friction import friction_impedance
 from model.setup import Setup
 from model.statics.equilibrium import Equilibrium
 from model.statics.pad_film import PadFilm
+from model.statics.tilt_hold import friction_limits, tilt_hold
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -34,6 +36,9 @@ class PadMatrices:
         Film [N/m, N/rad, N m/rad; times s].
     pad_mass, pad_damping, pad_stiffness : (2, 2) ndarray
         Eq. (12), in (theta, eta). A rigid pivot has infinite k_eta.
+    friction : tuple of float
+        Of a sphere in its seat: rotational stiffness while it sticks [N m/rad], in `pad_stiffness` too, and the moment
+        at which it slides [N m].
     """
 
     number: int
@@ -42,6 +47,7 @@ class PadMatrices:
     pad_mass: FloatArray
     pad_damping: FloatArray
     pad_stiffness: FloatArray
+    friction: tuple[float, float] = (0.0, math.inf)
 
 
 def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
@@ -55,15 +61,22 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
             [film.tangent[0], film.tangent[1], film.pivot_radius, 0.0],
         ]
     )
+    load = float(film.forces.force[0])
+    hold = tilt_hold(setup.change(friction=0.0), film.tilt, load)
+    friction = friction_limits(setup, load) if setup.friction else (0.0, math.inf)
+    # where the contact rolls away from the pivot line, a change of the pad's load has a moment
+    moments = frame.copy()
+    moments[0, 2] = hold.arm
     offset = mass_centre_offset(setup, film)
     coupling = -pad.mass * offset  # the centre moves outward by eta - b tilt
     return PadMatrices(
         number=film.number,
-        stiffness=frame.T @ film.forces.stiffness @ frame,
-        damping=frame.T @ film.forces.damping @ frame,
+        stiffness=moments.T @ film.forces.stiffness @ frame,
+        damping=moments.T @ film.forces.damping @ frame,
         pad_mass=np.array([[pad.moment_of_inertia, coupling], [coupling, pad.mass]]),
         pad_damping=np.diag([0.0, setup.pivot_damping]),
-        pad_stiffness=np.diag([setup.rotational_stiffness, law.vibration_stiffness(float(film.forces.force[0]))]),
+        pad_stiffness=np.diag([hold.stiffness + friction[0], law.vibration_stiffness(load)]),
+        friction=friction,
     )
 
 
@@ -78,7 +91,7 @@ def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
     return centroid * math.sin(middle)
 
 
-def reduce_pads(pads: list[PadMatrices], omega: FloatArray) -> ComplexArray:
+def reduce_pads(pads: list[PadMatrices], omega: FloatArray, vibration: float = 0.0) -> ComplexArray:
     """Eq. (10): the bearing's 2 x 2 impedance at every excitation frequency.
 
     Parameters
@@ -86,6 +99,8 @@ def reduce_pads(pads: list[PadMatrices], omega: FloatArray) -> ComplexArray:
     pads : list of PadMatrices
     omega : (n,) ndarray
         [rad/s]
+    vibration : float
+        Amplitude of the journal [m], for pivots with friction.
 
     Returns
     -------
@@ -104,9 +119,35 @@ def reduce_pads(pads: list[PadMatrices], omega: FloatArray) -> ComplexArray:
             + 1j * s * pad.pad_damping[inner, inner]
             + pad.pad_stiffness[inner, inner]
         )
-        film = z[:, keep, keep] + own
-        total += z[:, :2, :2] - z[:, :2, keep] @ np.linalg.solve(film, z[:, keep, :2])
+        film = np.asarray(z[:, keep, keep] + own, dtype=np.complex128)
+        if pad.friction[0]:
+            total = total + _reduce_with_friction(pad, z, film, vibration)
+        else:
+            total += z[:, :2, :2] - z[:, :2, keep] @ np.linalg.solve(film, z[:, keep, :2])
     return total
+
+
+def _reduce_with_friction(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
+    """One pad of Eq. (10) whose pivot sticks or slides, X and Y excited one at a time."""
+    out = z[:, :2, :2].copy()
+    keep = slice(2, 2 + film.shape[1])
+    loose = broken_loose(pad, z, film, vibration)
+    for axis in range(2):
+        pads = film.copy()
+        pads[:, 0, 0] += loose[:, axis] - pad.friction[0]
+        column = z[:, keep, axis : axis + 1]
+        out[:, :, axis : axis + 1] -= z[:, :2, keep] @ np.linalg.solve(pads, column)
+    return out
+
+
+def broken_loose(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
+    """Rotational impedance (n, 2) of a pivot's friction [N m/rad] for the journal vibrating along X, along Y."""
+    stick, slip = pad.friction
+    own, drive = film[:, 0, 0] - stick, z[:, 2, :2]
+    if film.shape[1] == 2:  # the pivot gives way as well
+        give = film[:, 0, 1] / film[:, 1, 1]
+        own, drive = own - give * film[:, 1, 0], drive - give[:, None] * z[:, 3, :2]
+    return friction_impedance(np.repeat(own[:, None], 2, axis=1), np.abs(drive) * vibration, stick, slip)
 
 
 def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> ComplexArray:
@@ -118,9 +159,33 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
         With added mass and series compliance, before any instrument.
     """
     pads = [m for film in equilibrium.films if (m := pad_matrices(setup, film)) is not None]
-    h = reduce_pads(pads, omega)
+    h = reduce_pads(pads, omega, setup.vibration)
     if setup.added_mass:
         h = h - (omega**2)[:, None, None] * setup.added_mass * np.eye(2)
-    if setup.series_compliance:
-        h = np.linalg.solve(np.eye(2) + setup.series_compliance * h, h).astype(np.complex128, copy=False)
+    if any(setup.series_compliance):
+        # of C and h both may be singular: (1 + h C)^-1 h needs neither inverse
+        h = np.linalg.solve(np.eye(2) + h @ setup.structure, h).astype(np.complex128, copy=False)
     return h
+
+
+def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> tuple[str, ...]:
+    """Named regimes of pivots with friction: which ones it holds, and which ones the vibration breaks loose."""
+    held: list[str] = []
+    loose: list[str] = []
+    for film in equilibrium.films:
+        pad = pad_matrices(setup, film)
+        if pad is None or not pad.friction[0]:
+            continue
+        s = omega[:, None, None]
+        z = pad.stiffness + 1j * s * pad.damping
+        keep = slice(0, 1) if math.isinf(pad.pad_stiffness[1, 1]) else slice(0, 2)
+        own = -(s**2) * pad.pad_mass + 1j * s * pad.pad_damping + pad.pad_stiffness
+        film_part = np.asarray(z[:, 2:, 2:][:, keep, keep] + own[:, keep, keep], dtype=np.complex128)
+        free = np.abs(broken_loose(pad, z, film_part, setup.vibration)) < pad.friction[0]
+        (loose if free.any() else held).append(str(film.number))
+    names = []
+    if held:
+        names.append(f"pivot friction holds pads {', '.join(held)}")
+    if loose:
+        names.append(f"vibration of {1e6 * setup.vibration:g} um breaks the pivots of pads {', '.join(loose)} loose")
+    return tuple(names)

@@ -57,13 +57,18 @@ def apply_effects(setup: Setup, effects: Iterable[Effect]) -> Setup:
     Raises
     ------
     EffectError
-        A pad number beyond the bearing's pads.
+        A pad number beyond the bearing's pads, not one number per pad, or a bearing that cannot have the effect.
     """
+    pads = len(setup.bearing.pads)
     for effect in effects:
+        kind = kind_of(effect.name)
+        known = {p.name for p in kind.parameters_of(pads)}
+        if set(effect.parameters) != known:
+            raise EffectError(f"{effect.name}: the bearing has {pads} pads; give {', '.join(sorted(known))}.")
+        if reason := kind.missing(setup.bearing):
+            raise EffectError(f"{effect.name}: {reason}")
         pad = effect.parameters.get("pad")
-        if pad is not None and pad > len(setup.bearing.pads):
-            raise EffectError(
-                f"{effect.name}: pad {pad:g} does not exist; the bearing has {len(setup.bearing.pads)} pads."
-            )
-        setup = kind_of(effect.name).apply(setup, **effect.parameters)
+        if pad is not None and pad > pads:
+            raise EffectError(f"{effect.name}: pad {pad:g} does not exist; the bearing has {pads} pads.")
+        setup = kind.apply(setup, **effect.parameters)
     return setup

@@ -3,27 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from model.effects.kind import EffectKind, Parameter
-from model.pivots import MeasuredPivot, PivotLaw, ScaledPivot
+from model.effects.series import add_compliance
 from model.setup import Setup
 
 
 def apply(setup: Setup, stiffness: float) -> Setup:
-    """A spring, equal in x and y, in series with the whole bearing.
-
-    A pivot curve that was measured against the same housing already holds the spring once; it is taken off there.
-    """
-    compliance = 1.0 / stiffness
-    pivots = tuple(_alone(law, compliance) for law in setup.pivots)
-    return setup.change(series_compliance=setup.series_compliance + compliance, pivots=pivots)
-
-
-def _alone(law: PivotLaw, compliance: float) -> PivotLaw:
-    if isinstance(law, ScaledPivot):
-        return replace(law, law=_alone(law.law, compliance))
-    return law.without_housing(compliance) if isinstance(law, MeasuredPivot) else law
+    """A spring, equal in x and y, in series with the whole bearing."""
+    return add_compliance(setup, 1.0 / stiffness, 0.0, 1.0 / stiffness)
 
 
 KIND = EffectKind(

@@ -5,12 +5,15 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from model.bearing import Bearing
 from model.setup import Setup
 from model.units import parse_quantity
 
+#: A bearing file lists no more pads.
+MAX_PADS = 40
 Side = Literal["bearing", "structure", "measurement"]
 
 
@@ -96,6 +99,10 @@ class EffectKind:
         ``apply(setup, **parameters) -> Setup``; parameters in SI.
     source : str
         Where the plausible range comes from.
+    per_pad : Parameter, optional
+        The effect has one such parameter per pad, named ``<name>_1`` to ``<name>_n``, after `parameters`.
+    obstacle : callable, optional
+        ``obstacle(bearing) -> str``: why a bearing cannot have this effect; empty if it can.
     """
 
     name: str
@@ -103,6 +110,19 @@ class EffectKind:
     parameters: tuple[Parameter, ...]
     apply: Callable[..., Setup]
     source: str = ""
+    per_pad: Parameter | None = None
+    obstacle: Callable[[Bearing], str] | None = None
+
+    def parameters_of(self, pads: int) -> tuple[Parameter, ...]:
+        """Every parameter, for a bearing of `pads` pads."""
+        if self.per_pad is None:
+            return self.parameters
+        each = (replace(self.per_pad, name=f"{self.per_pad.name}_{k}") for k in range(1, pads + 1))
+        return (*self.parameters, *each)
+
+    def missing(self, bearing: Bearing) -> str:
+        """Why a bearing cannot have this effect; empty if it can."""
+        return self.obstacle(bearing) if self.obstacle is not None else ""
 
     def check(self, values: Mapping[str, Any]) -> dict[str, float]:
         """Parameters as SI numbers, complete and within their bounds.
@@ -112,7 +132,8 @@ class EffectKind:
         EffectError
             Unknown, missing or impossible parameter.
         """
-        known = {p.name: p for p in self.parameters}
+        numbered = sum(self.per_pad is not None and name.startswith(f"{self.per_pad.name}_") for name in values)
+        known = {p.name: p for p in self.parameters_of(max(1, min(numbered, MAX_PADS)))}
         for name in values:
             if name not in known:
                 raise EffectError(f"{self.name}: no parameter {name!r}.{_nearest(name, known)}")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from model.film.loaded_attitude import Branch, LoadedAttitude, loaded_attitude
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
+from model.statics.tilt_hold import tilt_hold
 
 FloatArray = NDArray[np.float64]
 
@@ -92,8 +93,12 @@ def _stable(setup: Setup, film: PadFilm) -> bool:
     """Whether film and pivot push a pad back from a small change of tilt and deflection."""
     assert film.forces is not None
     (kaa, kab), (kba, kbb) = film.forces.stiffness
-    give = 1.0 / setup.pivots[film.number - 1].stiffness(max(float(film.forces.force[0]), 1e-6))
-    return bool(kbb * (1.0 + give * kaa) > give * kba * kab)
+    load = float(film.forces.force[0])
+    give = 1.0 / setup.pivots[film.number - 1].stiffness(max(load, 1e-6))
+    hold = tilt_hold(setup, film.tilt, load)
+    lever, arm = film.pivot_radius, hold.arm / film.pivot_radius
+    turning = kbb + arm * kab + hold.stiffness / lever**2
+    return bool(turning * (1.0 + give * kaa) > give * (kba + arm * kaa) * kab)
 
 
 def leave_unstable(setup: Setup, films: list[PadFilm], position: FloatArray) -> bool:

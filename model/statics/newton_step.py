@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from model.compilation import compiled
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
+from model.statics.tilt_hold import tilt_hold
 
 FloatArray = NDArray[np.float64]
 
@@ -30,19 +31,30 @@ def newton_step(setup: Setup, load: FloatArray, films: list[PadFilm]) -> tuple[f
         row[0:4] = *film.normal, *film.tangent
         row[4:10] = *forces.force, *forces.stiffness.ravel()
         row[10] = film.pivot_radius
-        row[11] = setup.rotational_stiffness / film.pivot_radius
-        row[12] = film.tilt
+        hold = tilt_hold(setup, film.tilt, radial)
+        row[11] = hold.stiffness / film.pivot_radius
+        row[12] = hold.moment / film.pivot_radius
         row[13] = law.deflection(max(radial, 0.0)) - film.deflection
         row[14] = 1.0 / law.stiffness(max(radial, 1e-6))
+        row[15] = hold.arm / film.pivot_radius
     residual, shift, moves = eliminate(load, pads)
+    if setup.friction:
+        _stop_where_friction_turns(carrying, moves)
     every = np.zeros((len(films), 2))
     every[[f.number - 1 for f in carrying]] = moves
     return residual, shift, every
 
 
-#: What `eliminate` is told per pad: normal, tangent, force, stiffness, R_P, k_theta / R_P, tilt, missing give,
-#: pivot compliance.
-_COLUMNS = 15
+def _stop_where_friction_turns(carrying: list[PadFilm], moves: FloatArray) -> None:
+    """Let no pad tilt past the untilted attitude in one step: the friction turns round there."""
+    for film, move in zip(carrying, moves, strict=True):
+        if film.tilt * (film.tilt + move[0]) < 0.0:
+            move[0] = -film.tilt
+
+
+#: What `eliminate` is told per pad: normal, tangent, force, stiffness, R_P, k_theta / R_P, moment that holds the tilt
+#: back over R_P, missing give, pivot compliance, slope of that moment by the pad's load over R_P.
+_COLUMNS = 16
 
 
 @compiled
@@ -53,7 +65,7 @@ def eliminate(load: FloatArray, pads: FloatArray) -> tuple[float, FloatArray, Fl
     ----------
     load : (2,) ndarray
         [N]
-    pads : (n, 15) ndarray
+    pads : (n, 16) ndarray
         One row per pad that carries, see `_COLUMNS`.
 
     Returns
@@ -76,10 +88,12 @@ def eliminate(load: FloatArray, pads: FloatArray) -> tuple[float, FloatArray, Fl
         nx, ny, tx, ty = pads[m, 0], pads[m, 1], pads[m, 2], pads[m, 3]
         radial, tangential = pads[m, 4], pads[m, 5]
         kaa, kab, kba, kbb = pads[m, 6], pads[m, 7], pads[m, 8], pads[m, 9]
-        arm, hold, tilt, missing, compliance = pads[m, 10], pads[m, 11], pads[m, 12], pads[m, 13], pads[m, 14]
-        moment = tangential + hold * tilt
+        arm, hold, held, missing, compliance = pads[m, 10], pads[m, 11], pads[m, 12], pads[m, 13], pads[m, 14]
+        moment = tangential + held
+        # slopes of the moment by (a, b): the film's own, and what holds the tilt back grows with the load
+        kma, kmb = kba + pads[m, 15] * kaa, kbb + pads[m, 15] * kab
         # d(a, b) = (n . dX - deta, t . dX + R_P dt); rows: tilting force, pivot
-        m11, m12 = kbb * arm + hold, -kba
+        m11, m12 = kmb * arm + hold, -kma
         m21, m22 = -compliance * kab * arm, 1.0 + compliance * kaa
         det = m11 * m22 - m12 * m21
         for axis in range(3):  # right-hand sides: constant, dx, dy
@@ -88,7 +102,7 @@ def eliminate(load: FloatArray, pads: FloatArray) -> tuple[float, FloatArray, Fl
             else:
                 da = nx if axis == 1 else ny
                 db = tx if axis == 1 else ty
-                r1, r2 = -(kba * da + kbb * db), compliance * (kaa * da + kab * db)
+                r1, r2 = -(kma * da + kmb * db), compliance * (kaa * da + kab * db)
             dt, deta = (r1 * m22 - m12 * r2) / det, (m11 * r2 - m21 * r1) / det
             if axis == 0:
                 constant[m, 0], constant[m, 1] = dt, deta

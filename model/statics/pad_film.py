@@ -57,6 +57,8 @@ class PadFilm:
         How the pad gives way; None for a rigid one.
     step : BendingStep or None
         Its part of the present Newton step.
+    kept : float
+        Share of the dissipation that stays in the film.
     solver : callable
         Solves the film's pressure, with or without its mass conserved.
     """
@@ -83,6 +85,7 @@ class PadFilm:
     flips: int = 0
     held: int = 0
     temperature_change: float = field(default=math.inf)
+    kept: float = 1.0
     solver: FilmSolver = solve_film
 
     @property
@@ -116,9 +119,10 @@ class PadFilm:
             See `model.film.energy.solve_energy`.
         """
         assert self.forces is not None
+        # what a share of the heat does to the oil, all of it does to oil that takes up more per kelvin
         change, limited, radial, tangential = heat_step(
-            self.grid, self.work, surface_speed, oil_constants(oil), (oil.specific_heat, oil.conductivity),
-            (self.inlet, *limits), self.warming,
+            self.grid, self.work, surface_speed, oil_constants(oil),
+            (oil.specific_heat / self.kept, oil.conductivity / self.kept), (self.inlet, *limits), self.warming,
         )  # fmt: skip
         self.temperature_change = change
         self.foreseen = self.forces._replace(force=self.forces.force + np.array([radial, tangential]))
@@ -167,6 +171,7 @@ def pad_films(setup: Setup) -> list[PadFilm]:
                 bent=np.zeros_like(work.extra),
                 warming=np.zeros_like(work.unknown),
                 give=pad_give(pad, bearing, grid) if setup.flexible_pads or setup.options.conduction else None,
+                kept=1.0 - setup.heat_loss,
                 solver=solver,
             )
         )

@@ -100,7 +100,7 @@ def _effect(rng: random.Random, pads: int) -> Effect:
     """One effect of the library, its parameters within their bounds or far beyond."""
     kind = rng.choice([known_effects()[name] for name in sorted(known_effects())])
     values = {}
-    for p in kind.parameters:
+    for p in kind.parameters_of(pads):
         low, high = max(p.low, -1e12), min(p.high, 1e12)
         inside = low + rng.random() ** 3 * (high - low)
         values[p.name] = float(rng.randint(1, pads)) if p.unit == "pad" else wild(rng, inside, rng.choice((0, 0, 1)))

@@ -118,11 +118,13 @@ class _World:
         load = point.static_load * np.array(
             [math.cos(point.static_load_direction), math.sin(point.static_load_direction)]
         )
-        return self._at(point).bearing_position + self.setup.series_compliance * load
+        return self._at(point).bearing_position + self.setup.structure @ load
 
     def temperature(self, point: OperatingPoint) -> FloatArray:
         return self._at(point).pad_temperature(SENSOR_POSITION)
 
     def pivot_deflection(self, pad: int, load: Any) -> FloatArray:
-        law = self.setup.pivots[pad - 1]
-        return np.array([law.deflection(float(w)) for w in load]) + self.setup.series_compliance * np.asarray(load)
+        law, angle = self.setup.pivots[pad - 1], self.setup.bearing.pads[pad - 1].pivot_angle
+        towards = np.array([math.cos(angle), math.sin(angle)])
+        structure = float(towards @ self.setup.structure @ towards)
+        return np.array([law.deflection(float(w)) for w in load]) + structure * np.asarray(load)

@@ -71,7 +71,7 @@ def candidates(bearing: Bearing, skip: frozenset[str] = frozenset()) -> tuple[Ca
     """
     out: list[Candidate] = []
     for kind in known_effects().values():
-        if kind.name in skip:
+        if kind.name in skip or kind.missing(bearing):
             continue
         free = [p for p in kind.parameters if p.neutral == p.neutral]
         choices: list[dict[str, float]] = [{}]
@@ -80,6 +80,8 @@ def candidates(bearing: Bearing, skip: frozenset[str] = frozenset()) -> tuple[Ca
                 continue
             options = range(1, len(bearing.pads) + 1) if parameter.discrete else parameter.options
             choices = [{**c, parameter.name: v} for c in choices for v in options]
+        if not free:  # one number per pad: no single amplitude
+            continue
         # one amplitude per candidate: further continuous parameters stay neutral
         rest = {p.name: p.neutral for p in free[1:]}
         out += [Candidate(kind.name, free[0], {**c, **rest}, kind.side) for c in choices]

@@ -54,7 +54,7 @@ class Solved:
         instruments = setup.instruments
         return Reading(
             instruments.shown_stiffness(self.h, np.array(lines)),
-            instruments.shown_position(self.position + setup.series_compliance * self.force),
+            instruments.shown_position(self.position + setup.structure @ self.force),
             instruments.shown_load(self.force), self.temperature, self.pad_load,
         )  # fmt: skip
 

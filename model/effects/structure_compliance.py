@@ -1,0 +1,29 @@
+"""`structure_compliance`: the structure gives way in one direction, a compliant cap or a soft foot."""
+
+from __future__ import annotations
+
+import math
+
+from model.effects.kind import EffectKind, Parameter
+from model.effects.series import add_compliance
+from model.setup import Setup
+
+
+def apply(setup: Setup, stiffness: float, direction: float) -> Setup:
+    """A spring along `direction` alone in series with the bearing: inv(H_meas) = inv(H) + e e^T / stiffness."""
+    x, y = math.cos(direction), math.sin(direction)
+    return add_compliance(setup, x * x / stiffness, x * y / stiffness, y * y / stiffness)
+
+
+KIND = EffectKind(
+    name="structure_compliance",
+    side="structure",
+    parameters=(
+        Parameter("stiffness", "N/m", "stiffness", math.inf, 50000000.0, math.inf, 2e9, "inverse"),
+        Parameter(
+            "direction", "rad", "angle", math.nan, -7.0, 7.0, options=(0.0, math.pi / 4, math.pi / 2, 3 * math.pi / 4)
+        ),
+    ),
+    apply=apply,
+    source="A cap or a foot is as stiff as a rig housing, in one direction: 1e9 to 5e9 N/m",
+)

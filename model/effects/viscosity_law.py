@@ -1,0 +1,27 @@
+"""`viscosity_law`: the oil thins faster or slower with temperature than stated."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from model.effects.kind import EffectKind, Parameter
+from model.setup import Setup
+
+
+def apply(setup: Setup, factor: float) -> Setup:
+    """The exponent kappa of mu(T) times factor; mu at the stated supply temperature stays."""
+    oil = setup.bearing.oil
+    exponent = oil.viscosity_exponent * factor
+    kept = oil.viscosity_40 * math.exp((oil.viscosity_exponent - exponent) * (40.0 - oil.supply_temperature))
+    changed = replace(oil, viscosity_40=kept, viscosity_exponent=exponent)
+    return setup.change(bearing=replace(setup.bearing, oil=changed))
+
+
+KIND = EffectKind(
+    name="viscosity_law",
+    side="bearing",
+    parameters=(Parameter("factor", "1", "ratio", 1.0, 0.2, 3.0, 0.1),),
+    apply=apply,
+    source="An exponential through two points of a data sheet: 5 to 15 % by the points chosen and the viscosity index",
+)

@@ -1,0 +1,255 @@
+"""Structure, uneven pads, oil law, heat paths and pivots that roll or slide: each against an exact limit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
+from model.dynamics.pivot_friction import describing, friction_impedance
+from model.dynamics.reduction import bearing_impedance
+from model.effects import Effect, EffectError, apply_effects, known_effects
+from model.frequency_model import full_set
+from model.options import Options
+from model.pivots import MeasuredPivot, pivot_laws
+from model.predict import Prediction, predict, predict_setup
+from model.setup import Setup
+from model.static_tests import corner_positions, dry_curve, polygon_sides
+from model.statics.tilt_hold import friction_limits, rolling_radius, tilt_hold
+
+SPEED, OMEGA, LOAD, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, 5000.0, -math.pi / 2
+
+
+@pytest.fixture(scope="module")
+def rocker(rocker_file) -> Bearing:
+    return load_bearing(rocker_file)
+
+
+@pytest.fixture(scope="module")
+def spherical(rocker_file) -> Bearing:
+    return load_bearing(rocker_file.with_name("spherical.toml"))
+
+
+def run(bearing: Bearing, *effects: Effect, thermal: str = "adiabatic", load: float = LOAD) -> Prediction:
+    p = predict(bearing, load, DOWN, SPEED, OMEGA, thermal=thermal, effects=effects)
+    assert p.converged
+    return p
+
+
+def offsets(*values: float) -> Effect:
+    return Effect("uneven_pads", **{f"offset_{k}": v for k, v in enumerate(values, start=1)})
+
+
+def test_structure_compliance_is_a_spring_in_one_direction(rocker):
+    base = run(rocker)
+    e = np.array([math.cos(0.6), math.sin(0.6)])
+    p = run(rocker, Effect("structure_compliance", stiffness=1.5e9, direction=0.6))
+    series = np.linalg.inv(base.h) + np.outer(e, e) / 1.5e9
+    np.testing.assert_allclose(np.linalg.inv(p.h), series, rtol=1e-9, atol=1e-18)
+    np.testing.assert_allclose(p.position - base.position, np.outer(e, e) @ [0.0, -LOAD / 1.5e9], atol=1e-14)
+    # a direction and its opposite are one, two at right angles the spring of housing_flexibility
+    back = run(rocker, Effect("structure_compliance", stiffness=1.5e9, direction=0.6 - math.pi))
+    np.testing.assert_allclose(back.h, p.h, rtol=1e-10)
+    both = [Effect("structure_compliance", stiffness=2e9, direction=0.3 + turn) for turn in (0.0, math.pi / 2)]
+    housing = run(rocker, Effect("housing_flexibility", stiffness=2e9))
+    np.testing.assert_allclose(run(rocker, *both).h, housing.h, rtol=1e-9, atol=1.0)
+    # with every pad's motion as coordinates it is the same bearing
+    np.testing.assert_allclose(full_set(p).reduce(1j * OMEGA), p.h, rtol=1e-9, atol=1.0)
+    assert full_set(p).names[2] == "structure"
+
+
+def test_structure_compliance_gives_in_dry_tests_and_clearance_too(rocker):
+    plain = Setup(rocker, pivot_laws("kirk", rocker))
+    soft = apply_effects(plain, [Effect("structure_compliance", stiffness=1e9, direction=-math.pi / 2)])
+    load = np.linspace(100.0, 5000.0, 7)
+    for pad, along in ((1, 1.0), (2, math.sin(math.radians(18.0)) ** 2)):
+        more = dry_curve(soft, pad, load).deflection - dry_curve(plain, pad, load).deflection
+        np.testing.assert_allclose(more, along * load / 1e9, rtol=1e-9)
+    sides = polygon_sides(soft, 2000.0).pushed - polygon_sides(plain, 2000.0).pushed
+    normals = np.array([[math.cos(p.pivot_angle), math.sin(p.pivot_angle)] for p in rocker.pads])
+    np.testing.assert_allclose(sides, normals[:, 1] ** 2 * 2000.0 / 1e9, atol=1e-15)
+    corners = corner_positions(soft, 2000.0) - corner_positions(plain, 2000.0)
+    np.testing.assert_allclose(corners[:, 0], 0.0, atol=1e-15)
+    assert np.abs(corners[:, 1]).max() == pytest.approx(2e-6, rel=1e-6)
+
+
+def test_parts_of_the_structure_are_taken_off_a_measured_curve_one_by_one(rocker):
+    load = np.linspace(0.0, 8000.0, 30)
+    pivot = 4e-6 * (load / 4000.0) ** 0.8
+    measured = MeasuredPivot(load, pivot + load / 2e9 + load / 4e9)
+    parts = [
+        Effect("housing_flexibility", stiffness=2e9),
+        Effect("structure_compliance", stiffness=4e9, direction=math.pi / 2),
+    ]
+    setup = apply_effects(Setup(rocker, (measured,) * 5), parts)
+    np.testing.assert_allclose(setup.pivots[0].deflection_points, pivot, atol=1e-15)
+    np.testing.assert_allclose(dry_curve(setup, 1, load[5:]).deflection, measured.deflection_points[5:], rtol=1e-9)
+
+
+def test_uneven_pads_know_no_rigid_shift(rocker):
+    base = run(rocker)
+    normals = np.array([[math.cos(p.pivot_angle), math.sin(p.pivot_angle)] for p in rocker.pads])
+    shifted = run(rocker, offsets(*(normals @ [6e-6, -9e-6])))
+    np.testing.assert_allclose(shifted.h, base.h, rtol=1e-7, atol=10.0)
+    np.testing.assert_allclose(shifted.position, base.position, atol=1e-12)
+    scatter = np.array([3e-6, -2e-6, 1e-6, 0.0, -4e-6])
+    one, two = run(rocker, offsets(*scatter)), run(rocker, offsets(*(scatter + normals @ [5e-6, 2e-6])))
+    np.testing.assert_allclose(one.h, two.h, rtol=1e-7, atol=10.0)
+    # all alike it is another Cb
+    wider = rocker.with_pads(tuple(replace(p, assembled_clearance=p.assembled_clearance + 4e-6) for p in rocker.pads))
+    np.testing.assert_allclose(run(rocker, offsets(*[4e-6] * 5)).h, run(wider).h, rtol=1e-9, atol=1.0)
+    # ... and one pad alone is pad_offset, seen from where the shift puts the bearing centre
+    alone = run(rocker, Effect("pad_offset", pad=2, radial_offset=5e-6))
+    np.testing.assert_allclose(run(rocker, offsets(0.0, 5e-6, 0.0, 0.0, 0.0)).h, alone.h, rtol=1e-6, atol=50.0)
+
+
+def test_uneven_pads_take_one_number_per_pad(rocker):
+    kind = known_effects()["uneven_pads"]
+    assert [p.name for p in kind.parameters_of(3)] == ["offset_1", "offset_2", "offset_3"]
+    with pytest.raises(EffectError, match=r"the bearing has 5 pads; give offset_1, .*offset_5"):
+        run(rocker, offsets(1e-6, 2e-6, 3e-6))
+    with pytest.raises(EffectError, match="offset_2"):
+        Effect("uneven_pads", offset_1=0.0, offset_3=0.0)
+
+
+def test_viscosity_law_turns_about_the_supply_temperature(rocker):
+    setup = Setup(replace(rocker, oil=replace(rocker.oil, supply_temperature=47.0)), pivot_laws("kirk", rocker))
+    oil = apply_effects(setup, [Effect("viscosity_law", factor=1.25)]).bearing.oil
+    assert oil.viscosity(47.0) == pytest.approx(setup.bearing.oil.viscosity(47.0), rel=1e-12)
+    ratio = oil.viscosity(57.0) / oil.viscosity(47.0)
+    assert ratio == pytest.approx(math.exp(-12.5 * rocker.oil.viscosity_exponent), rel=1e-12)
+    law = Effect("viscosity_law", factor=1.25)
+    cold = [run(rocker, *effects, thermal="isothermal") for effects in ((), (law,))]
+    np.testing.assert_allclose(cold[0].h, cold[1].h, rtol=1e-9)
+
+
+def test_heat_that_is_lost_is_oil_that_takes_up_more(rocker):
+    share = 0.3
+    lost = run(rocker, Effect("heat_loss", share=share))
+    oil = rocker.oil
+    roomy = replace(oil, specific_heat=oil.specific_heat / (1 - share), conductivity=oil.conductivity / (1 - share))
+    np.testing.assert_allclose(lost.h, run(replace(rocker, oil=roomy)).h, rtol=1e-9, atol=1.0)
+    # twice a loss is what is left of what is left; through the coupled heat paths it is the same
+    twice = run(rocker, *[Effect("heat_loss", share=1 - math.sqrt(1 - share))] * 2)
+    np.testing.assert_allclose(twice.h, lost.h, rtol=1e-9, atol=1.0)
+    most = run(rocker, Effect("heat_loss", share=0.95))
+    cold = run(rocker, thermal="isothermal")
+    assert most.max_temperature - 40.0 == pytest.approx(0.05 * (run(rocker).max_temperature - 40.0), rel=0.3)
+    np.testing.assert_allclose(most.h, cold.h, rtol=0.02, atol=1e6)
+
+
+def test_heat_loss_acts_through_the_coupled_paths_alike(rocker):
+    effects = [Effect("heat_loss", share=0.25)]
+    plain = run(rocker, *effects)
+    setup = apply_effects(Setup(rocker, pivot_laws("kirk", rocker)), effects).change(carryover=1e-12)
+    coupled = predict_setup(setup, LOAD, DOWN, SPEED, OMEGA)
+    np.testing.assert_allclose(coupled.h, plain.h, rtol=1e-6, atol=10.0)
+
+
+@pytest.mark.slow
+def test_pad_conduction_is_the_heat_paths_that_are_there(rocker):
+    p = run(rocker, Effect("pad_conduction", back_convection=80.0))
+    pads = tuple(replace(pad, back_convection=80.0) for pad in rocker.pads)
+    options = Options(conduction=True, isothermal_journal=True)
+    same = predict(rocker.with_pads(pads), LOAD, DOWN, SPEED, OMEGA, options=options)
+    np.testing.assert_allclose(p.h, same.h, rtol=1e-10)
+    assert p.max_temperature < run(rocker).max_temperature - 1.0
+
+
+def test_rolling_radii_of_the_drawings(rocker, spherical):
+    assert rolling_radius(rocker.pivot) == pytest.approx(0.64, abs=0.005)
+    assert rolling_radius(spherical.pivot) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("name", ["rocker", "spherical"])
+def test_a_rolling_pivot_holds_the_pad_in_proportion_to_its_load(name, request):
+    bearing = request.getfixturevalue(name)
+    p = run(bearing, Effect("pivot_rolling", factor=1.0))
+    reach = rolling_radius(bearing.pivot)
+    for film in p.equilibrium.films:
+        moment = film.forces.force[1] * bearing.pivot_radius(film.pad)
+        assert moment == pytest.approx(-reach * film.forces.force[0] * film.tilt, abs=2e-3)
+    for pad, load in zip(p.pad_matrices, p.pad_load, strict=True):
+        assert pad.pad_stiffness[0, 0] == pytest.approx(reach * load, rel=1e-9)
+
+
+def test_the_slope_of_the_locus_is_the_stiffness_with_rolling_pivots(rocker):
+    # isothermal film and tangent pivots: at zero frequency h is the derivative of the static solution
+    roll = [Effect("pivot_rolling", factor=2.0)]
+    laws = pivot_laws("kirk", rocker)
+    setup = apply_effects(Setup(rocker, laws, "isothermal"), roll).change(accuracy=1e-11)
+    points = [predict_setup(setup, load, DOWN, SPEED, OMEGA) for load in (5000.0, 4990.0, 5010.0)]
+    slope = (points[2].position - points[1].position) / 20.0
+    slow = bearing_impedance(setup, points[0].equilibrium, np.array([1e-6]))[0].real
+    np.testing.assert_allclose(slow @ slope, [0.0, -1.0], atol=5e-3)
+
+
+def test_pivots_without_radii_or_spheres_are_refused(rocker, spherical):
+    rigid = replace(rocker, pivot=replace(rocker.pivot, kind="rigid"))
+    with pytest.raises(EffectError, match="no radii to roll on"):
+        run(rigid, Effect("pivot_rolling", factor=1.0))
+    with pytest.raises(EffectError, match="only a spherical pivot slides"):
+        run(rocker, Effect("pivot_friction", coefficient=0.1))
+
+
+@pytest.mark.parametrize("coefficient", [0.002, 0.02, 0.1, 0.3])
+def test_friction_holds_a_pad_up_to_its_limit(spherical, coefficient):
+    p = run(spherical, Effect("pivot_friction", coefficient=coefficient))
+    for film in p.equilibrium.films:
+        load = float(film.forces.force[0])
+        limit = coefficient * load * 0.2
+        moment = film.forces.force[1] * spherical.pivot_radius(film.pad)
+        hold = tilt_hold(p.setup, film.tilt, load)
+        assert abs(moment) <= limit * 1.001 + 1e-2
+        assert moment == pytest.approx(-hold.moment, abs=2e-2)
+    named = " ".join(p.status)
+    assert "pivot friction holds" in named or "loose" in named
+
+
+def test_friction_that_is_broken_loose_leaves_a_free_pad(spherical):
+    free = run(spherical)
+    setup = apply_effects(Setup(spherical, pivot_laws("kirk", spherical)), [Effect("pivot_friction", coefficient=1e-4)])
+    far = predict_setup(setup.change(vibration=1e-3), LOAD, DOWN, SPEED, OMEGA)
+    np.testing.assert_allclose(far.h, free.h, rtol=0.02, atol=1e6)
+    assert any("breaks the pivots of pads 1, 2, 3, 4, 5 loose" in name for name in far.status)
+    held = predict_setup(setup.change(vibration=1e-12), LOAD, DOWN, SPEED, OMEGA)
+    assert held.status == ("pivot friction holds pads 1, 2, 3, 4, 5",)
+    # what sticks is a rotational stiffness of the contact, far above that of the film: a pad that does not tilt
+    stick, _ = friction_limits(held.setup, float(held.pad_load[0]))
+    assert stick > 1e7
+    setup = apply_effects(Setup(spherical, pivot_laws("kirk", spherical)), [])
+    fixed = setup.change(rotational_stiffness=stick)
+    h = bearing_impedance(fixed, held.equilibrium, np.array([OMEGA]))[0]
+    np.testing.assert_allclose(h, held.h, rtol=0.03, atol=1e6)
+
+
+def test_describing_function_of_a_sliding_contact():
+    stick, slip = 3e6, 12.0
+    edge = slip / stick
+    assert describing(np.array([0.5 * edge]), stick, slip)[0] == pytest.approx(stick)
+    far = describing(np.array([1e3 * edge]), stick, slip)[0]
+    assert far.imag == pytest.approx(4 * slip / (math.pi * 1e3 * edge), rel=2e-3)  # Coulomb's equivalent damping
+    assert abs(far.real) < 0.05 * abs(far.imag)
+    # the first harmonic of the hysteresis itself, at an amplitude between
+    amplitude = 2.7 * edge
+    t = np.linspace(0.0, 2 * math.pi, 200001)
+    angle, moment = amplitude * np.cos(t), np.empty_like(t)
+    moment[0] = slip
+    for k in range(1, len(t)):
+        moment[k] = min(max(moment[k - 1] + stick * (angle[k] - angle[k - 1]), -slip), slip)
+    harmonic = 2.0 * np.mean((moment * np.exp(-1j * t))[1:]) / amplitude
+    assert describing(np.array([amplitude]), stick, slip)[0] == pytest.approx(harmonic, rel=1e-3)
+
+
+def test_friction_impedance_balances_the_drive():
+    stick, slip = 3e6, 12.0
+    own = np.array([[2e5 + 1e5j, 2e5 + 1e5j]])
+    drive = np.array([[30.0, 1.0]])
+    n = friction_impedance(own, drive, stick, slip)
+    assert n[0, 1] == stick
+    amplitude = drive[0, 0] / abs(own[0, 0] + n[0, 0])
+    assert describing(np.array([amplitude]), stick, slip)[0] == pytest.approx(n[0, 0], rel=1e-6)
