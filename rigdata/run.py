@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +14,8 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import RunReader
 from rigdata.record import Record, VectorRecord
-from rigdata.vector import solve_vector
+from rigdata.rows import FileRows, RowReader
+from rigdata.vector import COLLINEAR_SINE, solve_vector
 
 #: Sample rates beyond these are none [Hz]: times counted from them overflow.
 LEAST_RATE, MOST_RATE = 1e-6, 1e12
@@ -165,7 +167,7 @@ class Run:
             cure = f"Describe two {quantity} channels with different axes in the manifest"
             raise self._error(f"quantity {quantity}", f"has {len(chosen)} channels, two are needed", cure)
         axes = np.array([c.axis for c in chosen])
-        if not np.any(np.abs(np.sin(axes - axes[0])) > 0.05):
+        if not np.any(np.abs(np.sin(axes - axes[0])) > COLLINEAR_SINE):
             cure = "Two channels at different angles (3 deg apart or more) are needed; check their axis"
             raise self._error(f"channels {', '.join(names)}", "all measure along one line", cure)
         first, last = self._slice(start, stop)
@@ -179,6 +181,21 @@ class Run:
             rate=rate,
             names=names,
         )
+
+    def row_reader(self, quantities: Sequence[str]) -> RowReader:
+        """Reader of several quantities, all their channels in one request per stretch.
+
+        Parameters
+        ----------
+        quantities : sequence of str
+            As of `vector`.
+        """
+        return FileRows(self, quantities)
+
+    def kept_open(self) -> AbstractContextManager[None]:
+        """Keep the file open while the block runs, where its reader can do that; nested blocks share it."""
+        opener = getattr(self.reader, "kept_open", None)
+        return nullcontext() if opener is None else opener()
 
     def temperatures(self) -> tuple[Temperature, ...]:
         """Where the temperature channels of this run sit, by pad and position."""

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import functools
+import math
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
 
-#: Below this smallest singular value two directions count as one (about 3 deg apart).
-_COLLINEAR = 0.035
+#: Two directions whose sine is not above this (3 deg) count as one.
+COLLINEAR_SINE = 0.05
+#: The same limit as the smallest singular value of two directions, sqrt(1 - cos).
+_LEAST_SINGULAR = math.sqrt(1.0 - math.sqrt(1.0 - COLLINEAR_SINE**2))
 
 
 @functools.lru_cache(maxsize=256)
 def inverse_directions(axes: tuple[float, ...]) -> FloatArray:
     """(2, m) matrix from components along `axes` [rad] to X and Y; NaN where they span no plane."""
     directions = np.stack([np.cos(axes), np.sin(axes)], axis=1)
-    if len(axes) < 2 or np.linalg.svd(directions, compute_uv=False)[-1] < _COLLINEAR:
+    if len(axes) < 2 or np.linalg.svd(directions, compute_uv=False)[-1] <= _LEAST_SINGULAR:
         return np.full((2, len(axes)), np.nan)
     inverse = np.linalg.pinv(directions)
     inverse.setflags(write=False)

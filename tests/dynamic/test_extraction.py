@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ import pytest
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
+from rigdata.rows import VectorRows
 from rigdata.run import Run
 from tpjb_ident.dynamic.records import extraction
 from tpjb_ident.dynamic.records.extraction import MAX_JITTER, extract
@@ -146,6 +148,12 @@ class Held:
             wave = np.outer(np.exp(2j * math.pi * DRIVEN * own), z).real
             wave += np.outer(shaft, RUNOUT).real * (quantity == "displacement")
             self.data[quantity] = wave + (1e-4 if quantity == "displacement" else 700.0)
+
+    def row_reader(self, quantities):
+        return VectorRows(self, quantities)
+
+    def kept_open(self):
+        return nullcontext()
 
     def vector(self, quantity, start=None, stop=None):
         return SimpleNamespace(values=self.data[quantity][start:stop], time=self.stamps[start:stop])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
+from rigdata.rows import VectorRows
 from rigdata.virtual_rig import Fault, Noise, RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
 from tests.studies.bench_phasors import HeldRun
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
@@ -152,6 +153,9 @@ def _with_offset(campaign, run_id: str, begin: float, end: float):
     """The campaign with a false 30 Hz line in one run's displacements for a while (too regular for a glitch)."""
 
     class Spoiled(type(campaign.run(run_id))):
+        def row_reader(self, quantities):
+            return VectorRows(self, quantities)
+
         def vector(self, quantity, start=None, stop=None):
             record = super().vector(quantity, start, stop)
             if quantity != "displacement":

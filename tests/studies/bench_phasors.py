@@ -14,7 +14,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,6 +24,7 @@ import numpy as np
 from rigdata.campaign import load_campaign
 from rigdata.operating_point import OperatingPoint
 from rigdata.record import Record, VectorRecord
+from rigdata.rows import RowReader, VectorRows
 from tests.studies.bench_phasors_data import write_csv, write_hdf5
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.dynamic.runs.run_jobs import all_runs
@@ -62,6 +64,12 @@ class HeldRun:
         part = slice(start, stop)
         return VectorRecord(quantity, self.data[quantity][part], self.time[part], self.sample_rate, ("A", "B"))
 
+    def row_reader(self, quantities: Sequence[str]) -> RowReader:
+        return VectorRows(self, quantities)
+
+    def kept_open(self) -> AbstractContextManager[None]:
+        return nullcontext()
+
     def speed(self, start: int | None = None, stop: int | None = None) -> Record:
         part = self.time[start:stop]
         return Record("K1", "speed", np.full(len(part), 2 * np.pi * 22.0), part, self.sample_rate)
@@ -70,6 +78,7 @@ class HeldRun:
 @dataclass
 class _Channel:
     quantity: str
+    axis: float | None = None
 
 
 def best(work: Callable[[], object], clock: Callable[[], float], times: int = 3) -> float:

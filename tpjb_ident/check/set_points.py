@@ -14,6 +14,7 @@ from rigdata.vector import inverse_directions
 from tpjb_ident.arrays import ComplexArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.wiring import guess_wiring, repairs
+from tpjb_ident.dynamic.records.oil_force import oil_force as film_force
 
 _ANGLE_WARNING, _ANGLE_ERROR = 10.0, 30.0
 _SPEED_STILL = 2 * math.pi * 0.5
@@ -110,8 +111,9 @@ def oil_force(seen: Observation, mass: float) -> ComplexArray | None:
     if force is None:
         return None
     acceleration = plane_vector(seen, "acceleration", seen.lines.phasor)
-    total = force if acceleration is None or math.isnan(mass) else force + mass * acceleration
-    return np.asarray(total, dtype=np.complex128)
+    if math.isnan(mass):  # not stated: the housing's inertia stays in the force
+        acceleration, mass = None, 0.0
+    return film_force(force, acceleration, mass)
 
 
 def excited(seen: Observation) -> bool:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
 
+from rigdata.campaign import Campaign
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change, gain_draws
@@ -71,7 +71,7 @@ class IdentifySettings:
 
 
 def identify(
-    campaign: Any,
+    campaign: Campaign,
     settings: IdentifySettings | None = None,
     progress: Progress | None = None,
     workers: Workers | None = None,
@@ -81,7 +81,7 @@ def identify(
 
     Parameters
     ----------
-    campaign : rigdata.campaign.Campaign
+    campaign : Campaign
     settings : IdentifySettings, optional
     progress : callable, optional
         Called as progress(text, done, total).
@@ -112,7 +112,7 @@ def identify(
         return assemble(campaign, shelf, settings, tell)
 
 
-def assemble(campaign: Any, shelf: RunShelf, settings: IdentifySettings, tell: Progress) -> Identification:
+def assemble(campaign: Campaign, shelf: RunShelf, settings: IdentifySettings, tell: Progress) -> Identification:
     """Estimate all points from runs already turned to phasors, one point's windows in memory at a time."""
     draws = gain_draws(campaign.channels, settings.n_calibration, settings.seed)
     sources, digests = point_sources(shelf), shelf.digests

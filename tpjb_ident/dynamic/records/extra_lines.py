@@ -7,13 +7,12 @@ gives its own line, the others are fitted beside it.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from scipy.ndimage import median_filter
 
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.records.measured_run import MeasuredRun
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.records.windows import line_design
 
@@ -30,12 +29,12 @@ MAX_LINES = 10
 LOBE = 4.0
 
 
-def unexpected_lines(run: Any, result: RunPhasors) -> tuple[tuple[float, ...], tuple[Condition, ...]]:
+def unexpected_lines(run: MeasuredRun, result: RunPhasors) -> tuple[tuple[float, ...], tuple[Condition, ...]]:
     """Frequencies of lines beside the known ones [Hz], and what to say about them.
 
     Parameters
     ----------
-    run : rigdata.campaign.Run
+    run : MeasuredRun
     result : RunPhasors
         First fit, with the known lines.
     """

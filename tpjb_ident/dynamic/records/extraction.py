@@ -5,12 +5,12 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from tpjb_ident.arrays import FloatArray, IntArray
 from tpjb_ident.dynamic.records.lines import LineSet
+from tpjb_ident.dynamic.records.measured_run import MeasuredRun
 from tpjb_ident.dynamic.records.phasors import SCALE_LIMIT, LineFitter, PhasorBlock, fit_uneven, usual_scale
 from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.dynamic.records.shaft_speed import window_speeds
@@ -25,13 +25,13 @@ MAX_JITTER = 0.02
 
 
 def extract(
-    run: Any, housing_mass: float, settings: PhasorSettings, lines: LineSet, follow: FloatArray | None = None
+    run: MeasuredRun, housing_mass: float, settings: PhasorSettings, lines: LineSet, follow: FloatArray | None = None
 ) -> RunPhasors:
     """Fit all windows of a run.
 
     Parameters
     ----------
-    run : rigdata.campaign.Run
+    run : MeasuredRun
     housing_mass : float
         [kg]
     settings : PhasorSettings

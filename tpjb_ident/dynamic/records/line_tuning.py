@@ -7,13 +7,13 @@ advance from window to window tells a frequency error to a fraction of the line'
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.lines import LineSet, known_lines
+from tpjb_ident.dynamic.records.measured_run import MeasuredRun
 from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
 
 #: Name of the condition that a shaft's changing speed gives rise to.
@@ -109,13 +109,13 @@ def frequency_slip(phasors: ComplexArray, start: FloatArray, noise: float) -> fl
 
 
 def tuned(
-    run: Any, result: RunPhasors, driven: tuple[float, ...], speed: float, settings: PhasorSettings
+    run: MeasuredRun, result: RunPhasors, driven: tuple[float, ...], speed: float, settings: PhasorSettings
 ) -> Tuning | None:
     """Compare a first fit with what it assumed; None where it was good enough.
 
     Parameters
     ----------
-    run : rigdata.campaign.Run
+    run : MeasuredRun
     result : RunPhasors
         The first fit.
     driven : tuple of float

@@ -7,25 +7,25 @@ looked for in its beginning, and small errors of their frequencies put right in 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.records.extra_lines import unexpected_lines
 from tpjb_ident.dynamic.records.extraction import extract
 from tpjb_ident.dynamic.records.line_tuning import DRIFT, retuned, tuned
 from tpjb_ident.dynamic.records.lines import LineSet, known_lines
+from tpjb_ident.dynamic.records.measured_run import MeasuredRun
 from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.dynamic.records.shaft_speed import shaft_speed
 from tpjb_ident.dynamic.records.short_record import SHORT, ShortRecord
 from tpjb_ident.dynamic.records.windows import RecordTooShortError
 
 
-def run_phasors(run: Any, housing_mass: float, settings: PhasorSettings | None = None) -> RunPhasors:
+def run_phasors(run: MeasuredRun, housing_mass: float, settings: PhasorSettings | None = None) -> RunPhasors:
     """Extract the phasors of one run.
 
     Parameters
     ----------
-    run : rigdata.campaign.Run
+    run : MeasuredRun
     housing_mass : float
         [kg]
     settings : PhasorSettings, optional
@@ -55,7 +55,7 @@ def run_phasors(run: Any, housing_mass: float, settings: PhasorSettings | None =
 
 
 def _known_from_the_beginning(
-    run: Any, housing_mass: float, settings: PhasorSettings
+    run: MeasuredRun, housing_mass: float, settings: PhasorSettings
 ) -> tuple[LineSet, tuple[Condition, ...]]:
     """Lines of a long run as its first samples show them, so that reading all of it once is enough."""
     first = _looked_at(ShortRecord(run, SHORT), housing_mass, settings)
@@ -63,7 +63,7 @@ def _known_from_the_beginning(
     return first.lines, own
 
 
-def _looked_at(run: Any, housing_mass: float, settings: PhasorSettings) -> RunPhasors:
+def _looked_at(run: MeasuredRun, housing_mass: float, settings: PhasorSettings) -> RunPhasors:
     """Fit, look for lines that nobody mentioned and for wrong frequencies, fit again where there are any."""
     speed, conditions = shaft_speed(run)
     driven = settings.excitation_lines or (run.point.excitation_hz,)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.records.measured_run import MeasuredRun
 
 #: Samples from which the speed of the run is taken.
 FIRST_LOOK = 2**17
@@ -15,7 +14,7 @@ FIRST_LOOK = 2**17
 MAX_DEPARTURE = 0.05
 
 
-def shaft_speed(run: Any) -> tuple[float, tuple[Condition, ...]]:
+def shaft_speed(run: MeasuredRun) -> tuple[float, tuple[Condition, ...]]:
     """Shaft speed of a run [Hz]: the tachometer's, or the set point where it gives nothing usable."""
     nominal = run.point.shaft_speed_hz
     record = run.speed(0, FIRST_LOOK)

@@ -1,141 +1,26 @@
-"""A run's samples stretch by stretch: all its channels read together, calibrated and turned into X and Y rows.
-
-`rigdata.run.Run.vector` does the same for one quantity at a time, with time stamps for each; over a long record
-that is most of the work. Here one request reads all channels, and calibration and axes are one 2x2 product. Where
-that does not apply (missing values, three probes, a run held in memory), the run's own `vector` is asked.
-"""
+"""A run opened for many requests, stretch by stretch; reading itself is `rigdata.rows`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
-from typing import Any
+from contextlib import contextmanager
 
-import numpy as np
-
-from rigdata.run import Run
-from rigdata.vector import inverse_directions
-from tpjb_ident.arrays import FloatArray
-
-#: Readings of this size are written for an overflow (see `rigdata.calibration.Channel.to_si`).
-OVERFLOW = 1e30
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """Consecutive samples of a run.
-
-    Attributes
-    ----------
-    rows : dict of str to (2, n) ndarray
-        X and Y by quantity, SI; NaN where missing.
-    time : (n,) ndarray or None
-        Seconds; None where they are counted from the rate.
-    speed : (n,) ndarray or None
-        Shaft speed by the tachometer [rad/s].
-    """
-
-    rows: dict[str, FloatArray]
-    time: FloatArray | None
-    speed: FloatArray | None
-
-
-@dataclass(frozen=True)
-class _Plan:
-    """How a quantity's two channels become rows: ``matrix @ readings + shift``."""
-
-    names: tuple[str, ...]
-    matrix: FloatArray
-    shift: FloatArray
-
-
-class Stretches:
-    """Reader of stretches; made by `open_stretches`.
-
-    Parameters
-    ----------
-    run : rigdata.campaign.Run
-        Or what stands for one.
-    quantities : sequence of str
-        With X and Y.
-    """
-
-    def __init__(self, run: Any, quantities: Sequence[str]) -> None:
-        self._run, self._quantities = run, quantities
-        self._reader = run.reader if type(run) is Run else None  # what only looks like one may do more
-        self._plans = {q: _plan(run, q) for q in quantities} if self._reader is not None else {}
-        self._tach = [c for c in run.channels.values() if c.quantity == "speed"][:1] if self._reader is not None else []
-        counted = getattr(self._reader, "counted", None)
-        self._counted = counted is not None and counted()
-
-    def read(self, start: int, stop: int) -> Stretch:
-        """Samples start..stop-1."""
-        if self._reader is None:
-            return self._asked(start, stop)
-        planned = [plan for plan in self._plans.values() if plan is not None]
-        names = [name for plan in planned for name in plan.names] + [c.name for c in self._tach]
-        readings = dict(zip(names, self._reader.read(names, start, stop))) if names else {}
-        rows = {}
-        for quantity, plan in self._plans.items():
-            own = None if plan is None else _rows(plan, readings)
-            rows[quantity] = own if own is not None else _turned(self._run.vector(quantity, start, stop).values)
-        time = None if self._counted else self._reader.time(start, stop)
-        speed = self._tach[0].to_si(readings[self._tach[0].name]) if self._tach else None
-        return Stretch(rows, time, speed)
-
-    def _asked(self, start: int, stop: int) -> Stretch:
-        records = {q: self._run.vector(q, start, stop) for q in self._quantities}
-        speed = self._run.speed(start, stop)
-        time = next(iter(records.values())).time
-        rows = {q: _turned(record.values) for q, record in records.items()}
-        return Stretch(rows, time, None if speed is None else speed.values)
-
-
-def kept_open(run: Any) -> AbstractContextManager[None]:
-    """Keep a run's file open while the block runs, where its reader can do that; nested blocks share it."""
-    reader: Any = getattr(run, "reader", None)
-    return reader.kept_open() if hasattr(reader, "kept_open") else nullcontext()
+from rigdata.rows import RowReader as Stretches
+from tpjb_ident.dynamic.records.measured_run import MeasuredRun
 
 
 @contextmanager
-def open_stretches(run: Any, quantities: Sequence[str]) -> Iterator[Stretches]:
-    """Open a run for many requests."""
-    with kept_open(run):
-        yield Stretches(run, quantities)
+def open_stretches(run: MeasuredRun, quantities: Sequence[str]) -> Iterator[Stretches]:
+    """Open a run for many requests.
+
+    Parameters
+    ----------
+    run : MeasuredRun
+    quantities : sequence of str
+        With X and Y: ``"displacement"``, ``"force"``, ``"acceleration"``.
+    """
+    with run.kept_open():
+        yield run.row_reader(quantities)
 
 
-def _turned(values: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(values.T)
-
-
-def _plan(run: Any, quantity: str) -> _Plan | None:
-    """Calibration and axes of two channels in one matrix; None where `Run.vector` has more to do, or to refuse."""
-    chosen = [c for c in run.channels.values() if c.quantity == quantity and c.axis is not None]
-    if len(chosen) != 2:
-        return None
-    if abs(np.sin(chosen[0].axis - chosen[1].axis)) <= 0.05:
-        return None
-    inverse = inverse_directions(tuple(c.axis for c in chosen))
-    inverse = np.where(np.abs(inverse) < 1e-12, 0.0, inverse)  # cos 90 deg is not quite zero, but a pass over the data
-    matrix = inverse * np.array([c.slope for c in chosen])
-    return _Plan(tuple(c.name for c in chosen), matrix, inverse @ np.array([c.zero for c in chosen]))
-
-
-def _rows(plan: _Plan, readings: dict[str, FloatArray]) -> FloatArray | None:
-    """X and Y, None where a reading is missing or an overflow."""
-    first, second = (readings[name] for name in plan.names)
-    for values in (first, second):
-        # a NaN makes both comparisons false
-        if len(values) and not (values.max() < OVERFLOW and values.min() > -OVERFLOW):
-            return None
-    rows = np.empty((2, len(first)))
-    for i in range(2):
-        own, other = (first, second) if plan.matrix[i, 0] != 0.0 else (second, first)
-        mine = plan.matrix[i] if plan.matrix[i, 0] != 0.0 else plan.matrix[i, ::-1]
-        np.multiply(own, mine[0], out=rows[i])
-        if mine[1] != 0.0:
-            rows[i] += other * mine[1]
-        if plan.shift[i] != 0.0:
-            rows[i] += plan.shift[i]
-    return rows
+__all__ = ["Stretches", "open_stretches"]

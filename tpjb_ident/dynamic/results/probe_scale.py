@@ -12,10 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
+from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.results.point_result import PointResult
@@ -28,12 +28,14 @@ APART = 3.0
 LEAST_STIFF = 0.5
 
 
-def with_probe_doubts(campaign: Any, points: Sequence[PointResult], clearance: float | None) -> tuple[PointResult, ...]:
+def with_probe_doubts(
+    campaign: Campaign, points: Sequence[PointResult], clearance: float | None
+) -> tuple[PointResult, ...]:
     """The points, each with the doubt that the probes' readings are no lengths in this bearing, where there is one.
 
     Parameters
     ----------
-    campaign : rigdata.campaign.Campaign
+    campaign : Campaign
         Its clearance sweeps are looked at.
     points : sequence of PointResult
     clearance : float or None
@@ -49,7 +51,7 @@ def with_probe_doubts(campaign: Any, points: Sequence[PointResult], clearance: f
     return tuple(replace(point, quality=merged(point.quality, (doubt,))) for point in points)
 
 
-def _sweeps(campaign: Any, clearance: float) -> list[str]:
+def _sweeps(campaign: Campaign, clearance: float) -> list[str]:
     said: dict[str, str] = {}
     for run in campaign.of_kind("clearance"):
         for name, channel in run.channels.items():

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from rigdata.vector import inverse_directions
 from tpjb_ident.arrays import ComplexArray, FloatArray
@@ -45,12 +45,14 @@ class Pairs:
     centre: tuple[float | None, float | None]
 
 
-def channel_pairs(campaign: Any) -> Pairs | None:
+def channel_pairs(campaign: Campaign) -> Pairs | None:
     """Probes and cells of a campaign; None where it has not two of each in different directions."""
     of = {q: [c for c in campaign.channels.values() if c.quantity == q] for q in ("displacement", "force")}
     if any(len(channels) != 2 for channels in of.values()):
         return None
-    probe_plane, cell_plane = (inverse_directions(tuple(float(c.axis) for c in channels)) for channels in of.values())
+    probe_plane, cell_plane = (
+        inverse_directions(tuple(float(c.axis or 0.0) for c in channels)) for channels in of.values()
+    )
     if not np.isfinite(probe_plane).all() or not np.isfinite(cell_plane).all():
         return None
     names = tuple(c.name for channels in of.values() for c in channels)
@@ -58,7 +60,7 @@ def channel_pairs(campaign: Any) -> Pairs | None:
     return Pairs(names, probe_plane, cell_plane, (first, second))
 
 
-def _centre(campaign: Any, probe: str, cells: Sequence[str], plane: FloatArray) -> float | None:
+def _centre(campaign: Campaign, probe: str, cells: Sequence[str], plane: FloatArray) -> float | None:
     found = []
     for run in campaign.of_kind("clearance"):
         try:

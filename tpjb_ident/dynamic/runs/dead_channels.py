@@ -7,8 +7,6 @@ the channels' axes they vanish. Only then is the run read once more and held aga
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from rigdata.problem import Problem, RigDataError
@@ -25,7 +23,7 @@ NOTHING = 1e-6
 ROUNDING = 1e-10
 
 
-def dead_accelerometers(run: Any, phasors: RunPhasors) -> tuple[Condition, ...]:
+def dead_accelerometers(run: Run, phasors: RunPhasors) -> tuple[Condition, ...]:
     """Refuse a run with a dead probe or cell; tell of a dead accelerometer.
 
     Parameters
@@ -52,9 +50,7 @@ def dead_accelerometers(run: Any, phasors: RunPhasors) -> tuple[Condition, ...]:
     return tuple(Condition(DEAD_ACCELEROMETER, f"{p.place} of {run.id} {p.what}") for p in found.values())
 
 
-def _dead(run: Any, phasors: RunPhasors) -> dict[str, Problem]:
-    if type(run) is not Run:
-        return {}
+def _dead(run: Run, phasors: RunPhasors) -> dict[str, Problem]:
     blocks = {"displacement": phasors.displacement, "force": phasors.cell_force, "acceleration": phasors.acceleration}
     silent = [
         name

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
+from rigdata.run import Run
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
-from tpjb_ident.dynamic.records.stretches import kept_open
 from tpjb_ident.dynamic.records.windows import RecordTooShortError
 from tpjb_ident.dynamic.runs.dead_channels import dead_accelerometers
 from tpjb_ident.dynamic.runs.left_out import LeftOut
@@ -30,7 +31,7 @@ TEMPERATURE_SAMPLES = 2**17
 
 
 def all_runs(
-    campaign: Any,
+    campaign: Campaign,
     settings: PhasorSettings,
     progress: Progress,
     workers: Workers | None = None,
@@ -42,7 +43,7 @@ def all_runs(
 
     Parameters
     ----------
-    campaign : rigdata.campaign.Campaign
+    campaign : Campaign
     settings : PhasorSettings
     progress : callable
         Called as progress(text, done, total).
@@ -89,7 +90,7 @@ def all_runs(
 
 
 def unless_known(
-    run: Any, housing_mass: float, settings: PhasorSettings, known: str | None
+    run: Run, housing_mass: float, settings: PhasorSettings, known: str | None
 ) -> tuple[str, RunResult | LeftOut | None]:
     """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
 
@@ -103,7 +104,7 @@ def unless_known(
 
 
 def _unless_known(
-    run: Any, housing_mass: float, settings: PhasorSettings, known: str | None
+    run: Run, housing_mass: float, settings: PhasorSettings, known: str | None
 ) -> tuple[str, RunResult | None]:
     if known is None:
         return "", one_run(run, housing_mass, settings)
@@ -115,7 +116,7 @@ def _unless_known(
     return (mark if before == _state(run) else ""), result
 
 
-def _state(run: Any) -> tuple[int, int] | None:
+def _state(run: Run) -> tuple[int, int] | None:
     path = getattr(getattr(run, "reader", None), "path", None)
     if path is None:
         return None
@@ -126,7 +127,7 @@ def _state(run: Any) -> tuple[int, int] | None:
     return state.st_size, state.st_mtime_ns
 
 
-def _anywhere(run: Any) -> Any:
+def _anywhere(run: Run) -> Any:
     """The run with its file's absolute path: workers may stand in another folder."""
     reader: Any = getattr(run, "reader", None)
     if reader is None or reader.path.is_absolute():
@@ -134,9 +135,9 @@ def _anywhere(run: Any) -> Any:
     return replace(run, reader=replace(reader, path=reader.path.absolute()))
 
 
-def one_run(run: Any, housing_mass: float, settings: PhasorSettings) -> RunResult:
+def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResult:
     """Phasors and temperatures of one run."""
-    with kept_open(run):
+    with run.kept_open():
         try:
             phasors = run_phasors(run, housing_mass, settings)
         except RecordTooShortError as error:
@@ -145,14 +146,14 @@ def one_run(run: Any, housing_mass: float, settings: PhasorSettings) -> RunResul
         return RunResult(replace(phasors, conditions=conditions), mean_temperatures(run))
 
 
-def _mended(run: Any) -> tuple[Condition, ...]:
+def _mended(run: Run) -> tuple[Condition, ...]:
     """What the reader had to mend in the record."""
     problems = run.reader.problems() if hasattr(run, "reader") else ()
     told = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
     return (Condition("record-damaged", "; ".join(told)),) if told else ()
 
 
-def mean_temperatures(run: Any) -> dict[int, float]:
+def mean_temperatures(run: Run) -> dict[int, float]:
     """Mean temperature per pad over a run [K]; pads with several sensors give their mean."""
     found: dict[int, list[float]] = {}
     for sensor in run.temperatures():

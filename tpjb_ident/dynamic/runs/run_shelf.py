@@ -12,10 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
+from rigdata.run import Run
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.mains_line import mains_line
@@ -114,9 +114,9 @@ class RunShelf:
 
     def __init__(
         self,
-        runs: Sequence[Any],
+        runs: Sequence[Run],
         housing_mass: float,
-        again: Callable[[Any], RunResult],
+        again: Callable[[Run], RunResult],
         store: RunStore | None = None,
         room: int | None = None,
     ) -> None:

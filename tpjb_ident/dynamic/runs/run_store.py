@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.run import Run
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.lines import Line, LineSet
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
@@ -34,7 +35,7 @@ _BLOCKS = ("displacement", "cell_force", "acceleration")
 _PARTS = ("phasors", "mean", "noise", "lost")
 
 
-def fingerprint(run: Any, housing_mass: float, settings: PhasorSettings) -> str:
+def fingerprint(run: Run, housing_mass: float, settings: PhasorSettings) -> str:
     """SHA-256 of everything that a run's phasors depend on; "" where the run has no file of its own, or none any more.
 
     Parameters
@@ -120,7 +121,7 @@ class RunStore:
             self.folder.mkdir(parents=True, exist_ok=True)
             write_atomic(self._file(phasors.run), lambda path: np.savez(path, meta=text, **arrays))
 
-    def load(self, run: Any, mark: str, housing_mass: float) -> RunResult | None:
+    def load(self, run: Run, mark: str, housing_mass: float) -> RunResult | None:
         """Give a kept run back; None if it is not there, or not under this fingerprint.
 
         Parameters
