@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tpjb_ident.cli.common import terminal as show
-from tpjb_ident.cli.common.loudness import voice
+from tpjb_ident.cli.common.output import command_output
 
 ROWS = [[f"row {i}", str(i)] for i in range(show.MOST_ROWS + 25)]
 
@@ -17,7 +17,7 @@ def test_a_long_table_ends_with_the_file_that_has_all_of_it(capsys, whole):
     assert ("row 64" in told) is (whole == "")
     assert ("25 more rows: coefficients.csv has all 65" in told) is (whole != "")
     assert f"row {show.MOST_ROWS - 1}" in told
-    assert voice().tables[-1]["rows"] == ROWS  # --json repeats every row
+    assert command_output().tables[-1]["rows"] == ROWS  # --json repeats every row
 
 
 def test_a_table_that_fits_says_no_more(capsys):

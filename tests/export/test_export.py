@@ -9,22 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tpjb_ident.export import (
-    COLUMNS,
-    ExportError,
-    ross_text,
-    sep005,
-    static_points,
-    write_ansys,
-    write_csv,
-    write_dyrobes,
-    write_excel,
-    write_mat,
-    write_parquet,
-    write_ross,
-    write_xltrc,
-)
-from tpjb_ident.export.rotor_programs import speed_tables
+from tpjb_ident.errors import NotTrustedError
+from tpjb_ident.export import COLUMNS, FORMATS, ExportError, export, export_format, sep005, static_points
+from tpjb_ident.export.matlab import write_mat
+from tpjb_ident.export.ross import ross_text, write_ross
+from tpjb_ident.export.rotor_programs import speed_tables, write_ansys, write_dyrobes, write_xltrc
+from tpjb_ident.export.table import write_csv, write_excel, write_parquet
 
 
 def table(points):
@@ -41,23 +31,24 @@ SERIES = [(5000.0, 25.0), (5000.0, 10.0), (5000.0, 40.0), (2500.0, 25.0)]
 
 
 def test_points_are_grouped_and_sorted():
-    points, left_out = static_points(table(SERIES))
+    chosen = static_points(table(SERIES))
+    points = chosen.points
     assert [(p.load, len(p.frequency)) for p in points] == [(2500.0, 1), (5000.0, 3)]
     assert np.allclose(points[1].frequency, 2 * math.pi * np.array([10.0, 25.0, 40.0]))
     assert points[1].coefficients["kxx"].tolist() == [5e8 + 10, 5e8 + 25, 5e8 + 40]
-    assert left_out == ()
+    assert chosen.left_out == chosen.doubtful == ()
 
 
 def test_points_without_an_answer_are_left_out_aloud():
     frame = table(SERIES)
     frame.loc[3, "cyy_Ns_per_m"] = math.nan
-    points, left_out = static_points(frame)
-    assert [p.load for p in points] == [5000.0]
-    assert left_out == ("2500 N, 25 Hz",)
+    chosen = static_points(frame)
+    assert [p.load for p in chosen.points] == [5000.0]
+    assert chosen.left_out == ("2500 N, 25 Hz",)
 
 
 def test_ross_reads_one_table_with_arrays_of_one_length():
-    points, _ = static_points(table(SERIES))
+    points = static_points(table(SERIES)).points
     data = tomllib.loads(ross_text(points[1], "campaign\nx"))
     assert len(data) == 1
     name, element = next(iter(data.items()))
@@ -70,7 +61,7 @@ def test_ross_reads_one_table_with_arrays_of_one_length():
 
 
 def test_one_frequency_becomes_constant_coefficients():
-    points, _ = static_points(table(SERIES))
+    points = static_points(table(SERIES)).points
     element = next(iter(tomllib.loads(ross_text(points[0], "c")).values()))
     assert "frequency" not in element
     assert len(element["kxx"]) == 1
@@ -80,7 +71,7 @@ def test_ross_itself_would_interpolate_what_was_written(tmp_path):
     """The spline that ROSS uses (UnivariateSpline, default smoothing) must keep stiffness and damping."""
     from scipy.interpolate import UnivariateSpline
 
-    points, _ = static_points(table([(5000.0, f) for f in (10.0, 20.0, 25.0, 30.0, 40.0, 50.0)]))
+    points = static_points(table([(5000.0, f) for f in (10.0, 20.0, 25.0, 30.0, 40.0, 50.0)])).points
     write_ross(tmp_path, points, "c")
     (path,) = tmp_path.glob("ross_*.toml")
     element = next(iter(tomllib.loads(path.read_text(encoding="utf-8")).values()))
@@ -90,7 +81,7 @@ def test_ross_itself_would_interpolate_what_was_written(tmp_path):
 
 
 def test_csv_has_speed_in_rpm_and_frequency_in_rad_per_s(tmp_path):
-    points, _ = static_points(table(SERIES))
+    points = static_points(table(SERIES)).points
     write_csv(tmp_path, points, "c")
     frame = pd.read_csv(tmp_path / "bearing_coefficients.csv")
     assert set(frame["shaft_speed_rpm"]) == {1320.0}
@@ -100,7 +91,7 @@ def test_csv_has_speed_in_rpm_and_frequency_in_rad_per_s(tmp_path):
 def test_matlab_gets_matrices(tmp_path):
     from scipy.io import loadmat
 
-    points, _ = static_points(table(SERIES))
+    points = static_points(table(SERIES)).points
     write_mat(tmp_path, points, "c")
     bearing = loadmat(tmp_path / "bearing_coefficients.mat")["bearing"].ravel()
     assert bearing[1]["K"].shape == (2, 2, 3)
@@ -121,17 +112,90 @@ def test_what_cannot_be_exported_is_refused(change, says):
         static_points(change(table(SERIES)))
 
 
-def test_the_command_line_knows_every_format():
-    from tpjb_ident.cli.commands.export import FORMATS
-    from tpjb_ident.export import WRITERS
+def test_every_format_has_its_writer():
+    assert all(callable(form.writer) for form in FORMATS.values())
 
-    assert tuple(WRITERS) == FORMATS
+
+def test_an_unknown_format_is_answered_with_the_nearest():
+    with pytest.raises(ExportError, match="Did you mean 'dyrobes'"):
+        export_format("dyrobe")
+
+
+def doubtful_table():
+    """Intervals, flags, and at 5 kN, 40 Hz a probe of wrong polarity; 2.5 kN is ill-conditioned."""
+    frame = table(SERIES)
+    for column in COLUMNS.values():
+        frame[f"{column}_lo"], frame[f"{column}_hi"] = 0.9 * frame[column], 1.1 * frame[column]
+    frame["quality"] = ["ok", "large-amplitude", "ok", "ill-conditioned; large-amplitude"]
+    for end in ("", "_lo", "_hi"):
+        frame.loc[2, f"kxx_N_per_m{end}"] = -64e6
+    return frame
+
+
+@pytest.mark.parametrize("to", sorted(FORMATS))
+def test_what_is_not_to_be_trusted_stays_behind(to, tmp_path):
+    if to == "excel":
+        pytest.importorskip("openpyxl")
+    written = export(doubtful_table(), to, tmp_path)
+    assert [len(p.frequency) for p in written.chosen.points] == [2]
+    assert len(written.chosen.doubtful) == 2
+    assert "kxx is negative (-64 MN/m)" in written.chosen.doubtful[0]
+    assert "ill-conditioned" in written.chosen.doubtful[1]
+
+
+@pytest.mark.parametrize("to", sorted(FORMATS))
+def test_intervals_and_flags_leave_with_every_format(to, tmp_path):
+    if to == "excel":
+        pytest.importorskip("openpyxl")
+    export(doubtful_table(), to, tmp_path, force=True)
+    if to in {"ross", "xltrc", "dyrobes", "ansys"}:
+        frame = pd.read_csv(tmp_path / "bearing_coefficients_intervals.csv")
+        texts = [path.read_text(encoding="utf-8") for path in tmp_path.glob(f"{to}_*")]
+        assert sum("NOT TO BE TRUSTED" in text for text in texts) == 2
+    elif to == "mat":
+        from scipy.io import loadmat
+
+        bearing = loadmat(tmp_path / "bearing_coefficients.mat")["bearing"].ravel()[1]
+        assert bearing["K_lo"].shape == bearing["C_hi"].shape == (2, 2, 3)
+        assert bearing["trusted"].ravel().tolist() == [1, 1, 0]
+        return
+    else:
+        read = {"csv": pd.read_csv, "parquet": pd.read_parquet, "excel": pd.read_excel}[to]
+        frame = read(next(tmp_path.glob("bearing_coefficients.*")))
+    assert frame["trusted"].tolist() == [False, True, True, False]
+    assert frame["quality"].tolist()[1] == "large-amplitude"
+    assert np.allclose(frame["cyy_Ns_per_m_hi"], 1.1 * frame["cyy_Ns_per_m"])
+
+
+def test_nothing_leaves_where_nothing_can_be_trusted(tmp_path):
+    frame = doubtful_table().assign(quality="negative-damping")
+    with pytest.raises(NotTrustedError, match="no point can be trusted"):
+        export(frame, "csv", tmp_path / "o")
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_prediction_that_did_not_converge_stays_behind(tmp_path):
+    frame = table(SERIES).assign(converged=[True, False, True, True], status="")
+    assert "did not converge" in export(frame, "csv", tmp_path).chosen.doubtful[0]
+
+
+def test_the_command_line_says_what_stayed_behind_and_exits_with_three(tmp_path):
+    from tests.command_line import tpjb
+
+    doubtful_table().to_csv(tmp_path / "coefficients.csv", index=False)
+    refused = tpjb("export", tmp_path, "--to", "csv", "--out", tmp_path / "o")
+    assert refused.exit_code == 3
+    assert "kxx is negative" in refused.stderr
+    assert "--force" in refused.stderr
+    forced = tpjb("export", tmp_path, "--to", "csv", "--out", tmp_path / "f", "--force")
+    assert forced.exit_code == 3
+    assert len(pd.read_csv(tmp_path / "f" / "bearing_coefficients.csv")) == 4
 
 
 def test_parquet_keeps_the_numbers_and_their_source(tmp_path):
     import pyarrow.parquet as pq
 
-    points, _ = static_points(table(SERIES))
+    points = static_points(table(SERIES)).points
     write_parquet(tmp_path, points, "campaign x")
     read = pq.read_table(tmp_path / "bearing_coefficients.parquet")
     assert read.num_rows == 4
@@ -142,11 +206,11 @@ def test_parquet_keeps_the_numbers_and_their_source(tmp_path):
 @pytest.mark.parametrize("start", ["=", "+", "-", "@"])
 def test_no_text_of_an_excel_file_is_a_formula(tmp_path, start):
     openpyxl = pytest.importorskip("openpyxl")
-    points, _ = static_points(table(SERIES))
+    points = static_points(table(SERIES)).points
     write_excel(tmp_path, points, f"{start}cmd|' /C calc'!A0")
     book = openpyxl.load_workbook(tmp_path / "bearing_coefficients.xlsx")
     cells = [cell for sheet in book for row in sheet.iter_rows() for cell in row]
-    assert {cell.data_type for cell in cells} <= {"n", "s"}
+    assert {cell.data_type for cell in cells} <= {"n", "s", "b"}
     assert book["about"]["A1"].value.startswith(start)
     sheet = book["coefficients"]
     assert sheet.max_row == 5
@@ -159,7 +223,7 @@ def test_an_excel_file_without_its_library_names_the_extra(tmp_path, monkeypatch
 
     monkeypatch.setitem(sys.modules, "openpyxl", None)
     with pytest.raises(ExportError, match=r"tpjb-ident\[excel\]"):
-        write_excel(tmp_path, static_points(table(SERIES))[0], "x")
+        write_excel(tmp_path, static_points(table(SERIES)).points, "x")
 
 
 def speeds():
@@ -241,7 +305,7 @@ def test_ross_itself_reads_what_was_written(tmp_path):
     python = os.environ.get("TPJB_ROSS_PYTHON", sys.executable)
     if subprocess.run([python, "-c", "import ross"], capture_output=True, cwd=tmp_path).returncode:
         pytest.skip("ross-rotordynamics is not installed; TPJB_ROSS_PYTHON can name a Python that has it")
-    points, _ = static_points(table([(5000.0, f) for f in (10.0, 20.0, 25.0, 30.0, 40.0, 50.0)] + [(2500.0, 25.0)]))
+    points = static_points(table([(5000.0, f) for f in (10.0, 20.0, 25.0, 30.0, 40.0, 50.0)] + [(2500.0, 25.0)])).points
     write_ross(tmp_path, points, "c")
     done = subprocess.run([python, "-c", ROSS, str(tmp_path)], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr[-2000:]

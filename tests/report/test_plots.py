@@ -27,8 +27,8 @@ from tests.report.plot_cases import (
     polygon,
 )
 from tpjb_ident.report import plots
-from tpjb_ident.report.plots.residual_frames import residual_frame
-from tpjb_ident.report.plots.style import LIGHT
+from tpjb_ident.report.plots.colours import LIGHT
+from tpjb_ident.report.plots.residual_table import residual_frame
 
 #: Root mean square difference of grey levels, out of 255, that another freetype or anti-aliasing may make.
 TOLERANCE = 5.0

@@ -21,7 +21,7 @@ from tpjb_ident.cli.commands.show import show
 from tpjb_ident.cli.commands.simulate import simulate
 from tpjb_ident.cli.commands.verify import verify
 from tpjb_ident.cli.commands.view import view
-from tpjb_ident.cli.common.common_options import add_command
+from tpjb_ident.cli.common.registration import add_command
 
 # plain help: the markup renderer costs more start-up time than all the rest together
 app = typer.Typer(

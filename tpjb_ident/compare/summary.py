@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from tpjb_ident.compare.comparison import Comparison
 
-SAID = {
+PIVOTS_IN_WORDS = {
     "rigid": "rigid pivots",
     "kirk": "Kirk pivots (printed formula, tangent)",
     "kirk-secant": "Kirk pivots (printed formula as printed, secant)",
@@ -81,24 +81,24 @@ def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None)
     """Say what the comparison found, the answer first."""
     found = deviations(comparison, frame)
     best = closest(found)
-    said = []
+    sentences = []
     if best is None:
-        said.append("No coefficient could be compared: see the quality flags.")
+        sentences.append("No coefficient could be compared: see the quality flags.")
     else:
         own = [d for d in found if d.pivots == best]
         worst = max((d for d in own if math.isfinite(d.worst)), key=lambda d: abs(d.worst))
-        said.append(
-            f"The prediction comes closest with {SAID[best]}: {_medians(own)} (median over "
+        sentences.append(
+            f"The prediction comes closest with {PIVOTS_IN_WORDS[best]}: {_medians(own)} (median over "
             f"{max(d.n for d in own)} points); the largest single deviation is {percent(worst.worst)} in "
             f"{worst.coefficient}."
         )
-    said += [
-        f"With {SAID[v.name]}: {_medians([d for d in found if d.pivots == v.name])}."
+    sentences += [
+        f"With {PIVOTS_IN_WORDS[v.name]}: {_medians([d for d in found if d.pivots == v.name])}."
         for v in comparison.variants
         if v.name != best
     ]
-    said += _pivot_sentence(comparison) + _clearance_sentence(comparison) + _locus_sentence(comparison)
-    return (*said, *comparison.remarks)
+    sentences += _pivot_sentence(comparison) + _clearance_sentence(comparison) + _locus_sentence(comparison)
+    return (*sentences, *comparison.remarks)
 
 
 def _medians(found: list[Deviation]) -> str:

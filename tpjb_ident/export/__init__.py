@@ -2,42 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
+import importlib
+from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.export.matlab import write_mat
-from tpjb_ident.export.points import COLUMNS, ExportError, StaticPoint, static_points
-from tpjb_ident.export.ross import ross_text, write_ross
-from tpjb_ident.export.rotor_programs import write_ansys, write_dyrobes, write_xltrc
-from tpjb_ident.export.structural import sep005
-from tpjb_ident.export.table import write_csv, write_excel, write_parquet
+if TYPE_CHECKING:
+    from tpjb_ident.export.formats import FORMATS, ExportError, Format, export_format
+    from tpjb_ident.export.points import COLUMNS, Chosen, StaticPoint, static_points
+    from tpjb_ident.export.structural import sep005
+    from tpjb_ident.export.write import Export, export
 
-#: How each format of ``tpjb export --to`` is written.
-WRITERS: dict[str, Callable[[Path, tuple[StaticPoint, ...], str], None]] = {
-    "ross": write_ross,
-    "csv": write_csv,
-    "parquet": write_parquet,
-    "excel": write_excel,
-    "mat": write_mat,
-    "xltrc": write_xltrc,
-    "dyrobes": write_dyrobes,
-    "ansys": write_ansys,
+#: Imported on first use: the command line asks for the names of the formats alone.
+_HOMES = {
+    "COLUMNS": "points",
+    "FORMATS": "formats",
+    "Chosen": "points",
+    "Export": "write",
+    "ExportError": "formats",
+    "Format": "formats",
+    "StaticPoint": "points",
+    "export": "write",
+    "export_format": "formats",
+    "sep005": "structural",
+    "static_points": "points",
 }
 
 __all__ = [
     "COLUMNS",
-    "WRITERS",
+    "FORMATS",
+    "Chosen",
+    "Export",
     "ExportError",
+    "Format",
     "StaticPoint",
-    "ross_text",
+    "export",
+    "export_format",
     "sep005",
     "static_points",
-    "write_ansys",
-    "write_csv",
-    "write_dyrobes",
-    "write_excel",
-    "write_mat",
-    "write_parquet",
-    "write_ross",
-    "write_xltrc",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'tpjb_ident.export' has no attribute {name!r}")
+    return getattr(importlib.import_module(f"tpjb_ident.export.{_HOMES[name]}"), name)

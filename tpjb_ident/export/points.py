@@ -1,4 +1,4 @@
-"""Coefficients sorted by static point, as every export wants them."""
+"""Coefficients sorted by static point, as every export wants them, with what speaks for and against each."""
 
 from __future__ import annotations
 
@@ -7,20 +7,16 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tpjb_ident.errors import TpjbError
+from tpjb_ident.arrays import BoolArray, FloatArray
+from tpjb_ident.export.formats import ExportError
+from tpjb_ident.export.trust import doubts
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, STATIC_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
 COLUMNS = {name[:3]: name for name in COEFFICIENT_COLUMNS}
-
-
-class ExportError(TpjbError):
-    """The table cannot be exported; says which column or point and what to do."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +35,12 @@ class StaticPoint:
         Excitation [rad/s], rising.
     coefficients : dict of str to (n,) ndarray
         ``"kxx"`` .. ``"cyy"`` [N/m], [N s/m].
+    low, high : dict of str to (n,) ndarray
+        Ends of their 95 % intervals; NaN where the table has none, as of a prediction.
+    quality : tuple of str
+        Per frequency the named conditions, ``"ok"`` if there are none.
+    trusted : (n,) bool ndarray
+        False where the coefficients are exported against advice.
     """
 
     load: float
@@ -46,48 +48,106 @@ class StaticPoint:
     speed: float
     frequency: FloatArray = field(repr=False)
     coefficients: dict[str, FloatArray] = field(repr=False)
+    low: dict[str, FloatArray] = field(repr=False)
+    high: dict[str, FloatArray] = field(repr=False)
+    quality: tuple[str, ...] = ()
+    trusted: BoolArray = field(repr=False, default_factory=lambda: np.zeros(0, bool))
 
     @property
     def tag(self) -> str:
         """Name that says what the frequency axis means."""
         return f"{self.load:.0f}N_{self.direction:g}deg_{self.speed:g}Hz_excitation"
 
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """A sentence per frequency that has something against it."""
+        return tuple(
+            f"{'' if ok else 'NOT TO BE TRUSTED, '}at {omega / (2 * math.pi):g} Hz: {said}"
+            for omega, said, ok in zip(self.frequency, self.quality, self.trusted, strict=True)
+            if said != "ok"
+        )
 
-def static_points(frame: pd.DataFrame) -> tuple[tuple[StaticPoint, ...], tuple[str, ...]]:
-    """Sort a coefficient table by static point.
+
+@dataclass(frozen=True)
+class Chosen:
+    """What of a table can leave.
+
+    Attributes
+    ----------
+    points : tuple of StaticPoint
+    left_out : tuple of str
+        Points without finite coefficients, which no program can use.
+    doubtful : tuple of str
+        Points that are not to be trusted, with the reason: left out, or among `points` where that was forced.
+    """
+
+    points: tuple[StaticPoint, ...]
+    left_out: tuple[str, ...] = ()
+    doubtful: tuple[str, ...] = ()
+
+
+def static_points(frame: pd.DataFrame, force: bool = False) -> Chosen:
+    """Sort a coefficient table by static point; what is not to be trusted stays behind.
 
     Parameters
     ----------
     frame : DataFrame
         As in coefficients.csv or prediction.csv.
+    force : bool
+        Also take the points that are not to be trusted, marked.
 
     Returns
     -------
-    points : tuple of StaticPoint
-    left_out : tuple of str
-        Points without finite coefficients, which no program can use.
+    Chosen
 
     Raises
     ------
     ExportError
-        A column is missing, a point stands twice, or nothing is left.
+        A column is missing, a point stands twice, or no point has finite coefficients.
     """
     needed = [*POINT_COLUMNS, *COLUMNS.values()]
     missing = [name for name in needed if name not in frame.columns]
     if missing:
         raise ExportError(f"the table has no column {missing[0]}. Give a coefficients.csv or prediction.csv of tpjb.")
     finite = np.isfinite(frame[needed].to_numpy(dtype=float)).all(axis=1)
-    left_out = tuple(
-        f"{row.static_load_N:g} N, {row.excitation_Hz:g} Hz" for row in frame[~finite].itertuples(index=False)
-    )
+    left_out = tuple(_place(row) for _, row in frame[~finite].iterrows())
     if not finite.any():
         raise ExportError("no point of the table has finite coefficients. Identify or predict again.")
-    points = []
-    for keys, group in frame[finite].groupby(list(STATIC_COLUMNS), sort=True):
-        ordered = group.sort_values("excitation_Hz")
-        if ordered["excitation_Hz"].duplicated().any():
-            raise ExportError(f"the point {keys[0]:g} N stands twice at one frequency. Export one method at a time.")
-        omega = 2 * math.pi * ordered["excitation_Hz"].to_numpy(dtype=float)
-        values = {short: ordered[column].to_numpy(dtype=float) for short, column in COLUMNS.items()}
-        points.append(StaticPoint(float(keys[0]), float(keys[1]), float(keys[2]), omega, values))
-    return tuple(points), left_out
+    usable = frame[finite]
+    reasons = [doubts(row) for _, row in usable.iterrows()]
+    doubtful = tuple(f"{_place(row)}: {why}" for (_, row), why in zip(usable.iterrows(), reasons, strict=True) if why)
+    usable = usable.assign(_trusted=[not why for why in reasons], _doubts=reasons)
+    chosen = usable if force else usable[usable["_trusted"]]
+    points = [_point(keys, group) for keys, group in chosen.groupby(list(STATIC_COLUMNS), sort=True)]
+    return Chosen(tuple(points), left_out, doubtful)
+
+
+def _place(row: pd.Series) -> str:
+    return f"{row['static_load_N']:g} N, {row['excitation_Hz']:g} Hz"
+
+
+def _point(keys: tuple[float, float, float], group: pd.DataFrame) -> StaticPoint:
+    ordered = group.sort_values("excitation_Hz")
+    if ordered["excitation_Hz"].duplicated().any():
+        raise ExportError(f"the point {keys[0]:g} N stands twice at one frequency. Export one method at a time.")
+    omega = 2 * math.pi * ordered["excitation_Hz"].to_numpy(dtype=float)
+    values, low, high = (
+        {short: _numbers(ordered, column + end) for short, column in COLUMNS.items()} for end in ("", "_lo", "_hi")
+    )
+    quality = ordered["quality"] if "quality" in ordered else ordered.get("status")
+    said = [""] * len(ordered) if quality is None else list(quality)
+    words = tuple(_with_doubts(text, why) for text, why in zip(said, ordered["_doubts"], strict=True))
+    return StaticPoint(
+        float(keys[0]), float(keys[1]), float(keys[2]), omega, values, low, high, words,
+        ordered["_trusted"].to_numpy(bool),
+    )  # fmt: skip
+
+
+def _with_doubts(quality: object, doubts: str) -> str:
+    """Named conditions of a row with what forbids trust, each once; ``"ok"`` if there is nothing."""
+    names = quality.split("; ") if isinstance(quality, str) and quality not in ("", "ok") else []
+    return "; ".join(dict.fromkeys([*names, *(part for part in doubts.split("; ") if part)])) or "ok"
+
+
+def _numbers(table: pd.DataFrame, column: str) -> FloatArray:
+    return table[column].to_numpy(dtype=float) if column in table else np.full(len(table), np.nan)

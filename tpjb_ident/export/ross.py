@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tpjb_ident.export.points import FloatArray, StaticPoint
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.export.points import StaticPoint
+from tpjb_ident.export.table import INTERVALS
 from tpjb_ident.runtime.tables import printable, write_text
 
 
@@ -31,6 +33,8 @@ def ross_text(point: StaticPoint, source: str) -> str:
         f"# static load {point.load:g} N at {point.direction:g} deg, shaft speed {point.speed:g} Hz",
         "# frequency: excitation [rad/s]; outside this range ROSS extrapolates" if several
         else f"# constant: identified at {point.frequency[0] / (2 * math.pi):g} Hz excitation only",
+        f"# 95 % intervals and flags: {INTERVALS}, beside this file",
+        *(f"# {printable(flag)}" for flag in point.flags),
         f'["BearingElement_{point.tag}"]',
         'color = "#355d7a"',
         "n = 0",
@@ -52,6 +56,14 @@ def _list(values: FloatArray) -> str:
 
 
 def write_ross(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write one TOML file per static point: ROSS reads the first table of a file."""
+    """Write one TOML file per static point: ROSS reads the first table of a file.
+
+    Parameters
+    ----------
+    folder : Path
+    points : tuple of StaticPoint
+    source : str
+        Where the coefficients come from.
+    """
     for point in points:
         write_text(folder / f"ross_{point.tag}.toml", ross_text(point, source))

@@ -13,7 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tpjb_ident.export.points import FloatArray, StaticPoint
+from tpjb_ident.arrays import BoolArray, FloatArray
+from tpjb_ident.export.points import StaticPoint
+from tpjb_ident.export.table import INTERVALS
 from tpjb_ident.runtime.tables import printable, write_text
 from tpjb_ident.schema import ENTRIES
 
@@ -32,6 +34,8 @@ class SpeedTable:
         [Hz], rising.
     k, c : (n, 4) ndarray
         xx, xy, yx, yy [N/m], [N s/m].
+    trusted : (n,) bool ndarray
+        False where they are exported against advice.
     """
 
     load: float
@@ -40,6 +44,7 @@ class SpeedTable:
     speed: FloatArray = field(repr=False)
     k: FloatArray = field(repr=False)
     c: FloatArray = field(repr=False)
+    trusted: BoolArray = field(repr=False)
 
     @property
     def name(self) -> str:
@@ -53,6 +58,12 @@ class SpeedTable:
         line = "the running speed" if np.isnan(self.frequency) else f"{self.frequency / (2 * np.pi):g} Hz"
         return f"static load {self.load:g} N at {self.direction:g} deg, excitation at {line}"
 
+    @property
+    def warning(self) -> str:
+        """Which speeds are not to be trusted, empty if all are."""
+        speeds = ", ".join(f"{60 * speed:.6g}" for speed, ok in zip(self.speed, self.trusted, strict=True) if not ok)
+        return f"NOT TO BE TRUSTED at {speeds} rpm" if speeds else ""
+
 
 def speed_tables(points: tuple[StaticPoint, ...]) -> tuple[SpeedTable, ...]:
     """Sort coefficients by load, direction and excitation frequency, each over shaft speed."""
@@ -62,7 +73,7 @@ def speed_tables(points: tuple[StaticPoint, ...]) -> tuple[SpeedTable, ...]:
             synchronous = abs(omega - 2 * np.pi * p.speed) < 1e-6 * omega
             k, c = ([p.coefficients[f"{kind}{e}"][i] for e in ENTRIES] for kind in "kc")
             line = -1.0 if synchronous else round(float(omega), 9)
-            rows.append(((p.load, p.direction, line), p.speed, k, c))
+            rows.append(((p.load, p.direction, line), p.speed, k, c, bool(p.trusted[i])))
     rows.sort(key=lambda row: (row[0], row[1]))
     out = []
     for (load, direction, line), group in itertools.groupby(rows, key=lambda row: row[0]):
@@ -70,7 +81,7 @@ def speed_tables(points: tuple[StaticPoint, ...]) -> tuple[SpeedTable, ...]:
         out.append(
             SpeedTable(
                 load, direction, float("nan") if line < 0 else line, np.array([r[1] for r in own]),
-                np.array([r[2] for r in own]), np.array([r[3] for r in own]),
+                np.array([r[2] for r in own]), np.array([r[3] for r in own]), np.array([r[4] for r in own]),
             )
         )  # fmt: skip
     return tuple(out)
@@ -84,21 +95,24 @@ def xltrc_text(table: SpeedTable, source: str) -> str:
     """Tab-separated table in the order of XLTRC's user-defined bearing sheet: paste it below the sheet's head."""
     names = [f"{kind}{e}" for kind in "KC" for e in ENTRIES]
     head = "\t".join(["Speed (rpm)", *(f"{n} ({'N/m' if n[0] == 'K' else 'N-s/m'})" for n in names)])
-    lines = [f"* {_one_line(source)}", f"* {table.words}; SI units", head]
+    lines = [f"* {_one_line(source)}", f"* {table.words}; SI units", f"* 95 % intervals and flags: {INTERVALS}"]
+    lines += [f"* {table.warning}"] if table.warning else []
+    lines.append(head)
     lines += ["\t".join([f"{rpm:.6g}", *(f"{v:.8e}" for v in (*k, *c))]) for rpm, k, c in _rows(table)]
     return "\n".join(lines) + "\n"
 
 
 def dyrobes_text(table: SpeedTable, source: str) -> str:
     """External bearing file of Dyrobes: points, unit system 4 (N, m, s), 8 coefficients, then one line per speed."""
-    lines = [f"{len(table.speed)}, 4, 8, 0, 0, 0, 0   {_one_line(source)}; {table.words}"]
+    lines = [f"{len(table.speed)}, 4, 8, 0, 0, 0, 0   {_one_line(source)}; {table.words}{_appendix(table)}"]
     lines += [", ".join([f"{rpm:.6g}", *(f"{v:.8e}" for v in (*k, *c))]) for rpm, k, c in _rows(table)]
     return "\n".join(lines) + "\n"
 
 
 def ansys_text(table: SpeedTable, source: str) -> str:
     """File that ANSYS reads for COMBI214: titles, count and unit keys (0: SI; 1: rpm to rad/s), K and C by speed."""
-    lines = [_one_line(source)[:80], table.words[:80], "K11 K12 K21 K22, C11 C12 C21 C22 in N/m, N s/m"]
+    third = table.warning or f"K11 .. K22, C11 .. C22 in N/m, N s/m; intervals: {INTERVALS}"
+    lines = [_one_line(source)[:80], table.words[:80], third[:80]]
     lines.append(f"{len(table.speed):10d}{0:10d}{1:10d}")
     for i, (rpm, k, c) in enumerate(_rows(table), start=1):
         lines.append(f"{i:10d}{rpm:10.2f}")
@@ -106,23 +120,51 @@ def ansys_text(table: SpeedTable, source: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _appendix(table: SpeedTable) -> str:
+    return f"; intervals and flags: {INTERVALS}" + (f"; {table.warning}" if table.warning else "")
+
+
 def _one_line(text: str) -> str:
     return printable(text).replace("\n", " ")
 
 
 def write_xltrc(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write xltrc_*.txt, one per load and excitation frequency."""
+    """Write xltrc_*.txt, one per load and excitation frequency.
+
+    Parameters
+    ----------
+    folder : Path
+    points : tuple of StaticPoint
+    source : str
+        Where the coefficients come from.
+    """
     for table in speed_tables(points):
         write_text(folder / f"xltrc_{table.name}.txt", xltrc_text(table, source))
 
 
 def write_dyrobes(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write dyrobes_*.txt, one per load and excitation frequency."""
+    """Write dyrobes_*.txt, one per load and excitation frequency.
+
+    Parameters
+    ----------
+    folder : Path
+    points : tuple of StaticPoint
+    source : str
+        Where the coefficients come from.
+    """
     for table in speed_tables(points):
         write_text(folder / f"dyrobes_{table.name}.txt", dyrobes_text(table, source))
 
 
 def write_ansys(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write ansys_*.txt, one per load and excitation frequency."""
+    """Write ansys_*.txt, one per load and excitation frequency.
+
+    Parameters
+    ----------
+    folder : Path
+    points : tuple of StaticPoint
+    source : str
+        Where the coefficients come from.
+    """
     for table in speed_tables(points):
         write_text(folder / f"ansys_{table.name}.txt", ansys_text(table, source))

@@ -1,4 +1,4 @@
-"""A plain table of the coefficients: CSV, Parquet, or an Excel workbook."""
+"""A plain table of the coefficients: CSV, Parquet, or an Excel workbook; and the table of intervals beside the rest."""
 
 from __future__ import annotations
 
@@ -7,15 +7,31 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tpjb_ident.export.points import COLUMNS, ExportError, StaticPoint
+from tpjb_ident.export.formats import ExportError
+from tpjb_ident.export.points import COLUMNS, StaticPoint
 from tpjb_ident.runtime.tables import printable, safe_for_spreadsheets, write_atomic
 
 if TYPE_CHECKING:
     import pandas as pd
 
+NAME = "bearing_coefficients"
+#: Beside files of a form that holds no intervals.
+INTERVALS = f"{NAME}_intervals.csv"
+
 
 def coefficient_table(points: tuple[StaticPoint, ...]) -> pd.DataFrame:
-    """One row per static point and frequency: speed in rpm, frequency in rad/s, K and C in SI."""
+    """One row per static point and frequency.
+
+    Parameters
+    ----------
+    points : tuple of StaticPoint
+
+    Returns
+    -------
+    DataFrame
+        Speed in rpm, frequency in rad/s, K and C in SI, each with ``_lo`` and ``_hi`` (95 %), ``quality`` (named
+        conditions) and ``trusted``.
+    """
     import pandas as pd
 
     parts = [
@@ -25,7 +41,13 @@ def coefficient_table(points: tuple[StaticPoint, ...]) -> pd.DataFrame:
                 "static_load_direction_deg": p.direction,
                 "shaft_speed_rpm": 60 * p.speed,
                 "frequency_rad_per_s": p.frequency,
-                **{COLUMNS[name]: values for name, values in p.coefficients.items()},
+                **{
+                    COLUMNS[name] + end: part[name]
+                    for name in COLUMNS
+                    for end, part in (("", p.coefficients), ("_lo", p.low), ("_hi", p.high))
+                },
+                "quality": list(p.quality),
+                "trusted": p.trusted,
             }
         )
         for p in points
@@ -34,26 +56,62 @@ def coefficient_table(points: tuple[StaticPoint, ...]) -> pd.DataFrame:
 
 
 def write_csv(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write bearing_coefficients.csv."""
+    """Write bearing_coefficients.csv into an existing folder.
+
+    Parameters
+    ----------
+    folder : Path
+    points : tuple of StaticPoint
+    source : str
+        Where the coefficients come from.
+    """
+    _write_csv(folder / f"{NAME}.csv", points)
+
+
+def write_intervals(folder: Path, points: tuple[StaticPoint, ...]) -> None:
+    """Write the same table beside files of a form that holds no intervals.
+
+    Parameters
+    ----------
+    folder : Path
+    points : tuple of StaticPoint
+    """
+    _write_csv(folder / INTERVALS, points)
+
+
+def _write_csv(path: Path, points: tuple[StaticPoint, ...]) -> None:
     frame = safe_for_spreadsheets(coefficient_table(points))
-    path = folder / "bearing_coefficients.csv"
     write_atomic(path, lambda part: frame.to_csv(part, index=False, encoding="utf-8", lineterminator="\n"))
 
 
 def write_parquet(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write bearing_coefficients.parquet; the source stands in the table's metadata."""
+    """Write bearing_coefficients.parquet; the source stands in the table's metadata.
+
+    Parameters
+    ----------
+    folder : Path
+    points : tuple of StaticPoint
+    source : str
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     table = pa.Table.from_pandas(coefficient_table(points), preserve_index=False)
     table = table.replace_schema_metadata({**(table.schema.metadata or {}), b"source": printable(source).encode()})
-    write_atomic(folder / "bearing_coefficients.parquet", lambda part: pq.write_table(table, part))
+    write_atomic(folder / f"{NAME}.parquet", lambda part: pq.write_table(table, part))
 
 
 def write_excel(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
     """Write bearing_coefficients.xlsx: all coefficients on one sheet, what they are on another.
 
-    Every text is written as text, so that no cell from outside can become a formula.
+    Every text is written as text, so that no cell from outside can become a formula. Rows that are not to be trusted
+    are red.
+
+    Parameters
+    ----------
+    folder : Path
+    points : tuple of StaticPoint
+    source : str
 
     Raises
     ------
@@ -62,6 +120,7 @@ def write_excel(folder: Path, points: tuple[StaticPoint, ...], source: str) -> N
     """
     try:
         from openpyxl import Workbook
+        from openpyxl.styles import Font
     except ModuleNotFoundError as error:
         raise ExportError('an Excel file needs openpyxl. Install it: pip install "tpjb-ident[excel]"') from error
     book = Workbook()
@@ -71,15 +130,29 @@ def write_excel(folder: Path, points: tuple[StaticPoint, ...], source: str) -> N
     for column, name in enumerate(frame.columns, start=1):
         _text(sheet.cell(1, column), str(name))
         sheet.column_dimensions[sheet.cell(1, column).column_letter].width = max(12, len(str(name)) + 2)
-        for row, value in enumerate(frame[name].to_numpy(dtype=float), start=2):
-            sheet.cell(row, column).value = float(value) if np.isfinite(value) else None
+        for row, value in enumerate(frame[name], start=2):
+            _fill(sheet.cell(row, column), value)
+            if not frame["trusted"].iloc[row - 2]:
+                sheet.cell(row, column).font = Font(color="C00000")
     sheet.freeze_panes = "A2"
     about = book.create_sheet("about")
     lines = (printable(source), "K = Re h, C = Im h / omega at the excitation frequency; SI units.",
-             "frequency_rad_per_s is the excitation; the shaft speed is constant along it.")  # fmt: skip
+             "frequency_rad_per_s is the excitation; the shaft speed is constant along it.",
+             "_lo and _hi: 95 % interval, random and calibration errors together; empty for a prediction.",
+             "quality: named conditions, explained in the report; trusted: FALSE was exported against advice.",
+             *(flag for p in points for flag in (f"{p.load:g} N {text}" for text in p.flags)))  # fmt: skip
     for row, line in enumerate(lines, start=1):
         _text(about.cell(row, 1), line)
-    write_atomic(folder / "bearing_coefficients.xlsx", lambda part: book.save(part))
+    write_atomic(folder / f"{NAME}.xlsx", lambda part: book.save(part))
+
+
+def _fill(cell: Any, value: Any) -> None:
+    if isinstance(value, (bool, np.bool_)):
+        cell.value = bool(value)
+    elif isinstance(value, str):
+        _text(cell, value)
+    else:
+        cell.value = float(value) if np.isfinite(value) else None
 
 
 def _text(cell: Any, text: str) -> None:

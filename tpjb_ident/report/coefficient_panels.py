@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from tpjb_ident.report.figure import Panel, panel
-from tpjb_ident.report.plots.fig17_coefficient import coefficient
+from tpjb_ident.report.plots.coefficient import coefficient
 from tpjb_ident.report.plots.series import CROSS, DIRECT, longest_series, where
 from tpjb_ident.schema import KINDS
 

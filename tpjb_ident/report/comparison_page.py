@@ -24,7 +24,7 @@ from tpjb_ident.report.comparison_tables import (
 from tpjb_ident.report.figure import Panel, save_panels
 from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.report.pivot_panels import pivot_panels
-from tpjb_ident.report.plots.style import VARIANT_LABEL
+from tpjb_ident.report.plots.colours import VARIANT_LABEL
 from tpjb_ident.report.position_panels import position_panels
 from tpjb_ident.rounding import percent
 from tpjb_ident.runtime.tables import write_text
@@ -79,12 +79,12 @@ def comparison_page(
         more=more,
         key_table=_key_table(deviations(comparison, frame)),
         sections=_sections(comparison, frame),
-        settings={name: _said(value) for name, value in (settings or _own_settings(comparison)).items()},
+        settings={name: _setting(value) for name, value in (settings or _own_settings(comparison)).items()},
         inputs=dict(campaign.fingerprint() if inputs is None else inputs),
     )
 
 
-def _said(value: Any) -> str:
+def _setting(value: Any) -> str:
     if value is None:
         return "none"
     return ", ".join(str(v) for v in value) if isinstance(value, (list, tuple)) else str(value)

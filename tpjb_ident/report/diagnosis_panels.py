@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from tpjb_ident.report.figure import Panel, panel
-from tpjb_ident.report.plots.gap_bars import gap
-from tpjb_ident.report.plots.residual_frames import residual_frame
-from tpjb_ident.report.plots.residual_heat import residual_map
-from tpjb_ident.report.plots.residual_lines import residual_series
+from tpjb_ident.report.plots.gap import gap
+from tpjb_ident.report.plots.residual_map import residual_map
+from tpjb_ident.report.plots.residual_series import residual_series
+from tpjb_ident.report.plots.residual_table import residual_frame
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnose.diagnose import Diagnosis

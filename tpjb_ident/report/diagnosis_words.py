@@ -13,14 +13,14 @@ def verdict_sentences(name: str, verdict: Verdict) -> list[str]:
     gap = verdict.gap
     change = f"{gap['heldout_before']:.2f} to {gap['heldout_after']:.2f} sigma"
     held = f"on points that no fit has seen the gap goes from {change}"
-    names = " and ".join(_spoken(e.label) for e in verdict.effects)
+    names = " and ".join(_words(e.label) for e in verdict.effects)
     verb = "explain" if len(verdict.effects) > 1 else "explains"
     first = {
         "consistent": f"{name}: consistent. Model and measurement agree within noise and tolerance "
         f"(gap {gap['before']:.2f} sigma).",
         "named": f"{name}: {names} {verb} the disagreement; {held}.",
         "ambiguous": f"{name}: {names} closes the gap, but these data cannot tell it from "
-        f"{' or '.join(_spoken(n) for group in verdict.indistinguishable for n in group[1:])}; {held}.",
+        f"{' or '.join(_words(n) for group in verdict.indistinguishable for n in group[1:])}; {held}.",
         "unexplained": f"{name}: unexplained. There is a gap of {gap['before']:.2f} sigma, and nothing in the library "
         "closes it.",
     }[verdict.verdict]
@@ -42,7 +42,7 @@ def verdict_sentences(name: str, verdict: Verdict) -> list[str]:
     if verdict.next_test and verdict.verdict in {"ambiguous", "unexplained"}:
         out.append(f"Next test: {verdict.next_test}.")
     if verdict.below_floor:
-        hidden = ", ".join(_spoken(n) for n in verdict.below_floor)
+        hidden = ", ".join(_words(n) for n in verdict.below_floor)
         out.append(
             f"This campaign could not have seen at a plausible size: {hidden}. Silence about them is no absence."
         )
@@ -54,7 +54,7 @@ def _worse(gap: dict[str, float]) -> bool:
     return after > before + 0.3
 
 
-def _spoken(name: str) -> str:
+def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
@@ -64,5 +64,5 @@ def effect_rows(verdict: Verdict) -> list[list[str]]:
     for e in verdict.effects:
         for k, p in e.parameters.items():
             interval = "" if p.lo == p.hi else f"{p.lo:.4g} .. {p.hi:.4g}"
-            rows.append([_spoken(e.name), _spoken(k), f"{p.value:.4g}", interval, p.unit])
+            rows.append([_words(e.name), _words(k), f"{p.value:.4g}", interval, p.unit])
     return rows

@@ -78,11 +78,11 @@ def _spots(figure: Figure, axes: Axes, line: Line2D, label: str, half: np.ndarra
     texts = []
     for k in range(len(x)):
         spread = f" ± {half[k]:.2g}" if half is not None and k < len(half) and np.isfinite(half[k]) else ""
-        texts.append(f"{name}{_said(yl, y[k], spread)} at {_said(xl, x[k])}")
+        texts.append(f"{name}{_with_unit(yl, y[k], spread)} at {_with_unit(xl, x[k])}")
     return Spots(str(line.get_gid()), places, tuple(texts))
 
 
-def _said(label: str, value: float, spread: str = "") -> str:
+def _with_unit(label: str, value: float, spread: str = "") -> str:
     """``kxx 66 ± 0.5 MN/m`` of the axis label ``kxx, MN/m``."""
     name, _, unit = label.rpartition(", ")
     name, unit = (name, unit) if name else (unit, "")

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from tpjb_ident.report.figure import Panel, panel
-from tpjb_ident.report.plots.fig10_pad_projection import pad_projection
-from tpjb_ident.report.plots.fig11_load_deflection import load_deflection
-from tpjb_ident.report.plots.fig12_pivot_stiffness import Formula, pivot_stiffness
+from tpjb_ident.report.plots.load_deflection import load_deflection
+from tpjb_ident.report.plots.pad_projection import pad_projection
+from tpjb_ident.report.plots.pivot_stiffness import Formula, pivot_stiffness
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.report.figure import panel, save_panels
-from tpjb_ident.report.plots.isolability_map import isolability
+from tpjb_ident.report.plots.isolability import isolability
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnose.plan.plan import CampaignPlan

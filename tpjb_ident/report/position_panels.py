@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpjb_ident.report.figure import Panel, panel
-from tpjb_ident.report.plots.fig14_clearance_and_locus import clearance_and_locus
+from tpjb_ident.report.plots.clearance_and_locus import clearance_and_locus
 
 if TYPE_CHECKING:
     from tpjb_ident.clearance.locus import Locus

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tpjb_ident.cli.common.common_options import add_command
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.options import BearingPath, Out, Scheduler, WorkerCount, out_folder
-from tpjb_ident.cli.common.record import write_record
-from tpjb_ident.cli.common.terminal import Progress, progress, say, table
+from tpjb_ident.cli.common.registration import add_command
+from tpjb_ident.cli.common.run_record import write_record
+from tpjb_ident.cli.common.terminal import Progress, print_line, progress, table
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
@@ -88,7 +88,7 @@ def evaluate(
         inputs = {file.name: sha256(file) for file in (bearing, *(rows or ()))}
         write_record(folder, target, "evaluate", options, inputs)
     _show(tables)
-    say(f"Results: {target}")
+    print_line(f"Results: {target}")
 
 
 def _plan(options: Mapping[str, Any]) -> Plan:

@@ -61,13 +61,13 @@ def confusion_table(rows: Sequence[Row], kind: str = "hidden") -> pd.DataFrame:
     cells: dict[tuple[str, str, float, float], Counter[str]] = {}
     for row in run(rows, kind):
         key = (rung(row), " + ".join(row["truth"]), row["size"], row["noise"])
-        cells.setdefault(key, Counter())[_said(row)] += 1
+        cells.setdefault(key, Counter())[_text(row)] += 1
     columns = ["rung", "hidden", "size_sigma", "noise_factor", "said", "count"]
     out = [(*key, said, count) for key, counts in sorted(cells.items()) for said, count in counts.most_common()]
     return pd.DataFrame(out, columns=columns)
 
 
-def _said(row: Row) -> str:
+def _text(row: Row) -> str:
     if row["verdict"] == "named":
         return " + ".join(row["labels"])
     if row["verdict"] == "ambiguous":

@@ -21,7 +21,7 @@ from tests.studies.pages.outcome_bars import outcomes
 from tests.studies.pages.p_values_line import p_values
 from tests.studies.pages.power_curves import power
 from tpjb_ident.report.figure import Panel, panel
-from tpjb_ident.report.plots.residual_heat import residual_map
+from tpjb_ident.report.plots.residual_map import residual_map
 
 if TYPE_CHECKING:
     import pandas as pd

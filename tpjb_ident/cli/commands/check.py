@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import campaign_place, open_bearing
 from tpjb_ident.cli.common.options import CampaignPath, Out, out_folder
-from tpjb_ident.cli.common.record import write_record
-from tpjb_ident.cli.common.terminal import progress, say
+from tpjb_ident.cli.common.run_record import write_record
+from tpjb_ident.cli.common.terminal import print_line, progress
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.tables import write_text
@@ -46,10 +46,10 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
         write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")
         write_record(folder, target, "check", {"campaign": campaign}, summary.pop("files_sha256"))
     for problem in problems:
-        say(f"{problem.severity}: {problem}")
+        print_line(f"{problem.severity}: {problem}")
     counts = summary["counts"]
-    say(f"{summary['campaign']}: {counts['error']} errors, {counts['warning']} warnings, {counts['note']} notes")
-    say(f"Results: {target}")
+    print_line(f"{summary['campaign']}: {counts['error']} errors, {counts['warning']} warnings, {counts['note']} notes")
+    print_line(f"Results: {target}")
     if errors:
         raise BadInputError(
             f"{campaign}: {len(errors)} errors, listed above and in {target / 'check.json'}. Mend them."

@@ -21,8 +21,8 @@ from tpjb_ident.cli.common.options import (
     Thermal,
     out_folder,
 )
-from tpjb_ident.cli.common.record import write_record
-from tpjb_ident.cli.common.terminal import Progress, progress, say, table
+from tpjb_ident.cli.common.run_record import write_record
+from tpjb_ident.cli.common.terminal import Progress, print_line, progress, table
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
@@ -70,7 +70,7 @@ def compare(
             write_comparison(folder, result, options, inputs, show)
         write_record(folder, target, "compare", options, inputs)
     show_comparison(result)
-    say(f"Report: {target / 'report.html'}")
+    print_line(f"Report: {target / 'report.html'}")
     refuse_comparison(result)
 
 
@@ -128,7 +128,7 @@ def show_comparison(result: Comparison) -> None:
     ]  # fmt: skip
     table(f"{result.campaign.id}: predicted / measured - 1, median", ["pivots", "kxx", "kyy", "cxx", "cyy"], rows)
     for sentence in summary_sentences(result):
-        say(sentence)
+        print_line(sentence)
 
 
 def refuse_comparison(result: Comparison) -> None:

@@ -10,8 +10,8 @@ from tpjb_ident.cli.commands.check import check_summary
 from tpjb_ident.cli.commands.compare import refuse_comparison, show_comparison, write_comparison
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.options import Out, out_folder
-from tpjb_ident.cli.common.record import write_record
-from tpjb_ident.cli.common.terminal import progress, say
+from tpjb_ident.cli.common.run_record import write_record
+from tpjb_ident.cli.common.terminal import print_line, progress
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.tables import write_table, write_text
 
@@ -49,11 +49,13 @@ def demo(out: Out = None) -> None:
             write_comparison(folder, result, options, inputs, show)
         write_record(folder, target, "demo", options, inputs)
     counts = summary["counts"]
-    say(f"Read {len(campaign.runs)} records of {path.name}: {counts['error']} errors, {counts['warning']} warnings.")
+    print_line(
+        f"Read {len(campaign.runs)} records of {path.name}: {counts['error']} errors, {counts['warning']} warnings."
+    )
     show_comparison(result)
-    say(truth_sentence(result, json.loads(sample("demo.truth.json").read_text(encoding="utf-8"))))
-    say(f"Report: {(target / 'report.html').resolve()}")
-    say("On your own campaign: tpjb compare CAMPAIGN   (every command: tpjb --help)")
+    print_line(truth_sentence(result, json.loads(sample("demo.truth.json").read_text(encoding="utf-8"))))
+    print_line(f"Report: {(target / 'report.html').resolve()}")
+    print_line("On your own campaign: tpjb compare CAMPAIGN   (every command: tpjb --help)")
     refuse_comparison(result)
 
 

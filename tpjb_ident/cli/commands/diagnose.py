@@ -12,8 +12,8 @@ from tpjb_ident.cli.commands.predict import model_settings, pivot_choice
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
 from tpjb_ident.cli.common.options import BearingOption, CampaignPath, EffectsFile, Out, Thermal, out_folder
-from tpjb_ident.cli.common.record import write_record
-from tpjb_ident.cli.common.terminal import progress, say, table
+from tpjb_ident.cli.common.run_record import write_record
+from tpjb_ident.cli.common.terminal import print_line, progress, table
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
@@ -72,7 +72,7 @@ def diagnose(
             write_diagnosis_report(folder, source, result, named, inputs)
         write_record(folder, target, "diagnose", options, inputs)
     show_verdict(source.id, verdict)
-    say(f"Report: {target / 'report.html'}")
+    print_line(f"Report: {target / 'report.html'}")
     refuse_untrusted(result.identification)
 
 
@@ -81,6 +81,6 @@ def show_verdict(name: str, verdict: Verdict) -> None:
     from tpjb_ident.report.diagnosis_words import effect_rows, verdict_sentences
 
     for sentence in verdict_sentences(name, verdict):
-        say(sentence)
+        print_line(sentence)
     if verdict.effects:
         table("Effects", ["effect", "parameter", "value", "95 % interval", "unit"], effect_rows(verdict))

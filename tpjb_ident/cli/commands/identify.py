@@ -23,8 +23,8 @@ from tpjb_ident.cli.common.options import (
     out_folder,
 )
 from tpjb_ident.cli.common.quantities import parse_values
-from tpjb_ident.cli.common.record import write_record
-from tpjb_ident.cli.common.terminal import note_line, progress, say, table
+from tpjb_ident.cli.common.run_record import write_record
+from tpjb_ident.cli.common.terminal import note_line, print_line, progress, table
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
@@ -84,8 +84,8 @@ def identify(
     show_coefficients(result)
     show_frequency_fits(result)
     for remark in result.remarks():
-        say(f"note: {remark}")
-    say(f"Results: {target}")
+        print_line(f"note: {remark}")
+    print_line(f"Results: {target}")
     refuse_untrusted(result)
 
 
@@ -234,7 +234,9 @@ def show_frequency_fits(result: Identification) -> None:
     if refusing:
         loads = ", ".join(f"{load / 1e3:g}" for load in refusing[:6]) + " kN"
         more = f" and {len(refusing) - 6} more loads" if len(refusing) > 6 else ""
-        say(f"note: at {loads}{more} the data refuse K-C and K-C-M; use the coefficients of each excitation frequency")
+        print_line(
+            f"note: at {loads}{more} the data refuse K-C and K-C-M; use the coefficients of each excitation frequency"
+        )
 
 
 def refuse_untrusted(result: Identification) -> None:

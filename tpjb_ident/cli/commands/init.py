@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.loudness import voice
-from tpjb_ident.cli.common.terminal import note_line, progress, say, table
+from tpjb_ident.cli.common.output import command_output
+from tpjb_ident.cli.common.terminal import note_line, print_line, progress, table
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
 
@@ -59,13 +59,13 @@ def init(folder: Folder, bearing: Bearing = None, out: Out = None) -> None:
     text = draft_manifest(found, name, bearing or bearing_file(folder))
     target.mkdir(parents=True, exist_ok=True)
     write_text(target / MANIFEST, text)
-    voice().wrote(target, (MANIFEST,))
+    command_output().add_files(target, (MANIFEST,))
     show_survey(found, folder.name)
     for problem in problems:
         note_line("warning", f"left out: {problem}")
     marks = sum(MARK in line.partition("#")[0] for line in text.splitlines())
-    say(f"{target / MANIFEST}: {marks} places are marked {MARK}; only you can fill them in.")
-    say(f"Then: tpjb check {folder}")
+    print_line(f"{target / MANIFEST}: {marks} places are marked {MARK}; only you can fill them in.")
+    print_line(f"Then: tpjb check {folder}")
 
 
 def bearing_file(folder: Path) -> str | None:
@@ -87,4 +87,4 @@ def show_survey(found: Survey, name: str) -> None:
     ]  # fmt: skip
     table(f"{name}: records, guessed", ["file", "kind", "rate Hz", "lines Hz", "why"], runs, words=(0, 1, 3, 4))
     if len(found.exports) > len(runs):
-        say(f"... and {len(found.exports) - len(runs)} more records")
+        print_line(f"... and {len(found.exports) - len(runs)} more records")

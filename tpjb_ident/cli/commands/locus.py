@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
 from tpjb_ident.cli.common.options import BearingOption, CampaignPath, Out, out_folder
-from tpjb_ident.cli.common.record import write_record
-from tpjb_ident.cli.common.terminal import note_line, progress, say, table
+from tpjb_ident.cli.common.run_record import write_record
+from tpjb_ident.cli.common.terminal import note_line, print_line, progress, table
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
@@ -61,7 +61,7 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
     if polygon is not None:
         show_clearance(polygon, drawn, source.id)
     if found is not None:
-        say(str(found))
+        print_line(str(found))
     for part in (polygon, found):
         for condition in part.status if part is not None else ():
             note_line("note", condition.sentence())
@@ -69,8 +69,8 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
         if found is None or sentence not in sentences(found.status):
             note_line("note", sentence)
     for other in others:
-        say(str(other))
-    say(f"Results: {target}")
+        print_line(str(other))
+    print_line(f"Results: {target}")
     if polygon is None and source.of_kind("clearance"):
         raise NotTrustedError(
             "no clearance run can be used: positions count from the probes' zero, not from the centre."

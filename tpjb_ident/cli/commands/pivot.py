@@ -7,8 +7,8 @@ from typing import Any
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
 from tpjb_ident.cli.common.options import BearingOption, CampaignPath, Out, out_folder
-from tpjb_ident.cli.common.record import write_record
-from tpjb_ident.cli.common.terminal import note_line, progress, say, table
+from tpjb_ident.cli.common.run_record import write_record
+from tpjb_ident.cli.common.terminal import note_line, print_line, progress, table
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
@@ -44,7 +44,7 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
         write_record(folder, target, "pivot", {"campaign": campaign, "bearing": bearing or source.bearing_name},
                      source.fingerprint() | given)  # fmt: skip
     show_curves(curves, source.id, formula)
-    say(f"Results: {target}")
+    print_line(f"Results: {target}")
     from tpjb_ident.compare.bearing_checks import bearing_problems
 
     for problem in bearing_problems(source, drawn):  # what is wrong with the probes is wrong with the curves

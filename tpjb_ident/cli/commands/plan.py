@@ -12,8 +12,8 @@ from tpjb_ident.cli.commands.predict import operating_points, pivot_choice
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import refuse_special
 from tpjb_ident.cli.common.options import BearingPath, Out, out_folder
-from tpjb_ident.cli.common.record import write_record
-from tpjb_ident.cli.common.terminal import progress, say, table
+from tpjb_ident.cli.common.run_record import write_record
+from tpjb_ident.cli.common.terminal import print_line, progress, table
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
@@ -77,13 +77,13 @@ def plan(
                 plans |= _parts(folder, setup, tests)
         frame = found.to_frame()
         write_table(folder, "effects", frame)
-        for name, told in plans.items():
-            write_table(folder, name, told.matrix())
+        for name, one in plans.items():
+            write_table(folder, name, one.matrix())
         save_isolability(folder, plans)
         write_text(folder / "plan.json", json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n")
         write_record(folder, target, "plan", options, {bearing.name: sha256(bearing)})
     _show(found)
-    say(f"Results: {target}")
+    print_line(f"Results: {target}")
 
 
 def _parts(folder: Path, setup: Setup, tests: Layout) -> dict[str, CampaignPlan]:
@@ -130,5 +130,5 @@ def _show(found: CampaignPlan) -> None:
         ["effect", "typical size, sigma", "seen from", "could be mistaken for"], rows, (0, 2, 3),
     )  # fmt: skip
     blind = found.below_floor
-    say(f"Below the floor at a size that would not surprise: {', '.join(blind) if blind else 'nothing'}.")
-    say(f"Pairs it could not tell apart at d' = 6: {len(found.confusable)} of {found.pairs}.")
+    print_line(f"Below the floor at a size that would not surprise: {', '.join(blind) if blind else 'nothing'}.")
+    print_line(f"Pairs it could not tell apart at d' = 6: {len(found.confusable)} of {found.pairs}.")

@@ -14,8 +14,8 @@ from tpjb_ident.cli.common.inputs import refuse_special
 from tpjb_ident.cli.common.model_options import HousingTemperature, Physics, parse_physics
 from tpjb_ident.cli.common.options import BearingPath, EffectsFile, Out, Thermal, out_folder
 from tpjb_ident.cli.common.quantities import MAX_VALUES, parse_value, parse_values
-from tpjb_ident.cli.common.record import write_record
-from tpjb_ident.cli.common.terminal import progress, say, table
+from tpjb_ident.cli.common.run_record import write_record
+from tpjb_ident.cli.common.terminal import print_line, progress, table
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
@@ -68,7 +68,7 @@ def predict(
         write_table(folder, "prediction", frame)
         write_record(folder, target, "predict", options, inputs)
     show_predictions(frame, loaded.name)
-    say(f"Results: {target}")
+    print_line(f"Results: {target}")
     bad = int((~frame["converged"]).sum())
     if bad:
         raise NotTrustedError(
@@ -154,4 +154,4 @@ def show_predictions(frame: Any, name: str) -> None:
     ]  # fmt: skip
     table(name, columns, rows)
     if len(frame) > 20:
-        say(f"... and {len(frame) - 20} more rows in prediction.csv")
+        print_line(f"... and {len(frame) - 20} more rows in prediction.csv")

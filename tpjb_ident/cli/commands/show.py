@@ -10,9 +10,9 @@ import typer
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import campaign_place, open_campaign
 from tpjb_ident.cli.common.options import Out, out_folder
-from tpjb_ident.cli.common.record import write_record
+from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.sparkline import sparkline
-from tpjb_ident.cli.common.terminal import progress, say, table
+from tpjb_ident.cli.common.terminal import print_line, progress, table
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.tables import write_table
@@ -59,9 +59,9 @@ def show(source: Source, run: Wanted = None, picture: Picture = False, out: Out 
 
 def show_campaign(campaign: Campaign) -> None:
     """Print the runs of a campaign."""
-    say(str(campaign))
+    print_line(str(campaign))
     if campaign.description:
-        say(campaign.description)
+        print_line(campaign.description)
     rows = []
     for r in campaign.runs[:200]:
         p = r.point
@@ -73,7 +73,7 @@ def show_campaign(campaign: Campaign) -> None:
     columns = ["run", "kind", "load kN", "direction deg", "speed Hz", "exc. Hz", "pad"]
     table("runs", columns, rows, words=(0, 1))
     if len(campaign.runs) > len(rows):
-        say(f"... and {len(campaign.runs) - len(rows)} more runs")
+        print_line(f"... and {len(campaign.runs) - len(rows)} more runs")
 
 
 def run_series(run: Run) -> tuple[str, list[Series]]:
@@ -151,4 +151,4 @@ def _write(target: Path, source: Path, shown: tuple[str, list[Series], dict[str,
 
             write_quick_look(folder, title, series, looks)
         write_record(folder, target, "show", {"source": source, "shown": title}, inputs)
-    say(f"Results: {target}")
+    print_line(f"Results: {target}")

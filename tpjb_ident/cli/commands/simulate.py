@@ -13,8 +13,8 @@ from tpjb_ident.cli.commands.predict import model_settings, operating_points, pi
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import refuse_special
 from tpjb_ident.cli.common.options import BearingPath, EffectsFile, Out, Thermal, out_folder
-from tpjb_ident.cli.common.record import write_record
-from tpjb_ident.cli.common.terminal import progress, say
+from tpjb_ident.cli.common.run_record import write_record
+from tpjb_ident.cli.common.terminal import print_line, progress
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
@@ -71,8 +71,8 @@ def simulate(
             truth = write_campaign(folder / file, rig, layout, progress=lambda done, total, run: show(run, done, total))
         truth.write(folder / "truth.json")
         write_record(folder, target, "simulate", options, inputs)
-    say(f"{name}: {len(rig.runs())} runs, seed {seed}")
-    say(f"Results: {target / file}, the truth in {target / 'truth.json'}")
+    print_line(f"{name}: {len(rig.runs())} runs, seed {seed}")
+    print_line(f"Results: {target / file}, the truth in {target / 'truth.json'}")
 
 
 def _rig(bearing: Path, settings: Any, seed: int, noise: float) -> Any:

@@ -13,8 +13,8 @@ import typer
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import campaign_place, refuse_special
 from tpjb_ident.cli.common.options import Out, out_folder
-from tpjb_ident.cli.common.record import write_record
-from tpjb_ident.cli.common.terminal import note_line, say, table
+from tpjb_ident.cli.common.run_record import write_record
+from tpjb_ident.cli.common.terminal import note_line, print_line, table
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256, versions
@@ -164,7 +164,7 @@ def show_checked(results: Path, entries: dict[str, dict[str, Any]], checked: Seq
     table(f"{results}: unchanged files", ["command", "finished", "results", "inputs"], rows, words=(0, 1))
     for one in checked:
         if one.state != "same":
-            say(f"{one.command}: {one.role} {one.file} {_WORDS[one.state]}")
+            print_line(f"{one.command}: {one.role} {one.file} {_WORDS[one.state]}")
     now = versions()
     for command, entry in entries.items():
         then = _texts(entry.get("versions"))
@@ -214,4 +214,4 @@ def judge(results: Path, checked: Sequence[Checked]) -> None:
         )
     if any(one.state == "not recorded" for one in checked):
         raise BadInputError(f"{results}: was written by a version that recorded no SHA-256 of results. Run it again.")
-    say("All results and inputs are the same bytes as when the commands ended.")
+    print_line("All results and inputs are the same bytes as when the commands ended.")

@@ -11,7 +11,7 @@ import typer
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import campaign_place, open_bearing, open_campaign
 from tpjb_ident.cli.common.options import BearingOption
-from tpjb_ident.cli.common.terminal import note_line, say
+from tpjb_ident.cli.common.terminal import note_line, print_line
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import former_runs
 
@@ -46,7 +46,7 @@ def view(
     from tpjb_ident.view.server import serve
 
     def ready(address: str) -> None:
-        say(f"{session.name}: {address}   (Ctrl-C ends it)")
+        print_line(f"{session.name}: {address}   (Ctrl-C ends it)")
         if browser:
             import webbrowser
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import TYPE_CHECKING, Literal
 
-from tpjb_ident.cli.common.loudness import voice
+from tpjb_ident.cli.common.output import command_output
 from tpjb_ident.runtime.tables import printable
 
 if TYPE_CHECKING:
@@ -36,10 +36,10 @@ def _console(stderr: bool = False) -> Console:
     return console
 
 
-def say(text: str) -> None:
+def print_line(text: str) -> None:
     """Print one line; text from outside is shown as it is, less its control characters."""
-    voice().said.append(printable(text))
-    if voice().silent:
+    command_output().sentences.append(printable(text))
+    if command_output().silent:
         return
     _console().print(printable(text), markup=False)
 
@@ -47,7 +47,7 @@ def say(text: str) -> None:
 def error_line(kind: str, text: str) -> None:
     """Print a message to stderr, its lines kept."""
     lines = "\n".join(printable(line) for line in text.splitlines())
-    voice().remarks.append({"kind": kind, "text": lines})
+    command_output().remarks.append({"kind": kind, "text": lines})
     style = "bold red" if kind == "bug" else None
     _console(stderr=True).print(f"tpjb: {kind}: {lines}", markup=False, style=style)
 
@@ -55,8 +55,8 @@ def error_line(kind: str, text: str) -> None:
 def note_line(kind: str, text: str) -> None:
     """Print a remark to stderr; of a quiet command only warnings."""
     if kind != "doing":
-        voice().remarks.append({"kind": kind, "text": printable(text)})
-    if voice().silent and kind != "warning":
+        command_output().remarks.append({"kind": kind, "text": printable(text)})
+    if command_output().silent and kind != "warning":
         return
     _console(stderr=True).print(f"tpjb: {kind}: {printable(text)}", markup=False)
 
@@ -68,8 +68,8 @@ def table(
 
     Of a long table that stands in a file, the one named `whole`, the first `MOST_ROWS` are printed.
     """
-    voice().tables.append({"title": title, "columns": list(columns), "rows": [list(row) for row in rows]})
-    if voice().silent:
+    command_output().tables.append({"title": title, "columns": list(columns), "rows": [list(row) for row in rows]})
+    if command_output().silent:
         return
     from rich import box
     from rich.table import Table
@@ -96,7 +96,7 @@ def progress(what: str) -> Iterator[Progress]:
     Progress
     """
     console = _console(stderr=True)
-    if voice().silent or not console.is_terminal:
+    if command_output().silent or not console.is_terminal:
         note_line("doing", what)
         yield _Lines(what)
         return
@@ -122,7 +122,7 @@ class _Lines:
 
     def __init__(self, what: str) -> None:
         self._what, self._step, self._first = what, 0, 0
-        self._began = self._told = time.monotonic()
+        self._began = self._last = time.monotonic()
 
     def __call__(self, text: str, done: int, total: int) -> None:
         now = time.monotonic()
@@ -130,9 +130,9 @@ class _Lines:
         if done <= self._step or done == 1:
             self._began, self._first = now, done
         self._step = done
-        if now - self._told < LINE_EVERY or not 0 < done < total:
+        if now - self._last < LINE_EVERY or not 0 < done < total:
             return
-        self._told = now
+        self._last = now
         left = ""
         counted = done - self._first
         if counted > 0 and done >= FORETELLS * total:

@@ -9,17 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.residual_frames import ENTRIES, residual_frame
-from tpjb_ident.report.plots.style import (
-    DIVERGING,
-    FONT_SIZE,
-    LIGHT,
-    VARIANT_LABEL,
-    add_colour_bar,
-    label,
-    new_pictures,
-    shrink,
-)
+from tpjb_ident.report.plots.colours import DIVERGING, LIGHT, VARIANT_LABEL
+from tpjb_ident.report.plots.picture import FONT_SIZE, add_colour_bar, label, new_pictures, shrink
+from tpjb_ident.report.plots.residual_table import ENTRIES, residual_frame
 
 if TYPE_CHECKING:
     import pandas as pd

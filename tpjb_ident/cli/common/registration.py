@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from tpjb_ident.cli.common.examples import EXAMPLES
-from tpjb_ident.cli.common.loudness import speaking
+from tpjb_ident.cli.common.output import output_of
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document with all results, for other programs.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings and errors only.")]
@@ -29,15 +29,15 @@ def add_command(app: typer.Typer, command: Callable[..., None], name: str | None
         Default: the function's own.
     """
     name = name or command.__name__
-    app.command(name, epilog=examples_text(name))(spoken(command, name))
+    app.command(name, epilog=examples_text(name))(with_output_options(command, name))
 
 
-def spoken(command: Callable[..., None], name: str) -> Callable[..., None]:
+def with_output_options(command: Callable[..., None], name: str) -> Callable[..., None]:
     """Wrap a command so that it takes ``--json`` and ``--quiet`` after its own options."""
 
     @functools.wraps(command)
     def wrapper(*args: Any, as_json: bool = False, quiet: bool = False, **kwargs: Any) -> None:
-        with speaking(name, as_json, quiet):
+        with output_of(name, as_json, quiet):
             command(*args, **kwargs)
 
     hints = typing.get_type_hints(command, include_extras=True)

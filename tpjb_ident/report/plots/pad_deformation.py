@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from tpjb_ident.report.plots.style import add_legend, label, new_pictures, style_of_pad
+from tpjb_ident.report.plots.colours import style_of_pad
+from tpjb_ident.report.plots.picture import add_legend, label, new_pictures
 
 
 def pad_deformation(

@@ -21,14 +21,14 @@ MOST_ROWS = 5000
 
 
 @dataclass
-class Voice:
-    """What a command has to say so far.
+class CommandOutput:
+    """What a command has printed and written so far.
 
     Attributes
     ----------
     command : str
     as_json, quiet : bool
-    said : list of str
+    sentences : list of str
         Sentences for standard output.
     tables : list of dict
         Short tables for people, as they would have been printed.
@@ -43,7 +43,7 @@ class Voice:
     command: str = ""
     as_json: bool = False
     quiet: bool = False
-    said: list[str] = field(default_factory=list)
+    sentences: list[str] = field(default_factory=list)
     tables: list[dict[str, Any]] = field(default_factory=list)
     remarks: list[dict[str, str]] = field(default_factory=list)
     folder: Path | None = None
@@ -54,45 +54,53 @@ class Voice:
         """Whether nothing is printed for people."""
         return self.as_json or self.quiet
 
-    def wrote(self, folder: Path, outputs: Sequence[str]) -> None:
+    def add_files(self, folder: Path, outputs: Sequence[str]) -> None:
         """Note where the results are."""
         self.folder, self.outputs = folder, (*self.outputs, *outputs)
 
     def document(self, exit_code: int) -> dict[str, Any]:
-        """Everything said, as plain data; ``data`` holds the result tables and JSON files themselves."""
+        """Everything printed, as plain data; ``data`` holds the result tables and JSON files themselves."""
         return {
             "schema": SCHEMA,
             "command": self.command,
             "exit_code": exit_code,
             "results": None if self.folder is None else str(self.folder),
             "outputs": list(self.outputs),
-            "said": self.said,
+            "said": self.sentences,
             "remarks": self.remarks,
             "tables": self.tables,
             "data": {} if self.folder is None else _data(self.folder, self.outputs),
         }
 
 
-_current = Voice()
+_current = CommandOutput()
 
 
-def voice() -> Voice:
-    """Return the voice of the command that runs."""
+def command_output() -> CommandOutput:
+    """Output of the command that runs."""
     return _current
 
 
 @contextlib.contextmanager
-def speaking(command: str, as_json: bool, quiet: bool) -> Iterator[Voice]:
-    """Give a command its voice; with JSON, print the document when the command ends, however it does.
+def output_of(command: str, as_json: bool, quiet: bool) -> Iterator[CommandOutput]:
+    """Collect the output of a command; with JSON, print the document when the command ends, however it does.
+
+    Parameters
+    ----------
+    command : str
+        Its name.
+    as_json, quiet : bool
+        As asked for.
+
 
     Yields
     ------
-    Voice
+    CommandOutput
     """
     import typer
 
     global _current
-    before, _current = _current, Voice(command, as_json, quiet)
+    before, _current = _current, CommandOutput(command, as_json, quiet)
     code = 0
     try:
         yield _current

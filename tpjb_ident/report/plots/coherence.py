@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from tpjb_ident.report.plots.colours import LIGHT
+from tpjb_ident.report.plots.picture import FONT_SIZE, add_legend, label, new_pictures, shrink
 from tpjb_ident.report.plots.series import as_table
-from tpjb_ident.report.plots.style import FONT_SIZE, LIGHT, add_legend, label, new_pictures, shrink
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tpjb_ident.cli.common.loudness import voice
+from tpjb_ident.cli.common.output import command_output
 from tpjb_ident.runtime.provenance import sha256, versions
 from tpjb_ident.runtime.publish import RECORD, former_runs, record_text
 from tpjb_ident.runtime.tables import write_text
@@ -58,7 +58,7 @@ def write_record(
         **({"remarks": list(remarks)} if remarks else {}),
     }
     write_text(staging / RECORD, record_text({**former_runs(target), command: entry}))
-    voice().wrote(target, outputs)
+    command_output().add_files(target, outputs)
     return entry
 
 
