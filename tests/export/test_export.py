@@ -229,16 +229,17 @@ def test_an_excel_file_without_its_library_names_the_extra(tmp_path, monkeypatch
 def speeds():
     frame = pd.concat([table([(5000.0, 25.0), (2500.0, 25.0)]).assign(shaft_speed_Hz=s) for s in (33.0, 22.0)])
     frame["kyx_N_per_m"] = frame["shaft_speed_Hz"] * 1e6
-    return static_points(frame)[0]
+    return static_points(frame).points
 
 
 def test_programs_over_speed_get_one_file_per_load_and_frequency(tmp_path):
     write_xltrc(tmp_path, speeds(), "two\nlines")
     files = sorted(p.name for p in tmp_path.iterdir())
     assert files == ["xltrc_2500N_-90deg_25Hz.txt", "xltrc_5000N_-90deg_25Hz.txt"]
-    comment, words, head, *rows = (tmp_path / files[1]).read_text(encoding="utf-8").splitlines()
+    comment, words, pointer, head, *rows = (tmp_path / files[1]).read_text(encoding="utf-8").splitlines()
     assert comment.startswith("* two lines")
     assert "excitation at 25 Hz" in words
+    assert pointer.endswith("bearing_coefficients_intervals.csv")
     assert head.split("\t")[:5] == ["Speed (rpm)", "Kxx (N/m)", "Kxy (N/m)", "Kyx (N/m)", "Kyy (N/m)"]
     cells = np.array([[float(c) for c in row.split("\t")] for row in rows])
     assert cells[:, 0].tolist() == [1320.0, 1980.0]
@@ -260,7 +261,7 @@ def test_dyrobes_and_ansys_files_have_their_fields_in_place(tmp_path):
 
 def test_a_synchronous_prediction_is_named_so():
     frame = pd.concat([table([(5000.0, s)]).assign(shaft_speed_Hz=s) for s in (20.0, 30.0)])
-    (one,) = speed_tables(static_points(frame)[0])
+    (one,) = speed_tables(static_points(frame).points)
     assert one.name == "5000N_-90deg_synchronous"
     assert one.speed.tolist() == [20.0, 30.0]
 
