@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.errors import TpjbError
+from rigdata.near_names import nearest_name
 
 if TYPE_CHECKING:
     from tpjb_ident.export.points import StaticPoint
@@ -80,7 +80,7 @@ def export_format(name: str) -> Format:
         Unknown; names the nearest.
     """
     if name not in FORMATS:
-        near = difflib.get_close_matches(name, FORMATS, n=1)
-        hint = f"Did you mean {near[0]!r}?" if near else f"Use one of {', '.join(FORMATS)}."
+        near = nearest_name(name, FORMATS)
+        hint = f"Did you mean {near!r}?" if near else f"Use one of {', '.join(FORMATS)}."
         raise ExportError(f"--to: {name!r} is not known. {hint}")
     return FORMATS[name]

@@ -20,6 +20,7 @@ from tpjb_ident.cli.common.options import (
     Out,
     Thermal,
     out_folder,
+    refuse_unknown,
 )
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import Progress, print_line, progress, table
@@ -75,16 +76,11 @@ def compare(
 
 
 def _variants(text: str) -> tuple[str, ...]:
-    import difflib
-
     from tpjb_ident.compare.comparison import VARIANTS
 
     names = tuple(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
     for name in names:
-        if name not in VARIANTS:
-            near = difflib.get_close_matches(name, VARIANTS, n=1)
-            hint = f"Did you mean {near[0]!r}?" if near else f"Use some of {', '.join(VARIANTS)}."
-            raise BadInputError(f"--pivots: {name!r} is not known. {hint}")
+        refuse_unknown(name, VARIANTS, "--pivots", several=True)
     if not names:
         raise BadInputError(f"--pivots: is empty. Use some of {', '.join(VARIANTS)}.")
     return names

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -21,6 +20,7 @@ from tpjb_ident.cli.common.options import (
     Scheduler,
     WorkerCount,
     out_folder,
+    refuse_unknown,
 )
 from tpjb_ident.cli.common.quantities import parse_values
 from tpjb_ident.cli.common.run_record import write_record
@@ -141,7 +141,7 @@ def phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:
     known: dict[str, float] = {}
     for text in delays:
         quantity, _, time = text.partition("=")
-        _known(quantity, QUANTITIES, "--delay")
+        refuse_unknown(quantity, QUANTITIES, "--delay")
         try:
             known[quantity] = parse_quantity(time, "time")
         except UnitError as error:
@@ -160,22 +160,15 @@ def identify_settings(campaign: Campaign, method: str, norm: str | None) -> Any:
     from tpjb_ident.dynamic.estimators.estimate import METHODS, NORMS
     from tpjb_ident.dynamic.identify import IdentifySettings
 
-    _known(method, METHODS, "--method")
+    refuse_unknown(method, METHODS, "--method")
     if norm is not None:
-        _known(norm, tuple(NORMS), "--norm")
+        refuse_unknown(norm, tuple(NORMS), "--norm")
         if method != "rlm":
             raise BadInputError(f"--norm: belongs to --method rlm, not to {method}.")
     if not campaign.of_kind("dynamic"):
         raise BadInputError(f"campaign {campaign.id}: has no dynamic runs; there is nothing to identify.")
     chosen = f"rlm:{norm or 'huber'}" if method == "rlm" else method
     return IdentifySettings(method=chosen, clearance=_clearance(campaign))
-
-
-def _known(value: str, known: tuple[str, ...], option: str) -> None:
-    if value not in known:
-        near = difflib.get_close_matches(value, known, n=1)
-        hint = f"Did you mean {near[0]!r}?" if near else f"Use one of {', '.join(known)}."
-        raise BadInputError(f"{option}: {value!r} is not known. {hint}")
 
 
 def _clearance(campaign: Campaign) -> float | None:

@@ -9,10 +9,11 @@ from typing import Annotated, Any
 
 import typer
 
+from rigdata.near_names import nearest_name
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import refuse_special
 from tpjb_ident.cli.common.model_options import HousingTemperature, Physics, parse_physics
-from tpjb_ident.cli.common.options import BearingPath, EffectsFile, Out, Thermal, out_folder
+from tpjb_ident.cli.common.options import BearingPath, EffectsFile, Out, Thermal, out_folder, refuse_unknown
 from tpjb_ident.cli.common.quantities import MAX_VALUES, parse_value, parse_values
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress, table
@@ -110,10 +111,8 @@ def pivot_choice(text: str) -> str | float | Path:
         return path
     if text[:1].isdigit():
         return parse_value(text, "stiffness", "--pivots")
-    import difflib
-
-    near = difflib.get_close_matches(text, NAMED_PIVOTS, n=1)
-    hint = f"Did you mean {near[0]!r}?" if near else "Use rigid, kirk, kirk-secant, a pivots.toml or a stiffness."
+    near = nearest_name(text, NAMED_PIVOTS)
+    hint = f"Did you mean {near!r}?" if near else "Use rigid, kirk, kirk-secant, a pivots.toml or a stiffness."
     raise BadInputError(f"--pivots: {text!r} is no such file and no pivot model. {hint}")
 
 
@@ -125,12 +124,7 @@ def model_settings(pivots: Any, thermal: str, effects: Path | None) -> Any:
     BadInputError
         Unknown heat model.
     """
-    if thermal not in THERMAL:
-        import difflib
-
-        near = difflib.get_close_matches(thermal, THERMAL, n=1)
-        hint = f"Did you mean {near[0]!r}?" if near else f"Use one of {', '.join(THERMAL)}."
-        raise BadInputError(f"--thermal: {thermal!r} is not known. {hint}")
+    refuse_unknown(thermal, THERMAL, "--thermal")
     from tpjb_ident.compare.predictions import ModelSettings
 
     refuse_special(effects)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from rigdata.near_names import nearest_name
 from tpjb_ident.cli.commands.predict import model_settings, operating_points, pivot_choice
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import refuse_special
@@ -117,8 +117,8 @@ def _fault_arguments(text: str) -> dict[str, Any]:
         key, equals, value = pair.partition("=")
         known = ("run", "channel", "value", "start", "length", "other")
         if not equals or key not in known:
-            near = difflib.get_close_matches(key, known, n=1)
-            hint = f"Did you mean {near[0]}=?" if near else f"Use {', '.join(f'{k}=' for k in known)}."
+            near = nearest_name(key, known)
+            hint = f"Did you mean {near}=?" if near else f"Use {', '.join(f'{k}=' for k in known)}."
             raise BadInputError(f"--fault {text!r}: {pair!r} is not understood. {hint}")
         arguments[key] = _number(value, text) if key in ("value", "start", "length") else value
     return arguments

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from tpjb_ident.cli.common.options import refuse_unknown
 from tpjb_ident.cli.common.quantities import parse_value
 from tpjb_ident.errors import BadInputError
 
@@ -40,12 +41,7 @@ def parse_physics(names: str | None, housing: str | None) -> Any:
     """
     chosen = [part.strip() for part in (names or "").split(",") if part.strip()]
     for name in chosen:
-        if name not in PHYSICS:
-            import difflib
-
-            near = difflib.get_close_matches(name, PHYSICS, n=1)
-            hint = f"Did you mean {near[0]!r}?" if near else f"Use some of {', '.join(PHYSICS)}."
-            raise BadInputError(f"--physics: {name!r} is not known. {hint}")
+        refuse_unknown(name, PHYSICS, "--physics", several=True)
     if housing is not None and "growth" not in chosen:
         raise BadInputError("--housing-temperature: means nothing without growth. Add --physics growth.")
     from model.growth import Growth

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from rigdata.near_names import nearest_name
+from tpjb_ident.errors import BadInputError
 
 
 def one_of(*names: str) -> Callable[[str], list[str]]:
@@ -73,6 +76,30 @@ Scheduler = Annotated[
     str | None,
     typer.Option("--scheduler", metavar="ADDRESS", help="Dask scheduler to work on, such as tcp://host:8786."),
 ]
+
+
+def refuse_unknown(value: str, known: Iterable[str], option: str, several: bool = False) -> None:
+    """Let a known name pass; answer another with the nearest.
+
+    Parameters
+    ----------
+    value : str
+    known : iterable of str
+    option : str
+        Name of the option, for the message.
+    several : bool
+        Whether the option takes several of the names.
+
+    Raises
+    ------
+    BadInputError
+        Not among the known names.
+    """
+    names = tuple(known)
+    if value not in names:
+        near = nearest_name(value, names)
+        hint = f"Did you mean {near!r}?" if near else f"Use {'some' if several else 'one'} of {', '.join(names)}."
+        raise BadInputError(f"{option}: {value!r} is not known. {hint}")
 
 
 def out_folder(out: Path | None, command: str) -> Path:

@@ -10,9 +10,9 @@ A picture's file bears its function's name; all are imported here at once, so th
 
 from __future__ import annotations
 
-import difflib
 from typing import Any
 
+from rigdata.near_names import nearest_name
 from tpjb_ident.report.plots.clearance_and_locus import clearance_and_locus
 from tpjb_ident.report.plots.coefficient import coefficient
 from tpjb_ident.report.plots.coherence import coherence
@@ -51,8 +51,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    near = difflib.get_close_matches(name, __all__, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    near = nearest_name(name, __all__)
+    hint = f"; did you mean {near!r}?" if near else ""
     raise AttributeError(f"module 'tpjb_ident.report.plots' has no attribute {name!r}{hint}")
 
 
