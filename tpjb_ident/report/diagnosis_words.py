@@ -1,68 +1,207 @@
-"""A verdict in sentences and rows, for the terminal and for the report."""
+"""A verdict in sentences and rows, in the units of an engineer, for the terminal and for the report."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from tpjb_ident.report.effect_words import WORDS, amount, finding
+from tpjb_ident.rounding import percent
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnose.verdict.verdict import Verdict
 
+#: Observables of a diagnosis in words.
+OBSERVABLES = {
+    "locus_x": "the shaft's horizontal position",
+    "locus_y": "the shaft's vertical position",
+    "load_ratio": "the size of the measured load",
+    "load_turn": "the direction of the measured load",
+    "clearance_pushed": "the clearance polygon",
+    "side_angle": "the angles of the polygon's sides",
+    "dry_compliance": "the dry pivot tests",
+    "pad_temperature": "the pad temperatures",
+}
+DIRECT = ("kxx", "kyy", "cxx", "cyy")
 
-def verdict_sentences(name: str, verdict: Verdict) -> list[str]:
-    """Say what came out, the answer first."""
-    gap = verdict.gap
-    change = f"{gap['heldout_before']:.2f} to {gap['heldout_after']:.2f} sigma"
-    held = f"on points that no fit has seen the gap goes from {change}"
-    names = " and ".join(_words(e.label) for e in verdict.effects)
-    verb = "explain" if len(verdict.effects) > 1 else "explains"
-    first = {
-        "consistent": f"{name}: consistent. Model and measurement agree within noise and tolerance "
-        f"(gap {gap['before']:.2f} sigma).",
-        "named": f"{name}: {names} {verb} the disagreement; {held}.",
-        "ambiguous": f"{name}: {names} closes the gap, but these data cannot tell it from "
-        f"{' or '.join(_words(n) for group in verdict.indistinguishable for n in group[1:])}; {held}.",
-        "unexplained": f"{name}: unexplained. There is a gap of {gap['before']:.2f} sigma, and nothing in the library "
-        "closes it.",
-    }[verdict.verdict]
-    out = [first]
-    if verdict.verdict == "unexplained":
-        out += [f"Because {reason}." for reason in verdict.reasons]
+
+def verdict_sentences(
+    name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, float]] | None = None
+) -> list[str]:
+    """Say what came out, the answer first.
+
+    Parameters
+    ----------
+    name : str
+        Of the campaign.
+    verdict : Verdict
+    deviations : mapping of str to (float, float), optional
+        Median of predicted / measured - 1 before and after, by coefficient.
+    """
+    sentences = [_answer(name, verdict, deviations)]
+    if deviations and verdict.verdict != "consistent":
+        before = ", ".join(f"{c} {percent(deviations[c][0])}" for c in DIRECT if c in deviations)
+        after = ", ".join(f"{c} {percent(deviations[c][1])}" for c in DIRECT if c in deviations)
+        with_effects = f"; with it {after}" if verdict.effects else ""
+        sentences.append(f"The model was off by {before} (median over the points){with_effects}.")
+    if verdict.effects:
+        sentences.append(
+            "The sizes were fitted to these data; that they close the gap was tested on points left out of the fit: "
+            f"{verdict.gap['heldout_before']:.1f} standard deviations before, {verdict.gap['heldout_after']:.1f} after."
+        )
+        checks = [f"{WORDS[e.name].check}" for e in verdict.effects if e.name in WORDS]
+        if checks:
+            sentences.append(f"Check first: {'; '.join(dict.fromkeys(checks))}.")
+    sentences += _remainder_sentences(verdict)
+    if verdict.verdict in {"unexplained", "partly-explained"}:
+        sentences += [f"Because {in_words(reason)}." for reason in verdict.reasons]
     if verdict.verdict != "consistent" and verdict.disagreement:
         worst = verdict.disagreement[0]
-        out.append(
-            f"It shows most in {worst.observable} at {worst.where}: {worst.size_sigma:.1f} sigma, "
-            f"{100 * worst.share:.0f} % of the squared gap."
-        )
-    sensors = verdict.notes.get("sensor_map")
-    if verdict.verdict != "consistent" and sensors:
-        out.append(f"Sensors or physics: {sensors['words']}.")
-    worse = [o for o, g in verdict.gap_by_observable.items() if _worse(g)]
+        sentences.append(f"The model and the rig part most in {observable(worst.observable)}, {place(worst.where)}.")
+    worse = [observable(o) for o, g in verdict.gap_by_observable.items() if _worse(g)]
     if verdict.effects and worse:
-        out.append(f"With the effect added, {', '.join(worse)} fits worse than before.")
-    if verdict.next_test and verdict.verdict in {"ambiguous", "unexplained"}:
-        out.append(f"Next test: {verdict.next_test}.")
+        sentences.append(f"With the effect added, {' and '.join(worse)} fits worse than before.")
+    if verdict.next_test and verdict.verdict in {"ambiguous", "unexplained", "partly-explained"}:
+        sentences.append(f"Next test: {in_words(verdict.next_test)}.")
     if verdict.below_floor:
         hidden = ", ".join(_words(n) for n in verdict.below_floor)
-        out.append(
-            f"This campaign could not have seen at a plausible size: {hidden}. Silence about them is no absence."
-        )
-    return out
+        sentences.append(f"This campaign could not have seen {hidden}: silence about that is no absence.")
+    return sentences
 
 
-def _worse(gap: dict[str, float]) -> bool:
+def _answer(name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, float]] | None) -> str:
+    found = " and ".join(finding(e.name, e.parameters) for e in verdict.effects)
+    found = found[:1].upper() + found[1:]
+    if verdict.verdict == "consistent":
+        return f"{name}: model and measurement agree within noise and tolerance."
+    if verdict.verdict == "named":
+        return f"{name}: {found}. That explains the disagreement."
+    if verdict.verdict == "ambiguous":
+        rivals = dict.fromkeys(_words(n) for group in verdict.indistinguishable for n in group[1:])
+        return f"{name}: {found}; these data cannot tell it from {' or '.join(rivals)}."
+    if verdict.effects:
+        return f"{name}: {found}. That explains most of the disagreement, and something is left."
+    worst = _largest(deviations)
+    return f"{name}: unexplained{worst}. Nothing in the library of effects closes the gap."
+
+
+def _largest(deviations: Mapping[str, tuple[float, float]] | None) -> str:
+    if not deviations:
+        return ""
+    name = max(deviations, key=lambda c: abs(deviations[c][0]))
+    return f", {name} is off by {percent(deviations[name][0])}"
+
+
+def _remainder_sentences(verdict: Verdict) -> list[str]:
+    """What is left and what it behaves like, where a diagnosis says so."""
+    known: dict[str, Any] = {**verdict.notes}
+    for name in ("behaves_like", "drift", "remainder"):
+        known.setdefault(name, getattr(verdict, name, None))
+    sentences = [f"What is left behaves like {in_words(_get(one, 'words'))}." for one in known["behaves_like"] or ()]
+    return sentences + [
+        f"The size of {_words(_get(one, 'effect'))} {in_words(_get(one, 'words'))}." for one in known["drift"] or ()
+    ]
+
+
+def _get(entry: Any, name: str) -> str:
+    return str(entry[name] if isinstance(entry, Mapping) else getattr(entry, name))
+
+
+def observable(name: str) -> str:
+    """An observable in words.
+
+    Parameters
+    ----------
+    name : str
+        As in ``diagnosis.json``: ``"kxx"``, ``"locus_x"``, ..
+    """
+    return OBSERVABLES.get(name, _words(name))
+
+
+def place(where: str) -> str:
+    """A range of operating points in words and in kN, Hz and degrees.
+
+    Parameters
+    ----------
+    where : str
+        As the diagnosis writes it: ``"static_load 2500-5000 N"``, ``"pad 5"``, ..
+    """
+
+    def kilo(match: re.Match[str]) -> str:
+        return f"{' to '.join(f'{float(v) / 1e3:g}' for v in match[1].split('-'))} kN"
+
+    text = re.sub(r"((?:\d+(?:\.\d+)?)(?:-\d+(?:\.\d+)?)?) N\b", kilo, where)
+    text = text.replace("static_load_direction", "load direction").replace("static_load", "static load")
+    text = re.sub(r"(-?\d+)-(-?\d+) deg", r"\1 to \2°", text)
+    text = re.sub(r"\bpads? (\d)", r"pad #\1", text).replace(" deg", "°")
+    return f"at {text}" if text and not text.startswith(("at ", "everywhere")) else text
+
+
+def in_words(text: str) -> str:
+    """A sentence of a diagnosis without the names of its variables.
+
+    Parameters
+    ----------
+    text : str
+    """
+    found = place(text).removeprefix("at ")
+    for name, words in OBSERVABLES.items():
+        found = found.replace(name, words)
+    return re.sub(r"(?<=[a-z])_(?=[a-z])", " ", found)
+
+
+def _worse(gap: Mapping[str, float]) -> bool:
     before, after = (next((v for k, v in gap.items() if k.endswith(end)), 0.0) for end in ("_before", "_after"))
-    return after > before + 0.3
+    return after > max(before + 0.3, 1.0)
 
 
 def _words(name: str) -> str:
-    return name.replace("_", " ")
+    return re.sub(r"\bpad (\d)", r"pad #\1", name.replace("_", " "))
 
 
 def effect_rows(verdict: Verdict) -> list[list[str]]:
-    """One row per parameter: effect, parameter, value, interval, unit."""
-    rows = []
-    for e in verdict.effects:
-        for k, p in e.parameters.items():
-            interval = "" if p.lo == p.hi else f"{p.lo:.4g} .. {p.hi:.4g}"
-            rows.append([_words(e.name), _words(k), f"{p.value:.4g}", interval, p.unit])
-    return rows
+    """One row per effect: what was found with its size, and its share among the explanations that were fitted.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    """
+    return [[_words(e.label), finding(e.name, e.parameters), f"{100 * e.probability:.0f} %"] for e in verdict.effects]
+
+
+def next_commands(campaign: str, bearing: str | None, verdict: Verdict, folder: str) -> list[str]:
+    """How to use what was found, as commands to type.
+
+    Parameters
+    ----------
+    campaign, bearing : str
+        As the diagnosis was called; no bearing where the campaign names its own.
+    verdict : Verdict
+    folder : str
+        Where ``updated.effects.toml`` lies.
+    """
+    drawn = f" --bearing {bearing}" if bearing else ""
+    if verdict.effects:
+        return [f"tpjb compare {campaign}{drawn} --effects {folder}/updated.effects.toml"]
+    if verdict.verdict == "consistent":
+        return [f"tpjb export {folder} --to ross"]
+    return [f"tpjb compare {campaign}{drawn} --pivots measured"]
+
+
+def parameter_rows(verdict: Verdict) -> list[list[str]]:
+    """One row per parameter of the effects, in the units that people read.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    """
+    return [
+        [_words(e.name), _words(key), f"#{p.value:.0f}" if key == "pad" else amount(p)]
+        for e in verdict.effects
+        for key, p in e.parameters.items()
+    ]
+
+
+__all__: Sequence[str] = ("effect_rows", "in_words", "next_commands", "observable", "parameter_rows", "place",
+                          "verdict_sentences")  # fmt: skip

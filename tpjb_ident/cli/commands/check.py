@@ -24,9 +24,9 @@ SEVERITIES = ("error", "warning", "note")
 
 @guarded
 def check(campaign: CampaignPath, out: Out = None) -> None:
-    """Read a whole campaign and report every problem found, not just the first.
+    """Report every problem of a campaign, not just the first.
 
-    Writes check.json. Exit code 2 if there is an error that makes a run unusable.
+    Reads all records. Writes check.json. Exit code 2 if there is an error that makes a run unusable.
     """
     from tpjb_ident.check.campaign import check_campaign
 

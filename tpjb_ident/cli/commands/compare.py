@@ -48,9 +48,9 @@ def compare(
     norm: Norm = None,
     out: Out = None,
 ) -> None:
-    """Compare prediction and measurement with rigid, Kirk and measured pivots; writes report.html.
+    """Compare prediction and measurement, with a report.
 
-    Also writes comparison, coefficients, estimators, windows, pivot_curves, locus and clearance tables, pivots.toml,
+    With rigid, Kirk and measured pivots: writes report.html, comparison, coefficients, estimators, windows, pivot_curves, locus and clearance tables, pivots.toml,
     and the figures as SVG and PNG.
     """
     source = open_campaign(campaign)

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
 @guarded
 def demo(out: Out = None) -> None:
-    """Run the main job end to end on a bundled campaign: check, identify, pivot, locus, predict, compare, report.
+    """Run the main job on a bundled campaign, with its report.
+
+    End to end: check, identify, pivot, locus, predict, compare, report.
 
     The campaign is computed (docs/make_demo_campaign.py): the paper's rocker-backed bearing with pivots softer than the
     printed formula, recorded with noise and glitches.

@@ -39,9 +39,9 @@ def diagnose(
     workers: Annotated[int | None, typer.Option(min=1, help="Processes [default: all cores].")] = None,
     out: Out = None,
 ) -> None:
-    """Find where model and measurement disagree and name the missing effect; says so when it does not know.
+    """Name what the model lacks where it and the rig disagree.
 
-    Writes diagnosis.json, updated.effects.toml (for `tpjb predict --effects` and `tpjb compare --effects`),
+    Says so when it does not know. Writes diagnosis.json, updated.effects.toml (for `tpjb predict --effects` and `tpjb compare --effects`),
     report.html, and the identified coefficients.
     """
     source = open_campaign(campaign)

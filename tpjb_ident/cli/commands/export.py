@@ -40,9 +40,9 @@ def export(
     force: Force = False,
     out: Out = None,
 ) -> None:
-    """Write coefficients as other programs read them, with their intervals and flags.
+    """Write coefficients as other programs read them.
 
-    ROSS bearing elements (one TOML file per static point), tables (CSV, Parquet, Excel), a MATLAB file, or text over
+    With their intervals and flags: ROSS bearing elements (one TOML file per static point), tables (CSV, Parquet, Excel), a MATLAB file, or text over
     shaft speed for XLTRC, Dyrobes and ANSYS (one file per load and excitation frequency). Where the form holds no
     intervals and flags, bearing_coefficients_intervals.csv beside it does. Points that are not to be trusted stay
     behind (exit code 3).

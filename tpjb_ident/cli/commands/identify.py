@@ -34,12 +34,15 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rigdata.campaign import Campaign
+    from tpjb_ident.arrays import FloatArray
     from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.runs.run_store import RunStore
 
 #: Records [bytes] above which several processes are quicker than one.
 WORTH_PROCESSES = 100 * 2**20
+#: Share of the mean direct coefficient from which a cross-coupled one is shown.
+CROSS_MATTERS = 0.1
 #: Folder in the output folder in which finished runs wait for the others.
 KEPT = ".tpjb-finished-runs"
 #: What worker processes need, imported once for all of them.
@@ -57,9 +60,9 @@ def identify(
     scheduler: Scheduler = None,
     out: Out = None,
 ) -> None:
-    """Identify stiffness and damping with 95 % intervals at every operating point.
+    """Identify stiffness and damping with 95 % intervals.
 
-    Writes coefficients (chosen method), estimators (every method, statsmodels RLM among them), windows (rejected
+    One row per operating point, in tables: writes coefficients (chosen method), estimators (every method, statsmodels RLM among them), windows (rejected
     ones, with reasons) and frequency_fits (K-C and K-C-M over frequency, per load), each as .csv and .parquet. Exit
     code 3 if a point is not to be trusted.
     """
@@ -83,8 +86,7 @@ def identify(
         write_record(folder, target, "identify", options, source.fingerprint(), result.remarks())
     show_coefficients(result)
     show_frequency_fits(result)
-    for remark in result.remarks():
-        print_line(f"note: {remark}")
+    show_remarks(result)
     print_line(f"Results: {target}")
     refuse_untrusted(result)
 
@@ -194,20 +196,93 @@ def write_identification(folder: Path, result: Identification) -> None:
 
 
 def show_coefficients(result: Identification) -> None:
-    """Print K and C of every point with half the width of their intervals."""
-    rows = []
+    """Print K and C of every point with half the width of their intervals; what is flagged stands below in full.
+
+    Parameters
+    ----------
+    result : Identification
+    """
+    import numpy as np
+
+    letters = flag_letters(result)
+    rows, cross = [], []
     for p in result.points:
-        half = p.stiffness.half_width()
-        omega = p.stiffness.omega
-        k, c = p.stiffness.k, p.stiffness.c
-        rows.append([
-            f"{p.point.static_load / 1e3:g}", f"{p.point.excitation_hz:g}",
-            f"{k[0, 0] / 1e6:.1f} ±{half[0] / 1e6:.1f}", f"{k[1, 1] / 1e6:.1f} ±{half[3] / 1e6:.1f}",
-            f"{c[0, 0] / 1e3:.0f} ±{half[4] / omega / 1e3:.0f}", f"{c[1, 1] / 1e3:.0f} ±{half[7] / omega / 1e3:.0f}",
-            f"{100 * p.outlier_fraction:.0f}", "; ".join(str(q) for q in p.quality) or "ok",
-        ])  # fmt: skip
-    columns = ["load kN", "exc. Hz", "kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m", "out %", "quality"]
-    table(f"{result.campaign}: {result.method}, 95 % intervals", columns, rows, words=(7,), whole="coefficients.csv")
+        half, omega = p.stiffness.half_width(), p.stiffness.omega
+        values = np.concatenate([p.stiffness.k.ravel() / 1e6, p.stiffness.c.ravel() / 1e3])
+        halves = half / np.repeat([1e6, 1e3 * omega], 4)
+        cells = [with_half(v, h) for v, h in zip(values, halves, strict=True)]
+        place = [f"{p.point.static_load / 1e3:g}", f"{p.point.static_load_direction_deg:g}",
+                 f"{p.point.shaft_speed_hz:g}", f"{p.point.excitation_hz:g}"]  # fmt: skip
+        flags = "".join(letters[str(q)] for q in p.quality)
+        rows.append([*place, cells[0], cells[3], cells[4], cells[7], f"{100 * p.outlier_fraction:.0f}", flags])
+        if cross_coupling_matters(values, halves):
+            cross.append([*place, *(cells[i] for i in (1, 2, 5, 6))])
+    point = ["load kN", "dir. deg", "speed Hz", "exc. Hz"]
+    direct = ["kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m"]
+    title = f"{result.campaign}: {result.method}, 95 % intervals"
+    table(title, [*point, *direct, "out %", "flags"], rows, words=(9,), whole="coefficients.csv")
+    if cross:
+        coupled = ["kxy MN/m", "kyx MN/m", "cxy kNs/m", "cyx kNs/m"]
+        heading = "cross-coupled, where they are more than a tenth of the direct ones"
+        table(heading, [*point, *coupled], cross, words=(), whole="coefficients.csv")
+
+
+def flag_letters(result: Identification) -> dict[str, str]:
+    """A letter for every condition that a point has, in the order of their appearance.
+
+    Parameters
+    ----------
+    result : Identification
+    """
+    names = dict.fromkeys(str(q) for p in result.points for q in p.quality)
+    return dict(zip(names, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ", strict=False))
+
+
+def show_remarks(result: Identification) -> None:
+    """Print every condition once, under the letter by which the table marks its points.
+
+    Parameters
+    ----------
+    result : Identification
+    """
+    letters = flag_letters(result)
+    for remark in result.remarks():
+        name = next((n for n in letters if remark.startswith(f"{n} at ")), "")
+        print_line(f"{letters[name]}: {remark}" if name else f"note: {remark}")
+
+
+def with_half(value: float, half: float) -> str:
+    """A number with half its interval, or that there is none.
+
+    Parameters
+    ----------
+    value, half : float
+        In the units of the table.
+    """
+    if not math.isfinite(value):
+        return "no answer"
+    if not math.isfinite(half) or half <= 0:
+        return f"{value:.4g} ±?"
+    digits = max(0, -math.floor(math.log10(half))) if half < 10 else 0
+    return f"{value:.{min(digits, 3)}f} ±{half:.{min(digits, 3)}f}"
+
+
+def cross_coupling_matters(values: FloatArray, halves: FloatArray) -> bool:
+    """Whether a cross-coupled term is beyond doubt more than a tenth of the direct ones.
+
+    Parameters
+    ----------
+    values, halves : (8,) ndarray
+        K and C, row by row, and half their intervals.
+    """
+    import numpy as np
+
+    for part in (slice(0, 4), slice(4, 8)):
+        value, half = values[part], halves[part]
+        direct = 0.5 * (abs(value[0]) + abs(value[3]))
+        if np.isfinite(value).all() and (np.abs(value[1:3]) - half[1:3] > CROSS_MATTERS * direct).any():
+            return True
+    return False
 
 
 def show_frequency_fits(result: Identification) -> None:

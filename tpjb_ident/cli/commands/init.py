@@ -29,7 +29,7 @@ Out = Annotated[
 
 @guarded
 def init(folder: Folder, bearing: Bearing = None, out: Out = None) -> None:
-    """Look at a folder of exports and write a commented draft of campaign.toml.
+    """Look at a folder of exports and draft its campaign.toml.
 
     Channels, units, rates and kinds of run are guessed from names and signals; what only the person at the rig can
     know is marked ??. Records are only read, and a campaign.toml that is there already is never replaced.

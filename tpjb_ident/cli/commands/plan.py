@@ -43,7 +43,9 @@ def plan(
     data_sets: Annotated[bool, typer.Option("--data-sets", help="Also: what parts of it could tell, A to E.")] = False,
     out: Out = None,
 ) -> None:
-    """Tell which effects a planned campaign could see, from which size on, and which it would mix up.
+    """Tell which effects a planned campaign could see.
+
+    From which size on, and which it would mix up.
 
     Writes plan.json, effects (detection floor and look-alikes) and isolability (the matrix of separations), each as
     .csv and .parquet, and the matrix as a picture; with --data-sets also data_sets: what the direct coefficients alone

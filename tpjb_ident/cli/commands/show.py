@@ -33,7 +33,7 @@ Picture = Annotated[bool, typer.Option("--picture", help="Draw channels and spec
 
 @guarded
 def show(source: Source, run: Wanted = None, picture: Picture = False, out: Out = None) -> None:
-    """Show what is in a file: channels, statistics, strongest lines, a spectrum per channel.
+    """Show channels, statistics and spectra of a file.
 
     Of a campaign the list of its runs, or one of them with --run. With --picture or --out also writes channels.csv and
     .parquet, and the picture. Values of a campaign are in SI; of a record file in the units that the file has.

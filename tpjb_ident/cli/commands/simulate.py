@@ -49,7 +49,9 @@ def simulate(
     layout: Annotated[str, typer.Option("--format", help="hdf5, csv, csv-german, csv-tabbed or csv-bare.")] = "hdf5",
     out: Out = None,
 ) -> None:
-    """Write a whole campaign of a virtual rig: campaign.h5 (or the folder campaign), and truth.json beside it.
+    """Write a whole campaign of a virtual rig.
+
+    Writes campaign.h5 (or the folder campaign), and truth.json beside it.
 
     The model gives K, C, positions and temperatures; noise, runout, drift, mains, 16-bit steps and glitches are
     those of a real rig. Effects that act on the records (probe_gain, ..) spoil the instruments.

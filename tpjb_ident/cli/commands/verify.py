@@ -51,7 +51,7 @@ class Checked:
 
 @guarded
 def verify(results: Folder, given: Inputs = None, out: Out = None) -> None:
-    """Check a result folder against its record: SHA-256 of every result and of every input.
+    """Check a result folder against its SHA-256 record.
 
     Exit code 0 if all are the same bytes as when the command ended, 3 if a result or an input differs or a result is
     missing, 2 if that cannot be told: no record, or inputs that are not where they were (give --input). Writes nothing

@@ -38,7 +38,9 @@ def view(
     seconds: Seconds = None,
     out: Out = None,
 ) -> None:
-    """Open a local page: runs with channels, spectra and orbits, windows with weights, prediction beside measurement.
+    """Open a local page with records, points and model.
+
+    Runs with channels, spectra and orbits, windows with weights, prediction beside measurement.
 
     The page is served on 127.0.0.1 only and loads nothing from anywhere else. Stop with Ctrl-C.
     """

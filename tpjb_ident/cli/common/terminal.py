@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import shutil
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.common.output import command_output
+from tpjb_ident.cli.common.table_layout import table_lines, wrapped
 from tpjb_ident.runtime.tables import printable
 
 if TYPE_CHECKING:
@@ -15,6 +17,8 @@ if TYPE_CHECKING:
 
 #: Seconds between two lines about progress where there is no terminal.
 LINE_EVERY = 30.0
+#: Columns of a log file or a pipe.
+LOG_WIDTH = 100
 #: Rows of a table that are printed where a file has them all.
 MOST_ROWS = 40
 #: Share of a step from which its speed is known well enough to tell the time left.
@@ -31,9 +35,12 @@ def _console(stderr: bool = False) -> Console:
             raise BrokenPipeError  # `guarded` ends the command well; rich would say 1
 
     console = Patient(stderr=stderr, highlight=False, soft_wrap=True)
-    if not console.is_terminal:
-        console.width = 140  # a log file has no edge to fold at
     return console
+
+
+def width() -> int:
+    """Columns that a table may take: the terminal's, or what COLUMNS says, or a log file's."""
+    return max(40, shutil.get_terminal_size((LOG_WIDTH, 24)).columns)
 
 
 def print_line(text: str) -> None:
@@ -41,7 +48,22 @@ def print_line(text: str) -> None:
     command_output().sentences.append(printable(text))
     if command_output().silent:
         return
-    _console().print(printable(text), markup=False)
+    if _console().is_terminal:  # whole words on every line; a log file has no edge
+        text = "\n".join(wrapped(text, width()))
+    _console().print("\n".join(printable(line) for line in text.split("\n")), markup=False)
+
+
+def command_line(text: str) -> None:
+    """Print a command to type, unbroken, so that it can be copied.
+
+    Parameters
+    ----------
+    text : str
+    """
+    line = f"Next: {printable(text)}"
+    command_output().sentences.append(line)
+    if not command_output().silent:
+        _console().print(line, markup=False)
 
 
 def error_line(kind: str, text: str) -> None:
@@ -64,25 +86,26 @@ def note_line(kind: str, text: str) -> None:
 def table(
     title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int] = (0,), whole: str = ""
 ) -> None:
-    """Print a table; columns of words stand left, numbers right.
+    """Print a table that fits the terminal; columns of words stand left, numbers right.
 
-    Of a long table that stands in a file, the one named `whole`, the first `MOST_ROWS` are printed.
+    Parameters
+    ----------
+    title : str
+    columns : sequence of str
+        Headings; they break at spaces where a column is narrower than its heading.
+    rows : sequence of sequence of str
+    words : collection of int
+        Columns of words.
+    whole : str
+        File that holds all of a long table; its first `MOST_ROWS` rows are printed.
     """
     command_output().tables.append({"title": title, "columns": list(columns), "rows": [list(row) for row in rows]})
     if command_output().silent:
         return
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    grid = Table(title=Text(printable(title)), box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
-    for i, column in enumerate(columns):
-        side: Literal["left", "right"] = "left" if i in words else "right"
-        grid.add_column(Text(printable(column)), justify=side, no_wrap=i < len(columns) - 1, overflow="fold")
     shown = rows[:MOST_ROWS] if whole else rows
-    for row in shown:
-        grid.add_row(*(Text(printable(cell)) for cell in row))
-    _console().print(grid)
+    lines = table_lines([printable(c) for c in columns], [[printable(c) for c in r] for r in shown], words, width())
+    for line in ("", printable(title), *lines, ""):
+        _console().print(line, markup=False)
     if len(shown) < len(rows):
         _console().print(f"{len(rows) - len(shown)} more rows: {whole} has all {len(rows)}", markup=False)
 

@@ -24,6 +24,8 @@ VARIANT_STYLE: dict[str, tuple[str, Any, str]] = {
     "kirk": ("orange", (0, (5, 2)), "^"),
     "kirk-secant": ("purple", (0, (3, 1, 1, 1)), "v"),
     "measured": ("blue", "-", "D"),
+    "model before": ("orange", (0, (5, 2)), "^"),
+    "with the effects found": ("blue", "-", "D"),
 }
 VARIANT_LABEL = {
     "rigid": "rigid pivots",
