@@ -11,7 +11,13 @@ import numpy as np
 from tpjb_ident.compare.pivot_formula import printed_formula
 from tpjb_ident.compare.positions import locus_distance
 from tpjb_ident.compare.tables import DIRECT, comparison_frame
+from tpjb_ident.effect_words import Fixed, finding
+from tpjb_ident.model_guard import check_model
 from tpjb_ident.rounding import percent, signed
+
+check_model()
+
+from model.effects import kind_of  # noqa: E402  (only once it is known to be ours)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,6 +83,65 @@ def closest(found: tuple[Deviation, ...]) -> str | None:
     return min(scores, key=lambda name: sum(scores[name]) / len(scores[name])) if scores else None
 
 
+#: Median deviation of a direct coefficient from which a model is said to be off.
+OFF = 0.05
+
+
+def worth_a_diagnosis(found: tuple[Deviation, ...]) -> bool:
+    """Whether even the closest pivot model is off by more than intervals and a model's tolerance excuse.
+
+    Parameters
+    ----------
+    found : tuple of Deviation
+    """
+    own = [d for d in found if d.pivots == closest(found) and math.isfinite(d.median)]
+    return any(abs(d.median) > OFF and d.inside < 0.5 * d.n for d in own)
+
+
+def verdict_sentence(comparison: Comparison, found: tuple[Deviation, ...]) -> str:
+    """Say in one sentence what to conclude.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    found : tuple of Deviation
+        Of it.
+    """
+    name, best = comparison.campaign.id, closest(found)
+    if best is None:
+        return f"{name}: no coefficient could be compared; see the quality flags."
+    own = [d for d in found if d.pivots == best and math.isfinite(d.median)]
+    worst = max(own, key=lambda d: abs(d.median))
+    if worth_a_diagnosis(found):
+        who = "No pivot model explains" if len(comparison.variants) > 1 else "The model does not explain"
+        return (
+            f"{name}: {who} {worst.coefficient}: it is off by {percent(worst.median)} even with "
+            f"{PIVOTS_IN_WORDS[best]}."
+        )
+    agrees = f"agree within {100 * max(abs(d.median) for d in own):.1f} % (median)"
+    return f"{name}: prediction and measurement {agrees} with {PIVOTS_IN_WORDS[best]}."
+
+
+def effects_sentences(comparison: Comparison) -> tuple[str, ...]:
+    """Say that effects took part, and what that means for the agreement.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    """
+    effects = comparison.settings.effects
+    if not effects:
+        return ()
+    listed = "; ".join(
+        finding(e.name, {p.name: Fixed(float(e.parameters[p.name]), p.unit) for p in kind_of(e.name).parameters})
+        for e in effects
+    )
+    return (
+        f"The model holds effects: {listed}. Where `tpjb diagnose` found them in this campaign they were fitted to "
+        "these data, and agreement with them is no independent proof.",
+    )
+
+
 def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None) -> tuple[str, ...]:
     """Say what the comparison found, the answer first."""
     found = deviations(comparison, frame)
@@ -97,6 +162,7 @@ def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None)
         for v in comparison.variants
         if v.name != best
     ]
+    sentences[:0] = [verdict_sentence(comparison, found), *effects_sentences(comparison)]
     sentences += _pivot_sentence(comparison) + _clearance_sentence(comparison) + _locus_sentence(comparison)
     return (*sentences, *comparison.remarks)
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tpjb_ident.errors import TpjbError
 from rigdata.near_names import nearest_name
+from tpjb_ident.errors import TpjbError
 
 if TYPE_CHECKING:
     from tpjb_ident.export.points import StaticPoint

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.dynamic.results.identification_tables import coefficient_columns, point_columns
 from tpjb_ident.schema import DAMPING, ENTRIES, STIFFNESS, coefficient_column
 
@@ -44,7 +45,7 @@ def before_and_after(diagnosis: Diagnosis, identification: Identification) -> pd
         predicted = _by_point(diagnosis, fit.prediction)
         for p in identification.points:
             own = predicted.get((round(p.point.static_load, 6), round(p.point.excitation, 6)), {})
-            row = {"pivots": name, **point_columns(p), **coefficient_columns(p.stiffness)}
+            row: dict[str, Any] = {"pivots": name, **point_columns(p), **coefficient_columns(p.stiffness)}
             for kind, omega in ((STIFFNESS, 1.0), (DAMPING, p.point.excitation)):
                 for entry in ENTRIES:
                     column = kind.column(entry)
@@ -54,7 +55,7 @@ def before_and_after(diagnosis: Diagnosis, identification: Identification) -> pd
     return pd.DataFrame(frames)
 
 
-def _by_point(diagnosis: Diagnosis, prediction: np.ndarray) -> dict[tuple[float, float], dict[str, float]]:
+def _by_point(diagnosis: Diagnosis, prediction: FloatArray) -> dict[tuple[float, float], dict[str, float]]:
     """Re h and Im h [N/m] by load [N] and excitation [rad/s]."""
     out: dict[tuple[float, float], dict[str, float]] = {}
     for element, value in zip(diagnosis.observations.elements, prediction, strict=True):

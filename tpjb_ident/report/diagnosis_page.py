@@ -6,14 +6,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tpjb_ident.effect_words import WORDS, finding
+from tpjb_ident.report.coefficient_panels import coefficient_panels
+from tpjb_ident.report.diagnosis_coefficients import before_and_after, median_deviations
 from tpjb_ident.report.diagnosis_evidence import evidence_sections
 from tpjb_ident.report.diagnosis_panels import GROUP, diagnosis_panels
-from tpjb_ident.report.diagnosis_words import effect_rows, verdict_sentences
-from tpjb_ident.report.figure import save_panels
+from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_rows, place, verdict_sentences
+from tpjb_ident.report.figure import Panel, save_panels
 from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from rigdata.campaign import Campaign
     from tpjb_ident.diagnose.campaign import CampaignDiagnosis
     from tpjb_ident.diagnose.verdict.verdict import Verdict
@@ -39,14 +44,15 @@ def diagnosis_page(
 ) -> Page:
     """Gather the content of the report; see `write_diagnosis_report`."""
     verdict = result.diagnosis.verdict
-    answer, *more = verdict_sentences(campaign.id, verdict)
+    table = before_and_after(result.diagnosis, result.identification)
+    answer, *more = verdict_sentences(campaign.id, verdict, median_deviations(table))
     return Page(
         title=f"{campaign.id}: what the model lacks",
         subtitle=f"{result.setup.bearing.name}{': ' + campaign.description if campaign.description else ''}",
         answer=answer,
         more=more,
         key_table=_effects_table(verdict) if verdict.effects else _gap_table(verdict),
-        sections=_sections(result),
+        sections=_sections(result, table),
         settings={k: str(v) for k, v in settings.items()},
         inputs=dict(inputs),
     )
@@ -54,8 +60,8 @@ def diagnosis_page(
 
 def _effects_table(verdict: Verdict) -> Table:
     return Table(
-        "Effects added to the model", ["effect", "parameter", "value", "95 % interval", "unit"], effect_rows(verdict),
-        frozenset({0, 1, 4}),
+        "Effects added to the model, with 95 % intervals", ["effect", "parameter", "value"], parameter_rows(verdict),
+        frozenset({0, 1}),
     )  # fmt: skip
 
 
@@ -64,15 +70,52 @@ def _gap_table(verdict: Verdict) -> Table:
     return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows)
 
 
-def _sections(result: CampaignDiagnosis) -> list[Section]:
+def _effect_sections(verdict: Verdict) -> list[Section]:
+    """What each named effect is, how it looks on a rig, what to check first."""
+    known = [(finding(e.name, e.parameters), WORDS[e.name]) for e in verdict.effects if e.name in WORDS]
+    return [
+        Section(
+            f"What it means: {said}",
+            [words.physics, f"On the rig: {words.on_the_rig}", f"Check first: {words.check}."],
+        )
+        for said, words in known
+    ]
+
+
+def _coefficient_sections(table: pd.DataFrame) -> list[Section]:
+    """K and C over load and frequency: measured, before and after."""
+    groups: dict[str, list[Panel]] = {}
+    for one in coefficient_panels(table):
+        groups.setdefault(one.group, []).append(one)
+    return [Section(heading, panels=panels) for heading, panels in groups.items()]
+
+
+def _other_explanations(verdict: Verdict) -> list[Section]:
+    """What else it could be, and the test that tells."""
+    notes = []
+    for group in verdict.indistinguishable:
+        names = " or ".join(in_words(name) for name in group)
+        notes.append(f"These data cannot tell apart: {names}.")
+    if not notes and verdict.effects:
+        notes.append("No other effect of the library, alone or in a pair, explains these data as well.")
+    if verdict.next_test:
+        notes.append(f"Next test: {in_words(verdict.next_test)}.")
+    return [Section("What else could it be, and the test that tells", notes)] if notes else []
+
+
+def _sections(result: CampaignDiagnosis, table: pd.DataFrame) -> list[Section]:
     verdict = result.diagnosis.verdict
     note = (
         "Sigma joins measurement noise and the stated model tolerance. Held-out points are whole operating points that "
         "no fit has seen: an upper load, an upper frequency and every fifth locus direction."
     )
-    places = [[d.observable, d.where, f"{d.size_sigma:.2f}", f"{100 * d.share:.1f} %"] for d in verdict.disagreement]
-    tried = [[c.name, f"{-c.score:.3f}", f"{c.heldout_gap:.2f}"] for c in verdict.candidates]
-    sections = [
+    places = [
+        [observable(d.observable), place(d.where), f"{d.size_sigma:.2f}", f"{100 * d.share:.1f} %"]
+        for d in verdict.disagreement
+    ]
+    tried = [[in_words(c.name), f"{-c.score:.3f}", f"{c.heldout_gap:.2f}"] for c in verdict.candidates]
+    sections = _effect_sections(verdict) + _coefficient_sections(table) + _other_explanations(verdict)
+    sections.append(
         Section(
             GROUP,
             notes=[note],
@@ -86,7 +129,7 @@ def _sections(result: CampaignDiagnosis) -> list[Section]:
                 )
             ],
         )
-    ]
+    )
     sections += evidence_sections(verdict)
     if tried:
         text = "Chi-square per element is the whitened misfit of the training points with calibration errors left free."

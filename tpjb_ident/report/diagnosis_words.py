@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.report.effect_words import WORDS, amount, finding
+from tpjb_ident.effect_words import WORDS, amount, finding
 from tpjb_ident.rounding import percent
 
 if TYPE_CHECKING:

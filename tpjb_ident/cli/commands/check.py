@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +13,7 @@ from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import campaign_place, open_bearing
 from tpjb_ident.cli.common.options import CampaignPath, Out, out_folder
 from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import print_line, progress
+from tpjb_ident.cli.common.terminal import print_line, progress, table
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.tables import write_text
@@ -19,6 +22,10 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from rigdata.problem import Problem
 
+#: Kinds of run in the order of the summary.
+KINDS = ("dynamic", "locus", "clearance", "dry_pivot")
+#: From as many problems of one sort on they are counted, not listed.
+ALIKE = 4
 SEVERITIES = ("error", "warning", "note")
 
 
@@ -45,8 +52,10 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
     with output_folder(target, "check", (campaign,)) as folder:
         write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")
         write_record(folder, target, "check", {"campaign": campaign}, summary.pop("files_sha256"))
-    for problem in problems:
-        print_line(f"{problem.severity}: {problem}")
+    for sentence in gathered(problems):
+        print_line(sentence)
+    if opened is not None:
+        show_coverage(opened)
     counts = summary["counts"]
     print_line(f"{summary['campaign']}: {counts['error']} errors, {counts['warning']} warnings, {counts['note']} notes")
     print_line(f"Results: {target}")
@@ -54,6 +63,60 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
         raise BadInputError(
             f"{campaign}: {len(errors)} errors, listed above and in {target / 'check.json'}. Mend them."
         )
+
+
+def gathered(problems: Sequence[Problem]) -> list[str]:
+    """One sentence per problem; what is the same but for its numbers in many runs is said once, with their count.
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+    """
+    groups: dict[tuple[str, str, str], list[Problem]] = {}
+    for p in problems:
+        alike = re.sub(r"[-+]?\d[\d.e+-]*", "#", p.what)
+        groups.setdefault((p.severity, alike, p.place if p.severity == "error" else ""), []).append(p)
+    sentences = []
+    for (severity, _, _), group in groups.items():
+        if severity == "error" or len(group) < ALIKE:
+            sentences += [f"{severity}: {p}" for p in group]
+        else:
+            runs = dict.fromkeys(p.run or p.file for p in group[1:])
+            named = ", ".join(list(runs)[:3]) + (", ..." if len(runs) > 3 else "")
+            sentences.append(f"{severity}: {group[0]} (the like {len(group) - 1} more times: {named}; see check.json)")
+    return sentences
+
+
+def show_coverage(campaign: Campaign) -> None:
+    """Print what the campaign holds: runs, points, rates and the range that they cover.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    """
+    rows = []
+    for kind in KINDS:
+        runs = campaign.of_kind(kind)
+        if runs:
+            points = {(r.point.static_load, r.point.static_load_direction, r.point.shaft_speed, r.point.excitation)
+                      for r in runs}  # fmt: skip
+            at = [r.point for r in runs]
+            rows.append([
+                kind, str(len(runs)), str(len({r.pad for r in runs}) if kind == "dry_pivot" else len(points)),
+                _range([r.sample_rate for r in runs]), _range([p.static_load / 1e3 for p in at]),
+                _range([p.static_load_direction_deg for p in at]), _range([p.shaft_speed_hz for p in at]),
+                _range([p.excitation_hz for p in at if p.excitation]),
+            ])  # fmt: skip
+    columns = ["kind", "runs", "points, pads", "rate Hz", "load kN", "direction deg", "speed Hz", "excitation Hz"]
+    table(f"{campaign.id}: what it covers", columns, rows, words=(0,))
+
+
+def _range(values: Sequence[float]) -> str:
+    finite = [v for v in values if math.isfinite(v)]
+    if not finite:
+        return "-"
+    low, high = min(finite), max(finite)
+    return f"{low:g}" if low == high else f"{low:g}..{high:g}"
 
 
 def _opened(path: Path) -> Campaign | None:

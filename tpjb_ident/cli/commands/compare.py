@@ -23,7 +23,7 @@ from tpjb_ident.cli.common.options import (
     refuse_unknown,
 )
 from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import Progress, print_line, progress, table
+from tpjb_ident.cli.common.terminal import Progress, command_line, print_line, progress, table
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
@@ -50,8 +50,8 @@ def compare(
 ) -> None:
     """Compare prediction and measurement, with a report.
 
-    With rigid, Kirk and measured pivots: writes report.html, comparison, coefficients, estimators, windows, pivot_curves, locus and clearance tables, pivots.toml,
-    and the figures as SVG and PNG.
+    With rigid, Kirk and measured pivots: writes report.html, comparison, coefficients, estimators, windows,
+    pivot_curves, locus and clearance tables, pivots.toml, and the figures as SVG and PNG.
     """
     source = open_campaign(campaign)
     variants = _variants(pivots)
@@ -71,6 +71,7 @@ def compare(
             write_comparison(folder, result, options, inputs, show)
         write_record(folder, target, "compare", options, inputs)
     show_comparison(result)
+    suggest_next(result, campaign, bearing)
     print_line(f"Report: {target / 'report.html'}")
     refuse_comparison(result)
 
@@ -119,12 +120,32 @@ def show_comparison(result: Comparison) -> None:
     from tpjb_ident.rounding import percent
 
     found = deviations(result)
+    first, *more = summary_sentences(result)
+    print_line(first)
     rows = [
         [v.name, *(percent(d.median) for d in found if d.pivots == v.name)] for v in result.variants
     ]  # fmt: skip
     table(f"{result.campaign.id}: predicted / measured - 1, median", ["pivots", "kxx", "kyy", "cxx", "cyy"], rows)
-    for sentence in summary_sentences(result):
+    for sentence in more:
         print_line(sentence)
+
+
+def suggest_next(result: Comparison, campaign: Path, bearing: Path | None) -> None:
+    """Print the command that comes next: a diagnosis where the model is off, an export where it is not.
+
+    Parameters
+    ----------
+    result : Comparison
+    campaign, bearing : Path
+        As the command was given them.
+    """
+    from tpjb_ident.compare.summary import deviations, worth_a_diagnosis
+
+    if worth_a_diagnosis(deviations(result)):
+        drawn = f" --bearing {bearing}" if bearing else ""
+        command_line(f"tpjb diagnose {campaign}{drawn}")
+    else:
+        command_line(f"tpjb export {campaign} --to ross")
 
 
 def refuse_comparison(result: Comparison) -> None:

@@ -13,14 +13,14 @@ from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
 from tpjb_ident.cli.common.options import BearingOption, CampaignPath, EffectsFile, Out, Thermal, out_folder
 from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import print_line, progress, table
+from tpjb_ident.cli.common.terminal import command_line, print_line, progress, table
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnose.verdict.verdict import Verdict
+    from tpjb_ident.diagnose.campaign import CampaignDiagnosis
 
 Pivots = Annotated[str, typer.Option("--pivots", help="Where to start from: kirk, rigid, measured or a pivots.toml.")]
 ModelTolerance = Annotated[
@@ -41,8 +41,8 @@ def diagnose(
 ) -> None:
     """Name what the model lacks where it and the rig disagree.
 
-    Says so when it does not know. Writes diagnosis.json, updated.effects.toml (for `tpjb predict --effects` and `tpjb compare --effects`),
-    report.html, and the identified coefficients.
+    Says so when it does not know. Writes diagnosis.json, updated.effects.toml (for `tpjb predict --effects` and
+    `tpjb compare --effects`), report.html, and the identified coefficients.
     """
     source = open_campaign(campaign)
     if not 1e-4 <= model_tolerance <= 0.5:
@@ -54,6 +54,7 @@ def diagnose(
     from tpjb_ident.diagnose.observations.tolerance import Tolerance
     from tpjb_ident.diagnose.search.settings import DiagnoseSettings
     from tpjb_ident.report.diagnosis_page import write_diagnosis_report
+    from tpjb_ident.report.diagnosis_words import next_commands
 
     settings = DiagnoseSettings(tolerance=Tolerance.scaled(model_tolerance), workers=workers)
     files = [f for f in (effects, start if isinstance(start, Path) else None) if f]
@@ -71,16 +72,28 @@ def diagnose(
             named = {name: getattr(value, "name", value) for name, value in options.items()}
             write_diagnosis_report(folder, source, result, named, inputs)
         write_record(folder, target, "diagnose", options, inputs)
-    show_verdict(source.id, verdict)
+    show_verdict(source.id, result)
+    for line in next_commands(str(campaign), str(bearing) if bearing else None, verdict, str(target)):
+        command_line(line)
     print_line(f"Report: {target / 'report.html'}")
     refuse_untrusted(result.identification)
 
 
-def show_verdict(name: str, verdict: Verdict) -> None:
-    """Print the verdict, the effects with their intervals, and the gap."""
-    from tpjb_ident.report.diagnosis_words import effect_rows, verdict_sentences
+def show_verdict(name: str, result: CampaignDiagnosis) -> None:
+    """Print the verdict, the effects with their intervals, and the gap, in the units that people read.
 
-    for sentence in verdict_sentences(name, verdict):
+    Parameters
+    ----------
+    name : str
+        Of the campaign.
+    result : CampaignDiagnosis
+    """
+    from tpjb_ident.report.diagnosis_coefficients import before_and_after, median_deviations
+    from tpjb_ident.report.diagnosis_words import parameter_rows, verdict_sentences
+
+    verdict = result.diagnosis.verdict
+    off = median_deviations(before_and_after(result.diagnosis, result.identification))
+    for sentence in verdict_sentences(name, verdict, off):
         print_line(sentence)
     if verdict.effects:
-        table("Effects", ["effect", "parameter", "value", "95 % interval", "unit"], effect_rows(verdict))
+        table("Effects, with 95 % intervals", ["effect", "parameter", "value"], parameter_rows(verdict), words=(0, 1))

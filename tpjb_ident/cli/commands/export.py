@@ -42,10 +42,10 @@ def export(
 ) -> None:
     """Write coefficients as other programs read them.
 
-    With their intervals and flags: ROSS bearing elements (one TOML file per static point), tables (CSV, Parquet, Excel), a MATLAB file, or text over
-    shaft speed for XLTRC, Dyrobes and ANSYS (one file per load and excitation frequency). Where the form holds no
-    intervals and flags, bearing_coefficients_intervals.csv beside it does. Points that are not to be trusted stay
-    behind (exit code 3).
+    With their intervals and flags: ROSS bearing elements (one TOML file per static point), tables (CSV,
+    Parquet, Excel), a MATLAB file, or text over shaft speed for XLTRC, Dyrobes and ANSYS (one file per load and
+    excitation frequency). Where the form holds no intervals and flags, bearing_coefficients_intervals.csv
+    beside it does. Points that are not to be trusted stay behind (exit code 3).
     """
     from tpjb_ident.export.write import export as write_export
     from tpjb_ident.export.write import result_table

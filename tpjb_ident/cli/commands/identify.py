@@ -24,7 +24,7 @@ from tpjb_ident.cli.common.options import (
 )
 from tpjb_ident.cli.common.quantities import parse_values
 from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import note_line, print_line, progress, table
+from tpjb_ident.cli.common.terminal import command_line, note_line, print_line, progress, table
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
@@ -62,9 +62,9 @@ def identify(
 ) -> None:
     """Identify stiffness and damping with 95 % intervals.
 
-    One row per operating point, in tables: writes coefficients (chosen method), estimators (every method, statsmodels RLM among them), windows (rejected
-    ones, with reasons) and frequency_fits (K-C and K-C-M over frequency, per load), each as .csv and .parquet. Exit
-    code 3 if a point is not to be trusted.
+    One row per operating point, in tables: writes coefficients (chosen method), estimators (every method,
+    statsmodels RLM among them), windows (rejected ones, with reasons) and frequency_fits (K-C and K-C-M over
+    frequency, per load), each as .csv and .parquet. Exit code 3 if a point is not to be trusted.
     """
     source = open_campaign(campaign)
     phasors = phasor_settings(lines, delay or ())
@@ -84,9 +84,11 @@ def identify(
         write_identification(folder, result)
         options = {"campaign": campaign, "method": method, "norm": norm, "lines": lines, "delay": delay}
         write_record(folder, target, "identify", options, source.fingerprint(), result.remarks())
+    show_summary(result)
     show_coefficients(result)
     show_frequency_fits(result)
     show_remarks(result)
+    command_line(f"tpjb {'compare' if source.bearing_text else 'export --to ross'} {campaign}")
     print_line(f"Results: {target}")
     refuse_untrusted(result)
 
@@ -193,6 +195,20 @@ def write_identification(folder: Path, result: Identification) -> None:
     write_table(folder, "estimators", result.estimators_frame())
     write_table(folder, "windows", result.windows_frame())
     write_table(folder, "frequency_fits", result.frequency_frame())
+
+
+def show_summary(result: Identification) -> None:
+    """Print how many points have an answer, and how many of those are to be trusted.
+
+    Parameters
+    ----------
+    result : Identification
+    """
+    bad = sum(bool(untrusted(p.quality)) or not math.isfinite(float(p.stiffness.k[0, 0])) for p in result.points)
+    flagged = sum(bool(p.quality) for p in result.points) - bad
+    trusted = "all to be trusted" if not bad else f"{bad} NOT to be trusted"
+    more = f", {flagged} with flags" if flagged else ""
+    print_line(f"{result.campaign}: {len(result.points)} operating points, {trusted}{more}.")
 
 
 def show_coefficients(result: Identification) -> None:

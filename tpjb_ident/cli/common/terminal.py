@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import shutil
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -48,7 +49,7 @@ def print_line(text: str) -> None:
     command_output().sentences.append(printable(text))
     if command_output().silent:
         return
-    if _console().is_terminal:  # whole words on every line; a log file has no edge
+    if _console().is_terminal or "COLUMNS" in os.environ:  # whole words on every line; a log file has no edge
         text = "\n".join(wrapped(text, width()))
     _console().print("\n".join(printable(line) for line in text.split("\n")), markup=False)
 

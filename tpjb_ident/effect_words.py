@@ -264,6 +264,24 @@ WORDS: dict[str, EffectWords] = {
 }
 
 
+@dataclass(frozen=True)
+class Fixed:
+    """A parameter without an interval."""
+
+    value: float
+    unit: str
+
+    @property
+    def lo(self) -> float:
+        """The value itself."""
+        return self.value
+
+    @property
+    def hi(self) -> float:
+        """The value itself."""
+        return self.value
+
+
 def finding(name: str, parameters: Parameters) -> str:
     """Say what was found, in one clause with its size; an effect of one's own by its name.
 
