@@ -50,7 +50,7 @@ def test_methods_that_disagree_are_named_on_screen_in_the_table_and_in_the_recor
     quality = pd.read_csv(out / "coefficients.csv").set_index("excitation_Hz")["quality"]
     assert "methods-disagree" in quality[25.0]
     assert "methods-disagree" not in quality[31.0]
-    assert "note: methods-disagree at 5 kN, 25 Hz: " in result.stdout
+    assert ": methods-disagree at 5 kN, 25 Hz: " in result.stdout
     entry = json.loads((out / "run.json").read_text(encoding="utf-8"))["commands"]["identify"]
     (remark,) = [r for r in entry["remarks"] if r.startswith("methods-disagree")]
     assert "times the interval) away from mm-eiv" in remark

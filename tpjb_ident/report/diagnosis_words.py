@@ -170,23 +170,23 @@ def effect_rows(verdict: Verdict) -> list[list[str]]:
     return [[_words(e.label), finding(e.name, e.parameters), f"{100 * e.probability:.0f} %"] for e in verdict.effects]
 
 
-def next_commands(campaign: str, bearing: str | None, verdict: Verdict, folder: str) -> list[str]:
-    """How to use what was found, as commands to type.
+def next_command(campaign: str, bearing: str, verdict: Verdict, folder: str) -> str:
+    """How to use what was found, as a command to type.
 
     Parameters
     ----------
     campaign, bearing : str
-        As the diagnosis was called; no bearing where the campaign names its own.
+        As the diagnosis was called; an empty bearing where the campaign names its own.
     verdict : Verdict
     folder : str
         Where ``updated.effects.toml`` lies.
     """
     drawn = f" --bearing {bearing}" if bearing else ""
     if verdict.effects:
-        return [f"tpjb compare {campaign}{drawn} --effects {folder}/updated.effects.toml"]
+        return f"tpjb compare {campaign}{drawn} --effects {folder}/updated.effects.toml"
     if verdict.verdict == "consistent":
-        return [f"tpjb export {folder} --to ross"]
-    return [f"tpjb compare {campaign}{drawn} --pivots measured"]
+        return f"tpjb export {folder} --to ross"
+    return f"tpjb compare {campaign}{drawn} --pivots measured"
 
 
 def parameter_rows(verdict: Verdict) -> list[list[str]]:
@@ -203,5 +203,5 @@ def parameter_rows(verdict: Verdict) -> list[list[str]]:
     ]
 
 
-__all__: Sequence[str] = ("effect_rows", "in_words", "next_commands", "observable", "parameter_rows", "place",
+__all__: Sequence[str] = ("effect_rows", "in_words", "next_command", "observable", "parameter_rows", "place",
                           "verdict_sentences")  # fmt: skip

@@ -70,8 +70,7 @@ def compare(
             result = compare_campaign(source, drawn, settings, show)
             write_comparison(folder, result, options, inputs, show)
         write_record(folder, target, "compare", options, inputs)
-    show_comparison(result)
-    suggest_next(result, campaign, bearing)
+    show_comparison(result, next_command(result, campaign, bearing))
     print_line(f"Report: {target / 'report.html'}")
     refuse_comparison(result)
 
@@ -114,14 +113,23 @@ def write_comparison(
     write_comparison_report(folder, result, named, inputs)
 
 
-def show_comparison(result: Comparison) -> None:
-    """Print the median deviations and the sentences that belong to them."""
+def show_comparison(result: Comparison, then: str = "") -> None:
+    """Print what to conclude, the command that comes next, and the median deviations with what belongs to them.
+
+    Parameters
+    ----------
+    result : Comparison
+    then : str
+        A command to type.
+    """
     from tpjb_ident.compare.summary import deviations, summary_sentences
     from tpjb_ident.rounding import percent
 
     found = deviations(result)
     first, *more = summary_sentences(result)
     print_line(first)
+    if then:
+        command_line(then)
     rows = [
         [v.name, *(percent(d.median) for d in found if d.pivots == v.name)] for v in result.variants
     ]  # fmt: skip
@@ -130,8 +138,8 @@ def show_comparison(result: Comparison) -> None:
         print_line(sentence)
 
 
-def suggest_next(result: Comparison, campaign: Path, bearing: Path | None) -> None:
-    """Print the command that comes next: a diagnosis where the model is off, an export where it is not.
+def next_command(result: Comparison, campaign: Path, bearing: Path | None) -> str:
+    """Command that comes next: a diagnosis where the model is off, an export where it is not.
 
     Parameters
     ----------
@@ -142,10 +150,8 @@ def suggest_next(result: Comparison, campaign: Path, bearing: Path | None) -> No
     from tpjb_ident.compare.summary import deviations, worth_a_diagnosis
 
     if worth_a_diagnosis(deviations(result)):
-        drawn = f" --bearing {bearing}" if bearing else ""
-        command_line(f"tpjb diagnose {campaign}{drawn}")
-    else:
-        command_line(f"tpjb export {campaign} --to ross")
+        return f"tpjb diagnose {campaign}" + (f" --bearing {bearing}" if bearing else "")
+    return f"tpjb export {campaign} --to ross"
 
 
 def refuse_comparison(result: Comparison) -> None:

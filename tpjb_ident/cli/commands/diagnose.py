@@ -54,7 +54,7 @@ def diagnose(
     from tpjb_ident.diagnose.observations.tolerance import Tolerance
     from tpjb_ident.diagnose.search.settings import DiagnoseSettings
     from tpjb_ident.report.diagnosis_page import write_diagnosis_report
-    from tpjb_ident.report.diagnosis_words import next_commands
+    from tpjb_ident.report.diagnosis_words import next_command
 
     settings = DiagnoseSettings(tolerance=Tolerance.scaled(model_tolerance), workers=workers)
     files = [f for f in (effects, start if isinstance(start, Path) else None) if f]
@@ -72,14 +72,12 @@ def diagnose(
             named = {name: getattr(value, "name", value) for name, value in options.items()}
             write_diagnosis_report(folder, source, result, named, inputs)
         write_record(folder, target, "diagnose", options, inputs)
-    show_verdict(source.id, result)
-    for line in next_commands(str(campaign), str(bearing) if bearing else None, verdict, str(target)):
-        command_line(line)
+    show_verdict(source.id, result, next_command(str(campaign), str(bearing or ""), verdict, str(target)))
     print_line(f"Report: {target / 'report.html'}")
     refuse_untrusted(result.identification)
 
 
-def show_verdict(name: str, result: CampaignDiagnosis) -> None:
+def show_verdict(name: str, result: CampaignDiagnosis, then: str) -> None:
     """Print the verdict, the effects with their intervals, and the gap, in the units that people read.
 
     Parameters
@@ -87,13 +85,18 @@ def show_verdict(name: str, result: CampaignDiagnosis) -> None:
     name : str
         Of the campaign.
     result : CampaignDiagnosis
+    then : str
+        The command that comes next.
     """
     from tpjb_ident.report.diagnosis_coefficients import before_and_after, median_deviations
     from tpjb_ident.report.diagnosis_words import parameter_rows, verdict_sentences
 
     verdict = result.diagnosis.verdict
     off = median_deviations(before_and_after(result.diagnosis, result.identification))
-    for sentence in verdict_sentences(name, verdict, off):
+    first, *more = verdict_sentences(name, verdict, off)
+    print_line(first)
+    command_line(then)
+    for sentence in more:
         print_line(sentence)
     if verdict.effects:
         table("Effects, with 95 % intervals", ["effect", "parameter", "value"], parameter_rows(verdict), words=(0, 1))
