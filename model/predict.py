@@ -20,7 +20,9 @@ from model.options import Options
 from model.pivots import pivot_laws
 from model.possible import check_possible
 from model.setup import Mesh, Setup
+from model.statics.conditions import largest_reynolds
 from model.statics.equilibrium import Equilibrium, solve_equilibrium
+from model.statics.pad_flow import PadFlow, pad_flow
 from model.statics.power import power_loss
 from model.units import to_si
 
@@ -147,9 +149,44 @@ class Prediction:
         """Thinnest film [m]; infinite if no pad carries."""
         return min((float(f.work.thickness.min()) for f in self.equilibrium.films if not f.idle), default=math.inf)
 
+    @functools.cached_property
+    def pad_flow(self) -> tuple[PadFlow, ...]:
+        """Per pad: oil in, out and over the sides [m^3/s], temperatures in and out [degC]."""
+        return tuple(pad_flow(f, self.setup.bearing.oil) for f in self.equilibrium.films)
+
+    @property
+    def reynolds(self) -> float:
+        """Largest local Reynolds number rho U h / mu of all films."""
+        return largest_reynolds(self.equilibrium.films, self.speed * self.setup.bearing.journal_radius)
+
+    @property
+    def sommerfeld(self) -> float:
+        """S = mu N D L / W (R / Cb)^2, N in rev/s, mu of the oil that enters, Cb the mean of the pads."""
+        bearing, clearance = self.setup.bearing, self._clearance
+        viscosity = float(bearing.oil.viscosity(self.setup.inlet_temperature))
+        turns = self.speed / (2.0 * math.pi)
+        size = viscosity * turns * bearing.journal_diameter * bearing.length
+        return size * (bearing.journal_radius / clearance) ** 2 / self.load if self.load > 0.0 else math.inf
+
+    @property
+    def eccentricity_ratio(self) -> float:
+        """Distance of the journal from the bearing centre over the mean Cb."""
+        return math.hypot(*self.bearing_position) / self._clearance
+
+    @property
+    def attitude_angle(self) -> float:
+        """Angle from the load's direction to that of the journal [rad], positive with rotation, within +-pi."""
+        x, y = self.bearing_position
+        return (math.atan2(y, x) - self.load_direction + math.pi) % (2.0 * math.pi) - math.pi
+
+    @property
+    def _clearance(self) -> float:
+        pads = self.setup.bearing.pads
+        return sum(p.assembled_clearance for p in pads) / len(pads) + self.setup.clearance_change
+
     @property
     def power_loss(self) -> float:
-        """Shear of all films [W]."""
+        """Shear of all films, those of idle pads too [W]."""
         return power_loss(self.equilibrium, self.speed * self.setup.bearing.journal_radius)
 
     def pad_temperature(self, fraction: float = 0.75) -> FloatArray:

@@ -132,7 +132,7 @@ class Setup:
     supply_change : float
         The oil enters this much hotter than the bearing file says [K].
     carryover : float
-        Fraction lambda of hot oil carried over from pad to pad.
+        Fraction lambda of the oil leaving a pad that enters the next, as far as that takes it in.
     options : Options
         Physics beyond the paper's model.
     bending : float

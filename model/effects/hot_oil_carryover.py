@@ -7,7 +7,11 @@ from model.setup import Setup
 
 
 def apply(setup: Setup, fraction: float) -> Setup:
-    """Inlet temperature of a pad = T_supply + fraction * (outlet of the pad before it - T_supply)."""
+    """A share lambda of the oil that leaves a pad enters the next one, as far as that takes it in.
+
+    T_in = T_supply + s (T_out before - T_supply) with s = min(1, lambda Q_out before / Q_in), see
+    `model.statics.heat_paths`.
+    """
     return setup.change(carryover=fraction)
 
 

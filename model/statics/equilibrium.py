@@ -29,7 +29,7 @@ from model.statics.carrying import (
     shorten,
     wake_or_rest,
 )
-from model.statics.conditions import overloaded_pads, unsupported
+from model.statics.conditions import overloaded_pads, regimes, unsupported
 from model.statics.first_position import first_position
 from model.statics.heat_paths import BOUNDLESS, couples_heat, settle_temperatures
 from model.statics.newton_step import newton_step
@@ -314,6 +314,8 @@ def _warm_films(search: _Search, carrying: list[PadFilm], oil: Oil) -> float:
     if not couples_heat(search.setup):
         search.limited = max((f.warm(search.surface_speed, oil, limits) for f in carrying), default=0.0)
         return max((f.temperature_change for f in carrying), default=0.0)
+    for film in search.films:
+        film.rest(search.position, search.surface_speed, oil)
     change, search.limited, search.journal = settle_temperatures(
         search.setup, search.films, search.surface_speed, search.journal, limits
     )
@@ -382,6 +384,8 @@ _NO_CHANGE = np.empty((0, 0))
 
 def _result(search: _Search, iterations: int, residual: float, heat: float, status: tuple[str, ...]) -> Equilibrium:
     names = list(status)
+    for film in search.films:
+        film.rest(search.position, search.surface_speed, search.setup.bearing.oil)
     if "not converged" in names and unsupported(search.setup, search.load):
         names.insert(0, "no pads against the load")
     overloaded = overloaded_pads(search.films)
@@ -392,6 +396,7 @@ def _result(search: _Search, iterations: int, residual: float, heat: float, stat
         names.append("idle pads " + ", ".join(map(str, idle)))
     if search.limited > 0:
         names.append("flow back at a leading edge")
+    names += regimes(search.setup, search.films, search.surface_speed)
     return Equilibrium(
         search.position.copy(), tuple(search.films), iterations, residual, heat, search.journal, tuple(names)
     )

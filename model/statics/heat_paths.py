@@ -6,7 +6,8 @@ The baseline is adiabatic, as the paper's model. Three options couple the films'
 - `isothermal_journal`: a turning journal has one temperature; it takes up heat where the film is hotter and gives it
   back where it is colder, and keeps none. A film with a parabolic temperature profile over its thickness, flat at the
   pad, passes q = 3 k / h (T_mean - T_journal).
-- `carryover`: a pad drinks a share of what leaves the pad before it.
+- `carryover`: of the oil that leaves a pad, a share lambda enters the next one as far as that takes it in; the groove
+  makes up the rest: T_in = T_supply + s (T_out before - T_supply), s = min(1, lambda Q_out before / Q_in).
 
 For given flows all of them are linear: every film's temperature is that of fresh oil at zero, plus its answer to its
 inlet, plus its answer to the journal. So the inlets and the journal follow from one small system, however much of the
@@ -26,6 +27,7 @@ from model.film.energy import dissipation, march
 from model.pad.bending import PadGive
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
+from model.statics.pad_flow import flow_weighted, outlet_temperature, through_flow
 
 FloatArray = NDArray[np.float64]
 
@@ -205,14 +207,16 @@ def _journal_exchange(setup: Setup, film: PadFilm) -> FloatArray:
 
 def _balance(setup: Setup, order: list[PadFilm], parts: list[FloatArray | None]) -> tuple[FloatArray, float]:
     """Inlet temperature of every pad, and the journal's that keeps no heat [degC]."""
-    n, supply, share = len(order), setup.inlet_temperature, setup.carryover
+    n, supply = len(order), setup.inlet_temperature
+    shares = mixing_shares(order, setup.carryover)
     matrix, right = np.eye(n + 1), np.full(n + 1, supply)
     kept = np.zeros(3)  # what the journal takes up: by fresh oil, by its own temperature
     by_inlet = np.zeros(n)
     for k, (film, part) in enumerate(zip(order, parts, strict=True)):
-        outlet = [0.0, 1.0, 0.0]  # an idle pad passes its inlet on
+        rest = outlet_temperature(film) - film.inlet if film.forces is None else 0.0
+        outlet = [rest, 1.0, 0.0]  # an idle pad passes its inlet on, somewhat warmer
         if part is not None:
-            outlet = _outlet(film, part)
+            outlet = flow_weighted(film, part)
             if setup.options.isothermal_journal:
                 weight = film.work.exchange.copy()  # all of it is the journal's, see `FilmHeat.answers`
                 weight[[0, -1]] *= 0.5
@@ -220,6 +224,7 @@ def _balance(setup: Setup, order: list[PadFilm], parts: list[FloatArray | None])
                 kept += np.array([taken[0], 0.0, taken[2] - weight.sum()])
                 by_inlet[k] = taken[1]
         after = (k + 1) % n
+        share = shares[after]
         right[after] = supply * (1.0 - share) + share * outlet[0]
         matrix[after, k] -= share * outlet[1]
         matrix[after, n] -= share * outlet[2]
@@ -230,16 +235,13 @@ def _balance(setup: Setup, order: list[PadFilm], parts: list[FloatArray | None])
     return answer[:n], float(answer[n])
 
 
-def outlet_temperature(film: PadFilm) -> float:
-    """Flow-weighted temperature at the trailing edge [degC]; an idle pad passes its inlet temperature on."""
-    if film.idle:
-        return film.inlet
-    return _outlet(film, film.work.temperature[None])[0]
-
-
-def _outlet(film: PadFilm, fields: FloatArray) -> list[float]:
-    """Flow-weighted value of every field at the trailing edge."""
-    flow = film.work.flow_x[-1]
-    total = float(flow.sum())
-    values: list[float] = (fields[:, -1] @ flow / total).tolist()
-    return values
+def mixing_shares(order: list[PadFilm], fraction: float) -> list[float]:
+    """Share s of what a pad drinks that comes from the pad before it, for the pads in the order of rotation."""
+    if fraction == 0.0:
+        return [0.0] * len(order)
+    flows = [through_flow(film) for film in order]
+    shares = []
+    for k, (entering, _) in enumerate(flows):
+        hot = fraction * flows[k - 1][1]
+        shares.append(1.0 if not hot < entering else max(0.0, hot / entering))
+    return shares

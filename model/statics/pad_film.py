@@ -14,6 +14,7 @@ from model.film.energy import heat_step
 from model.film.loaded_attitude import Branch
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.film.oil_state import set_viscosity
+from model.film.resting import RestingFilm, resting_film
 from model.film.reynolds import FilmForces, solve_film
 from model.film.slopes import warmer_pressure
 from model.pad.bending import BendingStep, PadGive, pad_give
@@ -61,6 +62,8 @@ class PadFilm:
         Share of the dissipation that stays in the film.
     solver : callable
         Solves the film's pressure, with or without its mass conserved.
+    resting : RestingFilm or None
+        What an idle pad's film does.
     """
 
     number: int
@@ -87,6 +90,7 @@ class PadFilm:
     temperature_change: float = field(default=math.inf)
     kept: float = 1.0
     solver: FilmSolver = solve_film
+    resting: RestingFilm | None = None
 
     @property
     def lost(self) -> bool:
@@ -109,6 +113,12 @@ class PadFilm:
         set_viscosity(self.work, oil_constants(oil))
         wedge = (self.pad.pad_clearance, a, b)
         self.forces = self.foreseen = self.solver(self.grid, self.work, wedge, surface_speed, False)
+
+    def rest(self, position: FloatArray, surface_speed: float, oil: Oil) -> None:
+        """Say what the film of an idle pad does; nothing for one that carries."""
+        wedge = (self.pad.pad_clearance, self.reach(position))
+        idle = self.idle or self.forces is None
+        self.resting = resting_film(self.grid, wedge, surface_speed, oil, self.inlet, self.kept) if idle else None
 
     def warm(self, surface_speed: float, oil: Oil, limits: tuple[float, float]) -> float:
         """Move the temperature towards what the pressure makes it, by `limits`: relaxation, and largest step [K].

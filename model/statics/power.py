@@ -1,10 +1,11 @@
-"""Power lost to the shear of the films."""
+"""Power lost to the shear of the films, of those that carry and of those that idle."""
 
 from __future__ import annotations
 
 import math
 
 from model.statics.equilibrium import Equilibrium
+from model.statics.pad_flow import striation
 
 
 def power_loss(equilibrium: Equilibrium, surface_speed: float) -> float:
@@ -16,17 +17,13 @@ def power_loss(equilibrium: Equilibrium, surface_speed: float) -> float:
     total = 0.0
     for film in equilibrium.films:
         if film.idle:
+            total += film.resting.power if film.resting is not None else 0.0
             continue
         work, grid = film.work, film.grid
         if not work.thickness.min() > 0:  # a lost film, of a prediction that did not converge
             return math.nan
         couette = work.viscosity * surface_speed**2 / work.thickness
-        share = work.thickness * 0 + 1.0
-        for j in range(share.shape[1]):
-            for i in range(1, share.shape[0]):
-                if work.ruptured[i, j]:
-                    share[i, j] = share[i - 1, j] * min(1.0, work.thickness[i - 1, j] / work.thickness[i, j])
-        total += float((grid.area * couette * share).sum())
+        total += float((grid.area * couette * striation(work)).sum())
         slope = (work.pressure[1:] - work.pressure[:-1]) / grid.dx
         middle = 0.5 * (work.thickness[1:] + work.thickness[:-1])
         weight = 0.5 * (grid.area[1:] + grid.area[:-1])
