@@ -3,9 +3,10 @@
 ```python
 import tpjb_ident as ti
 
-campaign = ti.load_campaign("rocker-A")
-result = ti.identify(campaign)
-bearing = ti.load_bearing(campaign.bearing_text)
+result = ti.identify("rocker-A")  # a path, or what ti.load_campaign gives
+found = ti.diagnose("rocker-A")
+print(found.summary())
+bearing = ti.load_bearing("rocker.toml")
 p = ti.predict(bearing, load=5000.0, speed=2 * np.pi * 22, excitation=2 * np.pi * 25, pivots="kirk")
 ```
 
@@ -37,6 +38,9 @@ _HOMES = {
     "write_pivots": "tpjb_ident.pivot",
     "measure_locus": "tpjb_ident.clearance.locus",
     "measure_clearance": "tpjb_ident.clearance.measure",
+    "diagnose": "tpjb_ident.diagnose",
+    "plan": "tpjb_ident.diagnose.from_python",
+    "export": "tpjb_ident.export",
     "Bearing": "model.bearing",
     "BearingError": "model.bearing",
     "load_bearing": "model.bearing_file",
@@ -51,6 +55,9 @@ _HOMES = {
     "write_report": "tpjb_ident.report",
     "plots": "tpjb_ident.report",
 }
+
+#: Functions whose first argument is a campaign: the path of one does as well.
+_TAKES_CAMPAIGN = {"identify", "fit_pivots", "measure_locus", "measure_clearance", "compare_campaign"}
 
 __all__ = sorted([*_HOMES, "__version__"])
 
@@ -67,10 +74,15 @@ def __getattr__(name: str) -> Any:
         from tpjb_ident.model_guard import check_model
 
         check_model()
-    value = getattr(importlib.import_module(home), name)
+    module = importlib.import_module(home)
+    value: Any = module if home == f"tpjb_ident.{name}" else getattr(module, name)  # a package that can be called
+    if name in _TAKES_CAMPAIGN:
+        from tpjb_ident.arguments import takes_paths
+
+        value = takes_paths(value)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOMES})
+    return __all__

@@ -69,3 +69,41 @@ def test_another_model_on_the_path_is_refused_by_name(tmp_path, form):
     else:
         assert "another package named 'model'" in done.stderr
         assert str(tmp_path) in done.stderr
+
+
+def test_the_names_are_the_public_ones_only():
+    assert set(dir(ti)) == set(ti.__all__)
+
+
+@pytest.mark.parametrize("first", ["", "import tpjb_ident.diagnose.search.fit, tpjb_ident.export.points\n"])
+def test_a_package_that_bears_the_name_of_a_function_is_called_whatever_was_imported_first(first):
+    code = (
+        f"import inspect\n{first}import tpjb_ident as ti\n"
+        "print(list(inspect.signature(ti.diagnose).parameters)[:2], list(inspect.signature(ti.export).parameters)[:2])\n"
+        "try:\n    ti.diagnose(5)\nexcept ValueError as error:\n    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.splitlines() == [
+        "['campaign', 'bearing'] ['source', 'to']",
+        "campaign: must be a Campaign or the path of one, got int.",
+    ], done.stderr
+
+
+def test_a_path_does_where_a_campaign_is_wanted(small_campaign):
+    result = ti.identify(str(small_campaign), ti.IdentifySettings(method="ols"))
+    assert repr(result).startswith("<Identification: ")
+    assert len(repr(result)) < 120
+    assert "MN/m" in result.summary()
+    assert "kxx, MN/m" in result._repr_html_()
+    assert result.to_dataframe()["kxx_N_per_m"].notna().all()
+    with pytest.raises(ValueError, match="identify: campaign: must be a Campaign or the path of one, got int"):
+        ti.identify(5)
+
+
+def test_a_plan_from_python(rocker_file):
+    import math
+
+    point = ti.OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22, 2 * math.pi * 25)
+    with pytest.raises(ValueError, match="no dynamic runs"):
+        ti.plan(rocker_file, [])
+    assert point.excitation_hz == 25.0

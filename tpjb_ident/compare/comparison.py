@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rigdata.campaign import Campaign
 from tpjb_ident.compare.measured_pivots import measured_laws
@@ -13,6 +13,7 @@ from tpjb_ident.compare.static_tests import measure_static
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.model_guard import check_model
+from tpjb_ident.presentation import Presented
 
 check_model()
 
@@ -20,6 +21,8 @@ from model.bearing import Bearing  # noqa: E402  (only once it is known to be ou
 from model.effects import Effect  # noqa: E402
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.dynamic.results.identification import Identification
@@ -73,8 +76,8 @@ class Variant:
     locus: tuple[PointPrediction, ...] = field(repr=False, default=())
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Presented):
     """Everything measured and predicted for one campaign.
 
     Attributes
@@ -105,6 +108,30 @@ class Comparison:
     def variant(self, name: str) -> Variant:
         """The predictions with one pivot model."""
         return next(v for v in self.variants if v.name == name)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """``comparison.csv``."""
+        from tpjb_ident.compare.tables import comparison_frame
+
+        return comparison_frame(self)
+
+    def summary(self) -> str:
+        """What to conclude, and what it rests on."""
+        from tpjb_ident.compare.summary import summary_sentences
+
+        return "\n".join(summary_sentences(self))
+
+    def plot(self, **options: Any) -> Any:
+        """Draw kxx over load, measured and predicted; see `tpjb_ident.report.plots.coefficient`.
+
+        Parameters
+        ----------
+        **options
+            ``name``, ``over``, ``title``.
+        """
+        from tpjb_ident.report.plots import coefficient
+
+        return coefficient(self, **{"name": "kxx", **options})
 
     def __str__(self) -> str:
         names = ", ".join(v.name for v in self.variants)

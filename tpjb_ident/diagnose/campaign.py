@@ -15,6 +15,7 @@ from tpjb_ident.diagnose.observations.housing import with_housing
 from tpjb_ident.diagnose.observations.observe import observe
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
+from tpjb_ident.presentation import Presented
 
 from model.effects import Effect, apply_effects  # isort: skip
 from model.pivots import pivot_laws  # isort: skip
@@ -22,6 +23,8 @@ from model.setup import Instruments, Setup  # isort: skip
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    import pandas as pd
 
     from model.bearing import Bearing
     from rigdata.campaign import Campaign
@@ -50,13 +53,39 @@ class Baseline:
     effects: tuple[Effect, ...] = ()
 
 
-@dataclass(frozen=True)
-class CampaignDiagnosis:
+@dataclass(frozen=True, repr=False)
+class CampaignDiagnosis(Presented):
     """A diagnosis with what it was made from."""
 
     diagnosis: Diagnosis
     identification: Identification
     setup: Setup
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """K and C measured, predicted before, and predicted with the effects found: columns as comparison.csv."""
+        from tpjb_ident.report.diagnosis_coefficients import before_and_after
+
+        return before_and_after(self.diagnosis, self.identification)
+
+    def summary(self) -> str:
+        """What was found, and what it rests on."""
+        from tpjb_ident.report.diagnosis_coefficients import median_deviations
+        from tpjb_ident.report.diagnosis_words import verdict_sentences
+
+        off = median_deviations(self.to_dataframe())
+        return "\n".join(verdict_sentences(self.identification.campaign, self.diagnosis.verdict, off))
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the gap by observable, before and after; see `tpjb_ident.report.plots.gap`.
+
+        Parameters
+        ----------
+        **options
+            ``logarithmic``, ``title``.
+        """
+        from tpjb_ident.report.plots import gap
+
+        return gap(self.diagnosis, **options)
 
 
 @dataclass(frozen=True)

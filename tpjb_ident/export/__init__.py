@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from tpjb_ident.callable_package import make_callable
+
 if TYPE_CHECKING:
     from tpjb_ident.export.formats import FORMATS, ExportError, Format, export_format
     from tpjb_ident.export.points import COLUMNS, Chosen, StaticPoint, static_points
@@ -39,6 +41,9 @@ __all__ = [
     "sep005",
     "static_points",
 ]
+
+
+make_callable(__name__, "tpjb_ident.export.write:export")  # ti.export(...)
 
 
 def __getattr__(name: str) -> Any:

@@ -14,7 +14,6 @@ from tpjb_ident.cli.common.inputs import refuse_special
 from tpjb_ident.cli.common.options import BearingPath, Out, out_folder
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress, table
-from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_table, write_text
@@ -22,9 +21,8 @@ from tpjb_ident.runtime.tables import write_table, write_text
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from model.bearing import Bearing
     from model.setup import Setup
-    from tpjb_ident.diagnose.observations.layout import DynamicTest, Layout
+    from tpjb_ident.diagnose.observations.layout import Layout
     from tpjb_ident.diagnose.plan.plan import CampaignPlan
 
 
@@ -56,12 +54,13 @@ def plan(
     from model.bearing_file import load_bearing
     from model.pivots import pivot_laws
     from model.setup import Setup
+    from tpjb_ident.diagnose.from_python import planned_layout
     from tpjb_ident.diagnose.plan.plan import plan as work_out
     from tpjb_ident.report.plan_page import save_isolability
 
     drawn = load_bearing(bearing)
     points = operating_points(load, load_direction, speed, excitation)
-    tests = _layout(drawn, points, (locus, dry, push, temperatures))
+    tests = planned_layout(drawn, points, (locus, dry, push, temperatures))
     target = out_folder(out, "plan")
     options: dict[str, Any] = {
         "bearing": bearing, "pivots": pivots, "load": load, "load_direction": load_direction, "speed": speed,
@@ -97,28 +96,6 @@ def _parts(folder: Path, setup: Setup, tests: Layout) -> dict[str, CampaignPlan]
     found = data_sets(setup, tests)
     write_table(folder, "data_sets", pd.DataFrame([one.to_row() for one in found]))
     return {f"isolability_{one.name}": one.free for one in found}
-
-
-def _layout(bearing: Bearing, points: Any, static: tuple[int, bool, float, bool]) -> Layout:
-    from tpjb_ident.diagnose.observations.layout import Layout
-    from tpjb_ident.diagnose.plan.planned import around, dry, dynamic
-
-    directions, with_dry, push, sensors = static
-    if not points:
-        raise BadInputError("--load, --excitation: the plan has no dynamic runs. Give at least one of each.")
-    pads = len(bearing.pads)
-    keys = sorted({(p.static_load, p.static_load_direction, p.shaft_speed) for p in points})
-    tests: list[DynamicTest] = []
-    for w, direction, omega in keys:
-        lines = sorted({p.excitation for p in points if (p.static_load, p.shaft_speed) == (w, omega)})
-        tests += dynamic([w], lines, omega, direction, pads if sensors else 0)
-    middle = keys[len(keys) // 2]
-    return Layout(
-        tuple(tests),
-        around(middle[0], directions, middle[2]) if directions else (),
-        dry(range(1, pads + 1)) if with_dry else (),
-        push if push > 0 else None,
-    )
 
 
 def _show(found: CampaignPlan) -> None:

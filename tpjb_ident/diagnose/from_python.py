@@ -1,0 +1,179 @@
+"""`ti.diagnose` and `ti.plan`: the diagnosis and the plan of a campaign in one call, paths welcome."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rigdata.operating_point import OperatingPoint
+from tpjb_ident.arguments import as_campaign
+from tpjb_ident.diagnose.campaign import Baseline, CampaignDiagnosis, diagnose_campaign
+from tpjb_ident.diagnose.observations.layout import DynamicTest, Layout
+from tpjb_ident.diagnose.observations.tolerance import Tolerance
+from tpjb_ident.diagnose.plan.plan import CampaignPlan
+from tpjb_ident.diagnose.plan.plan import plan as work_out
+from tpjb_ident.diagnose.plan.planned import around, dry, dynamic
+from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+from tpjb_ident.errors import ArgumentError
+from tpjb_ident.model_guard import check_model
+
+check_model()
+
+from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
+from model.bearing_file import load_bearing  # noqa: E402
+from model.effects import Effect  # noqa: E402
+from model.pivots import pivot_laws  # noqa: E402
+from model.setup import Setup  # noqa: E402
+
+if TYPE_CHECKING:
+    from rigdata.campaign import Campaign
+
+Progress = Callable[[str, int, int], None]
+
+
+def diagnose(
+    campaign: Campaign | str | Path,
+    bearing: Bearing | str | Path | None = None,
+    *,
+    pivots: Any = "kirk",
+    thermal: str = "adiabatic",
+    effects: Sequence[Effect] = (),
+    settings: DiagnoseSettings | None = None,
+) -> CampaignDiagnosis:
+    """Identify a campaign and find what its model lacks.
+
+    Parameters
+    ----------
+    campaign : Campaign, str or Path
+    bearing : Bearing, str or Path, optional
+        Default: the one that the campaign carries.
+    pivots : object
+        Where to start from: ``"kirk"``, ``"rigid"``, ``"measured"``, a path or laws.
+    thermal : {"isothermal", "adiabatic", "tehd"}
+    effects : sequence of Effect
+        Already in the model.
+    settings : DiagnoseSettings, optional
+        Default: model tolerance of 1.5 % of the direct coefficients, all cores.
+
+    Returns
+    -------
+    CampaignDiagnosis
+        Its ``diagnosis.verdict`` says what was found; ``summary()`` in words.
+
+    Raises
+    ------
+    ComparisonError
+        The campaign has no dynamic runs.
+    ArgumentError
+        No campaign, or no bearing anywhere.
+    """
+    opened = as_campaign(campaign, "campaign")
+    chosen = settings or DiagnoseSettings(tolerance=Tolerance())
+    return diagnose_campaign(opened, bearing_of(opened, bearing), Baseline(pivots, thermal, tuple(effects)), chosen)
+
+
+def plan(
+    bearing: Bearing | str | Path,
+    points: Sequence[OperatingPoint],
+    *,
+    pivots: Any = "kirk",
+    locus: int = 20,
+    dry_tests: bool = True,
+    push: float = 200.0,
+    temperatures: bool = True,
+) -> CampaignPlan:
+    """Tell which effects a planned campaign could see, from which size on, and which it would mix up.
+
+    Parameters
+    ----------
+    bearing : Bearing, str or Path
+    points : sequence of OperatingPoint
+        Of the dynamic runs.
+    pivots : object
+        As of `diagnose`.
+    locus : int
+        Load directions of the shaft locus; 0: none.
+    dry_tests : bool
+        Dry load-deflection tests on all pads.
+    push : float
+        Push load of the clearance sweep [N]; 0: none.
+    temperatures : bool
+        A temperature sensor in every pad.
+
+    Returns
+    -------
+    CampaignPlan
+
+    Raises
+    ------
+    ArgumentError
+        No dynamic runs.
+    """
+    drawn = _bearing(bearing)
+    return work_out(
+        Setup(drawn, pivot_laws(pivots, drawn)), planned_layout(drawn, points, (locus, dry_tests, push, temperatures))
+    )
+
+
+def planned_layout(bearing: Bearing, points: Sequence[OperatingPoint], static: tuple[int, bool, float, bool]) -> Layout:
+    """Lay out the tests of a plan.
+
+    Parameters
+    ----------
+    bearing : Bearing
+    points : sequence of OperatingPoint
+        Of the dynamic runs.
+    static : tuple of (int, bool, float, bool)
+        Load directions of the locus, dry tests or not, push load of the sweep [N], pad temperatures or not.
+
+    Raises
+    ------
+    ArgumentError
+        No dynamic runs.
+    """
+    directions, with_dry, push, sensors = static
+    if not points:
+        raise ArgumentError("points: the plan has no dynamic runs. Give at least one operating point.")
+    pads = len(bearing.pads)
+    keys = sorted({(p.static_load, p.static_load_direction, p.shaft_speed) for p in points})
+    tests: list[DynamicTest] = []
+    for w, direction, omega in keys:
+        lines = sorted({p.excitation for p in points if (p.static_load, p.shaft_speed) == (w, omega)})
+        tests += dynamic([w], lines, omega, direction, pads if sensors else 0)
+    middle = keys[len(keys) // 2]
+    return Layout(
+        tuple(tests),
+        around(middle[0], directions, middle[2]) if directions else (),
+        dry(range(1, pads + 1)) if with_dry else (),
+        push if push > 0 and math.isfinite(push) else None,
+    )
+
+
+def bearing_of(campaign: Campaign, given: Bearing | str | Path | None) -> Bearing:
+    """The bearing given, or the one that a campaign carries.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    given : Bearing, str, Path or None
+
+    Raises
+    ------
+    ArgumentError
+        Neither is there.
+    """
+    if given is not None:
+        return _bearing(given)
+    if not campaign.bearing_text:
+        raise ArgumentError(f"bearing: campaign {campaign.id} carries no bearing file. Give one, or its path.")
+    return load_bearing(campaign.bearing_text)
+
+
+def _bearing(given: Bearing | str | Path) -> Bearing:
+    if isinstance(given, Bearing):
+        return given
+    if isinstance(given, (str, Path)):
+        return load_bearing(given)
+    raise ArgumentError(f"bearing: must be a Bearing or the path of a bearing file, got {type(given).__name__}.")
