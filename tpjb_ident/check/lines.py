@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
+from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.dynamic.records.line_fit import GLITCH_LIMIT, fit_without_glitches
+from tpjb_ident.dynamic.records.windows import line_design
 
-_GLITCH = 6.0
 #: A line whose amplitude may change needs this distance from all others [1 / record length].
 _PARTED = 2.5
 
@@ -36,7 +36,7 @@ class Lines:
     mean: FloatArray
     phasor: ComplexArray
     floor: FloatArray
-    glitches: NDArray[np.int64]
+    glitches: IntArray
     scatter: FloatArray
 
 
@@ -68,59 +68,40 @@ def fit_lines(
         if frequency > 0 and all(abs(frequency - f) * span > 0.8 for f in kept):
             kept.append(frequency)
     growing = [f for f in inexact if f in kept[1:] and all(abs(f - k) * span > _PARTED for k in kept if k != f)]
-    design = _design(time, kept, growing)
-    good = np.isfinite(values)
-    coefficients, rest, used = _robust(design, np.where(good, values, 0.0), good)
+    design = line_design(time - time[0], np.array(kept), 1, np.array(growing))
+    coefficients, used = _robust(design, values)
+    rest = np.where(used, values - design @ coefficients, 0.0)
     counts = np.count_nonzero(used, axis=0)
-    fit = np.where(counts >= 3 * design.shape[1], 1.0, np.nan)
-    scatter = np.sqrt(np.sum(rest**2, axis=0) / np.maximum(counts, 1)) * fit
-    missing = np.full(values.shape[1], np.nan)
-    phasor = (coefficients[2] - 1j * coefficients[3]) * fit if kept else missing + 0j
-    floor = _floor(time, rest, kept[0], span) * len(time) / np.maximum(counts, 1) * fit if kept else missing
-    return Lines(coefficients[0] * fit, phasor, floor, np.count_nonzero(good, axis=0) - counts, scatter)
+    known = np.where(counts > 0, 1.0, np.nan)
+    scatter = np.sqrt(np.sum(rest**2, axis=0) / np.maximum(counts, 1)) * known
+    glitches = np.count_nonzero(np.isfinite(values), axis=0) - counts
+    mean = coefficients[2 * len(kept)]
+    if not kept:
+        missing = np.full(values.shape[1], np.nan)
+        return Lines(mean, missing + 0j, missing, glitches, scatter)
+    phasor = (coefficients[0] + 1j * coefficients[1]) * np.exp(-2j * math.pi * kept[0] * time[0])
+    floor = _floor(time, rest, kept[0], span) * len(time) / np.maximum(counts, 1) * known
+    return Lines(mean, phasor, floor, glitches, scatter)
 
 
-def _design(time: FloatArray, frequencies: Sequence[float], growing: Sequence[float]) -> FloatArray:
-    middle, half = (time[0] + time[-1]) / 2, max((time[-1] - time[0]) / 2, 1e-300)
-    place = (time - middle) / half
-    columns = [np.ones_like(time), place]
-    for frequency in frequencies:
-        angle = 2 * math.pi * frequency * time
-        columns += [np.cos(angle), np.sin(angle)]
-    for frequency in growing:
-        angle = 2 * math.pi * frequency * time
-        columns += [place * np.cos(angle), place * np.sin(angle)]
-    return np.stack(columns, axis=1)
+def _robust(design: FloatArray, values: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Coefficients (k, m) of every channel, NaN where too little is left of it, and the samples (n, m) it rests on.
 
-
-def _robust(design: FloatArray, values: FloatArray, good: BoolArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Least squares per column, glitches left out; what is left is zero where nothing was used."""
-    used = good
-    for _ in range(4):
-        coefficients = _solve(design, values, used)
-        rest = np.where(good, values - np.einsum("nk,km->nm", design, coefficients), 0.0)
-        scale = np.array([1.4826 * float(np.median(np.abs(r[u]))) if u.any() else 0.0 for r, u in zip(rest.T, used.T)])
-        kept = good & (np.abs(rest) <= _GLITCH * scale)
-        enough = (scale > 0) & (2 * np.count_nonzero(kept, axis=0) > np.count_nonzero(good, axis=0))
-        following = np.where(enough, kept, used)
-        if np.array_equal(following, used):
-            break
-        used = following
-    return coefficients, np.where(used, rest, 0.0), used
-
-
-def _solve(design: FloatArray, values: FloatArray, used: BoolArray) -> FloatArray:
-    """Normal equations: sines of well parted lines are nearly orthogonal, and einsum starts no threads."""
-    gram = np.einsum("nk,nl->kl", design, design)
+    As in `tpjb_ident.dynamic.records.phasors`: one solution for all channels that show no glitch, the others one by
+    one. Each is judged by itself.
+    """
+    complete = np.isfinite(values).all(axis=0)
+    coefficients, used = np.zeros((design.shape[1], values.shape[1])), np.isfinite(values)
+    gram = np.einsum("nk,nl->kl", design, design)  # einsum starts no threads
     right = np.einsum("nk,nm->km", design, np.where(used, values, 0.0))
-    result = np.zeros_like(right)
-    for column in range(values.shape[1]):
-        out = design[~used[:, column]]
-        if len(out) <= len(design) - 3 * design.shape[1]:
-            normal = gram - np.einsum("nk,nl->kl", out, out)
-            # Lines beyond the reach of the record make it singular: the shortest answer is as good as any.
-            result[:, column] = np.linalg.lstsq(normal, right[:, column], rcond=1e-12)[0]
-    return result
+    coefficients = np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ right
+    size = np.abs(values - np.einsum("nk,km->nm", design, coefficients))
+    scale = 1.4826 * np.median(size, axis=0)
+    clean = size.max(axis=0) <= np.maximum(GLITCH_LIMIT * scale, 1e-10 * np.abs(coefficients).sum(axis=0))
+    for k in np.flatnonzero(~(complete & clean)):
+        found = fit_without_glitches(design, values[:, k : k + 1], np.array([np.inf]))
+        coefficients[:, k], used[:, k] = found.coefficients[0], found.kept
+    return coefficients, used
 
 
 def _floor(time: FloatArray, rest: FloatArray, frequency: float, span: float) -> FloatArray:

@@ -10,22 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.records.line_fit import GLITCH_LIMIT, SCALE_LIMIT, beside, fit_without_glitches
 from tpjb_ident.dynamic.records.wave_blocks import BLOCK, WaveBlocks
 from tpjb_ident.dynamic.records.windows import line_design
 
-#: A sample is a glitch beyond this many robust standard deviations of the fit's residual.
-GLITCH_LIMIT = 5.5
-#: A window this many times noisier than its run's median is looked at again.
-SCALE_LIMIT = 1.5
-#: Samples left out on either side of a glitch.
-GLITCH_MARGIN = 3
-#: A window that has lost more than this share of its samples gives no phasor.
-MAX_LOST = 0.5
-#: Change of a residual over the usual one at which least absolute deviations have settled.
-SETTLED = 0.02
-_LAD_ROUNDS = 15
-_ROUNDS = 12
 #: Outlying samples up to this share are told by leaving them out, again and again, until fit and verdict agree.
 FEW = 0.1
 _FEW_ROUNDS = 8
@@ -150,7 +139,7 @@ class LineFitter:
         gram = np.linalg.inv(self._gram_inverse)
         size, found, left_out = np.abs(residual), coefficients, None
         for _ in range(_FEW_ROUNDS):
-            previous, left_out = left_out, _beside(size > GLITCH_LIMIT * scale[:, None])
+            previous, left_out = left_out, beside(size > GLITCH_LIMIT * scale[:, None])
             if previous is not None and np.array_equal(previous, left_out):
                 return found, scale, len(left_out) / self.length
             if len(left_out) > FEW * self.length:
@@ -167,11 +156,6 @@ class LineFitter:
         n = 2 * len(self.frequencies)
         local = coefficients[:, :, 0:n:2] + 1j * coefficients[:, :, 1:n:2]
         return to_run_origin(local.transpose(0, 2, 1), self.frequencies, start)
-
-
-def _beside(outlying: BoolArray) -> IntArray:
-    """Columns of (2, n) that are outlying in X or Y, or next to such a one: a glitch's flanks lie below the limit."""
-    return np.flatnonzero(np.convolve(outlying.any(axis=0), np.ones(2 * GLITCH_MARGIN + 1), mode="same") > 0)
 
 
 def _largest(rows: FloatArray) -> FloatArray:
@@ -239,53 +223,6 @@ def fit_uneven(values: FloatArray, time: FloatArray, frequencies: FloatArray, or
 
 
 def _refit(design: FloatArray, values: FloatArray, usual: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Robust fit of one window: find the glitches, then plain least squares without them.
-
-    Least absolute deviations (by reweighting) stand a quarter of the window being wrong; bisquare
-    steps with no more than the run's usual scale sharpen that into a clear verdict per sample.
-
-    Returns
-    -------
-    (2, n_columns) ndarray, (2,) ndarray, float
-        Coefficients of X and Y, residual scale, share of samples lost. NaN when too few are left.
-    """
-    present = np.isfinite(values).all(axis=1)
-    nothing = np.full((2, design.shape[1]), np.nan), np.full(2, np.nan)
-    if present.mean() < 1 - MAX_LOST or present.sum() <= 2 * design.shape[1]:
-        return *nothing, float(1 - present.mean())
-    full, y = design[present], values[present]
-    weights, size = np.ones(len(y)), np.full_like(y, np.inf)
-    for _ in range(_LAD_ROUNDS):
-        previous, size = size, np.abs(y - full @ _quick_solution(full, y, weights))
-        if (np.abs(size - previous).max(axis=0) <= SETTLED * np.median(size, axis=0)).all():
-            break  # nothing moves any more that could make a verdict
-        relative = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).max(axis=1)
-        weights = 1 / np.maximum(relative, 0.1)
-    scale = np.zeros(2)
-    for _ in range(_ROUNDS):
-        size = np.abs(y - full @ _quick_solution(full, y, weights))
-        scale = np.minimum(1.4826 * np.median(size, axis=0), SCALE_LIMIT * usual)
-        u = (size / np.maximum(scale, np.finfo(float).tiny)).max(axis=1) / GLITCH_LIMIT
-        previous, weights = weights, np.maximum(1 - u**2, 0.0) ** 2
-        if weights.mean() < 1 - MAX_LOST or np.abs(weights - previous).max() < 1e-3:
-            break
-    if weights.mean() < 1 - MAX_LOST:
-        return *nothing, 1.0
-    bad = np.zeros((1, len(values)), dtype=bool)
-    bad[0, present] = u > 1
-    keep = np.array(present)
-    keep[_beside(bad)] = False
-    lost = float(1 - keep.mean())
-    if lost > MAX_LOST:
-        return *nothing, lost
-    return _least_squares(design[keep], values[keep]).T, scale, lost
-
-
-def _quick_solution(design: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:
-    """Weighted least squares by normal equations: good enough for the verdict on samples, and several times quicker."""
-    weighted = design * weights[:, None]
-    return np.asarray(np.linalg.pinv(weighted.T @ design, rcond=1e-12, hermitian=True) @ (weighted.T @ values))
-
-
-def _least_squares(design: FloatArray, values: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.lstsq(design, values, rcond=None)[0], dtype=float)
+    """Fit one window without its glitches: coefficients (2, n_columns), residual scale (2,), share of samples lost."""
+    found = fit_without_glitches(design, values, usual)
+    return found.coefficients, found.scale, found.lost

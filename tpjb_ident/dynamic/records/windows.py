@@ -54,7 +54,9 @@ class RecordTooShortError(TpjbError):
         return RecordTooShortError, (str(self), self.needed)
 
 
-def line_design(time: FloatArray, frequencies: FloatArray, drift_order: int = 1) -> FloatArray:
+def line_design(
+    time: FloatArray, frequencies: FloatArray, drift_order: int = 1, growing: FloatArray | None = None
+) -> FloatArray:
     """Columns of the joint least-squares problem.
 
     Parameters
@@ -65,10 +67,12 @@ def line_design(time: FloatArray, frequencies: FloatArray, drift_order: int = 1)
         [Hz].
     drift_order : int
         Polynomial order of the slow drift (0: mean only).
+    growing : (m,) ndarray, optional
+        Lines whose amplitude may change along the record [Hz]: the first order of a frequency that is slightly wrong.
 
     Returns
     -------
-    (n, 2 n_lines + drift_order + 1) ndarray
+    (n, 2 n_lines + drift_order + 1 + 2 m) ndarray
         cos and -sin of every line, then Legendre polynomials over the window: a line's two
         coefficients are Re and Im of its phasor in the exp(+i omega t) convention.
     """
@@ -78,7 +82,11 @@ def line_design(time: FloatArray, frequencies: FloatArray, drift_order: int = 1)
     waves = np.empty((len(time), 2 * len(frequencies)))
     waves[:, 0::2] = np.cos(phase)
     waves[:, 1::2] = -np.sin(phase)
-    return np.concatenate([waves, slow], axis=1)
+    if growing is None or not len(growing):
+        return np.concatenate([waves, slow], axis=1)
+    turning = 2 * np.pi * np.multiply.outer(time, growing)
+    place = ((time - middle) / half)[:, None]
+    return np.concatenate([waves, slow, place * np.cos(turning), place * np.sin(turning)], axis=1)
 
 
 def variance_inflation(frequencies: FloatArray, n_driven: int, length: float, rate: float) -> float:

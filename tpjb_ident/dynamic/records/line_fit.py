@@ -1,0 +1,128 @@
+"""The robust fit of lines to a stretch of samples: least squares of all lines together, glitches left out.
+
+One fit for `tpjb identify` (window by window, `phasors`) and `tpjb check` (a whole run, `tpjb_ident.check.lines`): what
+one of them calls a glitch the other does too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
+
+#: A sample is a glitch beyond this many robust standard deviations of the fit's residual.
+GLITCH_LIMIT = 5.5
+#: A window this many times noisier than its run's median is looked at again.
+SCALE_LIMIT = 1.5
+#: Samples left out on either side of a glitch.
+GLITCH_MARGIN = 3
+#: A window that has lost more than this share of its samples gives no phasor.
+MAX_LOST = 0.5
+#: Change of a residual over the usual one at which least absolute deviations have settled.
+SETTLED = 0.02
+_LAD_ROUNDS = 15
+_ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class RobustLines:
+    """A fit, and which samples it rests on.
+
+    Attributes
+    ----------
+    coefficients : (q, n_columns) ndarray
+        Of every channel; NaN where too few samples are left.
+    scale : (q,) ndarray
+        Robust standard deviation of the residuals.
+    kept : (n,) ndarray of bool
+        Samples neither missing nor glitched, of all channels together.
+    lost : float
+        Share of the samples left out; of the missing ones alone where they are too many, 1 where most are glitches.
+    """
+
+    coefficients: FloatArray
+    scale: FloatArray
+    kept: BoolArray
+    lost: float
+
+
+def beside(outlying: BoolArray) -> IntArray:
+    """Samples that are outlying, or next to such a one: a glitch's flanks lie below the limit.
+
+    Parameters
+    ----------
+    outlying : (q, n) ndarray of bool
+        Of every channel.
+
+    Returns
+    -------
+    (m,) ndarray of int
+        Places along n.
+    """
+    return np.flatnonzero(np.convolve(outlying.any(axis=0), np.ones(2 * GLITCH_MARGIN + 1), mode="same") > 0)
+
+
+def fit_without_glitches(design: FloatArray, values: FloatArray, usual: FloatArray) -> RobustLines:
+    """Find the glitches, then plain least squares without them.
+
+    Least absolute deviations (by reweighting) stand a quarter of the samples being wrong; bisquare
+    steps with no more than the run's usual scale sharpen that into a clear verdict per sample.
+
+    Parameters
+    ----------
+    design : (n, n_columns) ndarray
+        As of `line_design`.
+    values : (n, q) ndarray
+        Channels that lose a sample together; NaN where missing.
+    usual : (q,) ndarray
+        Residual scale that others like them have; infinite where not known.
+    """
+    present = np.asarray(np.isfinite(values).all(axis=1))
+    q = values.shape[1]
+    nothing = np.full((q, design.shape[1]), np.nan), np.full(q, np.nan), np.zeros(len(values), dtype=bool)
+    if present.mean() < 1 - MAX_LOST or present.sum() <= 2 * design.shape[1]:
+        return RobustLines(*nothing, float(1 - present.mean()))
+    full, y = design[present], values[present]
+    u, scale = _verdicts(full, y, usual)
+    if u is None:
+        return RobustLines(*nothing, 1.0)
+    bad = np.zeros((1, len(values)), dtype=bool)
+    bad[0, present] = u > 1
+    keep = np.array(present)
+    keep[beside(bad)] = False
+    lost = float(1 - keep.mean())
+    if lost > MAX_LOST:
+        return RobustLines(*nothing, lost)
+    return RobustLines(_least_squares(design[keep], values[keep]).T, scale, keep, lost)
+
+
+def _verdicts(full: FloatArray, y: FloatArray, usual: FloatArray) -> tuple[FloatArray | None, FloatArray]:
+    """Residual of every sample over the limit of a glitch (None where most are), and the residuals' scale (q,)."""
+    weights, size = np.ones(len(y)), np.full_like(y, np.inf)
+    for _ in range(_LAD_ROUNDS):
+        previous, size = size, np.abs(y - full @ _quick_solution(full, y, weights))
+        if (np.abs(size - previous).max(axis=0) <= SETTLED * np.median(size, axis=0)).all():
+            break  # nothing moves any more that could make a verdict
+        relative = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).max(axis=1)
+        weights = 1 / np.maximum(relative, 0.1)
+    scale = np.zeros(y.shape[1])
+    for _ in range(_ROUNDS):
+        size = np.abs(y - full @ _quick_solution(full, y, weights))
+        scale = np.minimum(1.4826 * np.median(size, axis=0), SCALE_LIMIT * usual)
+        u = (size / np.maximum(scale, np.finfo(float).tiny)).max(axis=1) / GLITCH_LIMIT
+        previous, weights = weights, np.maximum(1 - u**2, 0.0) ** 2
+        if weights.mean() < 1 - MAX_LOST or np.abs(weights - previous).max() < 1e-3:
+            break
+    return (None if weights.mean() < 1 - MAX_LOST else u), scale
+
+
+def _quick_solution(design: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Weighted least squares by normal equations: good enough for the verdict on samples, and several times quicker."""
+    weighted = design * weights[:, None]
+    return np.asarray(np.linalg.pinv(weighted.T @ design, rcond=1e-12, hermitian=True) @ (weighted.T @ values))
+
+
+def _least_squares(design: FloatArray, values: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.lstsq(design, values, rcond=None)[0], dtype=float)
