@@ -19,3 +19,20 @@ def nearest_name(name: object, known: Iterable[str], cutoff: float = 0.6) -> str
     """
     close = difflib.get_close_matches(str(name)[:60], list(known), n=1, cutoff=cutoff)
     return close[0] if close else None
+
+
+def unknown_name(what: str, name: object, known: Iterable[str]) -> str:
+    """The refusal of a name that a registry does not hold, with the nearest one and all there are.
+
+    Parameters
+    ----------
+    what : str
+        Kind of thing that the name is for.
+    name : object
+        As given.
+    known : iterable of str
+    """
+    names = list(known)
+    near = nearest_name(name, names)
+    hint = f"; did you mean {near!r}?" if near else ""
+    return f"unknown {what} {name!r}{hint} Known: {', '.join(names)}"

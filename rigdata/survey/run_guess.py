@@ -13,7 +13,7 @@ from rigdata.arrays import FloatArray
 from rigdata.readers.series import Series
 from rigdata.survey.channel_guess import ChannelGuess
 from rigdata.survey.exports import Export
-from rigdata.survey.spectrum import Line, amplitude_spectrum, strongest
+from rigdata.survey.spectrum import SpectralPeak, amplitude_spectrum, strongest
 
 #: Share of slow movement above which a record is a quasi-static test, and of one direction for load steps.
 _SLOW, _STRAIGHT = 0.9, 0.97
@@ -35,7 +35,7 @@ class RunGuess:
     kind : str
         ``"dynamic"``, ``"dry_pivot"``, ``"locus"``, ``"clearance"``, or "" if nothing tells.
     why : str
-    lines : tuple of Line
+    lines : tuple of SpectralPeak
         Strongest lines of forces or displacements, strongest first.
     load : float
         Static load [N] that the file's name seems to state; NaN without one.
@@ -47,7 +47,7 @@ class RunGuess:
 
     kind: str
     why: str
-    lines: tuple[Line, ...] = ()
+    lines: tuple[SpectralPeak, ...] = ()
     load: float = float("nan")
     direction: float = float("nan")
     pad: int = 0
@@ -101,7 +101,7 @@ def _direction(forces: list[Series], channels: Mapping[str, ChannelGuess], steps
     return float(round(math.degrees(math.atan2(parts[1], parts[0])))) if any(parts) else float("nan")
 
 
-def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[Line, ...]) -> tuple[str, str]:
+def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[SpectralPeak, ...]) -> tuple[str, str]:
     pair = [s for s in forces if s.rate > 0][:2] or [s for s in moves if s.rate > 0][:2]
     if not pair:
         return "", ""
@@ -127,9 +127,9 @@ def _slow(series: Series) -> FloatArray:
     return np.array([float(np.mean(b[np.isfinite(b)])) for b in blocks if np.isfinite(b).any()])
 
 
-def strongest_lines(series: list[Series]) -> tuple[Line, ...]:
+def strongest_lines(series: list[Series]) -> tuple[SpectralPeak, ...]:
     """Lines of the channel that swings most, strongest first."""
-    best: tuple[Line, ...] = ()
+    best: tuple[SpectralPeak, ...] = ()
     size = 0.0
     for one in series:
         found = strongest(*amplitude_spectrum(one.values, one.rate), most=4)

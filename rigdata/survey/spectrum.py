@@ -14,7 +14,7 @@ _NEIGHBOURS = 25
 
 
 @dataclass(frozen=True)
-class Line:
+class SpectralPeak:
     """A spectral line: frequency [Hz] and peak amplitude, in the unit of the signal."""
 
     frequency: float
@@ -34,7 +34,7 @@ class Look:
         NaN where no sample has a value.
     frequency, amplitude : (m,) ndarray
         Spectrum [Hz] and peak amplitude; empty where the rate is unknown or the record is short.
-    lines : tuple of Line
+    lines : tuple of SpectralPeak
         The strongest ones, strongest first.
     """
 
@@ -46,7 +46,7 @@ class Look:
     high: float
     frequency: FloatArray = field(repr=False)
     amplitude: FloatArray = field(repr=False)
-    lines: tuple[Line, ...] = ()
+    lines: tuple[SpectralPeak, ...] = ()
 
     @property
     def flat(self) -> bool:
@@ -104,9 +104,9 @@ def amplitude_spectrum(values: FloatArray, rate: float) -> tuple[FloatArray, Flo
     return np.asarray(np.fft.rfftfreq(n, 1.0 / rate), dtype=np.float64), amplitude
 
 
-def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> tuple[Line, ...]:
+def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> tuple[SpectralPeak, ...]:
     """Name the strongest peaks that stand out of their neighbourhood; slow drift below four bins is no line."""
-    found: list[Line] = []
+    found: list[SpectralPeak] = []
     if len(amplitude) < 16:
         return ()
     left = amplitude.copy()
@@ -117,7 +117,7 @@ def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> tuple[
             break
         around = amplitude[max(4, i - _NEIGHBOURS) : i + _NEIGHBOURS + 1]
         if amplitude[i] > _STANDS_OUT * np.median(around) and i + 1 < len(amplitude):
-            found.append(Line(_refined(frequency, amplitude, i), float(amplitude[i])))
+            found.append(SpectralPeak(_refined(frequency, amplitude, i), float(amplitude[i])))
         left[max(0, i - 3) : i + 4] = 0.0
     return tuple(found)
 

@@ -30,7 +30,7 @@ class Motion(Protocol):
 
 
 @dataclass(frozen=True)
-class Line:
+class MotionLine:
     """One spectral line, phasors of exp(+i omega t).
 
     Attributes
@@ -66,7 +66,7 @@ class SteadyMotion:
     ----------
     position, load : (2,) ndarray
         Mean shaft position [m] and mean force on the housing [N].
-    lines : tuple of Line
+    lines : tuple of MotionLine
     temperature : (n_pads,) ndarray
         [degC]
     speed : float
@@ -77,7 +77,7 @@ class SteadyMotion:
 
     position: FloatArray
     load: FloatArray
-    lines: tuple[Line, ...]
+    lines: tuple[MotionLine, ...]
     temperature: FloatArray
     speed: float
     surface: ComplexArray

@@ -9,7 +9,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig.instruments import Instruments
-from rigdata.virtual_rig.motion import Line, RunPhysics, SteadyMotion
+from rigdata.virtual_rig.motion import MotionLine, RunPhysics, SteadyMotion
 from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import PlannedRun
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, load_vector
@@ -80,7 +80,7 @@ def actuator_forces(run: PlannedRun, noise: Noise, rng: np.random.Generator) -> 
     return forces
 
 
-def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: Instruments) -> Line:
+def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: Instruments) -> MotionLine:
     """How shaft and housing answer an oil force phasor (2,) [N] at one frequency [rad/s].
 
     The film passes the force on to the housing: k_cell x_h - m_h omega^2 x_h = F_oil.
@@ -89,7 +89,7 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
     # written with the compliance, so that rigid cells (infinite stiffness) are no special case
     housing = (force / cells) / (1 - instruments.true_mass * frequency**2 / cells)
     acceleration = -(frequency**2) * housing
-    return Line(
+    return MotionLine(
         frequency=frequency,
         oil_force=force,
         displacement=np.asarray(np.linalg.solve(h, force), dtype=complex),

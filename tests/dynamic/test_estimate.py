@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tpjb_ident.dynamic.estimators.estimate import METHODS, estimate_dynamic_stiffness
+from tpjb_ident.dynamic.estimators.estimate import METHODS, SOLVERS, estimate_dynamic_stiffness
 from tpjb_ident.dynamic.estimators.r_matrix import r_matrix, real_rows
 from tpjb_ident.dynamic.estimators.rlm import NORMS, ComplexInputError, RlmSettings, rlm_fit, solve_rlm
 
@@ -144,6 +144,7 @@ def test_missing_windows_keep_their_place_in_the_weights():
 
 def test_arguments_are_checked():
     D, F, label, _ = sample(11)
+    assert set(SOLVERS) == set(METHODS)
     with pytest.raises(ValueError, match="did you mean 'mm-eiv'"):
         estimate_dynamic_stiffness(D, F, OMEGA, label, method="mm-eif")
     with pytest.raises(ValueError, match="did you mean 'huber'"):

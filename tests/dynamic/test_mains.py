@@ -29,7 +29,7 @@ from tpjb_ident.dynamic.corrections.mains import (
     with_mains_uncertainty,
     without_mains,
 )
-from tpjb_ident.dynamic.corrections.mains_angles import Problem
+from tpjb_ident.dynamic.corrections.mains_angles import MainsEquations
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
@@ -130,7 +130,7 @@ def test_phases_that_stay_within_eighteen_degrees_are_locked(off, patterns):
 def problem(patterns, seed=3, sigma=0.5):
     data, vectors = with_pickup(shaken(noise=0.0), patterns, seed)
     first = np.arange(0, 24, 4)
-    return Problem(data.D[first], data.F[first], patterns, np.full(6, sigma)), vectors
+    return MainsEquations(data.D[first], data.F[first], patterns, np.full(6, sigma)), vectors
 
 
 SINGLE, OWN = PATTERN[None], np.linalg.solve(PROBES, np.diag([1.0e-7, 0.7e-7])).T + 0j
@@ -223,7 +223,7 @@ def test_the_scatter_of_other_points_and_ones_own_misfit_make_the_interval():
     for fit, scatter in ((small, 1e-3), (large, 1e-1)):
         means = shaken(n=8)
         first = np.arange(0, 32, 4)
-        own = Problem(data.D[first], F[first], SINGLE, scatter * np.linalg.norm(F[first], axis=1))
+        own = MainsEquations(data.D[first], F[first], SINGLE, scatter * np.linalg.norm(F[first], axis=1))
         best = own.solve()[0]
         assert fit.chi_square == pytest.approx(best.cost / spare, rel=1e-3)
         inflation = (8.0 + best.cost) / (8.0 + spare)
@@ -244,18 +244,18 @@ def test_two_answers_that_are_equally_good_share_by_their_breadth(monkeypatch, o
         return mains_angles.Minimum(cost, x, (k + 1) * 1e10 * np.eye(8), (math.log(3.0), 0.0)[k] + off)
 
     scale = float(np.linalg.norm(data.F[::4]) / np.linalg.norm(data.D[::4]))
-    monkeypatch.setattr(Problem, "solve", lambda self: [minimum(5.0, 0), minimum(5.0, 1)])
+    monkeypatch.setattr(MainsEquations, "solve", lambda self: [minimum(5.0, 0), minimum(5.0, 1)])
     fit = fit_mains(data, Pickup(SINGLE, np.ones(2), 9), 1e-3)
     np.testing.assert_allclose(fit.shift, shares @ entries, rtol=1e-4)
     inflation = 13.0 / 18.0
     between = 0.75 * 0.25 * 16e12
     np.testing.assert_allclose(fit.covariance, inflation * 1.25e10 * np.eye(8) + between, rtol=1e-3)
     # two units of chi-square worse, in units of the inflation: exp(-1 / inflation) less likely
-    monkeypatch.setattr(Problem, "solve", lambda self: [minimum(5.0, 0), minimum(7.0, 1)])
+    monkeypatch.setattr(MainsEquations, "solve", lambda self: [minimum(5.0, 0), minimum(7.0, 1)])
     worse = math.exp(-1.0 / inflation) / 3.0
     shift = fit_mains(data, Pickup(SINGLE, np.ones(2), 9), 1e-3).shift
     np.testing.assert_allclose(shift, 4e6 * worse / (1.0 + worse), rtol=1e-4)
-    monkeypatch.setattr(Problem, "solve", lambda self: [])
+    monkeypatch.setattr(MainsEquations, "solve", lambda self: [])
     assert fit_mains(data, Pickup(SINGLE, np.ones(2), 9), 1e-3) is None
 
 

@@ -10,12 +10,12 @@ from scipy.stats import chi2
 from scipy.stats import f as fisher_f
 
 from tests.dynamic.phasor_cases import H, complex_normal
-from tpjb_ident.dynamic.estimators import trimmed_start
+from tpjb_ident.dynamic.estimators import least_trimmed
 from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, repeats
+from tpjb_ident.dynamic.estimators.least_trimmed import Regression, distance2, robust_start
 from tpjb_ident.dynamic.estimators.mm import MANY_WINDOWS, mm_fit
 from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
 from tpjb_ident.dynamic.estimators.robust_constants import bisquare_weight, efficiency_constant
-from tpjb_ident.dynamic.estimators.trimmed_start import Regression, distance2, robust_start
 from tpjb_ident.dynamic.estimators.whole_directions import readmitted
 
 
@@ -136,8 +136,8 @@ def test_one_start_that_fits_exactly_is_the_answer():
     regression = Regression(X, Y)
     pairs = np.array([[0, k] for k in range(1, 12)] + [[20, 30]])
     for order in (pairs, pairs[::-1]):
-        seeds = trimmed_start._first_fits(regression, order)
-        found, exact = trimmed_start._concentrated(regression, seeds, 0.5)
+        seeds = least_trimmed._first_fits(regression, order)
+        found, exact = least_trimmed._concentrated(regression, seeds, 0.5)
         assert exact
         np.testing.assert_allclose(found, H, atol=1e-9)
 
@@ -186,14 +186,14 @@ def test_a_component_without_noise_is_found_exactly_beside_one_with_noise():
 
 def test_starts_are_pairs_of_windows_that_differ_in_direction_and_cores_the_nearest_windows():
     label = np.repeat(np.arange(4), [30, 5, 3, 2])
-    pairs = trimmed_start._start_pairs(label, 1)
-    assert pairs.shape == (trimmed_start.STARTS, 2)
+    pairs = least_trimmed._start_pairs(label, 1)
+    assert pairs.shape == (least_trimmed.STARTS, 2)
     assert (label[pairs[:, 0]] != label[pairs[:, 1]]).all()
-    alone = trimmed_start._start_pairs(np.zeros(40, dtype=int), 1)
+    alone = least_trimmed._start_pairs(np.zeros(40, dtype=int), 1)
     assert (alone[:, 0] != alone[:, 1]).all()
-    assert len(alone) == trimmed_start.STARTS
+    assert len(alone) == least_trimmed.STARTS
     distance = np.random.default_rng(2).random((20, 300))
-    nearest = trimmed_start._nearest(distance, 150)
+    nearest = least_trimmed._nearest(distance, 150)
     np.testing.assert_array_equal(nearest, np.argsort(np.argsort(distance)) < 150)
 
 

@@ -11,9 +11,7 @@ from scipy.stats import chi2
 from tests.dynamic.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.estimators.drive_phase import LOCKED, aligned
 from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats, eiv_fit, repeats
-from tpjb_ident.dynamic.estimators.mm import mm_fit
-from tpjb_ident.dynamic.estimators.phasor_table import displacement_condition, phasor_table
-from tpjb_ident.dynamic.estimators.trimmed_start import (
+from tpjb_ident.dynamic.estimators.least_trimmed import (
     Regression,
     distance2,
     evenly_chosen,
@@ -21,6 +19,8 @@ from tpjb_ident.dynamic.estimators.trimmed_start import (
     robust_start,
     scatter,
 )
+from tpjb_ident.dynamic.estimators.mm import mm_fit
+from tpjb_ident.dynamic.estimators.phasor_table import displacement_condition, phasor_table
 from tpjb_ident.dynamic.estimators.uncertainty import (
     CLEAR,
     DirectionMeans,

@@ -17,8 +17,8 @@ from tpjb_ident.pivot.fit import LAWS, MODEL_ERROR, REFERENCE_SHARE, UNKNOWN_ZER
 from tpjb_ident.pivot.laws.law_fit import LawFit
 from tpjb_ident.pivot.records.blocks import Blocks
 from tpjb_ident.pivot.records.dry_record import DryRecord, read_dry_run
-from tpjb_ident.pivot.records.pickup import Pickup
-from tpjb_ident.pivot.records.projection import Direction, project
+from tpjb_ident.pivot.records.pickup import PickupSignature
+from tpjb_ident.pivot.records.projection import PadDirection, project
 from tpjb_ident.pivot.records.refusals import check_directions, check_pickup, check_placement
 from tpjb_ident.pivot.records.settings import PivotSettings
 from tpjb_ident.pivot.records.steps import Hold
@@ -124,7 +124,7 @@ def test_two_pads_tell_no_centre():
 
 
 def signed(pad, size, name=None):
-    return record(pad, pickup=Pickup(tuple(CHANNELS), np.array(size), np.full(4, 0.01)), name=name)
+    return record(pad, pickup=PickupSignature(tuple(CHANNELS), np.array(size), np.full(4, 0.01)), name=name)
 
 
 def test_runs_whose_mains_is_that_of_exchanged_channels_are_named():
@@ -146,7 +146,7 @@ def law(name="linear", scale=SCALE, friction=0.0, chi_square=50.0, contact=(), z
 
 def choice(*records, fits=None, weights=(1.0,), good=None, directions=None):
     masks = tuple(np.ones(len(r.blocks), dtype=bool) for r in records) if good is None else good
-    both = (Direction(0.0, 1e-3), Direction(0.0, 1e-3)) if directions is None else directions
+    both = (PadDirection(0.0, 1e-3), PadDirection(0.0, 1e-3)) if directions is None else directions
     return Choice(tuple(records), masks, (both,) * len(records), fits or (law(),), np.array(weights))
 
 
@@ -226,9 +226,9 @@ CONTACT = (3e-6, math.log(500.0))
 @pytest.mark.parametrize(
     ("changes", "status"),
     [
-        ({"directions": (Direction(math.radians(-4.1), 0.0), Direction(0.0, 0.0))}, "load-off-pad: -4.10 deg"),
+        ({"directions": (PadDirection(math.radians(-4.1), 0.0), PadDirection(0.0, 0.0))}, "load-off-pad: -4.10 deg"),
         (
-            {"directions": (Direction(0.0, 0.0), Direction(math.radians(15.1), 0.0))},
+            {"directions": (PadDirection(0.0, 0.0), PadDirection(math.radians(15.1), 0.0))},
             r"moves-aside: the shaft goes \+15.10",
         ),
         ({"fits": (law(contact=CONTACT),)}, "contact-incomplete: below 1701 N"),
@@ -248,7 +248,7 @@ def test_every_condition_has_its_name(changes, status):
 
 
 def test_conditions_just_within_their_limits_say_nothing():
-    inside = (Direction(math.radians(3.9), 0.0), Direction(math.radians(-14.9), 0.0))
+    inside = (PadDirection(math.radians(3.9), 0.0), PadDirection(math.radians(-14.9), 0.0))
     assert curve(directions=inside).status == ()
     # with and without contact loss it is the same law
     both = (law(), law(contact=CONTACT), law("hertz-point"))

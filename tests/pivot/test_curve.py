@@ -17,7 +17,7 @@ from tpjb_ident.pivot.fit import LAWS
 from tpjb_ident.pivot.hysteresis import measure_loop
 from tpjb_ident.pivot.laws.choice import keep_likely, posterior_weights
 from tpjb_ident.pivot.laws.law_fit import FitData, fit_law
-from tpjb_ident.pivot.records.projection import Direction
+from tpjb_ident.pivot.records.projection import PadDirection
 
 REFERENCE = 2000.0
 LOADS = np.array([50.0, 250.0, 1000.0, 2000.0, 4000.0, 8000.0])
@@ -53,8 +53,8 @@ def curve(**changes):
         onset_load_se=0.0,
         valid_from=250.0,
         valid_to=5000.0,
-        load_direction=Direction(0.02, 0.001),
-        displacement_direction=Direction(0.1, 0.01),
+        load_direction=PadDirection(0.02, 0.001),
+        displacement_direction=PadDirection(0.1, 0.01),
     )
     return replace(whole, **changes)
 

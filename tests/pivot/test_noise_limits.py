@@ -10,7 +10,7 @@ import pytest
 
 from tpjb_ident.pivot.records.blocks import Blocks
 from tpjb_ident.pivot.records.noise_of_records import noise_about_curve, noise_within_holds
-from tpjb_ident.pivot.records.pickup import Pickup, measure_pickup, mistakes
+from tpjb_ident.pivot.records.pickup import PickupSignature, measure_pickup, mistakes
 from tpjb_ident.pivot.records.projection import Projection
 from tpjb_ident.slow_records.noise import DRIFT_OVER_FLICKER, NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 
@@ -294,11 +294,11 @@ SIZE = np.array([1.0 + 0.2j, -0.3 + 1.1j, 0.8 - 0.9j, 0.1 + 0.6j])
 def signature(seed, factor=1.0, size=SIZE, noise=0.02):
     rng = np.random.default_rng(seed)
     drawn = noise / math.sqrt(2.0) * (rng.standard_normal(4) + 1j * rng.standard_normal(4))
-    return Pickup(NAMES, factor * size + drawn, np.full(4, noise))
+    return PickupSignature(NAMES, factor * size + drawn, np.full(4, noise))
 
 
 def exchanged(one):
-    return Pickup(one.channels, one.size[[1, 0, 2, 3]], one.noise)
+    return PickupSignature(one.channels, one.size[[1, 0, 2, 3]], one.noise)
 
 
 PAIRS = [("A", "B"), ("H", "V")]
@@ -318,11 +318,11 @@ def test_a_mistake_needs_two_others_and_most_of_them():
     odd = exchanged(signature(9))
     assert mistakes([odd, signature(1)], PAIRS) == [None, None]
     assert mistakes([odd, signature(1), signature(2)], PAIRS)[0].agree == 2
-    strange = Pickup(NAMES, SIZE[[2, 0, 3, 1]], np.full(4, 0.02))
+    strange = PickupSignature(NAMES, SIZE[[2, 0, 3, 1]], np.full(4, 0.02))
     # two of five others agree: not enough; three of five are
     assert mistakes([odd, signature(1), signature(2), strange, strange, strange], PAIRS)[0] is None
     assert mistakes([odd, signature(1), signature(2), signature(3), strange, strange], PAIRS)[0].agree == 3
-    other_names = Pickup(("A", "B", "H", "W"), SIZE, np.full(4, 0.02))
+    other_names = PickupSignature(("A", "B", "H", "W"), SIZE, np.full(4, 0.02))
     assert mistakes([odd, signature(1), other_names, other_names], PAIRS) == [None] * 4
 
 
@@ -331,7 +331,7 @@ def test_a_reversed_channel_is_named(channel):
     turned = np.ones(4)
     turned[channel] = -1.0
     odd = signature(9)
-    runs = [signature(1), Pickup(NAMES, odd.size * turned, odd.noise), signature(2), signature(3)]
+    runs = [signature(1), PickupSignature(NAMES, odd.size * turned, odd.noise), signature(2), signature(3)]
     assert mistakes(runs, PAIRS)[1].what == f"{NAMES[channel]} is reversed"
 
 
@@ -346,7 +346,7 @@ def test_by_chance_alone_signatures_differ_by_chi_square():
         both = []
         for factor in (1.0, 2.5 * np.exp(1.0j)):
             error = noise / math.sqrt(2.0) * (rng.standard_normal(4) + 1j * rng.standard_normal(4))
-            both.append(Pickup(NAMES, factor * SIZE + error, noise))
+            both.append(PickupSignature(NAMES, factor * SIZE + error, noise))
         drawn.append(_mismatch(*both))
         assert _mismatch(*both[::-1]) == pytest.approx(drawn[-1], rel=0.05)
     assert np.mean(drawn) == pytest.approx(6.0, abs=5 * math.sqrt(12.0 / 300))

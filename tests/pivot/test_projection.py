@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tpjb_ident.pivot.records.projection import (
-    Direction,
+    PadDirection,
     Projection,
     displacement_direction,
     load_direction,
@@ -66,7 +66,7 @@ def test_exact_lines_give_their_direction_with_no_error(off):
 
 def test_without_motion_there_is_no_direction():
     some = blocks(vectors(0.0, LOADS), np.zeros((len(LOADS), 2)))
-    assert displacement_direction(project(some, 0.0), some, white(1e-7)) == Direction(0.0, math.inf)
+    assert displacement_direction(project(some, 0.0), some, white(1e-7)) == PadDirection(0.0, math.inf)
 
 
 def test_the_stated_error_is_that_of_the_draws():
@@ -107,5 +107,5 @@ def test_blocks_of_one_hold_count_as_one():
 
 
 def test_words():
-    assert str(Direction(0.01, 0.002)) == "+0.57 deg (se 0.11 deg) from the pad"
+    assert str(PadDirection(0.01, 0.002)) == "+0.57 deg (se 0.11 deg) from the pad"
     assert Projection(LOADS, LOADS, LOADS, LOADS).load is LOADS

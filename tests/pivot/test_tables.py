@@ -17,7 +17,7 @@ from tpjb_ident.pivot.hysteresis import Hysteresis, measure_loop
 from tpjb_ident.pivot.laws.law_fit import LawFit
 from tpjb_ident.pivot.pads_table import pads_table
 from tpjb_ident.pivot.pivots_toml import pivots_text, table_loads, write_pivots
-from tpjb_ident.pivot.records.projection import Direction
+from tpjb_ident.pivot.records.projection import PadDirection
 from tpjb_ident.pivot.table import load_grid, pivot_table
 
 REFERENCE, SCALE = 2000.0, 4e-9
@@ -37,7 +37,7 @@ def curve(fits=None, weights=(1.0,), **changes):
     fields = {
         "pad": 1, "angle": -np.pi / 2, "steps": steps, "fits": fits or (law(),), "weights": np.array(weights),
         "onset_load": 0.0, "onset_load_se": 0.0, "valid_from": 400.0, "valid_to": 5000.0,
-        "load_direction": Direction(0.02, 0.001), "displacement_direction": Direction(0.1, 0.01),
+        "load_direction": PadDirection(0.02, 0.001), "displacement_direction": PadDirection(0.1, 0.01),
     }  # fmt: skip
     return PivotCurve(**(fields | changes))
 

@@ -15,7 +15,7 @@ import pytest
 
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
-from tpjb_ident.dynamic.corrections.mains_angles import Problem
+from tpjb_ident.dynamic.corrections.mains_angles import MainsEquations
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
 
 SHARED = Path(__file__).parents[2].parent / "shared"
@@ -69,7 +69,7 @@ def test_angles_of_a_known_disturbance_are_found_among_many_minima():
         force = np.stack([np.cos(angle), np.sin(angle)], axis=1) * np.exp(2j * np.pi * rng.random(6))[:, None]
         force = 500 * force * (1 + 5e-4 * rng.standard_normal((6, 1)))
         disturbed = np.linalg.solve(h, force.T).T + np.exp(2j * np.pi * rng.random((6, 2))) @ patterns
-        problem = Problem(disturbed, force, patterns, 1e-3 * np.linalg.norm(force, axis=1))
+        problem = MainsEquations(disturbed, force, patterns, 1e-3 * np.linalg.norm(force, axis=1))
         best = problem.solve()[0]
         x = best.x + 1e-7
         slope = (problem.residual(x + 1e-6) - problem.residual(x - 1e-6)) / 2e-6

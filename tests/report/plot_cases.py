@@ -39,7 +39,7 @@ from tpjb_ident.clearance.polygon import corners
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
 from tpjb_ident.pivot.fit import LAWS
 from tpjb_ident.pivot.laws.law_fit import LawFit
-from tpjb_ident.pivot.records.projection import Direction
+from tpjb_ident.pivot.records.projection import PadDirection
 from tpjb_ident.report import plots
 from tpjb_ident.slow_records.noise import NoiseModel
 
@@ -75,8 +75,8 @@ def curve(pad: int = 1, softer: float = 1.0, gap: float = 0.0, down: bool = Fals
         onset_load_se=100.0 if gap else 0.0,
         valid_from=max(onset, 250.0),
         valid_to=5000.0,
-        load_direction=Direction(0.03, 0.001),
-        displacement_direction=Direction(0.149, 0.01),
+        load_direction=PadDirection(0.03, 0.001),
+        displacement_direction=PadDirection(0.149, 0.01),
     )
 
 

@@ -47,20 +47,20 @@ def check_agreement(
     if len(group) < _MIN_RUNS:
         return set()
     misfits = np.array([misfit_of(a, stiffness) for a in group])
-    told = set()
+    outliers = set()
     if np.median(misfits) <= _AGREE:
         allowed = max(_OUTLIER, 6 * float(np.median(misfits)))
-        told = {i for i, misfit in enumerate(misfits) if misfit > allowed}
-    told |= _apart(group, told)
-    others = [i for i in range(len(group)) if i not in told]
-    common = solve_stiffness([group[i] for i in others]) if told and len(others) > 1 else None
-    for i in sorted(told):
+        outliers = {i for i, misfit in enumerate(misfits) if misfit > allowed}
+    outliers |= _apart(group, outliers)
+    others = [i for i in range(len(group)) if i not in outliers]
+    common = solve_stiffness([group[i] for i in others]) if outliers and len(others) > 1 else None
+    for i in sorted(outliers):
         gain = None if readings is None else gain_of_run(readings, i, others)
         hint = (
             "" if gain is None or gain.chance > _CHANCE else _as_if(channel_names(group)[gain.channels[0]], gain.gain)
         )
         _tell(group[i], stiffness if common is None else common, hint)
-    return told
+    return outliers
 
 
 def _apart(group: Sequence[Answer], known: set[int]) -> set[int]:

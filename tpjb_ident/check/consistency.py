@@ -46,8 +46,8 @@ def check_load_ratios(runs: Sequence[Observation]) -> None:
     off = np.abs(ratios - middle) / max(abs(middle), 1e-12)
     allowed = max(_LOAD_OFF, _MANY * 1.4826 * float(np.median(off)))
     for (seen, ratio), distance in zip(shown, off):
-        told = any(f.key.startswith("load ") for f in seen.report.found)
-        if distance > allowed and not told:
+        reported = any(f.key.startswith("load ") for f in seen.report.found)
+        if distance > allowed and not reported:
             turned = math.degrees(np.angle(ratio / middle))
             what = (
                 f"is {abs(ratio / middle) - 1:+.1%} in size and {turned:+.1f} deg in direction off what the set point "

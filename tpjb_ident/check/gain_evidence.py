@@ -169,10 +169,10 @@ def dynamic_difference(
     scatter = (force[list(others)] - displacement[list(others)] @ stiffness.T) / sizes
     own, size = displacement[one], float(np.linalg.norm(displacement[one]))
     each = float(np.sum(np.abs(scatter) ** 2)) / spare
-    told = _noise_told(readings, others, stiffness)
-    if spare >= _TELLING and 0 < each <= _NO_MORE * told:
+    noise_error = _noise_error(readings, others, stiffness)
+    if spare >= _TELLING and 0 < each <= _NO_MORE * noise_error:
         # the runs differ by no more than their records' noise lets them, which is known from many lines
-        each, spare = max(each, told), spare + _LINES_TELL * len(others)
+        each, spare = max(each, noise_error), spare + _LINES_TELL * len(others)
     variance = each * size**2 * (1 + leverage(unit, own / size))
     variance += (_LEAST_PHASOR * float(np.linalg.norm(force[one]))) ** 2
     changes = _bearing_changes(stiffness, own)
@@ -198,7 +198,7 @@ def _bearing_wander(readings: PointReadings, runs: Sequence[int], stiffness: Com
     return np.asarray(np.mean(np.square(shares), axis=0) * len(runs) / (len(runs) - 2))
 
 
-def _noise_told(readings: PointReadings, runs: Sequence[int], stiffness: ComplexArray) -> float:
+def _noise_error(readings: PointReadings, runs: Sequence[int], stiffness: ComplexArray) -> float:
     """Variance of (F - H D) / |D| per real equation by the records' noise, mean over runs; 0 where not known."""
     if readings.noise is None:
         return 0.0

@@ -17,7 +17,7 @@ _PARTED = 2.5
 
 
 @dataclass(frozen=True)
-class Lines:
+class RecordLines:
     """What the fit found, for m channels.
 
     Attributes
@@ -42,7 +42,7 @@ class Lines:
 
 def fit_lines(
     time: FloatArray, values: FloatArray, frequencies: Sequence[float], inexact: Sequence[float] = ()
-) -> Lines:
+) -> RecordLines:
     """Fit mean, drift and lines to every column.
 
     Parameters
@@ -59,7 +59,7 @@ def fit_lines(
 
     Returns
     -------
-    Lines
+    RecordLines
         NaN for columns with too few samples.
     """
     span = max(float(time[-1] - time[0]), 1e-300)
@@ -78,10 +78,10 @@ def fit_lines(
     mean = coefficients[2 * len(kept)]
     if not kept:
         missing = np.full(values.shape[1], np.nan)
-        return Lines(mean, missing + 0j, missing, glitches, scatter)
+        return RecordLines(mean, missing + 0j, missing, glitches, scatter)
     phasor = (coefficients[0] + 1j * coefficients[1]) * np.exp(-2j * math.pi * kept[0] * time[0])
     floor = _floor(time, rest, kept[0], span) * len(time) / np.maximum(counts, 1) * known
-    return Lines(mean, phasor, floor, glitches, scatter)
+    return RecordLines(mean, phasor, floor, glitches, scatter)
 
 
 def _robust(design: FloatArray, values: FloatArray) -> tuple[FloatArray, BoolArray]:

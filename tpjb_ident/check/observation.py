@@ -16,7 +16,7 @@ from rigdata.run import Run
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.clock import check_clock
 from tpjb_ident.check.findings import Reporter
-from tpjb_ident.check.lines import Lines, fit_lines, strongest_line
+from tpjb_ident.check.lines import RecordLines, fit_lines, strongest_line
 from tpjb_ident.check.rotation import turning_frequency
 from tpjb_ident.check.signals import check_signal, needed
 
@@ -35,7 +35,7 @@ class Observation:
     run : Run
     channels : tuple of Channel
         Displacement, force and acceleration channels that could be read and live.
-    lines : Lines or None
+    lines : RecordLines or None
         Mean, phasor at the excitation, noise of `channels`, SI.
     spread : (3, m) ndarray
         2 %, 50 % and 98 % quantiles of `channels`, SI.
@@ -53,7 +53,7 @@ class Observation:
 
     run: Run
     channels: tuple[Channel, ...]
-    lines: Lines | None = field(repr=False)
+    lines: RecordLines | None = field(repr=False)
     spread: FloatArray = field(repr=False)
     other_line: float
     samples: FloatArray = field(repr=False)
@@ -165,7 +165,7 @@ def _is_dead(seen: ChannelStatistics) -> bool:
     return seen.values == 0 or seen.constant
 
 
-def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: Lines | None) -> bool:
+def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: RecordLines | None) -> bool:
     """Whether noise stays below the converter's steps, as in records computed without noise."""
     main = [i for i, c in enumerate(live) if c.quantity in {"displacement", "force"}]
     if not main:
@@ -186,7 +186,7 @@ def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: L
     return True
 
 
-def _lines(run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray) -> Lines:
+def _lines(run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray) -> RecordLines:
     excitation = run.point.excitation_hz if run.kind == "dynamic" else 0.0
     probes = values[:, [i for i, c in enumerate(channels) if c.quantity == "displacement"]]
     others = [excitation, 50.0, 2 * excitation]

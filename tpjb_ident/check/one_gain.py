@@ -166,11 +166,11 @@ def _with_means(static: Difference | None, channel: int, lever: float | None, sl
         return _Try(channel, shown, False, 0.0)
     pattern = np.where(np.arange(4) == channel, 1.0 if lever is None else lever, 0.0)
     widened = static.widened(channel, slack)
-    told = widened.evidence(pattern)
-    if lever is None or told.information <= 0:
+    by_phasor = widened.evidence(pattern)
+    if lever is None or by_phasor.information <= 0:
         # the mean may have moved by anything
-        return _Try(channel, shown, False, widened.misfit(pattern, told.part))
-    apart = abs(told.part - shown.part) / np.sqrt(1 / told.information + 1 / shown.information)
-    joint = shown.joined(told)
+        return _Try(channel, shown, False, widened.misfit(pattern, by_phasor.part))
+    apart = abs(by_phasor.part - shown.part) / np.sqrt(1 / by_phasor.information + 1 / shown.information)
+    joint = shown.joined(by_phasor)
     left = widened.misfit(pattern, joint.part) if apart <= _AGREE else np.inf
-    return _Try(channel, joint, told.chance() < _PHASORS_SHOW, left)
+    return _Try(channel, joint, by_phasor.chance() < _PHASORS_SHOW, left)

@@ -53,9 +53,9 @@ def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[O
             continue
         _check_signs(group, stiffness)
         readings = point_readings(group, centres)
-        told = check_agreement(group, stiffness, readings)
+        outliers = check_agreement(group, stiffness, readings)
         if readings is not None:
-            check_gains(group, told, readings)
+            check_gains(group, outliers, readings)
 
 
 def definiteness(matrix: NDArray) -> float:

@@ -21,19 +21,19 @@ _MEDIAN = math.sqrt(2 * math.log(2))
 _SECTORS, _MET = 36, 0.9
 
 
-def check_gains(group: Sequence[Answer], told: Collection[int], readings: PointReadings) -> None:
+def check_gains(group: Sequence[Answer], known_outliers: Collection[int], readings: PointReadings) -> None:
     """Name runs with one wrong gain.
 
     Parameters
     ----------
     group : sequence of Answer
         Runs of one operating point, with the same displacement channels.
-    told : collection of int
-        Places of those already told to differ.
+    known_outliers : collection of int
+        Places of those already named as differing.
     readings : PointReadings
         Of the same runs.
     """
-    for found in wrong_gains(readings, told):
+    for found in wrong_gains(readings, known_outliers):
         _tell(group[found.run], found, [channel_names(group)[i] for i in found.channels])
 
 

@@ -13,6 +13,7 @@ from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change, gain_draws
 from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table
+from tpjb_ident.dynamic.estimators.methods import TABLED
 from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
 from tpjb_ident.dynamic.estimators.rlm import RlmSettings
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
@@ -61,7 +62,7 @@ class IdentifySettings:
     """
 
     method: str = "mm-eiv"
-    methods: tuple[str, ...] = ("ols", "rlm:huber", "rlm:tukey", "mm", "mm-eiv", "iv")
+    methods: tuple[str, ...] = TABLED
     phasors: PhasorSettings = field(default_factory=PhasorSettings)
     clearance: float | None = None
     correct: bool = True

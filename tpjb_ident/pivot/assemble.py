@@ -17,7 +17,7 @@ from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
 from tpjb_ident.pivot.hysteresis import Hysteresis, measure_loop
 from tpjb_ident.pivot.laws.law_fit import FRICTION, OFFSET, LawFit
 from tpjb_ident.pivot.records.dry_record import DryRecord
-from tpjb_ident.pivot.records.projection import Direction
+from tpjb_ident.pivot.records.projection import PadDirection
 from tpjb_ident.pivot.records.settings import PivotSettings
 from tpjb_ident.slow_records.noise import NoiseModel
 
@@ -40,7 +40,7 @@ class Choice:
         Its runs.
     good : tuple of (m,) ndarray of bool
         Used blocks per run.
-    directions : tuple of (Direction, Direction)
+    directions : tuple of (PadDirection, PadDirection)
         Load and displacement direction per run.
     fits : tuple of LawFit
         Likely laws, most likely first.
@@ -50,7 +50,7 @@ class Choice:
 
     records: tuple[DryRecord, ...]
     good: tuple[BoolArray, ...]
-    directions: tuple[tuple[Direction, Direction], ...]
+    directions: tuple[tuple[PadDirection, PadDirection], ...]
     fits: tuple[LawFit, ...]
     weights: FloatArray
 

@@ -14,7 +14,7 @@ from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.hysteresis import Hysteresis
 from tpjb_ident.pivot.laws.law_fit import FRICTION, OFFSET, SCALE, LawFit
-from tpjb_ident.pivot.records.projection import Direction
+from tpjb_ident.pivot.records.projection import PadDirection
 
 EXTRAPOLATION_SPREAD = 0.04  # of ln(stiffness) per e-fold of load beyond the points: no law is quite the pivot's own
 
@@ -64,7 +64,7 @@ class PivotCurve:
     pad : int
         Number, from 1.
     angle : float
-        Direction of the pad [rad].
+        PadDirection of the pad [rad].
     steps : PivotSteps
         The points.
     fits : tuple of LawFit
@@ -77,7 +77,7 @@ class PivotCurve:
         Its standard error [N].
     valid_from, valid_to : float
         Loads between which the curve was measured with full contact [N].
-    load_direction, displacement_direction : Direction
+    load_direction, displacement_direction : PadDirection
         Fitted directions, relative to the pad.
     hysteresis : Hysteresis or None
         Loop of loading and unloading, where both were recorded.
@@ -99,8 +99,8 @@ class PivotCurve:
     onset_load_se: float
     valid_from: float
     valid_to: float
-    load_direction: Direction
-    displacement_direction: Direction
+    load_direction: PadDirection
+    displacement_direction: PadDirection
     hysteresis: Hysteresis | None = None
     relative_calibration: float = 0.0
     status: tuple[Condition, ...] = ()

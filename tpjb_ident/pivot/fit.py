@@ -20,7 +20,7 @@ from tpjb_ident.pivot.laws.shape_sharing import with_shared_shape
 from tpjb_ident.pivot.laws.spline_law import SplineLaw
 from tpjb_ident.pivot.records.dry_record import DryRecord, read_dry_run
 from tpjb_ident.pivot.records.noise_of_records import noise_about_curve, noise_within_holds
-from tpjb_ident.pivot.records.projection import Direction
+from tpjb_ident.pivot.records.projection import PadDirection
 from tpjb_ident.pivot.records.refusals import check_directions, check_pickup, check_placement
 from tpjb_ident.pivot.records.settings import PivotSettings
 from tpjb_ident.slow_records.noise import NoiseModel
@@ -43,7 +43,7 @@ class _Pad:
 
     records: tuple[DryRecord, ...]
     good: tuple[BoolArray, ...]
-    directions: tuple[tuple[Direction, Direction], ...]
+    directions: tuple[tuple[PadDirection, PadDirection], ...]
 
 
 def fit_pivots(
@@ -78,7 +78,7 @@ def fit_pivots(
     problems += check_placement(records) + check_pickup(records)
     refused = {problem.run for problem in problems}
     noise = noise_within_holds(records, chosen.drift_rate) if records else NoiseModel(1.0, 1.0, 1.0)
-    pads: dict[int, list[tuple[DryRecord, tuple[Direction, Direction]]]] = {}
+    pads: dict[int, list[tuple[DryRecord, tuple[PadDirection, PadDirection]]]] = {}
     for record in records:
         try:
             directions = check_directions(record, noise, chosen, angles)
@@ -113,7 +113,7 @@ def _read(campaign: Campaign, angles: FloatArray, settings: PivotSettings) -> tu
 
 
 def _curves(
-    pads: dict[int, list[tuple[DryRecord, tuple[Direction, Direction]]]],
+    pads: dict[int, list[tuple[DryRecord, tuple[PadDirection, PadDirection]]]],
     first_noise: NoiseModel,
     settings: PivotSettings,
     refused: tuple[str, ...],

@@ -15,7 +15,7 @@ import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.corrections.mains_angles import Problem
+from tpjb_ident.dynamic.corrections.mains_angles import MainsEquations
 from tpjb_ident.dynamic.estimators.errors_in_variables import repeats
 from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
@@ -124,7 +124,7 @@ def fit_mains(data: PointData, pickup: Pickup, scatter: float) -> MainsFit | Non
     spare = 4 * len(D) - 8 - len(pickup.patterns) * len(D)
     if spare < 1 or len(D) < MIN_DIRECTIONS:
         return None
-    problem = Problem(D, F, pickup.patterns, scatter * np.linalg.norm(F, axis=1))
+    problem = MainsEquations(D, F, pickup.patterns, scatter * np.linalg.norm(F, axis=1))
     minima = problem.solve()
     if not minima:
         return None

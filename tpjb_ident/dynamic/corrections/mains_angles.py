@@ -38,7 +38,7 @@ class Minimum:
 
 
 @dataclass(frozen=True)
-class Problem:
+class MainsEquations:
     """F_g = H (D_g - sum_k patterns_k exp(i angle_gk)), for H (8 real numbers) and the angles.
 
     Attributes

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from rigdata.near_names import nearest_name
+from rigdata.near_names import unknown_name
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, repeats
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
+from tpjb_ident.dynamic.estimators.methods import METHODS
 from tpjb_ident.dynamic.estimators.mm import mm_fit
 from tpjb_ident.dynamic.estimators.ols import ols_fit
 from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable, displacement_condition, phasor_table
@@ -22,7 +23,6 @@ from tpjb_ident.dynamic.estimators.uncertainty import homoscedastic, with_repeat
 from tpjb_ident.dynamic.estimators.whole_directions import readmitted
 from tpjb_ident.errors import ArgumentError
 
-METHODS = ("ols", "rlm", "mm", "mm-eiv", "iv")
 #: Condition number of the displacement directions beyond which entries cannot be told apart.
 MAX_CONDITION = 30.0
 #: Share of windows without weight beyond which the answer needs a look.
@@ -71,9 +71,7 @@ def estimate_dynamic_stiffness(
         Shapes that do not fit, an unknown method or norm, omega not positive.
     """
     if method not in METHODS:
-        near = nearest_name(method, METHODS)
-        hint = f"; did you mean {near!r}?" if near else ""
-        raise ArgumentError(f"unknown method {method!r}{hint} Known: {', '.join(METHODS)}")
+        raise ArgumentError(unknown_name("method", method, METHODS))
     if norm is not None and method != "rlm":
         raise ArgumentError(f'norm={norm!r} belongs to method="rlm", not to {method!r}')
     frequency = float(_si(omega, "rad/s", "omega"))
@@ -89,22 +87,34 @@ def estimate_dynamic_stiffness(
 def estimate_table(
     table: PhasorTable, omega: float, method: str, rlm_settings: RlmSettings | None = None
 ) -> DynamicStiffness:
-    """As `estimate_dynamic_stiffness`, for a table that is already checked and scaled."""
+    """As `estimate_dynamic_stiffness`, for a table that is already checked and scaled.
+
+    Parameters
+    ----------
+    table : PhasorTable
+    omega : float
+        [rad/s]
+    method : str
+        One of `METHODS`.
+    rlm_settings : RlmSettings, optional
+        For ``"rlm"``.
+
+    Raises
+    ------
+    ArgumentError
+        Unknown method; the nearest known one is named.
+    """
+    if method not in METHODS:
+        raise ArgumentError(unknown_name("method", method, METHODS))
     name = f"rlm:{(rlm_settings or RlmSettings()).norm}" if method == "rlm" else method
     obstacle = _obstacle(table) or _no_reference(table, method)
     if obstacle is not None:
         return _failed(table, omega, name, obstacle)
     if len(table) == 2:
         return _exact(table, omega, name)
-    if method == "rlm":
+    if method == "rlm" and rlm_settings is not None:  # the only one with settings of its own
         return _rlm(table, omega, name, rlm_settings)
-    solver: Callable[[PhasorTable, float, str], DynamicStiffness] = {
-        "ols": _ols,
-        "mm": _mm,
-        "mm-eiv": _mm_eiv,
-        "iv": _iv,
-    }[method]
-    return solver(table, omega, name)
+    return SOLVERS[method](table, omega, name)
 
 
 def _si(value: Any, unit: str, name: str) -> Any:
@@ -154,7 +164,7 @@ def _exact(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
     return _result(table, omega, name, numbers, np.ones(2), (none,))
 
 
-def _rlm(table: PhasorTable, omega: float, name: str, settings: RlmSettings | None) -> DynamicStiffness:
+def _rlm(table: PhasorTable, omega: float, name: str, settings: RlmSettings | None = None) -> DynamicStiffness:
     fit = rlm_fit(table.D, table.F, settings)
     return _result(table, omega, name, (fit.h, fit.covariance, fit.dof, np.nan), fit.weights, fit.conditions)
 
@@ -271,5 +281,14 @@ def _many_rejected(weights: FloatArray) -> Condition | None:
         return None
     return Condition("many-windows-rejected", f"{100 * share:.0f} % of the windows got no weight (limit 40 %)")
 
+
+#: What solves Eq. (15) by each method: a new estimator is a function here and a name in `methods`.
+SOLVERS: dict[str, Callable[[PhasorTable, float, str], DynamicStiffness]] = {
+    "ols": _ols,
+    "rlm": _rlm,
+    "mm": _mm,
+    "mm-eiv": _mm_eiv,
+    "iv": _iv,
+}
 
 __all__ = ["METHODS", "NORMS", "estimate_dynamic_stiffness", "estimate_table"]

@@ -1,7 +1,7 @@
 """Joint complex MM regression: one weight per window over all its components.
 
 An M-estimator on stacked real rows (what RLM does) breaks down with a few bad regressors, and here
-the regressors are the probes. This one starts from a high-breakdown fit (`trimmed_start`) with its
+the regressors are the probes. This one starts from a high-breakdown fit (`least_trimmed`) with its
 scale, then takes a 95 % efficient biweight M-step at that fixed scale (the MM principle of Yohai 1987).
 All of it with the full residual covariance, so that phase, axes and units
 do not matter. A biweight S-start was tried and given up: with 45 % of the windows hit by one and the
@@ -16,8 +16,8 @@ import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.estimators.least_trimmed import Regression, distance2, evenly_chosen, robust_start
 from tpjb_ident.dynamic.estimators.robust_constants import bisquare_weight, efficiency_constant
-from tpjb_ident.dynamic.estimators.trimmed_start import Regression, distance2, evenly_chosen, robust_start
 
 #: Fewer windows than this leave nothing to be robust with: least squares, and said so.
 MIN_WINDOWS = 8

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rigdata.near_names import nearest_name
+from rigdata.near_names import unknown_name
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.r_matrix import real_rows
@@ -137,7 +137,7 @@ def _norm(name: str) -> Any:
     from statsmodels.robust import norms
 
     if name not in NORMS:
-        raise ArgumentError(_unknown("norm", name, list(NORMS)))
+        raise ArgumentError(unknown_name("norm", name, NORMS))
     if name == "student":
         return norms.StudentT(c=1.0, df=4.0)
     if name == "mquantile":  # the symmetric one; others estimate quantiles, not H
@@ -154,18 +154,12 @@ def _scale(name: str) -> Any:
         return scale.HuberScale(d=1.345, tol=1e-13, maxiter=500)  # as MASS::rlm's proposal 2
     if name == "mass":
         return _mass_scale
-    raise ArgumentError(_unknown("scale", name, ["mad", "mass", "huber"]))
+    raise ArgumentError(unknown_name("scale", name, ["mad", "mass", "huber"]))
 
 
 def _mass_scale(model: Any, residual: FloatArray) -> float:
     """MASS::rlm divides the median by 0.6745, not by the normal quantile."""
     return float(np.median(np.abs(residual)) / 0.6745)
-
-
-def _unknown(what: str, name: str, known: list[str]) -> str:
-    near = nearest_name(name, known)
-    hint = f"; did you mean {near!r}?" if near else ""
-    return f"unknown {what} {name!r}{hint} Known: {', '.join(known)}"
 
 
 @dataclass(frozen=True)

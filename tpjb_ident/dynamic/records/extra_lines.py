@@ -49,7 +49,7 @@ def unexpected_lines(run: MeasuredRun, result: RunPhasors) -> tuple[tuple[float,
             continue
         smallest = MIN_SHARE * float(np.nanmedian(sizes))
         if lines is None or found:
-            lines = _Lines(n, run.sample_rate, np.append(known, found))
+            lines = _KnownLines(n, run.sample_rate, np.append(known, found))
         found += lines.beside(record.values, smallest)
     top = REACH * max(line.frequency for line in result.lines.excitation)
     extra = tuple(sorted(f for f in found if f < top))[:MAX_LINES]
@@ -68,7 +68,7 @@ def unexpected_lines(run: MeasuredRun, result: RunPhasors) -> tuple[tuple[float,
     return extra, tuple(conditions)
 
 
-class _Lines:
+class _KnownLines:
     """Known lines on an even grid, and the peaks that they leave.
 
     Parameters

@@ -189,8 +189,8 @@ def _drifting(result: RunPhasors, rate: float) -> FloatArray | None:
 
     The runout tells them ten times better than a tachometer, whose own noise looks like a drift.
     """
-    told = speeds_from_runout(result, rate)
-    speeds, doubt = (result.speeds, 0.0) if told is None else told
+    by_runout = speeds_from_runout(result, rate)
+    speeds, doubt = (result.speeds, 0.0) if by_runout is None else by_runout
     known = speeds[np.isfinite(speeds)]
     if len(known) < 2 or np.ptp(known) / 2 <= max(MAX_WINDOW_SLIP / result.length, 4 * doubt):
         return None

@@ -82,15 +82,15 @@ def amplitude_slope(data: PointData, h: ComplexArray, weights: FloatArray) -> Am
         excess = float((fitted.conj() @ (F - fitted)).real / np.linalg.norm(fitted) ** 2)
         angle = round(float(np.degrees(run.direction)) % 180.0, 1)
         groups.setdefault(angle, []).append((np.log2(float(np.linalg.norm(D))), excess))
-    told = [np.array(g) for g in groups.values() if len(g) > 1]
-    told = [g for g in told if np.ptp(g[:, 0]) > np.log2(MIN_RATIO)]
-    runs = sum(len(g) for g in told)
-    if runs - len(told) < 2:
+    comparable = [np.array(g) for g in groups.values() if len(g) > 1]
+    comparable = [g for g in comparable if np.ptp(g[:, 0]) > np.log2(MIN_RATIO)]
+    runs = sum(len(g) for g in comparable)
+    if runs - len(comparable) < 2:
         return None
     # Differences within a direction only: what a direction as a whole is off by is no amplitude effect.
-    x = np.concatenate([g[:, 0] - g[:, 0].mean() for g in told])
-    y = np.concatenate([g[:, 1] - g[:, 1].mean() for g in told])
+    x = np.concatenate([g[:, 0] - g[:, 0].mean() for g in comparable])
+    y = np.concatenate([g[:, 1] - g[:, 1].mean() for g in comparable])
     slope = float(x @ y / (x @ x))
-    spare = max(runs - len(told) - 1, 1)
+    spare = max(runs - len(comparable) - 1, 1)
     error = float(np.sqrt(np.sum((y - slope * x) ** 2) / spare / (x @ x)))
     return AmplitudeSlope(slope, error, runs)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import chi2
 
+from rigdata.near_names import unknown_name
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.results.point_result import PointResult
@@ -89,7 +90,7 @@ def fit_over_frequency(estimates: list[DynamicStiffness], model: str) -> Frequen
         Unknown model, or fewer frequencies than it needs (1 for K-C, 2 for K-C-M).
     """
     if model not in MODELS:
-        raise ArgumentError(f"unknown model {model!r}; known: {', '.join(MODELS)}")
+        raise ArgumentError(unknown_name("model", model, MODELS))
     usable = [e for e in estimates if np.isfinite(e.h).all() and np.isfinite(e.covariance).all()]
     omegas = np.array([e.omega for e in usable])
     needed = 1 if model == "K-C" else 2

@@ -133,7 +133,7 @@ class Identification(Presented):
 
     def remarks(self) -> tuple[str, ...]:
         """What somebody should read beside the numbers: each condition once, with the places where it was found."""
-        told = [condition.sentence() for condition in self.conditions]
+        remarks = [condition.sentence() for condition in self.conditions]
         places: dict[str, list[str]] = {}
         for p in self.points:
             for condition in p.quality:
@@ -142,8 +142,8 @@ class Identification(Presented):
         for name, found in places.items():
             others = len(found) - 1
             more = f" (and at {others} more point{'s' if others > 1 else ''})" if others else ""
-            told.append(f"{name} at {found[0]}{more}")
-        return tuple(told)
+            remarks.append(f"{name} at {found[0]}{more}")
+        return tuple(remarks)
 
     def _groups(self) -> dict[int, LoadFits]:
         """Models over frequency by the index of the points that they belong to."""

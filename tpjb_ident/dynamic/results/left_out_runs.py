@@ -38,8 +38,8 @@ def lost_points(points: Sequence[PointResult], left: Sequence[LeftOut], any_exci
 def _named(point: PointResult, runs: list[str]) -> PointResult:
     if not runs:
         return point
-    told = Condition("run-left-out", f"without {', '.join(runs)}, which cannot be used")
-    return replace(point, quality=merged(point.quality, (told,)))
+    condition = Condition("run-left-out", f"without {', '.join(runs)}, which cannot be used")
+    return replace(point, quality=merged(point.quality, (condition,)))
 
 
 def _same(one: LeftOut, result: PointResult, any_excitation: bool) -> bool:

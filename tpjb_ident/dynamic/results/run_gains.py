@@ -91,13 +91,13 @@ def with_gain_doubts(result: PointResult, data: PointData, pairs: Pairs | None) 
     if not kept:
         return result
     found = wrong_gains(_readings(data, [medians[k] for k in kept], kept, pairs))
-    told = []
+    doubts = []
     for one in sorted(found, key=lambda f: f.run):
         names = [pairs.names[i] for i in one.channels]
-        told.append(f"{data.runs[kept[one.run]].run}: {names[0]} {gain_in_words(one, names)}")
-    if not told:
+        doubts.append(f"{data.runs[kept[one.run]].run}: {names[0]} {gain_in_words(one, names)}")
+    if not doubts:
         return result
-    return replace(result, quality=merged(result.quality, (Condition(RUN_GAIN_OFF, "; ".join(told)),)))
+    return replace(result, quality=merged(result.quality, (Condition(RUN_GAIN_OFF, "; ".join(doubts)),)))
 
 
 def _medians(data: PointData, k: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

@@ -60,8 +60,8 @@ def _dead(run: Run, phasors: RunPhasors) -> dict[str, Problem]:
     ]
     if not silent:
         return {}
-    told = {f.key: f.problem for f in observe(run).report.found if f.problem.severity == "error"}
-    return {name: told[f"dead {name}"] for name in silent if f"dead {name}" in told}
+    errors = {f.key: f.problem for f in observe(run).report.found if f.problem.severity == "error"}
+    return {name: errors[f"dead {name}"] for name in silent if f"dead {name}" in errors}
 
 
 def _silent(block: PhasorBlock, axis: float) -> bool:

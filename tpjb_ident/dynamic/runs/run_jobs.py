@@ -80,7 +80,7 @@ def all_runs(
     jobs = ((_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs)
     try:
         each_finished(workers or InProcessWorkers(), unless_known, list(jobs), finished)
-        shelf.leave_out_the_odd_ones()
+        shelf.leave_out_dead_accelerometers()
         if runs and not shelf.places:
             raise shelf.left_out[0].error
     except BaseException:
@@ -149,8 +149,8 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResul
 def _mended(run: Run) -> tuple[Condition, ...]:
     """What the reader had to mend in the record."""
     problems = run.reader.problems() if hasattr(run, "reader") else ()
-    told = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
-    return (Condition("record-damaged", "; ".join(told)),) if told else ()
+    mended = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
+    return (Condition("record-damaged", "; ".join(mended)),) if mended else ()
 
 
 def mean_temperatures(run: Run) -> dict[int, float]:

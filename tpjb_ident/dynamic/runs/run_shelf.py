@@ -164,15 +164,15 @@ class RunShelf:
         self._digests.pop(index, None)
         self._memory.pop(index, None)
 
-    def leave_out_the_odd_ones(self) -> None:
+    def leave_out_dead_accelerometers(self) -> None:
         """Leave out runs with a dead accelerometer, where most of the others show that there is an acceleration."""
         dead = [i for i, one in self._digests.items() if DEAD_ACCELEROMETER in one.conditions]
         if 2 * len(dead) < len(self._digests):
             for i in dead:
                 run = self._runs[i]
-                (told,) = (c for c in self._digests[i].conditions if c == DEAD_ACCELEROMETER)
+                (dead_one,) = (c for c in self._digests[i].conditions if c == DEAD_ACCELEROMETER)
                 cure = "Check sensor, cable and amplifier; repeat the run"
-                problem = Problem("error", run.file, "", told.detail, cure, run.id)
+                problem = Problem("error", run.file, "", dead_one.detail, cure, run.id)
                 self.leave_out(i, LeftOut(run.id, run.point, RigDataError(problem)))
 
     def put(self, index: int, result: RunResult | None, mark: str = "") -> None:

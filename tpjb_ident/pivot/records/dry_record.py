@@ -12,7 +12,7 @@ import numpy as np
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.pivot.records.blocks import Blocks, Samples, cut_blocks
-from tpjb_ident.pivot.records.pickup import Pickup, measure_pickup
+from tpjb_ident.pivot.records.pickup import PickupSignature, measure_pickup
 from tpjb_ident.pivot.records.projection import Projection, pad_axes, project
 from tpjb_ident.pivot.records.settings import PivotSettings
 from tpjb_ident.pivot.records.steps import Hold, find_holds
@@ -52,7 +52,7 @@ class DryRecord:
         Share of samples left out.
     quantisation : float
         Standard deviation [m] of what the converter's steps add to a whole hold; zero where noise smears them.
-    pickup : Pickup or None
+    pickup : PickupSignature or None
         Mains line in every probe and cell; None where the record is too short to show it.
     """
 
@@ -64,7 +64,7 @@ class DryRecord:
     projection: Projection
     lost: float
     quantisation: float
-    pickup: Pickup | None = None
+    pickup: PickupSignature | None = None
 
 
 def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> DryRecord:
@@ -108,7 +108,7 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
     return DryRecord(run, run.pad, angle, holds, blocks, on_pad, samples.lost, steps, pickup)
 
 
-def _samples(run: Run, angle: float, settings: PivotSettings) -> tuple[Samples, Pickup | None]:
+def _samples(run: Run, angle: float, settings: PivotSettings) -> tuple[Samples, PickupSignature | None]:
     """Both vectors on one time base, glitches left out; the mains line of the channels behind them."""
     force, displacement = run.vector("force"), run.vector("displacement")
     n = min(len(force), len(displacement))
@@ -127,7 +127,7 @@ def _samples(run: Run, angle: float, settings: PivotSettings) -> tuple[Samples, 
     return Samples(time, load, position, np.asarray(load @ pad_axes(angle)[0]), lost), pickup
 
 
-def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: BoolArray) -> Pickup | None:
+def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: BoolArray) -> PickupSignature | None:
     """Mains line per channel. Two channels per vector: only then the vector holds each of them as it was."""
     channels = axial_channels(run)
     if any(sum(c.quantity == quantity for c in channels.values()) != 2 for quantity in vectors):

@@ -30,7 +30,7 @@ CLEARER = 25.0  # by which a mistake undone must lower it
 
 
 @dataclass(frozen=True)
-class Pickup:
+class PickupSignature:
     """Mains line in every channel of a run.
 
     Attributes
@@ -64,7 +64,7 @@ class Mistake:
     agree: int
 
 
-def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: float) -> Pickup | None:
+def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: float) -> PickupSignature | None:
     """Mains line in the channels of one run.
 
     Parameters
@@ -78,7 +78,7 @@ def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: floa
 
     Returns
     -------
-    Pickup or None
+    PickupSignature or None
         None for short or slow records.
     """
     n = len(good)
@@ -94,7 +94,7 @@ def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: floa
     length = fft.next_fast_len(3 * n, real=True)
     spectra = fft.rfft(np.array(rows), n=length, axis=1) * (2.0 / window.sum())
     frequency = np.arange(spectra.shape[1]) * rate / length
-    best: Pickup | None = None
+    best: PickupSignature | None = None
     strength = 0.0
     for mains in MAINS:
         off = np.abs(frequency - mains)
@@ -103,16 +103,16 @@ def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: floa
         peak = int(np.argmax(np.where(off < AROUND, power, 0.0)))
         if power[peak] > strength:
             strength = float(power[peak])
-            best = Pickup(tuple(values), spectra[:, peak], noise)
+            best = PickupSignature(tuple(values), spectra[:, peak], noise)
     return best
 
 
-def mistakes(pickups: Sequence[Pickup | None], pairs: Sequence[tuple[str, str]]) -> list[Mistake | None]:
+def mistakes(pickups: Sequence[PickupSignature | None], pairs: Sequence[tuple[str, str]]) -> list[Mistake | None]:
     """What the signatures say of every run: nothing, or a mistake that most other runs confirm.
 
     Parameters
     ----------
-    pickups : sequence of Pickup or None
+    pickups : sequence of PickupSignature or None
         One per run, all with the same channels.
     pairs : sequence of (str, str)
         Channels that could have been exchanged.
@@ -128,7 +128,9 @@ def mistakes(pickups: Sequence[Pickup | None], pairs: Sequence[tuple[str, str]])
     return out
 
 
-def _mistake(mine: Pickup, others: Sequence[Pickup], pairs: Sequence[tuple[str, str]]) -> Mistake | None:
+def _mistake(
+    mine: PickupSignature, others: Sequence[PickupSignature], pairs: Sequence[tuple[str, str]]
+) -> Mistake | None:
     others = [other for other in others if other.channels == mine.channels]
     stated = [(other, _mismatch(mine, other)) for other in others]
     strange = [(other, size) for other, size in stated if size > MATCHES]
@@ -143,22 +145,24 @@ def _mistake(mine: Pickup, others: Sequence[Pickup], pairs: Sequence[tuple[str, 
     return best if best.agree >= needed else None
 
 
-def _undone(mine: Pickup, pairs: Sequence[tuple[str, str]]) -> list[tuple[str, Pickup]]:
+def _undone(mine: PickupSignature, pairs: Sequence[tuple[str, str]]) -> list[tuple[str, PickupSignature]]:
     """A run's signature with every simple mistake undone."""
     out = []
     for first, second in pairs:
         i, j = mine.channels.index(first), mine.channels.index(second)
         order = np.arange(len(mine.channels))
         order[[i, j]] = j, i
-        out.append((f"{first} and {second} are exchanged", Pickup(mine.channels, mine.size[order], mine.noise[order])))
+        out.append(
+            (f"{first} and {second} are exchanged", PickupSignature(mine.channels, mine.size[order], mine.noise[order]))
+        )
     for i, name in enumerate(mine.channels):
         turned = np.ones(len(mine.channels))
         turned[i] = -1.0
-        out.append((f"{name} is reversed", Pickup(mine.channels, mine.size * turned, mine.noise)))
+        out.append((f"{name} is reversed", PickupSignature(mine.channels, mine.size * turned, mine.noise)))
     return out
 
 
-def _mismatch(a: Pickup, b: Pickup) -> float:
+def _mismatch(a: PickupSignature, b: PickupSignature) -> float:
     """Chi-square of one signature being the other's, times one complex factor."""
     factor = complex(np.vdot(b.size / b.noise, a.size / b.noise) / np.vdot(b.size / b.noise, b.size / b.noise))
     for _ in range(2):

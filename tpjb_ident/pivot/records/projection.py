@@ -18,7 +18,7 @@ from tpjb_ident.slow_records.noise import NoiseModel
 
 
 @dataclass(frozen=True)
-class Direction:
+class PadDirection:
     """A direction fitted to vectors.
 
     Attributes
@@ -68,7 +68,7 @@ def project(blocks: Blocks, angle: float) -> Projection:
     blocks : Blocks
         Averages in the bearing frame.
     angle : float
-        Direction of the pad [rad].
+        PadDirection of the pad [rad].
 
     Returns
     -------
@@ -80,8 +80,8 @@ def project(blocks: Blocks, angle: float) -> Projection:
     return Projection(load[:, 0], load[:, 1], displacement[:, 0], displacement[:, 1])
 
 
-def load_direction(projection: Projection, blocks: Blocks) -> Direction:
-    """Direction in which the load grows, relative to the pad."""
+def load_direction(projection: Projection, blocks: Blocks) -> PadDirection:
+    """PadDirection in which the load grows, relative to the pad."""
     vectors = np.column_stack([projection.load, projection.across_load])
     size = np.hypot(*vectors.T)
     # neighbouring blocks share one hold: their scatter about the line is counted hold by hold
@@ -89,8 +89,8 @@ def load_direction(projection: Projection, blocks: Blocks) -> Direction:
     return _growth(vectors, size, np.eye(len(size)), len(size) / holds)
 
 
-def displacement_direction(projection: Projection, blocks: Blocks, noise: NoiseModel) -> Direction:
-    """Direction in which the shaft moves as the load grows, relative to the pad.
+def displacement_direction(projection: Projection, blocks: Blocks, noise: NoiseModel) -> PadDirection:
+    """PadDirection in which the shaft moves as the load grows, relative to the pad.
 
     Both components carry the same noise, correlated and drifting as `noise` says.
     """
@@ -99,8 +99,8 @@ def displacement_direction(projection: Projection, blocks: Blocks, noise: NoiseM
     return _growth(vectors, size, noise.covariance(blocks.time, blocks.duration), 1.0)
 
 
-def _growth(vectors: FloatArray, size: FloatArray, covariance: FloatArray, dependence: float) -> Direction:
-    """Direction of the slope of vectors (m, 2) over a load size (m,), by generalised least squares."""
+def _growth(vectors: FloatArray, size: FloatArray, covariance: FloatArray, dependence: float) -> PadDirection:
+    """PadDirection of the slope of vectors (m, 2) over a load size (m,), by generalised least squares."""
     design = np.column_stack([np.ones_like(size), (size - size.mean()) / max(float(np.ptp(size)), 1e-300)])
     whitener = np.linalg.inv(np.linalg.cholesky(covariance))
     x, y = whitener @ design, whitener @ vectors
@@ -108,10 +108,10 @@ def _growth(vectors: FloatArray, size: FloatArray, covariance: FloatArray, depen
     along, across = (inverse @ (x.T @ y))[1]
     length = math.hypot(along, across)
     if length == 0.0:
-        return Direction(0.0, math.inf)
+        return PadDirection(0.0, math.inf)
     # the slope is an average over a curved path; what counts is the scatter across the direction itself
     normal = np.array([-across, along]) / length
     off = y @ normal
     misfit = float(np.sum((off - x @ (inverse @ (x.T @ off))) ** 2)) / max(len(size) - 2, 1)
     spread = math.sqrt(inverse[1, 1] * misfit * dependence)
-    return Direction(math.atan2(across, along), spread / length)
+    return PadDirection(math.atan2(across, along), spread / length)

@@ -11,7 +11,7 @@ from rigdata.problem import Problem, RigDataError
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.pivot.records.dry_record import DryRecord, axial_channels, refusal
 from tpjb_ident.pivot.records.pickup import mistakes
-from tpjb_ident.pivot.records.projection import Direction, displacement_direction, load_direction
+from tpjb_ident.pivot.records.projection import PadDirection, displacement_direction, load_direction
 from tpjb_ident.pivot.records.settings import PivotSettings
 from tpjb_ident.slow_records.noise import NoiseModel
 
@@ -23,7 +23,7 @@ CURE = "Check the run's pad number, the channels' axes, polarities and order, an
 
 def check_directions(
     record: DryRecord, noise: NoiseModel, settings: PivotSettings, pad_angles: FloatArray
-) -> tuple[Direction, Direction]:
+) -> tuple[PadDirection, PadDirection]:
     """Directions of load and displacement, or a refusal.
 
     Parameters
@@ -39,7 +39,7 @@ def check_directions(
 
     Returns
     -------
-    load, displacement : Direction
+    load, displacement : PadDirection
         Relative to the pad.
 
     Raises
@@ -59,7 +59,7 @@ def check_directions(
     return load, displacement
 
 
-def _elsewhere(record: DryRecord, quantity: str, direction: Direction, limit: float, guess: str) -> RigDataError:
+def _elsewhere(record: DryRecord, quantity: str, direction: PadDirection, limit: float, guess: str) -> RigDataError:
     degrees = math.degrees(direction.angle)
     reading = "opposite to" if abs(degrees) > 135.0 else "away from"
     what = (
@@ -70,7 +70,7 @@ def _elsewhere(record: DryRecord, quantity: str, direction: Direction, limit: fl
 
 
 def _suspect(
-    record: DryRecord, load: Direction, displacement: Direction, settings: PivotSettings, pad_angles: FloatArray
+    record: DryRecord, load: PadDirection, displacement: PadDirection, settings: PivotSettings, pad_angles: FloatArray
 ) -> str:
     """Which of wrong pad, wrong channel and wrong angle explains both directions."""
     off_load = abs(load.angle) > settings.load_angle_limit
