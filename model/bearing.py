@@ -6,8 +6,10 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from model.errors import ModelError
 
-class BearingError(ValueError):
+
+class BearingError(ModelError):
     """A bearing file or definition that cannot be used; says file, key, what and cure."""
 
 

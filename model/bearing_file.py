@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from pathlib import Path
 from typing import Any
 
 from model.bearing import BABBITT, STEEL, Bearing, BearingError, Material, Oil, Pad, Pivot
+from model.nearest import hint
 from model.toml_text import parse_toml
 from model.units import UnitError, parse_quantity
 
@@ -140,9 +140,7 @@ def _section(data: dict[str, Any], key: str, name: str) -> dict[str, Any]:
             raise BearingError(f"{name}, {key}: must be a table, got {section!r}. Write it as [{key}].")
     known = set(_KEYS[key]) | {k[len(key) + 1 if key else 0 :].split(".")[0] for k in _KEYS if _is_child(k, key)}
     for unknown in set(section) - known:
-        near = difflib.get_close_matches(unknown, known, n=1)
-        hint = f" Did you mean {near[0]!r}?" if near else f" Known keys: {', '.join(sorted(known))}."
-        raise BearingError(f"{name}, [{key}] {unknown}: unknown key.{hint}")
+        raise BearingError(f"{name}, [{key}] {unknown}: unknown key. {hint(unknown, sorted(known), 'Known keys:')}")
     return section
 
 
@@ -258,11 +256,7 @@ def _check_pivot(kind: str, pivot: dict[str, Any], name: str) -> None:
         "rigid": set(),
     }
     if kind not in need:
-        near = difflib.get_close_matches(kind, need, n=1)
-        raise BearingError(
-            f"{name}, [pivot] kind: {kind!r} is not known."
-            + (f" Did you mean {near[0]!r}?" if near else f" Use one of {', '.join(need)}.")
-        )
+        raise BearingError(f"{name}, [pivot] kind: {kind!r} is not known. {hint(kind, need, 'Use one of')}")
     missing = sorted(need[kind] - set(pivot))
     if missing:
         raise BearingError(f"{name}, [pivot] {missing[0]}: missing; a {kind} pivot needs it.")

@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from model.bearing import Bearing, Pad
+from model.bearing import Bearing, BearingError, Pad
+from model.errors import OptionError
 
 
 @dataclass(frozen=True)
@@ -38,9 +39,9 @@ class Growth:
     def __post_init__(self) -> None:
         given = [t for t in (self.reference, self.housing, self.journal) if t is not None]
         if not all(math.isfinite(t) and -50.0 <= t <= 300.0 for t in given):
-            raise ValueError(f"temperatures of Growth must lie between -50 and 300 degC, got {given}")
+            raise OptionError(f"temperatures of Growth must lie between -50 and 300 degC, got {given}")
         if len(self.expansion) != 2 or not all(0.0 <= a < 1e-4 for a in self.expansion):
-            raise ValueError(f"expansion must be two numbers from 0 to 1e-4 1/K, got {self.expansion!r}")
+            raise OptionError(f"expansion must be two numbers from 0 to 1e-4 1/K, got {self.expansion!r}")
 
 
 def grown(bearing: Bearing, growth: Growth, supply: float, journal: float) -> Bearing:
@@ -62,7 +63,7 @@ def grown(bearing: Bearing, growth: Growth, supply: float, journal: float) -> Be
 
     Raises
     ------
-    ValueError
+    BearingError
         Nothing is left of a clearance.
     """
     by_journal, by_housing = growth.expansion
@@ -78,7 +79,7 @@ def grown(bearing: Bearing, growth: Growth, supply: float, journal: float) -> Be
         assembled = pad.assembled_clearance + seat_growth - thicker - out
         machined = pad.pad_clearance + wider - out
         if not (assembled > 0.0 and machined > 0.0):
-            raise ValueError(
+            raise BearingError(
                 f"{bearing.name}: pad #{number} has no clearance left with the journal at {journal:.0f} degC "
                 f"(Cb {assembled * 1e6:.1f} um, Cp {machined * 1e6:.1f} um). Check the clearances and their "
                 "reference temperature."

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from model.errors import OptionError
+from model.film.models import FILM_MODELS
 from model.growth import Growth
+from model.nearest import check_known
 
-CAVITATION = ("swift-stieber", "jfo")
+#: Names of the models of a rupturing film.
+CAVITATION = tuple(FILM_MODELS)
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,6 @@ class Options:
     cavitation: str = "swift-stieber"
 
     def __post_init__(self) -> None:
-        if self.cavitation not in CAVITATION:
-            raise ValueError(f"cavitation must be one of {', '.join(CAVITATION)}, got {self.cavitation!r}")
+        check_known("cavitation", self.cavitation, FILM_MODELS)
         if not (self.growth is None or isinstance(self.growth, Growth)):
-            raise ValueError(f"growth must be a Growth or None, got {self.growth!r}")
+            raise OptionError(f"growth must be a Growth or None, got {self.growth!r}")

@@ -14,12 +14,16 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
 from model.bearing import Bearing, BearingError, Pivot
+from model.errors import ModelError
+from model.nearest import hint
 from model.toml_text import parse_toml
 
-FloatArray = NDArray[np.float64]
+
+class PivotCurveError(ModelError):
+    """A measured load-deflection curve that no pivot has."""
 
 
 @runtime_checkable
@@ -227,19 +231,19 @@ class MeasuredPivot:
     def __post_init__(self) -> None:
         load, points = np.asarray(self.load, float), np.asarray(self.deflection_points, float)
         if load.ndim != 1 or load.shape != points.shape or len(load) < 2:
-            raise ValueError(f"load and deflection must be 1-D and alike, got {load.shape} and {points.shape}")
+            raise PivotCurveError(f"load and deflection must be 1-D and alike, got {load.shape} and {points.shape}")
         if not (np.all(np.isfinite(load)) and np.all(np.isfinite(points))):
-            raise ValueError("a pivot curve must be finite")
+            raise PivotCurveError("a pivot curve must be finite")
         if np.any(np.diff(load) <= 0) or np.any(np.diff(points) <= 0):
-            raise ValueError("a pivot curve must rise strictly in load and deflection")
+            raise PivotCurveError("a pivot curve must rise strictly in load and deflection")
         with np.errstate(over="ignore"):  # an infinite slope is refused in the next line
             slopes = np.diff(points) / np.diff(load)
         if not np.all((slopes > 1e-100) & (slopes < 1e100)):
-            raise ValueError("a pivot curve must have slopes that are numbers")
+            raise PivotCurveError("a pivot curve must have slopes that are numbers")
         if load[0] != 0.0 or points[0] != 0.0:
             load, points = np.concatenate([[0.0], load]), np.concatenate([[0.0], points])
             if load[1] <= 0 or points[1] <= 0:
-                raise ValueError("a pivot curve must start at or above zero load and deflection")
+                raise PivotCurveError("a pivot curve must start at or above zero load and deflection")
         from scipy.interpolate import PchipInterpolator
 
         object.__setattr__(self, "load", load)
@@ -306,6 +310,10 @@ def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> PivotLaw:
     return RigidPivot()
 
 
+#: What `pivot_laws` knows by name.
+NAMED_LAWS = ("rigid", "kirk", "kirk-secant")
+
+
 def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
     """One law per pad from what a user may say.
 
@@ -322,12 +330,12 @@ def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
         Unknown name, wrong number of laws, or a stiffness that is not positive.
     """
     n = len(bearing.pads)
-    if isinstance(choice, str) and choice in {"rigid", "kirk", "kirk-secant"}:
+    if isinstance(choice, str) and choice in NAMED_LAWS:
         law = RigidPivot() if choice == "rigid" else formula_pivot(bearing.pivot, choice == "kirk-secant")
         return (law,) * n
     if isinstance(choice, (str, Path)):
         if not Path(choice).suffix:
-            raise BearingError(f"pivots: {str(choice)!r} is not known. Use rigid, kirk, kirk-secant or a pivots.toml.")
+            raise BearingError(f"pivots: {str(choice)!r} is not known. {_other_choice(str(choice))}")
         return load_pivots(choice, n)
     if isinstance(choice, (int, float)) and not isinstance(choice, bool):
         if not (math.isfinite(choice) and choice > 0):
@@ -339,6 +347,11 @@ def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
     if len(laws) != n or not all(isinstance(law, PivotLaw) for law in laws):
         raise BearingError(f"pivots: need one pivot law per pad ({n}), got {len(laws)} entries.")
     return laws
+
+
+def _other_choice(name: str) -> str:
+    said = hint(name, NAMED_LAWS, "Use one of")
+    return said if said.startswith("Did") else "Use rigid, kirk, kirk-secant or a pivots.toml."
 
 
 def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ...]:

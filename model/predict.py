@@ -10,24 +10,23 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import ComplexArray, FloatArray
 from model.bearing import Bearing
+from model.conditions import Condition
 from model.dynamics.reduction import PadMatrices, bearing_impedance, friction_regimes, pad_matrices
 from model.effects import Effect, apply_effects
+from model.errors import ModelError, OptionError
 from model.growth import grown
 from model.options import Options
 from model.pivots import pivot_laws
 from model.possible import check_possible
 from model.setup import Mesh, Setup
-from model.statics.conditions import largest_reynolds
+from model.statics.conditions import NOT_CONVERGED, UNSETTLED_GROWTH, largest_reynolds
 from model.statics.equilibrium import Equilibrium, solve_equilibrium
 from model.statics.pad_flow import PadFlow, pad_flow
 from model.statics.power import power_loss
 from model.units import to_si
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 #: No shaker excites faster [rad/s]; beyond, squares overflow.
 FASTEST = 1e9
@@ -35,7 +34,7 @@ FASTEST = 1e9
 NO_LOAD = 1e-200
 
 
-class OperatingPointError(ValueError):
+class OperatingPointError(ModelError):
     """A load, direction, speed or excitation that no bearing can have."""
 
 
@@ -60,8 +59,8 @@ class Prediction:
         Journal from the bearing centre [m].
     tilt, deflection, pad_load : (n_pads,) ndarray
         [rad], [m], [N]
-    status : tuple of str
-        Named conditions; empty when all is well.
+    status : tuple of Condition
+        Named conditions, which compare and print like strings; empty when all is well.
     equilibrium : Equilibrium
     setup : Setup
     """
@@ -78,7 +77,7 @@ class Prediction:
     tilt: FloatArray = field(repr=False)
     deflection: FloatArray = field(repr=False)
     pad_load: FloatArray
-    status: tuple[str, ...]
+    status: tuple[Condition, ...]
     equilibrium: Equilibrium = field(repr=False)
     setup: Setup = field(repr=False)
 
@@ -269,16 +268,15 @@ def predict(
     Raises
     ------
     BearingError
-        The bearing has a number that no bearing has; a ValueError too.
+        The bearing has a number that no bearing has.
     OperatingPointError
-        A load, direction, speed or excitation that no bearing can have; a ValueError too.
-    ValueError
-        Another argument with a wrong dimension, sign or name (the message says which).
+        A load, direction, speed or excitation that is no number, or that no bearing can have.
+    OptionError, UnitError, EffectError
+        Another argument with a wrong name, dimension or sign (the message says which). All are `ModelError`, and
+        a ValueError too.
     """
-    if thermal not in {"isothermal", "adiabatic", "tehd"}:
-        raise ValueError(f"thermal must be isothermal, adiabatic or tehd, got {thermal!r}")
     if not (options is None or isinstance(options, Options)):
-        raise ValueError(f"options must be an Options object, got {options!r}")
+        raise OptionError(f"options must be an Options object, got {options!r}")
     check_possible(bearing)
     plain = Setup(bearing, pivot_laws(pivots, bearing), thermal, _mesh(mesh), options=options or Options())
     setup = apply_effects(plain, effects)
@@ -300,17 +298,17 @@ def _mesh(mesh: Any) -> Mesh:
     try:
         along, across = (operator.index(n) for n in mesh)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"mesh must be two whole numbers, along and across, got {mesh!r}") from error
+        raise OptionError(f"mesh must be two whole numbers, along and across, got {mesh!r}") from error
     return Mesh(along, across)
 
 
 def _number(value: Any, dimension: str, name: str) -> float:
     if isinstance(value, bool):
-        raise ValueError(f"{name} must be a number, got {value!r}")
+        raise OperatingPointError(f"{name} must be a number, got {value!r}")
     try:
         return float(to_si(value, dimension, name))
     except TypeError as error:
-        raise ValueError(f"{name} must be a number, got {value!r}") from error
+        raise OperatingPointError(f"{name} must be a number, got {value!r}") from error
 
 
 def predict_setup(
@@ -320,7 +318,7 @@ def predict_setup(
     try:
         omega = np.asarray(excitation, float)
     except TypeError as error:
-        raise ValueError(f"excitation must be numbers [rad/s], got {excitation!r}") from error
+        raise OperatingPointError(f"excitation must be numbers [rad/s], got {excitation!r}") from error
     _check_point(load, load_direction, speed, omega)
     # A load near the smallest float is none: its quotients would not be numbers.
     pushing = load if load > NO_LOAD else 0.0
@@ -375,7 +373,7 @@ def _solve_as_it_runs(
             break
         journal = felt
     if not settled:
-        names = (*equilibrium.status, "thermal growth does not settle", "not converged")
+        names = (*equilibrium.status, UNSETTLED_GROWTH, NOT_CONVERGED)
         equilibrium = replace(equilibrium, status=names)
     return running, equilibrium
 

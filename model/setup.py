@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from model.bearing import Bearing, Pad
+from model.arrays import ComplexArray, FloatArray
+from model.bearing import Bearing, BearingError, Pad
+from model.nearest import check_known
 from model.options import Options
 from model.pivots import PivotLaw
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 THERMAL = ("isothermal", "adiabatic", "tehd")
 #: A sensor map: excitation frequency [rad/s] -> (2, 2) complex; 0 gives what static readings see.
 SensorMap = Callable[[float], NDArray[Any]]
@@ -188,12 +188,11 @@ class Setup:
     accuracy: float = 1e-7
 
     def __post_init__(self) -> None:
-        if self.thermal not in THERMAL:
-            raise ValueError(f"thermal must be one of {', '.join(THERMAL)}, got {self.thermal!r}")
+        check_known("thermal", self.thermal, THERMAL)
         if not self.bearing.pads:
-            raise ValueError("a bearing needs at least one pad")
+            raise BearingError("a bearing needs at least one pad")
         if len(self.pivots) != len(self.bearing.pads):
-            raise ValueError(f"need one pivot law per pad ({len(self.bearing.pads)}), got {len(self.pivots)}")
+            raise BearingError(f"need one pivot law per pad ({len(self.bearing.pads)}), got {len(self.pivots)}")
 
     def change(self, **changes: Any) -> Setup:
         """Return a copy with other values."""

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from model.arrays import FloatArray
+from model.bearing import BearingError
 from model.predict import Prediction, predict_setup
 from model.setup import Setup
 from model.statics.equilibrium import Equilibrium
 from model.statics.warm_start import carried_on
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -130,6 +130,11 @@ def corner_positions(setup: Setup, push_load: float) -> FloatArray:
     -------
     (n_pads, 2) ndarray
         As read [m], counter-clockwise as `PolygonSides.corners`.
+
+    Raises
+    ------
+    BearingError
+        Two neighbouring pads stand half a turn apart or more.
     """
     angles = np.array([pad.pivot_angle for pad in setup.bearing.pads])
     order = np.argsort(angles % (2.0 * math.pi))
@@ -137,7 +142,9 @@ def corner_positions(setup: Setup, push_load: float) -> FloatArray:
     for i, j in zip(order, np.roll(order, -1), strict=True):
         half = 0.5 * ((angles[j] - angles[i]) % (2.0 * math.pi))
         if half >= 0.5 * math.pi:
-            raise ValueError(f"pads {i + 1} and {j + 1} stand {math.degrees(2 * half):.0f} deg apart: no corner there")
+            raise BearingError(
+                f"pads {i + 1} and {j + 1} stand {math.degrees(2 * half):.0f} deg apart: no corner there"
+            )
         share = 0.5 * push_load / math.cos(half)
         pair = np.array([[math.cos(angles[k]), math.sin(angles[k])] for k in (i, j)])
         reach = [setup.bearing.pads[k].assembled_clearance + setup.pivots[k].deflection(share) for k in (i, j)]

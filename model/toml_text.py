@@ -1,10 +1,12 @@
-"""TOML from a stranger: parsed, or refused with a `ValueError` before it can take long."""
+"""TOML from a stranger: parsed, or refused with a `ModelError` or tomllib's own before it can take long."""
 
 from __future__ import annotations
 
 import re
 import tomllib
 from typing import Any
+
+from model.errors import ModelError
 
 #: Keys with more dots than this nest deeper than any file of ours; parsing them takes the square of their length.
 MAX_DEPTH = 64
@@ -25,20 +27,20 @@ def parse_toml(text: str) -> dict[str, Any]:
 
     Raises
     ------
-    ValueError
+    ModelError, tomllib.TOMLDecodeError
         Not TOML, nested too deeply, or a whole number of thousands of digits; says the line where it is known.
     """
     for number, line in enumerate(text.split("\n"), start=1):
         if line.count(".") > MAX_DEPTH and not line.lstrip().startswith("#") and _longest_key(line) > MAX_DEPTH:
-            raise ValueError(f"line {number} nests far too deeply")
+            raise ModelError(f"line {number} nests far too deeply")
     try:
         return tomllib.loads(text)
     except RecursionError as error:
-        raise ValueError("nested far too deeply") from error
+        raise ModelError("nested far too deeply") from error
     except tomllib.TOMLDecodeError:
         raise
     except ValueError as error:  # Python refuses to read whole numbers of more than 4300 digits
-        raise ValueError("a whole number has thousands of digits") from error
+        raise ModelError("a whole number has thousands of digits") from error
 
 
 def _longest_key(line: str) -> int:

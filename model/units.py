@@ -7,6 +7,8 @@ import math
 import re
 from typing import Any
 
+from model.errors import ModelError
+
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d{1,3})?"
 _UNIT = r"[A-Za-zµμ°%Ω][A-Za-z0-9µμ°%Ω/*^ .]{0,40}|1/[A-Za-z]{1,10}|"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*({_UNIT})\s*")
@@ -37,7 +39,7 @@ SI_UNITS = {
 }
 
 
-class UnitError(ValueError):
+class UnitError(ModelError):
     """A quantity that cannot be read, or has the wrong dimension."""
 
 

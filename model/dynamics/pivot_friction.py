@@ -17,10 +17,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from model.arrays import ComplexArray, FloatArray
 
 HALVINGS = 60
 

@@ -12,16 +12,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import ComplexArray, FloatArray
+from model.conditions import Condition
 from model.dynamics.pivot_friction import friction_impedance
 from model.setup import Setup
 from model.statics.equilibrium import Equilibrium
 from model.statics.pad_film import PadFilm
 from model.statics.tilt_hold import friction_limits, tilt_hold
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -168,10 +166,10 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
     return h
 
 
-def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> tuple[str, ...]:
+def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> tuple[Condition, ...]:
     """Named regimes of pivots with friction: which ones it holds, and which ones the vibration breaks loose."""
-    held: list[str] = []
-    loose: list[str] = []
+    held: list[int] = []
+    loose: list[int] = []
     for film in equilibrium.films:
         pad = pad_matrices(setup, film)
         if pad is None or not pad.friction[0]:
@@ -182,10 +180,11 @@ def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) 
         own = -(s**2) * pad.pad_mass + 1j * s * pad.pad_damping + pad.pad_stiffness
         film_part = np.asarray(z[:, 2:, 2:][:, keep, keep] + own[:, keep, keep], dtype=np.complex128)
         free = np.abs(broken_loose(pad, z, film_part, setup.vibration)) < pad.friction[0]
-        (loose if free.any() else held).append(str(film.number))
+        (loose if free.any() else held).append(film.number)
     names = []
     if held:
-        names.append(f"pivot friction holds pads {', '.join(held)}")
+        names.append(Condition(f"pivot friction holds pads {', '.join(map(str, held))}", "note", pads=tuple(held)))
     if loose:
-        names.append(f"vibration of {1e6 * setup.vibration:g} um breaks the pivots of pads {', '.join(loose)} loose")
+        said = f"vibration of {1e6 * setup.vibration:g} um breaks the pivots of pads {', '.join(map(str, loose))} loose"
+        names.append(Condition(said, "note", pads=tuple(loose)))
     return tuple(names)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from model.bearing import Bearing
+from model.errors import ModelError
+from model.nearest import hint
 from model.setup import Setup
 from model.units import parse_quantity
 
@@ -17,7 +18,7 @@ MAX_PADS = 40
 Side = Literal["bearing", "structure", "measurement"]
 
 
-class EffectError(ValueError):
+class EffectError(ModelError):
     """An effect that is not known, or a parameter that is missing, unknown or out of its bounds."""
 
 
@@ -136,7 +137,7 @@ class EffectKind:
         known = {p.name: p for p in self.parameters_of(max(1, min(numbered, MAX_PADS)))}
         for name in values:
             if name not in known:
-                raise EffectError(f"{self.name}: no parameter {name!r}.{_nearest(name, known)}")
+                raise EffectError(f"{self.name}: no parameter {name!r}. {hint(name, known)}")
         out = {}
         for name, parameter in known.items():
             if name not in values:
@@ -162,9 +163,3 @@ def _number(value: Any, parameter: Parameter, where: str) -> float:
             raise EffectError(f"{where}: a pad is a whole number, got {value!r}.")
         return int(value)
     return float(value)
-
-
-def _nearest(name: str, known: Iterable[str]) -> str:
-    known = list(known)
-    near = difflib.get_close_matches(name, known, n=1)
-    return f" Did you mean {near[0]!r}?" if near else f" Known: {', '.join(known)}."

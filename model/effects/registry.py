@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 import importlib
 import pkgutil
 from pathlib import Path
 
 from model.effects.kind import EffectError, EffectKind
+from model.nearest import hint
 
 _registered: dict[str, EffectKind] = {}
 
@@ -38,9 +38,7 @@ def kind_of(name: str) -> EffectKind:
     """
     kinds = known_effects()
     if name not in kinds:
-        near = difflib.get_close_matches(str(name), kinds, n=1)
-        hint = f"Did you mean {near[0]!r}?" if near else f"Known effects: {', '.join(sorted(kinds))}."
-        raise EffectError(f"effect {name!r} is not known. {hint}")
+        raise EffectError(f"effect {name!r} is not known. {hint(name, sorted(kinds), 'Known effects:')}")
     return kinds[name]
 
 

@@ -23,11 +23,9 @@ J. Tribology 132 (2010) 041702 (complementarity); L. Portugal, J. Judice, L. Vic
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import BoolArray, FloatArray
 from model.compilation import compiled
 from model.film.cavitation_matrix import (
     FaceFlows,
@@ -40,9 +38,6 @@ from model.film.cavitation_slopes import jfo_slopes
 from model.film.matrix import assemble, factorise
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, solve_film
-
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
 
 MAX_STEPS = 4000
 #: How many steps in a row may fail to lower the number of nodes on the wrong side before they change one at a time.
@@ -87,18 +82,10 @@ def solve_film_jfo(
     return FilmForces(force, stiffness, damping, forces.min_film, steps)
 
 
-#: Grid, work, (Cp, a, b), surface speed, sharp: pressure and derivatives of one film.
-FilmSolver = Callable[[FilmGrid, FilmWork, tuple[float, float, float], float, bool], FilmForces]
-
-
-def film_solver(cavitation: str) -> FilmSolver:
-    """The solver of a film that is flooded where it enters, by what happens where it ruptures."""
-    return _flooded_jfo if cavitation == "jfo" else solve_film
-
-
-def _flooded_jfo(
+def solve_flooded_film(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool
 ) -> FilmForces:
+    """`solve_film_jfo` for a film that the supply fills where it enters; parameters as those of `solve_film`."""
     return solve_film_jfo(grid, work, wedge, speed, sharp, 1.0)
 
 

@@ -11,14 +11,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import BoolArray, FloatArray
 from model.compilation import compiled
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import conductances
-
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
 
 
 class FaceFlows(NamedTuple):

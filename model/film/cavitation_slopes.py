@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
 from model.compilation import compiled
 from model.film.cavitation_matrix import FaceFlows, assemble_columns, factorise_columns, substitute_columns
 from model.film.mesh import FilmGrid, FilmWork
-
-FloatArray = NDArray[np.float64]
 
 
 @compiled

@@ -11,13 +11,11 @@ the mass flows used here are those of the full film.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
 from model.compilation import compiled
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import warmer_pressure
-
-FloatArray = NDArray[np.float64]
 
 #: Least share of the Couette flow that is taken to run downstream. A pressure peak near a leading edge pushes oil
 #: back there; what the journal drags in mixes with what returns, so that the net flow is no measure of the heat

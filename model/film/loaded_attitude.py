@@ -14,12 +14,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
 from model.film.mesh import film_grid, film_work
 from model.film.reynolds import solve_film
 
-FloatArray = NDArray[np.float64]
 _TABLE_MESH = (32, 4)
 #: (A, B) -> tilting force and load over mu U R^2 L; the tilting force is infinite where the film is gone.
 _Force = Callable[[float, float], tuple[float, float]]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from model.arrays import BoolArray, FloatArray
 from model.compilation import compiled
-from model.film.mesh import BoolArray, FloatArray
 
 
 @compiled

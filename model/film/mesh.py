@@ -6,10 +6,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from model.arrays import BoolArray, FloatArray
+from model.errors import OptionError
 
 
 class FilmGrid(NamedTuple):
@@ -124,7 +123,7 @@ def film_grid(
     """
     nt, nz = shape
     if nt < 4 or nz < 2 or nt % 2 or nz % 2:
-        raise ValueError(f"mesh must have even numbers of intervals, at least 4 x 2, got {nt} x {nz}")
+        raise OptionError(f"mesh must have even numbers of intervals, at least 4 x 2, got {nt} x {nz}")
     angle = np.linspace(start, end, nt + 1)
     z = 0.5 * length * _graded(nz, symmetric)
     face = 0.5 * (angle[1:] + angle[:-1])

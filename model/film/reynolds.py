@@ -22,9 +22,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from model.arrays import BoolArray, FloatArray
 from model.compilation import compiled
 from model.film.matrix import add_diagonal, assemble, factorise, substitute
-from model.film.mesh import BoolArray, FilmGrid, FilmWork, FloatArray
+from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import derivatives, rupture_line
 
 #: A cold start moves the rupture line by one node a step, so that fine meshes need many.

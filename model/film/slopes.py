@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from model.arrays import FloatArray
 from model.compilation import compiled
 from model.film.matrix import substitute, substitute_four, substitute_many
-from model.film.mesh import FilmGrid, FilmWork, FloatArray
+from model.film.mesh import FilmGrid, FilmWork
 
 
 @compiled

@@ -12,16 +12,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
 from model.bearing import Bearing, Pad
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, conductances
 from model.film.slopes import shape_slopes
 from model.pad.mesh import PadGeometry
 from model.pad.solid import solid_of
-
-FloatArray = NDArray[np.float64]
 
 #: Stations on the dry arc ahead of a film that starts late.
 DRY_STATIONS = 8

@@ -11,12 +11,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky
 from scipy.linalg.blas import dgemm, dsyrk, dtrsm
 
-Array = NDArray[np.float64]
-BlockRow = dict[int, Array]  # block row i of a lower triangle: column j <= i -> block (i, j); absent ones are zero
+from model.arrays import FloatArray
+
+BlockRow = dict[int, FloatArray]  # block row i of a lower triangle: column j <= i -> block (i, j); absent ones are zero
 
 
 def factor_rows(rows: Iterable[BlockRow]) -> Iterator[BlockRow]:
@@ -57,7 +57,7 @@ def factor_rows(rows: Iterable[BlockRow]) -> Iterator[BlockRow]:
         yield row
 
 
-def forward_rows(factor: Iterable[BlockRow], rhs: Iterable[Array]) -> Iterator[Array]:
+def forward_rows(factor: Iterable[BlockRow], rhs: Iterable[FloatArray]) -> Iterator[FloatArray]:
     """Solve L Y = B, row by row of blocks.
 
     Parameters
@@ -73,7 +73,7 @@ def forward_rows(factor: Iterable[BlockRow], rhs: Iterable[Array]) -> Iterator[A
     (m, n_columns) ndarray
         Block rows of Y.
     """
-    known: dict[int, Array] = {}
+    known: dict[int, FloatArray] = {}
     for i, (row, given) in enumerate(zip(factor, rhs)):
         known = {j: known[j] for j in range(min(row), i)}
         block = np.array(given, dtype=float, order="F")
@@ -102,7 +102,7 @@ class BlockCholesky:
         """Factor; arguments and errors as for `factor_rows`."""
         return cls(tuple(factor_rows(rows)))
 
-    def solve(self, rhs: Array) -> Array:
+    def solve(self, rhs: FloatArray) -> FloatArray:
         """Solve K X = B.
 
         Parameters

@@ -18,12 +18,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import BoolArray, FloatArray
 from model.pad.block_cholesky import BlockRow, factor_rows, forward_rows
 from model.pad.mesh import SectorMesh
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -66,10 +64,10 @@ class ElasticSector:
     """
 
     mesh: SectorMesh
-    fixed: NDArray[np.bool_]
+    fixed: BoolArray
 
     @classmethod
-    def held_at(cls, mesh: SectorMesh, nodes: NDArray[np.bool_], even: bool = True) -> ElasticSector:
+    def held_at(cls, mesh: SectorMesh, nodes: BoolArray, even: bool = True) -> ElasticSector:
         """Hold some nodes, and make the mid-plane one of symmetry.
 
         Parameters
@@ -106,7 +104,7 @@ class ElasticSector:
             row[i][np.diag_indices_from(row[i])] += ~free[i]
             yield row
 
-    def _sections(self) -> dict[tuple[int, int], Array]:
+    def _sections(self) -> dict[tuple[int, int], FloatArray]:
         """M_ab: for derivative orders a, b along the arc, the cross-section's matrix, shape (m, m)."""
         mesh = self.mesh
         n_r, n_z = mesh.r.n_nodes, mesh.z.n_nodes
@@ -128,14 +126,14 @@ class ElasticSector:
         size = 3 * n_r * n_z
         return {key: value.reshape(size, size) for key, value in out.items()}
 
-    def _lame(self) -> tuple[Array, Array]:
+    def _lame(self) -> tuple[FloatArray, FloatArray]:
         """Lame's lambda and mu at the Gauss points across the thickness [Pa]."""
         layers = self.mesh.layers
         shear = [m.youngs_modulus / (2.0 * (1.0 + m.poissons_ratio)) for m in layers]
         lame = [2.0 * g * m.poissons_ratio / (1.0 - 2.0 * m.poissons_ratio) for g, m in zip(shear, layers)]
         return self.mesh.per_gauss_point(lame), self.mesh.per_gauss_point(shear)
 
-    def thermal_load(self, temperature: Array) -> Array:
+    def thermal_load(self, temperature: FloatArray) -> FloatArray:
         """Forces of hindered thermal expansion, the right-hand side of Eq. (7) in weak form.
 
         Parameters
@@ -161,7 +159,7 @@ class ElasticSector:
         out[self.fixed] = 0.0
         return out.reshape(n_theta, 3 * n_r * n_z, n_columns)
 
-    def surface_response(self, temperature: Array) -> tuple[Array, Array]:
+    def surface_response(self, temperature: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Radial displacement of the film face under nodal forces and temperatures.
 
         With K = L L^T, E the unit radial forces on the film face and F the thermal loads, both results are products
@@ -195,7 +193,7 @@ class ElasticSector:
             expansion[:width] += unit.T @ block[:, :n_fields]
         return compliance, expansion
 
-    def _surface_loads(self, thermal: Array) -> Iterator[Array]:
+    def _surface_loads(self, thermal: FloatArray) -> Iterator[FloatArray]:
         """Thermal loads, then unit forces on the film nodes of this slab and of those before it."""
         n_r, n_z = self.mesh.r.n_nodes, self.mesh.z.n_nodes
         n_fields = thermal.shape[2]

@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
 from model.pad.line import Line, gauss_rule
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +29,8 @@ class AxisMap:
         M^-1 G^T: film values of a face function.
     """
 
-    gather: Array
-    project: Array
+    gather: FloatArray
+    project: FloatArray
 
 
 def plain_map(face: Line, film: Line) -> AxisMap:
@@ -65,8 +63,8 @@ class FilmMap:
 
     theta: AxisMap
     z: AxisMap
-    coarse_theta: Array
-    coarse_z: Array
+    coarse_theta: FloatArray
+    coarse_z: FloatArray
 
     @classmethod
     def between(cls, face: tuple[Line, Line], film: tuple[Line, Line], even: bool | None) -> FilmMap:
@@ -84,7 +82,7 @@ class FilmMap:
         )
 
     @cached_property
-    def dense(self) -> tuple[Array, Array, Array]:
+    def dense(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Gather, project and coarse as matrices on raveled fields: (face, film), (film, face), (coarse, film)."""
         return (
             _kron(self.theta.gather, self.z.gather),
@@ -93,16 +91,16 @@ class FilmMap:
         )
 
 
-def _kron(first: Array, second: Array) -> Array:
+def _kron(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.asarray(np.kron(first, second), dtype=float)
 
 
-def _solve(line: Line, integrals: Array) -> Array:
+def _solve(line: Line, integrals: FloatArray) -> FloatArray:
     """Coefficients of the function of `line` with these integrals against its basis."""
     return np.asarray(np.linalg.solve(line.matrix(0, 0), integrals), dtype=float)
 
 
-def _points(first: Array, second: Array, degree: int) -> tuple[Array, Array]:
+def _points(first: FloatArray, second: FloatArray, degree: int) -> tuple[FloatArray, FloatArray]:
     """Gauss points exact for products of piecewise polynomials of both sets of breaks."""
     merged = np.unique(np.concatenate((first, second)))
     keep = np.concatenate(([True], np.diff(merged) > 1e-12 * (merged[-1] - merged[0])))

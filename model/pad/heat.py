@@ -11,12 +11,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
 from model.pad.block_cholesky import BlockCholesky, BlockRow
 from model.pad.mesh import SectorMesh
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +29,11 @@ class HeatSolution:
         Heat that enters the pad at the nodes of the film face, weighted by their basis functions [W].
     """
 
-    temperature: Array
-    heat: Array
+    temperature: FloatArray
+    heat: FloatArray
 
 
-def conduct(mesh: SectorMesh, convection: float, face: Array, even: bool = True) -> HeatSolution:
+def conduct(mesh: SectorMesh, convection: float, face: FloatArray, even: bool = True) -> HeatSolution:
     """Solve the conduction problem for many temperature fields of the film face at once.
 
     Parameters

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from model.arrays import FloatArray
+from model.errors import ModelError
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,21 +25,21 @@ class Line:
 
     Raises
     ------
-    ValueError
+    ModelError
         `breaks` is not a strictly increasing 1-D array of at least two values, or `degree` < 1.
     """
 
-    breaks: Array
+    breaks: FloatArray
     degree: int = 2
 
     def __post_init__(self) -> None:
         breaks = np.array(self.breaks, dtype=float)
         if breaks.ndim != 1 or breaks.size < 2 or not np.all(np.diff(breaks) > 0):
-            raise ValueError(
+            raise ModelError(
                 f"breaks must be 1-D, strictly increasing, of at least two values; got shape {breaks.shape}."
             )
         if self.degree < 1:
-            raise ValueError(f"degree must be at least 1, got {self.degree}.")
+            raise ModelError(f"degree must be at least 1, got {self.degree}.")
         breaks.setflags(write=False)
         object.__setattr__(self, "breaks", breaks)
 
@@ -53,12 +54,12 @@ class Line:
         return self.n_elements * self.degree + 1
 
     @cached_property
-    def nodes(self) -> Array:
+    def nodes(self) -> FloatArray:
         """Node coordinates, shape (n_nodes,), increasing."""
         inside = self.breaks[:-1, None] + np.diff(self.breaks)[:, None] * _reference_nodes(self.degree)[None, :-1]
         return np.append(inside.ravel(), self.breaks[-1])
 
-    def tabulate(self, x: ArrayLike, derivative: int = 0) -> Array:
+    def tabulate(self, x: ArrayLike, derivative: int = 0) -> FloatArray:
         """Basis functions at points.
 
         Parameters
@@ -89,14 +90,14 @@ class Line:
         return out
 
     @cached_property
-    def gauss(self) -> tuple[Array, Array]:
+    def gauss(self) -> tuple[FloatArray, FloatArray]:
         """Gauss points and weights, each of shape (n_elements * (degree + 2),).
 
         Two points more than a polynomial needs: the weights 1/r of cylindrical coordinates are none.
         """
         return gauss_rule(self.breaks, self.degree + 2)
 
-    def matrix(self, rows: int, columns: int, weight: Array | float = 1.0) -> Array:
+    def matrix(self, rows: int, columns: int, weight: FloatArray | float = 1.0) -> FloatArray:
         """Weighted product of basis functions or their derivatives.
 
         Parameters
@@ -116,7 +117,7 @@ class Line:
         return left.T @ ((factor * weight)[:, None] * right)
 
 
-def graded(start: float, stop: float, count: int, first: float, last: float) -> Array:
+def graded(start: float, stop: float, count: int, first: float, last: float) -> FloatArray:
     """Break an interval into elements that grow geometrically from both ends, by one factor.
 
     Parameters
@@ -133,7 +134,7 @@ def graded(start: float, stop: float, count: int, first: float, last: float) -> 
     """
     length, steps = stop - start, np.arange(count)
 
-    def sizes(growth: float) -> Array:
+    def sizes(growth: float) -> FloatArray:
         return np.minimum(first * growth**steps, last * growth ** steps[::-1])
 
     low, high = 1.0, 2.0
@@ -148,7 +149,7 @@ def graded(start: float, stop: float, count: int, first: float, last: float) -> 
     return breaks
 
 
-def gauss_rule(breaks: Array, count: int) -> tuple[Array, Array]:
+def gauss_rule(breaks: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
     """Gauss-Legendre points and weights, `count` in every interval of `breaks`."""
     points, weights = np.polynomial.legendre.leggauss(count)
     size = np.diff(breaks)
@@ -156,7 +157,7 @@ def gauss_rule(breaks: Array, count: int) -> tuple[Array, Array]:
     return x.ravel(), (0.5 * size[:, None] * weights).ravel()
 
 
-def _reference_nodes(degree: int) -> Array:
+def _reference_nodes(degree: int) -> FloatArray:
     """Gauss-Lobatto points on [0, 1]: well conditioned, and equally spaced up to degree 2."""
     if degree == 1:
         return np.array([0.0, 1.0])

@@ -6,12 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from model.bearing import Bearing, Material, Pad
+from model.arrays import BoolArray, FloatArray
+from model.bearing import Bearing, BearingError, Material, Pad
+from model.errors import ModelError, OptionError
 from model.pad.line import Line, graded
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class PivotFace:
 
     def __post_init__(self) -> None:
         if not (self.width > 0 and self.length > 0):
-            raise ValueError(f"A pivot face needs a positive width and length, got {self.width} m x {self.length} m.")
+            raise BearingError(f"A pivot face needs a positive width and length, got {self.width} m x {self.length} m.")
 
 
 def pivot_face(pad: Pad, bearing: Bearing) -> PivotFace:
@@ -103,13 +102,13 @@ class PadGeometry:
     def __post_init__(self) -> None:
         half = 0.5 * self.face.width / self.outer_radius
         if not (self.leading < -half and half < self.trailing):
-            raise ValueError(
+            raise BearingError(
                 f"The pivot face ({math.degrees(2 * half):.1f} deg wide) does not fit on the pad, which spans "
                 f"{math.degrees(self.leading):.1f} to {math.degrees(self.trailing):.1f} deg about its pivot. "
                 "Give a narrower face, or a pivot_offset nearer 0.5."
             )
         if self.face.length > self.length * (1 + 1e-12):
-            raise ValueError(f"The pivot face ({self.face.length} m) is longer than the pad ({self.length} m).")
+            raise BearingError(f"The pivot face ({self.face.length} m) is longer than the pad ({self.length} m).")
 
     @classmethod
     def of(cls, pad: Pad, bearing: Bearing, face: PivotFace | None = None) -> PadGeometry:
@@ -161,11 +160,11 @@ class SectorMesh:
 
     def __post_init__(self) -> None:
         if len(self.layers) != self.r.n_elements:
-            raise ValueError(
+            raise ModelError(
                 f"layers: {len(self.layers)} materials for {self.r.n_elements} elements across the thickness."
             )
 
-    def per_gauss_point(self, values: list[float]) -> Array:
+    def per_gauss_point(self, values: list[float]) -> FloatArray:
         """Spread one value per radial element over the Gauss points of `r`; shape of ``r.gauss[0]``."""
         return np.repeat(np.asarray(values, dtype=float), self.r.degree + 2)
 
@@ -174,7 +173,7 @@ class SectorMesh:
         """Nodes on the film face of the half pad."""
         return self.theta.n_nodes * self.z.n_nodes
 
-    def held(self, face: PivotFace) -> NDArray[np.bool_]:
+    def held(self, face: PivotFace) -> BoolArray:
         """Nodes on the pivot face, shape (n_theta, n_r, n_z)."""
         slack = 1e-9
         angle = 0.5 * face.width / self.r.breaks[-1]
@@ -217,7 +216,7 @@ class MeshDensity:
 
     def __post_init__(self) -> None:
         if self.arc < 2 or self.half_length < 3 or min(self.face, self.backing, self.babbitt, self.degree) < 1:
-            raise ValueError(f"A pad needs arc >= 2, half_length >= 3 and every other count >= 1, got {self}.")
+            raise OptionError(f"A pad needs arc >= 2, half_length >= 3 and every other count >= 1, got {self}.")
 
     def refined(self, factor: int) -> MeshDensity:
         """Return a density of `factor` times as many elements in every direction."""
@@ -270,5 +269,5 @@ def _share(count: int, first: float, second: float) -> tuple[int, int]:
     return share, count - share
 
 
-def _join(*pieces: Array) -> Array:
+def _join(*pieces: FloatArray) -> FloatArray:
     return np.concatenate([piece[: -1 if i < len(pieces) - 1 else None] for i, piece in enumerate(pieces)])

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
 from model.pad.elasticity import ElasticSector
 from model.pad.heat import conduct
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PadGeometry, sector_mesh
 from model.pad.store import load_arrays, save_arrays, storage_key
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +42,12 @@ class PadOperators:
 
     theta: Line
     z: Line
-    radius: Array
-    compliance: Array
-    expansion: Array
-    flux: Array
-    section: Array
-    back: Array
+    radius: FloatArray
+    compliance: FloatArray
+    expansion: FloatArray
+    flux: FloatArray
+    section: FloatArray
+    back: FloatArray
 
     @property
     def coarse(self) -> tuple[Line, Line]:
@@ -90,7 +88,7 @@ def _shapes(theta: Line, z: Line, n_r: int) -> dict[str, tuple[int, int]]:
     return {name: (count, n_surface if name == "compliance" else n_temperatures) for name, count in zip(_RESULTS, rows)}
 
 
-def _solve(geometry: PadGeometry, density: MeshDensity, even: bool) -> dict[str, Array]:
+def _solve(geometry: PadGeometry, density: MeshDensity, even: bool) -> dict[str, FloatArray]:
     """Solve conduction, then thermoelasticity; see `PadOperators` for the results."""
     mesh = sector_mesh(geometry, density)
     theta, z = mesh.theta, mesh.z

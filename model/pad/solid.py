@@ -12,15 +12,15 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from model.arrays import FloatArray
 from model.bearing import Bearing, Pad
+from model.errors import ModelError
 from model.pad.film_map import FilmMap
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PadGeometry, PivotFace
 from model.pad.operators import PadOperators, pad_operators
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,8 +43,8 @@ class PadSolid:
 
     geometry: PadGeometry
     density: MeshDensity
-    film_theta: Array
-    film_z: Array
+    film_theta: FloatArray
+    film_z: FloatArray
     _parts: tuple[tuple[PadOperators, FilmMap], ...] = field(repr=False)
 
     @property
@@ -52,7 +52,7 @@ class PadSolid:
         """Whether the film grid is one half of a symmetric film."""
         return len(self._parts) == 1
 
-    def bend(self, pressure: ArrayLike) -> Array:
+    def bend(self, pressure: ArrayLike) -> FloatArray:
         """Deformation by film pressure, bilinear between film nodes.
 
         Parameters
@@ -73,7 +73,7 @@ class PadSolid:
             out += to.theta.project @ moved @ to.z.project.T
         return out
 
-    def expand(self, rise: ArrayLike) -> Array:
+    def expand(self, rise: ArrayLike) -> FloatArray:
         """Thermal deformation for a film temperature rise, conduction through the pad included.
 
         Parameters
@@ -88,16 +88,16 @@ class PadSolid:
         """
         return self._thermal(self._on_grid(rise, "rise"), "expansion")
 
-    def deform(self, pressure: ArrayLike, rise: ArrayLike, factor: float = 1.0) -> Array:
+    def deform(self, pressure: ArrayLike, rise: ArrayLike, factor: float = 1.0) -> FloatArray:
         """Sum of `bend` and `expand`, times `factor` (the `compliance_factor` of physics.md) [m]."""
         return factor * (self.bend(pressure) + self.expand(rise))
 
-    def heat_flow(self, rise: ArrayLike) -> Array:
+    def heat_flow(self, rise: ArrayLike) -> FloatArray:
         """Heat flux density from film into pad [W/m^2], shape (n_theta, n_z), for a film temperature rise [K]."""
         return self._thermal(self._on_grid(rise, "rise"), "flux")
 
     @cached_property
-    def compliance(self) -> Array:
+    def compliance(self) -> FloatArray:
         """Deformation per film pressure, ``compliance @ p.ravel()`` as `bend` [m/Pa], (n_film, n_film)."""
         out = np.zeros((self._n_film, self._n_film))
         for solid, to in self._parts:
@@ -106,12 +106,12 @@ class PadSolid:
         return _frozen(self.geometry.inner_radius * out)
 
     @cached_property
-    def thermal(self) -> Array:
+    def thermal(self) -> FloatArray:
         """Deformation per film temperature rise, ``thermal @ rise.ravel()`` as `expand` [m/K], (n_film, n_film)."""
         return self._thermal_matrix("expansion")
 
     @cached_property
-    def thermal_factors(self) -> tuple[Array, Array, Array]:
+    def thermal_factors(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Film to the pad's coarser nodes, (n_coarse, n_film), and from there `thermal` and `heat_flux`."""
         coarser, expansion, flux = [], [], []
         for solid, to in self._parts:
@@ -122,12 +122,12 @@ class PadSolid:
         return _frozen(np.vstack(coarser)), _frozen(np.hstack(expansion)), _frozen(np.hstack(flux))
 
     @cached_property
-    def heat_flux(self) -> Array:
+    def heat_flux(self) -> FloatArray:
         """Heat flux density into the pad per film temperature rise, as `heat_flow` [W/m^2/K], (n_film, n_film)."""
         return self._thermal_matrix("flux")
 
     @cached_property
-    def film_mass(self) -> Array:
+    def film_mass(self) -> FloatArray:
         """Area weights of the film grid [m^2], (n_film, n_film): integrals of products of its bilinear functions.
 
         ``film_mass @ compliance`` is symmetric and positive semidefinite.
@@ -135,7 +135,7 @@ class PadSolid:
         theta, z = (Line(nodes, 1).matrix(0, 0) for nodes in (self.film_theta, self.film_z))
         return _frozen(np.asarray(self.geometry.inner_radius * np.kron(theta, z)))
 
-    def pad_temperature(self, rise: ArrayLike) -> tuple[Array, Array, Array]:
+    def pad_temperature(self, rise: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Temperature of the pad's mid-plane.
 
         Parameters
@@ -157,7 +157,7 @@ class PadSolid:
         field_ = (even.section @ coarse.ravel()).reshape(even.theta.n_nodes, even.radius.size)
         return even.theta.nodes, even.radius, field_
 
-    def back_temperature(self, rise: ArrayLike) -> Array:
+    def back_temperature(self, rise: ArrayLike) -> FloatArray:
         """Temperature rise on the pad's back over the film nodes [K], shape (n_theta, n_z)."""
         return self._thermal(self._on_grid(rise, "rise"), "back")
 
@@ -193,14 +193,14 @@ class PadSolid:
     def _n_film(self) -> int:
         return self.film_theta.size * self.film_z.size
 
-    def _on_grid(self, values: ArrayLike, name: str) -> Array:
+    def _on_grid(self, values: ArrayLike, name: str) -> FloatArray:
         array = np.asarray(values, dtype=float)
         shape = (self.film_theta.size, self.film_z.size)
         if array.shape not in (shape, (self._n_film,)):
-            raise ValueError(f"{name} must have the film grid's shape {shape}, got {array.shape}.")
+            raise ModelError(f"{name} must have the film grid's shape {shape}, got {array.shape}.")
         return array.reshape(shape)
 
-    def _thermal(self, rise: Array, name: str) -> Array:
+    def _thermal(self, rise: FloatArray, name: str) -> FloatArray:
         out = np.zeros(rise.shape)
         for solid, to in self._parts:
             coarse = to.coarse_theta @ rise @ to.coarse_z.T
@@ -208,7 +208,7 @@ class PadSolid:
             out += to.theta.project @ answer @ to.z.project.T
         return out
 
-    def _thermal_matrix(self, name: str) -> Array:
+    def _thermal_matrix(self, name: str) -> FloatArray:
         out = np.zeros((self._n_film, self._n_film))
         for solid, to in self._parts:
             _, project, coarse = to.dense
@@ -246,7 +246,7 @@ def pad_solid(
 
     Raises
     ------
-    ValueError
+    ModelError
         The film grid does not span the pad, or the pivot face does not fit on it.
     """
     return solid_of(PadGeometry.of(pad, bearing, face), film_theta, film_z, density)
@@ -279,23 +279,23 @@ def _solid(geometry: PadGeometry, density: MeshDensity, theta_bytes: bytes, z_by
     return PadSolid(geometry, density, along.breaks, across.breaks, tuple(parts))
 
 
-def _snap(nodes: Array, first: float, last: float) -> Array:
+def _snap(nodes: FloatArray, first: float, last: float) -> FloatArray:
     """Put the end nodes exactly on the pad's edges."""
     out = nodes.copy()
     out[0], out[-1] = first, last
     return out
 
 
-def _check_span(nodes: Array, ends: tuple[float, float], name: str, unit: str) -> None:
+def _check_span(nodes: FloatArray, ends: tuple[float, float], name: str, unit: str) -> None:
     tolerance = 1e-6 * (ends[1] - ends[0])
     fits = nodes.ndim == 1 and nodes.size >= 2 and bool(np.all(np.diff(nodes) > 0))
     if not fits or abs(nodes[0] - ends[0]) > tolerance or abs(nodes[-1] - ends[1]) > tolerance:
         got = f"{nodes[0]:.6g} to {nodes[-1]:.6g}" if nodes.ndim == 1 and nodes.size else f"shape {nodes.shape}"
-        raise ValueError(
+        raise ModelError(
             f"{name} must be a 1-D increasing grid from {ends[0]:.6g} to {ends[1]:.6g} {unit} (the pad), got {got}."
         )
 
 
-def _frozen(array: Array) -> Array:
+def _frozen(array: FloatArray) -> FloatArray:
     array.setflags(write=False)
     return array

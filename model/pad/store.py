@@ -13,9 +13,8 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from model.arrays import FloatArray
 
 _LOG = logging.getLogger(__name__)
 _KEEP = 40  # files of 3 to 4 MB each
@@ -59,7 +58,7 @@ def _source_digest() -> str:
     return digest.hexdigest()
 
 
-def load_arrays(key: str, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Array] | None:
+def load_arrays(key: str, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, FloatArray] | None:
     """Arrays stored under `key`, or None if there are none, or none of these shapes and finite."""
     folder = cache_folder()
     if folder is None:
@@ -79,7 +78,7 @@ def load_arrays(key: str, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Ar
     return arrays
 
 
-def save_arrays(key: str, arrays: Mapping[str, Array]) -> bool:
+def save_arrays(key: str, arrays: Mapping[str, FloatArray]) -> bool:
     """Store arrays whole or not at all; a folder that cannot be written leaves the solution in memory only.
 
     Returns

@@ -9,15 +9,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from model.arrays import FloatArray
 from model.film.loaded_attitude import Branch, LoadedAttitude, loaded_attitude
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
 from model.statics.tilt_hold import tilt_hold
-
-FloatArray = NDArray[np.float64]
 
 #: The tabulated edge of carrying is right within this share of the pad clearance.
 EDGE = 0.03

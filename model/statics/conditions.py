@@ -10,12 +10,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
+from model.conditions import Condition
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
-
-FloatArray = NDArray[np.float64]
 
 #: Below this film the surfaces touch: three times the combined roughness, 1 um, of ground journal and bored pad [m].
 THINNEST_FILM = 3e-6
@@ -28,6 +27,62 @@ LAMINAR = 1000.0
 OIL_DATA = (20.0, 120.0)
 #: Above this film temperature tin babbitt creeps; machines are tripped at pad temperatures of 115 to 130 [degC].
 HOTTEST_FILM = 150.0
+
+NOT_CONVERGED = Condition("not converged", "error", "no equilibrium was found, and there are no coefficients")
+FILM_LOST = Condition("film lost", "error", "a film closed on the way: too much load, or too much heat")
+BOUNDLESS_HEAT = Condition("heat without bounds", "error", "the film's heat is beyond any number that means something")
+SINGULAR = Condition("singular", "error", "a Newton step has no solution")
+UNSUPPORTED = Condition(
+    "no pads against the load", "error", "no set of pivots can balance the load, wherever the journal goes"
+)
+UNSETTLED_GROWTH = Condition(
+    "thermal growth does not settle", "error", "clearances and journal temperature go on changing each other"
+)
+FLOW_BACK = Condition(
+    "flow back at a leading edge", "warning", "a pressure peak pushes oil back; the heat balance there is limited"
+)
+
+
+def idle(pads: Sequence[int]) -> Condition:
+    """Pads without a loaded attitude, numbers from 1."""
+    return Condition(
+        f"idle pads {_listed(pads)}", "note", "they carry nothing and take no part in the dynamics", tuple(pads)
+    )
+
+
+def overloaded(pads: Sequence[int]) -> Condition:
+    """Pads whose film no bearing has, numbers from 1."""
+    limits = f"{1e6 * THINNEST_FILM:g} um, {HIGHEST_PRESSURE / 1e6:g} MPa, {HOTTEST_FILM:g} degC"
+    return Condition(
+        f"overloaded pads {_listed(pads)}", "warning", f"thinnest film, pressure or heat beyond {limits}", tuple(pads)
+    )
+
+
+def left_unloaded(pads: Sequence[int]) -> Condition:
+    """Pads that were left idle on the way, although they could carry, numbers from 1."""
+    return Condition(
+        f"pads {_listed(pads)} cannot keep their load", "warning", "carrying, they would push the journal off",
+        tuple(pads),
+    )  # fmt: skip
+
+
+def torn(pads: Sequence[int]) -> Condition:
+    """Pads that find no state at all, numbers from 1."""
+    return Condition(
+        f"pads {_listed(pads)} can neither carry nor idle", "error",
+        "idle they take up load at once, carrying they push the journal off", tuple(pads),
+    )  # fmt: skip
+
+
+def restless(pads: Sequence[int]) -> Condition:
+    """Pads that went on taking up and shedding their load, numbers from 1."""
+    return Condition(
+        f"pads {_listed(pads)} take up and shed their load", "error", "the iteration finds no rest", tuple(pads)
+    )
+
+
+def _listed(pads: Sequence[int]) -> str:
+    return ", ".join(map(str, pads))
 
 
 def unsupported(setup: Setup, load: FloatArray) -> bool:
@@ -49,7 +104,7 @@ def unsupported(setup: Setup, load: FloatArray) -> bool:
     return bool(missing > 1e-9)
 
 
-def overloaded_pads(films: tuple[PadFilm, ...] | list[PadFilm]) -> list[int]:
+def overloaded_pads(films: Sequence[PadFilm]) -> list[int]:
     """Numbers of the pads whose film is too thin, whose pressure too high or whose oil too hot for a pad to live."""
     return [
         f.number
@@ -63,18 +118,20 @@ def overloaded_pads(films: tuple[PadFilm, ...] | list[PadFilm]) -> list[int]:
     ]
 
 
-def regimes(setup: Setup, films: Sequence[PadFilm], surface_speed: float) -> list[str]:
+def regimes(setup: Setup, films: Sequence[PadFilm], surface_speed: float) -> list[Condition]:
     """Named regimes beyond what the equations hold for: pads in each other's way, films not laminar, oil too hot."""
     names = misfits(setup)
     reynolds = largest_reynolds(films, surface_speed)
     if reynolds > LAMINAR:
-        names.append(f"film not laminar: Re {reynolds:.0f}")
+        detail = f"above Re {LAMINAR:.0f} turbulence, which the model leaves out, carries and heats"
+        names.append(Condition(f"film not laminar: Re {reynolds:.0f}", "warning", detail))
     carrying = [f for f in films if f.forces is not None]
     low = min((float(f.work.temperature.min()) for f in carrying), default=OIL_DATA[0])
     high = max((float(f.work.temperature.max()) for f in carrying), default=OIL_DATA[1])
     if low < OIL_DATA[0] or high > OIL_DATA[1]:
         beyond = low if low < OIL_DATA[0] else high
-        names.append(f"oil beyond its data: {beyond:.0f} degC")
+        detail = "mu(T) of Eq. (4) holds from {:g} to {:g} degC".format(*OIL_DATA)
+        names.append(Condition(f"oil beyond its data: {beyond:.0f} degC", "warning", detail))
     return names
 
 
@@ -89,13 +146,14 @@ def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:
     return max((n for n in numbers if math.isfinite(n)), default=math.nan)
 
 
-def misfits(setup: Setup) -> list[str]:
+def misfits(setup: Setup) -> list[Condition]:
     """Pads that stand in each other's way, or in the journal's, in a bearing built in code (a file is refused)."""
     pads = setup.bearing.pads
     names = []
-    inside = [str(k) for k, p in enumerate(pads, 1) if not p.assembled_clearance + setup.clearance_change > 0.0]
+    inside = [k for k, p in enumerate(pads, 1) if not p.assembled_clearance + setup.clearance_change > 0.0]
     if inside:
-        names.append(f"interference: no clearance at pads {', '.join(inside)}")
+        said = f"interference: no clearance at pads {_listed(inside)}"
+        names.append(Condition(said, "warning", "a concentric journal would touch them", tuple(inside)))
     ring = sorted(((p.pivot_angle + p.leading_edge) % (2.0 * math.pi), k) for k, p in enumerate(pads))
     for at, (start, k) in enumerate(ring):
         following, other = ring[(at + 1) % len(ring)]
@@ -104,5 +162,6 @@ def misfits(setup: Setup) -> list[str]:
             room = 0.0
         gap = room - pads[k].arc
         if gap < 1e-9:
-            names.append(f"pads {k + 1} and {other + 1} {'touch' if gap > -1e-9 else 'overlap'}")
+            said = f"pads {k + 1} and {other + 1} {'touch' if gap > -1e-9 else 'overlap'}"
+            names.append(Condition(said, "warning", "no room for oil to enter", (k + 1, other + 1)))
     return names

@@ -12,9 +12,10 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
 from model.bearing import Oil
+from model.conditions import Condition, has_answer
 from model.film.oil_state import least_share
 from model.pad.bending import bending_step, change_of_shape, wanted_shapes
 from model.setup import Setup
@@ -29,13 +30,26 @@ from model.statics.carrying import (
     shorten,
     wake_or_rest,
 )
-from model.statics.conditions import overloaded_pads, regimes, unsupported
+from model.statics.conditions import (
+    BOUNDLESS_HEAT,
+    FILM_LOST,
+    FLOW_BACK,
+    NOT_CONVERGED,
+    SINGULAR,
+    UNSUPPORTED,
+    idle,
+    left_unloaded,
+    overloaded,
+    overloaded_pads,
+    regimes,
+    restless,
+    torn,
+    unsupported,
+)
 from model.statics.first_position import first_position
 from model.statics.heat_paths import BOUNDLESS, couples_heat, settle_temperatures
 from model.statics.newton_step import newton_step
 from model.statics.pad_film import PadFilm, pad_films
-
-FloatArray = NDArray[np.float64]
 
 MAX_ITERATIONS = 80
 #: Film temperatures count as settled when one more step would change them by this times `Setup.accuracy` [K].
@@ -70,7 +84,7 @@ class Equilibrium:
         Largest change that one more step would make [K].
     journal_temperature : float
         [degC]; NaN where the journal takes no heat.
-    status : tuple of str
+    status : tuple of Condition
         Named conditions; empty when all is well.
     """
 
@@ -80,12 +94,12 @@ class Equilibrium:
     force_residual: float
     temperature_residual: float
     journal_temperature: float
-    status: tuple[str, ...]
+    status: tuple[Condition, ...]
 
     @property
     def converged(self) -> bool:
         """Whether the residuals are below the tolerances."""
-        return "not converged" not in self.status and "film lost" not in self.status
+        return has_answer(self.status)
 
     @property
     def mean_journal_temperature(self) -> float:
@@ -209,11 +223,11 @@ def _iterate(search: _Search) -> Equilibrium:
         before = _state(search) if left > SLOW * best_left and not isothermal else None
         heat_change = _solve_films(search)
         if not heat_change < BOUNDLESS:
-            name = "film lost" if any(f.lost for f in search.films) else "heat without bounds"
-            return _result(search, iteration, math.inf, heat_change, (name, "not converged"))
+            name = FILM_LOST if any(f.lost for f in search.films) else BOUNDLESS_HEAT
+            return _result(search, iteration, math.inf, heat_change, (name, NOT_CONVERGED))
         residual, shift, moves = newton_step(search.setup, search.load, search.films)
         if not (math.isfinite(residual) and np.isfinite([*search.position, *shift]).all() and np.isfinite(moves).all()):
-            return _result(search, iteration, math.inf, heat_change, ("singular", "not converged"))
+            return _result(search, iteration, math.inf, heat_change, (SINGULAR, NOT_CONVERGED))
         best_left, left = min(best_left, left), max(residual, heat_change / HEAT_PER_FORCE)
         near = residual < NEAR and heat_change < NEAR_HEAT
         search.relaxation = 1.0 if near else HELD_BACK
@@ -221,12 +235,11 @@ def _iterate(search: _Search) -> Equilibrium:
             if leave_unstable(search.setup, search.films, search.position):
                 memory.reset()
                 continue
-            resting, torn = shed_pads(search.films, search.position)
-            if torn:
-                name = f"pads {', '.join(map(str, torn))} can neither carry nor idle"
-                return _result(search, iteration, residual, heat_change, (name, "not converged"))
+            resting, restarting = shed_pads(search.films, search.position)
+            if restarting:
+                return _result(search, iteration, residual, heat_change, (torn(restarting), NOT_CONVERGED))
             _sharpen(search)
-            names = (f"pads {', '.join(map(str, resting))} cannot keep their load",) if resting else ()
+            names = (left_unloaded(resting),) if resting else ()
             return _result(search, iteration, residual, heat_change, names)
         stalled = 0 if residual < 0.7 * best else stalled + 1
         best = min(best, residual)
@@ -236,9 +249,9 @@ def _iterate(search: _Search) -> Equilibrium:
             _set_state(search, memory.next(before, _state(search)))
         else:
             memory.reset()
-    restless = [str(f.number) for f in search.films if f.flips >= MAX_FLIPS]
-    names = (f"pads {', '.join(restless)} take up and shed their load",) if restless else ()
-    return _result(search, iteration, residual, heat_change, (*names, "not converged"))
+    flipping = [f.number for f in search.films if f.flips >= MAX_FLIPS]
+    names = (restless(flipping),) if flipping else ()
+    return _result(search, iteration, residual, heat_change, (*names, NOT_CONVERGED))
 
 
 #: Scale of lengths in the state that is accelerated [m]: a micrometre weighs as much as a kelvin.
@@ -382,20 +395,23 @@ def _apply(search: _Search, step: tuple[FloatArray, FloatArray], damping: float)
 _NO_CHANGE = np.empty((0, 0))
 
 
-def _result(search: _Search, iterations: int, residual: float, heat: float, status: tuple[str, ...]) -> Equilibrium:
+def _result(
+    search: _Search, iterations: int, residual: float, heat: float, status: tuple[Condition, ...]
+) -> Equilibrium:
     names = list(status)
     for film in search.films:
         film.rest(search.position, search.surface_speed, search.setup.bearing.oil)
-    if "not converged" in names and unsupported(search.setup, search.load):
-        names.insert(0, "no pads against the load")
-    overloaded = overloaded_pads(search.films)
-    if overloaded and "not converged" not in names:
-        names.append("overloaded pads " + ", ".join(map(str, overloaded)))
-    idle = [f.number for f in search.films if f.idle]
-    if idle:
-        names.append("idle pads " + ", ".join(map(str, idle)))
+    found = has_answer(names)
+    if not found and unsupported(search.setup, search.load):
+        names.insert(0, UNSUPPORTED)
+    beyond = overloaded_pads(search.films)
+    if beyond and found:
+        names.append(overloaded(beyond))
+    resting = [f.number for f in search.films if f.idle]
+    if resting:
+        names.append(idle(resting))
     if search.limited > 0:
-        names.append("flow back at a leading edge")
+        names.append(FLOW_BACK)
     names += regimes(search.setup, search.films, search.surface_speed)
     return Equilibrium(
         search.position.copy(), tuple(search.films), iterations, residual, heat, search.journal, tuple(names)

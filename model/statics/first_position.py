@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray, IntArray
 from model.compilation import compiled
 from model.film.loaded_attitude import Branch
 
-FloatArray = NDArray[np.float64]
 #: Share of the load that may be missing.
 GOOD_ENOUGH = 0.002
 
@@ -45,7 +44,7 @@ def first_position(load: FloatArray, normals: FloatArray, gaps: FloatArray, bran
 
 @compiled
 def _first_position(
-    load: FloatArray, pads: FloatArray, curves: FloatArray, lengths: NDArray[np.int64], room: float
+    load: FloatArray, pads: FloatArray, curves: FloatArray, lengths: IntArray, room: float
 ) -> FloatArray:
     size = math.hypot(load[0], load[1])
     position = np.zeros(2)
@@ -85,7 +84,7 @@ def _first_position(
 
 @compiled
 def _missing(
-    x: float, y: float, load: FloatArray, pads: FloatArray, curves: FloatArray, lengths: NDArray[np.int64]
+    x: float, y: float, load: FloatArray, pads: FloatArray, curves: FloatArray, lengths: IntArray
 ) -> tuple[float, float]:
     """Part of the load that the tabulated films do not carry at a position."""
     fx, fy = load[0], load[1]

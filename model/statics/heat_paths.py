@@ -21,15 +21,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
 from model.film.energy import dissipation, march
 from model.pad.bending import PadGive
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
 from model.statics.pad_flow import flow_weighted, outlet_temperature, through_flow
-
-FloatArray = NDArray[np.float64]
 
 #: q h / k (T_mean - T_wall) of a parabolic profile, flat at the other wall.
 NUSSELT = 3.0

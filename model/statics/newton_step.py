@@ -9,14 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
 from model.compilation import compiled
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
 from model.statics.tilt_hold import tilt_hold
-
-FloatArray = NDArray[np.float64]
 
 
 def newton_step(setup: Setup, load: FloatArray, films: list[PadFilm]) -> tuple[float, FloatArray, FloatArray]:

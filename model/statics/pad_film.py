@@ -6,21 +6,19 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import FloatArray
 from model.bearing import Oil, Pad
-from model.film.cavitation import FilmSolver, film_solver
 from model.film.energy import heat_step
 from model.film.loaded_attitude import Branch
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film.models import FilmSolver, film_solver
 from model.film.oil_state import set_viscosity
 from model.film.resting import RestingFilm, resting_film
 from model.film.reynolds import FilmForces, solve_film
 from model.film.slopes import warmer_pressure
 from model.pad.bending import BendingStep, PadGive, pad_give
 from model.setup import Setup
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass

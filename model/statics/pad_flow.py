@@ -6,13 +6,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import BoolArray, FloatArray
 from model.bearing import Oil
 from model.film.mesh import FilmWork
 from model.statics.pad_film import PadFilm
-
-FloatArray = NDArray[np.float64]
 
 
 class PadFlow(NamedTuple):
@@ -100,7 +98,7 @@ def leaving_flow(work: FilmWork) -> FloatArray:
     return np.asarray(work.flow_x[-1] * np.where(_ruptured(work)[-2], streaks, 1.0))
 
 
-def _ruptured(work: FilmWork) -> NDArray[np.bool_]:
+def _ruptured(work: FilmWork) -> BoolArray:
     """Where the film is ruptured, its edges as the nodes beside them: there p = 0 says nothing."""
     ruptured = work.ruptured.copy()
     ruptured[-1] = ruptured[-2]

@@ -135,7 +135,7 @@ def errors(p: Prediction) -> dict[str, float]:
     total = np.zeros(2)
     for film in p.equilibrium.films:
         if film.idle:
-            if not any("cannot keep" in s and str(film.number) in s.split(" cannot")[0] for s in p.status):
+            if not any("cannot keep" in c and film.number in c.pads for c in p.status):
                 out["missed"] = max(out["missed"], missed_attitude(p, film))
             continue
         theta = film.grid.angle + film.pad.pivot_angle
@@ -265,7 +265,7 @@ def run(cases: list[Case], turn_every: int = 20) -> Outcome:
         p = case.predict()
         out.seconds.append(time.perf_counter() - began)
         if not p.converged:
-            statuses["; ".join(s for s in p.status if not s.startswith("idle"))] += 1
+            statuses["; ".join(c for c in p.status if c.severity != "note")] += 1
             out.failed.append(number)
             continue
         out.converged += 1

@@ -110,7 +110,7 @@ def _effect(rng: random.Random, pads: int) -> Effect:
 def fault_of(prediction: Prediction) -> str:
     """What is wrong with an answer; empty if nothing."""
     if not prediction.converged:
-        if "not converged" not in prediction.status:
+        if all(condition.severity != "error" for condition in prediction.status):
             return "not converged, and no status says so"
         return "" if np.isnan(prediction.h).all() else "not converged, and it gives numbers"
     if not (np.isfinite(prediction.h).all() and np.isfinite(prediction.position).all()):
