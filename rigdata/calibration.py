@@ -105,7 +105,13 @@ class Channel:
         return values
 
     def to_reading(self, values: FloatArray) -> FloatArray:
-        """Turn SI values into readings (the inverse of `to_si`)."""
+        """Turn SI values into readings (the inverse of `to_si`).
+
+        Parameters
+        ----------
+        values : (n,) ndarray
+            SI.
+        """
         return (np.asarray(values, dtype=np.float64) - self.zero) / self.slope
 
 

@@ -65,6 +65,10 @@ class Campaign:
     def run(self, run_id: str) -> Run:
         """Find the run `run_id`.
 
+        Parameters
+        ----------
+        run_id : str
+
         Raises
         ------
         RigDataError
@@ -78,7 +82,13 @@ class Campaign:
         raise RigDataError(Problem("error", self.path.name, "", f"no run has the id {run_id!r}", cure))
 
     def of_kind(self, kind: str) -> tuple[Run, ...]:
-        """All runs of one kind, in the manifest's order."""
+        """All runs of one kind, in the manifest's order.
+
+        Parameters
+        ----------
+        kind : str
+            ``"dynamic"``, ``"dry_pivot"``, ``"locus"`` or ``"clearance"``.
+        """
         return tuple(r for r in self.runs if r.kind == kind)
 
     def fingerprint(self) -> dict[str, str]:

@@ -45,7 +45,13 @@ class ChannelStatistics:
     _flat: int = 0
 
     def add(self, readings: FloatArray) -> None:
-        """Take the next block, (n,) readings as the file holds them."""
+        """Take the next block, (n,) readings as the file holds them.
+
+        Parameters
+        ----------
+        readings : (n,) ndarray
+            As the file holds them.
+        """
         if len(readings) == 0:
             return
         valid = np.isfinite(readings) & (np.abs(np.nan_to_num(readings)) < _OVERFLOW)

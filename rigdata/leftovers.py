@@ -13,7 +13,12 @@ _MAX_LOOKED_AT = 10_000
 
 
 def leftovers(campaign: Campaign) -> list[Problem]:
-    """Note records without a run: forgotten in the manifest, or left from another campaign."""
+    """Note records without a run: forgotten in the manifest, or left from another campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    """
     if campaign.path.is_dir():
         names = _files(campaign)
         where, what = campaign.path.name, "files"

@@ -15,7 +15,15 @@ _MAX_TEXT = 20_000
 
 
 def shown(value: object, length: int = 60) -> str:
-    """`value` as it stands in a message: quoted, short, on one line, controls escaped."""
+    """`value` as it stands in a message: quoted, short, on one line, controls escaped.
+
+    Parameters
+    ----------
+    value : object
+        Of a manifest.
+    length : int, optional
+        Characters at most.
+    """
     if isinstance(value, str):
         text = _printable(value)
     elif isinstance(value, (dict, list)):  # may be nested too deeply to be printed
@@ -31,7 +39,15 @@ def _printable(text: str) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Name the nearest of `known`, as the cure for an unknown `name`."""
+    """Name the nearest of `known`, as the cure for an unknown `name`.
+
+    Parameters
+    ----------
+    name : str
+        As the user wrote it.
+    known : iterable of str
+        Names that are known.
+    """
     names = list(known)
     close = nearest_name(name.lower(), names, cutoff=0.4)
     return f"Did you mean {close!r}?" if close else f"Known: {', '.join(names)}"
@@ -51,12 +67,37 @@ class Findings:
         return any(p.severity == "error" for p in self.problems)
 
     def add(self, severity: Severity, path: Path, what: str, cure: str, run: str | None = None) -> None:
-        """Note a problem of the key at `path`."""
+        """Note a problem of the key at `path`.
+
+        Parameters
+        ----------
+        severity : Severity
+        path : tuple
+            Keys down to the one meant.
+        what : str
+            What is wrong.
+        cure : str
+            What to do.
+        run : str or None, optional
+            Run id, where it belongs to one.
+        """
         if len(self.problems) < _MAX_FINDINGS:
             self.problems.append(Problem(severity, self.file, place_of(self.lines, path), what, cure, run))
 
     def error(self, path: Path, what: str, cure: str, run: str | None = None) -> None:
-        """Note an error of the key at `path`."""
+        """Note an error of the key at `path`.
+
+        Parameters
+        ----------
+        path : tuple
+            Keys down to the one meant.
+        what : str
+            What is wrong.
+        cure : str
+            What to do.
+        run : str or None, optional
+            Run id, where it belongs to one.
+        """
         self.add("error", path, what, cure, run)
 
 
@@ -71,17 +112,41 @@ class Table:
             findings.error(path, f"is {shown(data)}, not a table", "Write it as a [table] with keys")
 
     def only(self, known: tuple[str, ...], where: str) -> None:
-        """Note every key that is not in `known`."""
+        """Note every key that is not in `known`.
+
+        Parameters
+        ----------
+        known : tuple of str
+            Keys allowed.
+        where : str
+            Name of the table, for the message.
+        """
         for key in self.data:
             if key not in known:
                 self.findings.error((*self.path, key), f"unknown key {shown(key)} in {where}", nearest(key, known))
 
     def subtable(self, key: str) -> Table:
-        """Give the table under `key`, empty where absent."""
+        """Give the table under `key`, empty where absent.
+
+        Parameters
+        ----------
+        key : str
+            Key of the table.
+        """
         return Table(self.data.get(key, {}), (*self.path, key), self.findings)
 
     def error(self, key: str, what: str, cure: str) -> None:
-        """Note an error of `key`."""
+        """Note an error of `key`.
+
+        Parameters
+        ----------
+        key : str
+            Key of the table.
+        what : str
+            What is wrong.
+        cure : str
+            What to do.
+        """
         self.findings.error((*self.path, key), what, cure)
 
     def _get(self, key: str, required: bool, cure: str) -> Any:
@@ -90,7 +155,15 @@ class Table:
         return self.data.get(key)
 
     def text(self, key: str, required: bool = False) -> str | None:
-        """Give a string, not longer than is sane."""
+        """Give a string, not longer than is sane.
+
+        Parameters
+        ----------
+        key : str
+            Key of the table.
+        required : bool, optional
+            Whether its absence is an error.
+        """
         value = self._get(key, required, f'Add {key} = "..."')
         if value is None:
             return None
@@ -106,7 +179,17 @@ class Table:
         return value
 
     def choice(self, key: str, known: tuple[str, ...], required: bool = False) -> str | None:
-        """Give one of the texts `known`."""
+        """Give one of the texts `known`.
+
+        Parameters
+        ----------
+        key : str
+            Key of the table.
+        known : tuple of str
+            Texts allowed.
+        required : bool, optional
+            Whether its absence is an error.
+        """
         value = self.text(key, required)
         if value is not None and value not in known:
             self.error(key, f"{key} {shown(value)} is unknown", nearest(value, known))
@@ -114,7 +197,19 @@ class Table:
         return value
 
     def integer(self, key: str, low: int, high: int = 10_000_000, required: bool = False) -> int | None:
-        """Give a whole number between `low` and `high`."""
+        """Give a whole number between `low` and `high`.
+
+        Parameters
+        ----------
+        key : str
+            Key of the table.
+        low : int
+            Least value allowed.
+        high : int, optional
+            Greatest value allowed.
+        required : bool, optional
+            Whether its absence is an error.
+        """
         value = self._get(key, required, f"Add {key} = {low}")
         if value is None:
             return None
@@ -131,7 +226,21 @@ class Table:
         above: float | None = None,
         required: bool = False,
     ) -> float | None:
-        """Give an SI value not below `low` and greater than `above`."""
+        """Give an SI value not below `low` and greater than `above`.
+
+        Parameters
+        ----------
+        key : str
+            Key of the table.
+        dimension : str
+            Key of `rigdata.units.DIMENSIONS`.
+        low : float or None, optional
+            Least value allowed, SI.
+        above : float or None, optional
+            Bound that the value must exceed, SI.
+        required : bool, optional
+            Whether its absence is an error.
+        """
         value = self._get(key, required, f"Add {key}, a {dimension} with its unit")
         if value is None:
             return None

@@ -91,7 +91,15 @@ class Run:
         return rate
 
     def time(self, start: int | None = None, stop: int | None = None) -> FloatArray:
-        """Read or count the times of some samples [s]."""
+        """Read or count the times of some samples [s].
+
+        Parameters
+        ----------
+        start : int or None, optional
+            First sample; default the first of all.
+        stop : int or None, optional
+            Sample after the last; default the end.
+        """
         first, last = self._slice(start, stop)
         self.sample_rate  # noqa: B018 (refuses a rate that times cannot be counted from)
         return self.reader.time(first, last)
@@ -204,7 +212,15 @@ class Run:
         return tuple(Temperature(c.name, c.pad, c.position) for c in found)
 
     def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
-        """Read the shaft speed [rad/s]; None where no channel measures it."""
+        """Read the shaft speed [rad/s]; None where no channel measures it.
+
+        Parameters
+        ----------
+        start : int or None, optional
+            First sample; default the first of all.
+        stop : int or None, optional
+            Sample after the last; default the end.
+        """
         for channel in self.channels.values():
             if channel.quantity == "speed":
                 return self.record(channel.name, start, stop)

@@ -49,7 +49,15 @@ def key_lines(text: str) -> dict[Path, int]:
 
 
 def place_of(lines: dict[Path, int], path: Path) -> str:
-    """Say where `path` stands: ``"line 14, [channels.X1A] sensitivity"``."""
+    """Say where `path` stands: ``"line 14, [channels.X1A] sensitivity"``.
+
+    Parameters
+    ----------
+    lines : dict of tuple to int
+        Line numbers, by keys down to the one meant.
+    path : tuple
+        Keys down to the one meant.
+    """
     words = _spell(path)
     at: Path = path
     while at and at not in lines:

@@ -87,7 +87,12 @@ class Unit:
         return Unit(self.factor**power, tuple((n, p * power) for n, p in self.powers))
 
     def same_dimension(self, other: Unit) -> bool:
-        """Whether both measure the same thing."""
+        """Whether both measure the same thing.
+
+        Parameters
+        ----------
+        other : Unit
+        """
         return self.powers == other.powers
 
 
@@ -192,6 +197,13 @@ def _named(name: str, dimension: str) -> Unit:
 def unit_factor(unit: str, dimension: str) -> float:
     """SI value of one `unit`, a multiple without offset (``degC`` counts as a kelvin step).
 
+    Parameters
+    ----------
+    unit : str
+        As written by the logger or in the manifest.
+    dimension : str
+        Key of `rigdata.units.DIMENSIONS`.
+
     Raises
     ------
     UnitError
@@ -210,6 +222,13 @@ def _example(dimension: str) -> str:
 
 def split_quantity(value: object, dimension: str) -> tuple[float, str]:
     """Split ``"7.78 mV/um"`` into 7.78 and ``"mV/um"``.
+
+    Parameters
+    ----------
+    value : object
+        Text of a number and a unit, or a plain number in SI.
+    dimension : str
+        Key of `rigdata.units.DIMENSIONS`.
 
     Raises
     ------
@@ -282,7 +301,13 @@ def parse_quantity(value: object, dimension: str) -> float:
 
 
 def temperature_offset(unit: str) -> float:
-    """Kelvin at 0 of the temperature `unit`."""
+    """Kelvin at 0 of the temperature `unit`.
+
+    Parameters
+    ----------
+    unit : str
+        As written by the logger or in the manifest.
+    """
     plain = unit.strip().replace("°", "deg")
     if plain in {"degC", "C", "celsius"}:
         return _ZERO_CELSIUS
@@ -290,7 +315,13 @@ def temperature_offset(unit: str) -> float:
 
 
 def is_signal(unit: str) -> bool:
-    """Whether `unit` is what a data logger sees (V, mA, mV/V), not an engineering unit."""
+    """Whether `unit` is what a data logger sees (V, mA, mV/V), not an engineering unit.
+
+    Parameters
+    ----------
+    unit : str
+        As written by the logger or in the manifest.
+    """
     parsed = parse_unit(unit)
     if is_bridge_ratio(unit):
         return True
@@ -298,7 +329,13 @@ def is_signal(unit: str) -> bool:
 
 
 def is_bridge_ratio(unit: str) -> bool:
-    """Whether `unit` is volts per volt, as a strain-gauge bridge gives."""
+    """Whether `unit` is volts per volt, as a strain-gauge bridge gives.
+
+    Parameters
+    ----------
+    unit : str
+        As written by the logger or in the manifest.
+    """
     numerator, slash, denominator = unit.partition("/")
     if not slash:
         return False

@@ -17,7 +17,13 @@ _LEAST_SINGULAR = math.sqrt(1.0 - math.sqrt(1.0 - COLLINEAR_SINE**2))
 
 @functools.lru_cache(maxsize=256)
 def inverse_directions(axes: tuple[float, ...]) -> FloatArray:
-    """(2, m) matrix from components along `axes` [rad] to X and Y; NaN where they span no plane."""
+    """(2, m) matrix from components along `axes` [rad] to X and Y; NaN where they span no plane.
+
+    Parameters
+    ----------
+    axes : tuple of float
+        Directions [rad].
+    """
     directions = np.stack([np.cos(axes), np.sin(axes)], axis=1)
     if len(axes) < 2 or np.linalg.svd(directions, compute_uv=False)[-1] <= _LEAST_SINGULAR:
         return np.full((2, len(axes)), np.nan)

@@ -64,7 +64,13 @@ def guess_channel(name: str, unit: str) -> ChannelGuess:
 
 
 def usable_unit(unit: str) -> str:
-    """Write a logger's unit so that a manifest can hold it; "" if it is none."""
+    """Write a logger's unit so that a manifest can hold it; "" if it is none.
+
+    Parameters
+    ----------
+    unit : str
+        As written by the logger or in the manifest.
+    """
     text = unit.strip().replace("°", "deg").replace("µ", "u").replace("μ", "u")
     text = _SPELT.get(text, text)
     try:
@@ -75,7 +81,13 @@ def usable_unit(unit: str) -> str:
 
 
 def quantity_of_unit(unit: str) -> str:
-    """Quantity that an engineering unit belongs to; "" for volts and for nothing known."""
+    """Quantity that an engineering unit belongs to; "" for volts and for nothing known.
+
+    Parameters
+    ----------
+    unit : str
+        As written by the logger or in the manifest.
+    """
     if not unit or _is_signal(unit):
         return ""
     for quantity, dimension in DIMENSIONS.items():

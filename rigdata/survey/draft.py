@@ -55,7 +55,12 @@ class Survey:
 
 
 def survey(exports: Sequence[Export]) -> Survey:
-    """Guess channels and runs of a folder of exports."""
+    """Guess channels and runs of a folder of exports.
+
+    Parameters
+    ----------
+    exports : sequence of Export
+    """
     channels: dict[str, ChannelGuess] = {}
     for export in exports:
         for one in export.series:
@@ -181,7 +186,12 @@ def _line(key: str, value: float, unit: str, why: str, otherwise: str = "") -> s
 
 
 def toml_string(text: str) -> str:
-    """Write text as a TOML string: quoted, controls escaped."""
+    """Write text as a TOML string: quoted, controls escaped.
+
+    Parameters
+    ----------
+    text : str
+    """
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

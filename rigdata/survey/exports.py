@@ -48,6 +48,10 @@ class Export:
 def record_files(folder: Path) -> list[Path]:
     """List files below `folder` that may be records, by suffix, in order of name.
 
+    Parameters
+    ----------
+    folder : Path
+
     Raises
     ------
     RigDataError
@@ -71,6 +75,12 @@ def record_files(folder: Path) -> list[Path]:
 def read_export(path: Path, name: str | None = None) -> Export:
     """Read one record file of any known kind, without a manifest.
 
+    Parameters
+    ----------
+    path : Path
+    name : str or None, optional
+        Display name; default that of the file.
+
     Raises
     ------
     RigDataError
@@ -83,7 +93,14 @@ def read_export(path: Path, name: str | None = None) -> Export:
 
 
 def read_exports(folder: Path, problems: list[Problem]) -> Iterator[Export]:
-    """Read all records of a folder one by one; what cannot be read is noted in `problems` and left out."""
+    """Read all records of a folder one by one; what cannot be read is noted in `problems` and left out.
+
+    Parameters
+    ----------
+    folder : Path
+    problems : list of Problem
+        What cannot be read is added here.
+    """
     for path in record_files(folder):
         try:
             yield read_export(path, path.relative_to(folder).as_posix())

@@ -128,7 +128,12 @@ def _slow(series: Series) -> FloatArray:
 
 
 def strongest_lines(series: list[Series]) -> tuple[SpectralPeak, ...]:
-    """Lines of the channel that swings most, strongest first."""
+    """Lines of the channel that swings most, strongest first.
+
+    Parameters
+    ----------
+    series : list of Series
+    """
     best: tuple[SpectralPeak, ...] = ()
     size = 0.0
     for one in series:

@@ -90,6 +90,13 @@ def amplitude_spectrum(values: FloatArray, rate: float) -> tuple[FloatArray, Flo
     """Peak amplitudes over frequency [Hz], Hann window, straight trend taken off; empty if there is too little.
 
     Gaps are filled in between, which is good enough for a look and for nothing else.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        SI; NaN where missing.
+    rate : float
+        [Hz]
     """
     good = np.isfinite(values)
     n = len(values)
@@ -105,7 +112,17 @@ def amplitude_spectrum(values: FloatArray, rate: float) -> tuple[FloatArray, Flo
 
 
 def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> tuple[SpectralPeak, ...]:
-    """Name the strongest peaks that stand out of their neighbourhood; slow drift below four bins is no line."""
+    """Name the strongest peaks that stand out of their neighbourhood; slow drift below four bins is no line.
+
+    Parameters
+    ----------
+    frequency : (m,) ndarray
+        [Hz]
+    amplitude : (m,) ndarray
+        Peak amplitudes, in the unit of the signal.
+    most : int
+        Peaks named at most.
+    """
     found: list[SpectralPeak] = []
     if len(amplitude) < 16:
         return ()

@@ -15,7 +15,16 @@ from rigdata.virtual_rig.sensing import felt_direction
 
 
 def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instruments) -> ComplexArray:
-    """Dynamic stiffness (2, 2) [N/m] that the readings show for a true `h` at `frequency` [rad/s]."""
+    """Dynamic stiffness (2, 2) [N/m] that the readings show for a true `h` at `frequency` [rad/s].
+
+    Parameters
+    ----------
+    h : (2, 2) complex ndarray
+        Dynamic stiffness [N/m].
+    frequency : float
+        [rad/s]
+    instruments : Instruments
+    """
     lines = [answer(frequency, force, h, instruments) for force in np.eye(2, dtype=complex)]
     seen = {}
     for quantity in ("displacement", "force", "acceleration"):
@@ -26,12 +35,30 @@ def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instrumen
 
 
 def apparent_vector(vector: FloatArray, quantity: str, instruments: Instruments) -> FloatArray:
-    """Mean vector (2,) of a quantity that the readings show; the sensors' offsets are left out."""
+    """Mean vector (2,) of a quantity that the readings show; the sensors' offsets are left out.
+
+    Parameters
+    ----------
+    vector : (2,) ndarray
+        True X and Y, SI.
+    quantity : str
+        ``"displacement"``, ``"force"`` or ``"acceleration"``.
+    instruments : Instruments
+    """
     return (reading_map(instruments, quantity, 0.0) @ vector).real
 
 
 def reading_map(instruments: Instruments, quantity: str, frequency: float) -> ComplexArray:
-    """Map (2, 2) from true to stated X and Y of a quantity, phasors at `frequency` [rad/s]; first pair of sensors."""
+    """Map (2, 2) from true to stated X and Y of a quantity, phasors at `frequency` [rad/s]; first pair of sensors.
+
+    Parameters
+    ----------
+    instruments : Instruments
+    quantity : str
+        ``"displacement"``, ``"force"`` or ``"acceleration"``.
+    frequency : float
+        [rad/s]
+    """
     pair = instruments.of(quantity)[:2]
     stated = np.array([s.stated_direction for s in pair])
     felt = np.array(

@@ -15,7 +15,16 @@ UPPER = 0.3  # sine of a pivot's angle above which its pad counts as an upper on
 
 
 def dry_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> RunPhysics:
-    """Physics of a dry pivot test: position along the pad = clearance + deflection under the load on the pivot."""
+    """Physics of a dry pivot test: position along the pad = clearance + deflection under the load on the pivot.
+
+    Parameters
+    ----------
+    run : PlannedRun
+    truth : RigTruth
+    noise : Noise
+    seed : int
+        Of the random numbers.
+    """
     test = run.test
     if not isinstance(test, DryTest) or run.direction is None:
         raise VirtualRigError(f"run {run.id} is not a dry pivot test")
@@ -47,7 +56,14 @@ def dry_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Ru
 
 
 def load_history(test: DryTest, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Time (n,) [s] and load (n,) [N] of a dry test: ramps and holds."""
+    """Time (n,) [s] and load (n,) [N] of a dry test: ramps and holds.
+
+    Parameters
+    ----------
+    test : DryTest
+    rate : float
+        [Hz]
+    """
     knots, level, held = [0.0], [test.start], []
     rising = list(zip(test.levels, test.holds))
     order = {"up": rising, "down": rising[::-1], "cycle": rising + rising[-2::-1]}[test.branch]
@@ -77,6 +93,13 @@ def held_back(load: FloatArray, friction: float) -> FloatArray:
 
     The play operator: going up the pivot feels (1 - friction) of the load, going down (1 + friction), and on
     reversal it waits until the load has crossed that gap.
+
+    Parameters
+    ----------
+    load : (n,) ndarray
+        [N]
+    friction : float
+        Dry friction over force.
     """
     if friction == 0.0:
         return load

@@ -109,14 +109,31 @@ class Fault:
         return KINDS[self.kind][0]
 
     def strikes(self, run: str, channel: str | None = None) -> bool:
-        """Whether it concerns a run, and a channel of it."""
+        """Whether it concerns a run, and a channel of it.
+
+        Parameters
+        ----------
+        run : str
+            Run id.
+        channel : str or None, optional
+            Channel name; None for the run as a whole.
+        """
         return fnmatchcase(run, self.run) and (
             channel is None or self.channel is None or fnmatchcase(channel, self.channel)
         )
 
 
 def check_faults(faults: Iterable[Fault], runs: Iterable[str], channels: Iterable[str]) -> None:
-    """Refuse faults that would strike nothing: a campaign must hold what was asked for."""
+    """Refuse faults that would strike nothing: a campaign must hold what was asked for.
+
+    Parameters
+    ----------
+    faults : iterable of Fault
+    runs : iterable of str
+        Run ids.
+    channels : iterable of str
+        Channel names.
+    """
     runs, channels = list(runs), list(channels)
     for fault in faults:
         if not any(fnmatchcase(run, fault.run) for run in runs):
@@ -129,7 +146,15 @@ def check_faults(faults: Iterable[Fault], runs: Iterable[str], channels: Iterabl
 
 
 def faulty_instruments(instruments: Instruments, faults: Iterable[Fault], run: str) -> Instruments:
-    """Instruments of one run, with the faults of its sensors."""
+    """Instruments of one run, with the faults of its sensors.
+
+    Parameters
+    ----------
+    instruments : Instruments
+    faults : iterable of Fault
+    run : str
+        Run id.
+    """
     sensors = list(instruments.sensors)
     for fault in faults:
         for i, sensor in enumerate(sensors):
@@ -157,7 +182,17 @@ def spoil_record(
     run: str,
     rng: np.random.Generator,
 ) -> Readings:
-    """Readings with the record faults of this run; the given ones stay as they are."""
+    """Readings with the record faults of this run; the given ones stay as they are.
+
+    Parameters
+    ----------
+    readings : Readings
+    instruments : Instruments
+    faults : iterable of Fault
+    run : str
+        Run id.
+    rng : numpy.random.Generator
+    """
     columns = dict(readings.columns)
     time = readings.time
     for fault in faults:

@@ -84,7 +84,18 @@ class Sensor:
 
     @classmethod
     def probe(cls, name: str, axis: float, gap_voltage: float = 8.0, mv_per_um: float = 7.78) -> Sensor:
-        """Eddy-current probe: the reading falls as the shaft comes nearer."""
+        """Eddy-current probe: the reading falls as the shaft comes nearer.
+
+        Parameters
+        ----------
+        name : str
+        axis : float
+            Direction [rad].
+        gap_voltage : float, optional
+            Reading at the centre [V].
+        mv_per_um : float, optional
+            Sensitivity [mV/um].
+        """
         return cls(
             name,
             "displacement",
@@ -106,7 +117,20 @@ class Sensor:
         mv_per_v: float = 2.0,
         excitation: float = 5.0,
     ) -> Sensor:
-        """Strain-gauge cell in a bridge; `full_scale` [N], `excitation` [V]."""
+        """Strain-gauge cell in a bridge; `full_scale` [N], `excitation` [V].
+
+        Parameters
+        ----------
+        name : str
+        axis : float
+            Direction [rad].
+        full_scale : float, optional
+            [N]
+        mv_per_v : float, optional
+            At full scale [mV/V].
+        excitation : float, optional
+            Supply [V].
+        """
         span = mv_per_v * excitation
         return cls(
             name,
@@ -125,7 +149,18 @@ class Sensor:
 
     @classmethod
     def accelerometer(cls, name: str, axis: float, mv_per_g: float = 10.0, span: float = 0.05) -> Sensor:
-        """Accelerometer; `span` of its converter in V."""
+        """Accelerometer; `span` of its converter in V.
+
+        Parameters
+        ----------
+        name : str
+        axis : float
+            Direction [rad].
+        mv_per_g : float, optional
+            Sensitivity [mV/g].
+        span : float, optional
+            Of the converter [V].
+        """
         return cls(
             name,
             "acceleration",
@@ -138,7 +173,18 @@ class Sensor:
 
     @classmethod
     def thermometer(cls, name: str, pad: int, kelvin_per_volt: float = 15.0, position: float = 0.75) -> Sensor:
-        """Pt100 with its amplifier, in `pad` (1 for pad #1) at a fraction of the arc."""
+        """Pt100 with its amplifier, in `pad` (1 for pad #1) at a fraction of the arc.
+
+        Parameters
+        ----------
+        name : str
+        pad : int
+            From 1.
+        kelvin_per_volt : float, optional
+            [K/V]
+        position : float, optional
+            Fraction of the pad's arc from its leading edge.
+        """
         return cls(
             name,
             "temperature",
@@ -154,7 +200,14 @@ class Sensor:
 
     @classmethod
     def tachometer(cls, name: str, mv_per_hz: float = 100.0) -> Sensor:
-        """Speed as a voltage."""
+        """Speed as a voltage.
+
+        Parameters
+        ----------
+        name : str
+        mv_per_hz : float, optional
+            [mV/Hz]
+        """
         stated = (("sensitivity", f"{mv_per_hz:g} mV/Hz"),)
         return cls(name, "speed", "V", mv_per_hz * 1e-3 / hz(1.0), stated=stated)
 
@@ -210,6 +263,12 @@ class Instruments:
 
         With a `seed`, gap voltages and the zeros of accelerometers and Pt100s are drawn; without, the probes
         stand at 8 V and everything else is at zero.
+
+        Parameters
+        ----------
+        n_pads : int, optional
+        seed : int or None, optional
+            Draws the gains from their uncertainties; None leaves them exact.
         """
         rng = None if seed is None else np.random.default_rng([seed, 0])
         gaps = (8.0, 8.0) if rng is None else tuple(rng.normal(8.0, 0.2, 2))
@@ -235,18 +294,35 @@ class Instruments:
         return self.housing_mass + self.housing_mass_error
 
     def of(self, quantity: str) -> tuple[Sensor, ...]:
-        """All sensors of a quantity."""
+        """All sensors of a quantity.
+
+        Parameters
+        ----------
+        quantity : str
+            ``"displacement"``, ``"force"`` or ``"acceleration"``.
+        """
         return tuple(sensor for sensor in self.sensors if sensor.quantity == quantity)
 
     def named(self, name: str) -> Sensor:
-        """Look up one sensor by its channel name."""
+        """Look up one sensor by its channel name.
+
+        Parameters
+        ----------
+        name : str
+        """
         for sensor in self.sensors:
             if sensor.name == name:
                 return sensor
         raise VirtualRigError(f"no channel {name!r}; there are {[s.name for s in self.sensors]}")
 
     def partner(self, sensor: Sensor) -> Sensor:
-        """Find the other sensor of its pair."""
+        """Find the other sensor of its pair.
+
+        Parameters
+        ----------
+        sensor : Sensor
+            One of two of its quantity.
+        """
         family = [s.name for s in self.of(sensor.quantity)]
         return self.named(family[family.index(sensor.name) ^ 1])
 
@@ -301,6 +377,13 @@ class Instruments:
         """Draw every gain from its stated uncertainty, and the probes' and cells' angles from `angle` [rad].
 
         A campaign without any hidden effect still has these: leaving them out flatters the false alarms.
+
+        Parameters
+        ----------
+        seed : int
+            Of the random numbers.
+        angle : float, optional
+            Standard deviation of the angles [rad].
         """
         rng = np.random.default_rng([seed, 1])
         gains, turns = rng.standard_normal((2, len(self.sensors)))

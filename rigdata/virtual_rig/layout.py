@@ -126,7 +126,12 @@ LAYOUTS: dict[str, Layout] = {
 
 
 def layout_named(layout: str | Layout) -> Layout:
-    """Layout by its name; one that is already a layout is returned as it is."""
+    """Layout by its name; one that is already a layout is returned as it is.
+
+    Parameters
+    ----------
+    layout : str or Layout
+    """
     if not isinstance(layout, str):
         return layout
     if layout not in LAYOUTS:

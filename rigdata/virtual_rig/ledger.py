@@ -64,7 +64,12 @@ class CampaignTruth:
         return {"schema": "tpjb-truth/1", **asdict(self)}
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write as JSON, whole or not at all; never into the campaign itself. What is infinite becomes null."""
+        """Write as JSON, whole or not at all; never into the campaign itself. What is infinite becomes null.
+
+        Parameters
+        ----------
+        path : str or path-like
+        """
         target = Path(path)
         spare = target.with_name(f".{target.name}.part")
         spare.write_text(json.dumps(_finite(self.to_dict()), indent=1, allow_nan=False), encoding="utf-8")
@@ -83,7 +88,14 @@ def _finite(value: object) -> object:
 
 
 def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) -> CampaignTruth:
-    """Gather the truth of a rig and of its simulated runs."""
+    """Gather the truth of a rig and of its simulated runs.
+
+    Parameters
+    ----------
+    rig : VirtualRig
+    runs : mapping of str to mapping
+        Facts of every record, by run id.
+    """
     cells = rig.instruments.cell_stiffness
     return CampaignTruth(
         campaign=rig.campaign,
@@ -102,7 +114,12 @@ def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) ->
 
 
 def run_facts(record: SimulatedRun) -> dict[str, object]:
-    """Facts of one record for the truth."""
+    """Facts of one record for the truth.
+
+    Parameters
+    ----------
+    record : SimulatedRun
+    """
     return {
         "kind": record.run.kind,
         "recorded_in": record.source,

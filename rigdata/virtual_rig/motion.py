@@ -23,10 +23,26 @@ class Motion(Protocol):
         """Shaft speed [rad/s]."""
 
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
-        """X and Y of "displacement" [m], "force" [N] or "acceleration" [m/s^2] at `time` (n,) -> (n, 2)."""
+        """X and Y of "displacement" [m], "force" [N] or "acceleration" [m/s^2] at `time` (n,) -> (n, 2).
+
+        Parameters
+        ----------
+        quantity : str
+            ``"displacement"`` [m], ``"force"`` [N] or ``"acceleration"`` [m/s^2].
+        time : (n,) ndarray
+            [s]
+        """
 
     def runout(self, axis: float, time: FloatArray) -> FloatArray:
-        """Surface runout (n,) [m] that a probe at `axis` [rad] sees."""
+        """Surface runout (n,) [m] that a probe at `axis` [rad] sees.
+
+        Parameters
+        ----------
+        axis : float
+            Direction [rad].
+        time : (n,) ndarray
+            [s]
+        """
 
 
 @dataclass(frozen=True)
@@ -54,7 +70,13 @@ class MotionLine:
     acceleration: ComplexArray
 
     def phasor(self, quantity: str) -> ComplexArray:
-        """Phasor (2,) of a measured quantity."""
+        """Phasor (2,) of a measured quantity.
+
+        Parameters
+        ----------
+        quantity : str
+            ``"displacement"``, ``"force"`` or ``"acceleration"``.
+        """
         return self.cell_force if quantity == "force" else getattr(self, quantity)
 
 

@@ -41,7 +41,12 @@ class ChannelNoise:
             raise VirtualRigError(f"noise must be finite and not negative: {self}")
 
     def scaled(self, factor: float) -> ChannelNoise:
-        """Return the same noise, `factor` times as strong."""
+        """Return the same noise, `factor` times as strong.
+
+        Parameters
+        ----------
+        factor : float
+        """
         return ChannelNoise(*(getattr(self, f.name) * factor for f in fields(self)))
 
 
@@ -231,7 +236,12 @@ class Noise:
         )
 
     def scaled(self, factor: float) -> Noise:
-        """Return it with the channels' noise `factor` times as strong; shaft, actuators, dry tests as they are."""
+        """Return it with the channels' noise `factor` times as strong; shaft, actuators, dry tests as they are.
+
+        Parameters
+        ----------
+        factor : float
+        """
         names = ("displacement", "force", "acceleration", "temperature", "speed")
         return replace(self, **{name: getattr(self, name).scaled(factor) for name in names})
 
@@ -241,5 +251,15 @@ PURPOSES = ("physics", "noise", "mains", "glitches", "dry", "faults", "campaign"
 
 
 def stream(seed: int, run: str, purpose: str) -> np.random.Generator:
-    """Generator for one run (by its id) and purpose; the same for the same arguments, on every machine."""
+    """Generator for one run (by its id) and purpose; the same for the same arguments, on every machine.
+
+    Parameters
+    ----------
+    seed : int
+        Of the random numbers.
+    run : str
+        Run id.
+    purpose : str
+        What the numbers are for.
+    """
     return np.random.default_rng([seed, crc32(run.encode()), PURPOSES.index(purpose)])

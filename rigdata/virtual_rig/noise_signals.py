@@ -11,7 +11,19 @@ from rigdata.virtual_rig.noise import ChannelNoise, Noise, stream
 
 
 def channel_noise(sensors: tuple[Sensor, ...], noise: Noise, time: FloatArray, seed: int, run: str) -> FloatArray:
-    """Noise of each sensor over `time` (n,) [s] -> (n_sensors, n), in the SI unit of its quantity."""
+    """Noise of each sensor over `time` (n,) [s] -> (n_sensors, n), in the SI unit of its quantity.
+
+    Parameters
+    ----------
+    sensors : tuple of Sensor
+    noise : Noise
+    time : (n,) ndarray
+        [s]
+    seed : int
+        Of the random numbers.
+    run : str
+        Run id.
+    """
     kinds: list[ChannelNoise] = [getattr(noise, sensor.quantity) for sensor in sensors]
     amounts = np.array([[k.white, k.flicker, k.mains, k.drift] for k in kinds]).T[..., None]
     white, pink, mains, drift = amounts
@@ -31,6 +43,16 @@ def flicker(rng: np.random.Generator, rows: int, n: int, rate: float) -> FloatAr
 
     Shaped in the frequency domain over twice the length and cut, because one period of a periodic series would
     end where it began, which drift does not.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    rows : int
+        Signals.
+    n : int
+        Samples.
+    rate : float
+        [Hz]
     """
     length = next_fast_len(2 * n, real=True)
     frequency = np.arange(1, length // 2 + 1) * rate / length
@@ -42,7 +64,16 @@ def flicker(rng: np.random.Generator, rows: int, n: int, rate: float) -> FloatAr
 
 
 def slow_drift(rng: np.random.Generator, rows: int, time: FloatArray) -> FloatArray:
-    """Slow monotone drift (rows, n), zero in the mean, with a standard deviation of 1 from start to end."""
+    """Slow monotone drift (rows, n), zero in the mean, with a standard deviation of 1 from start to end.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    rows : int
+        Signals.
+    time : (n,) ndarray
+        [s]
+    """
     share = np.linspace(-0.5, 0.5, len(time))
     size = rng.standard_normal((rows, 1))
     bend = rng.uniform(-1.0, 1.0, (rows, 1))
@@ -54,6 +85,18 @@ def pick_up(noise: Noise, names: list[str], time: FloatArray, seed: int, run: st
 
     How the channels pick it up belongs to the cabling, the same in the whole campaign; the phase of the mains
     at the start of a record is chance.
+
+    Parameters
+    ----------
+    noise : Noise
+    names : list of str
+        Channel names.
+    time : (n,) ndarray
+        [s]
+    seed : int
+        Of the random numbers.
+    run : str
+        Run id.
     """
     rng = stream(seed, run, "mains")
     frequency = noise.mains_frequency + noise.mains_scatter * rng.standard_normal()

@@ -194,7 +194,13 @@ class RigPlan:
         )
 
     def runs(self, pivot_angles: Sequence[float]) -> tuple[PlannedRun, ...]:
-        """All runs in order; `pivot_angles` [rad] give the dry tests their directions."""
+        """All runs in order; `pivot_angles` [rad] give the dry tests their directions.
+
+        Parameters
+        ----------
+        pivot_angles : sequence of float
+            Pad directions [rad], pad #1 first.
+        """
         runs = (
             *self._dynamic_runs(),
             *self._locus_runs(),
@@ -280,14 +286,36 @@ class RigPlan:
 def operating_points(
     pairs: Iterable[tuple[float, float]], direction: float = DOWNWARD, speed: float = hz(22.0)
 ) -> tuple[OperatingPoint, ...]:
-    """Make set points of (load [N], excitation [Hz]) at one load direction [rad] and speed [rad/s]."""
+    """Make set points of (load [N], excitation [Hz]) at one load direction [rad] and speed [rad/s].
+
+    Parameters
+    ----------
+    pairs : iterable of (float, float)
+        Load [N] and excitation [Hz].
+    direction : float, optional
+        [rad]
+    speed : float, optional
+        [rad/s]
+    """
     return tuple(OperatingPoint(load, direction, speed, hz(frequency)) for load, frequency in pairs)
 
 
 def locus_points(
     count: int, load: float = 5000.0, first: float = DOWNWARD, speed: float = hz(22.0)
 ) -> tuple[OperatingPoint, ...]:
-    """Give `count` directions of one load [N], evenly all around, counter-clockwise from `first` [rad]."""
+    """Give `count` directions of one load [N], evenly all around, counter-clockwise from `first` [rad].
+
+    Parameters
+    ----------
+    count : int
+        Directions.
+    load : float, optional
+        [N]
+    first : float, optional
+        First direction [rad].
+    speed : float, optional
+        [rad/s]
+    """
     return tuple(OperatingPoint(load, first + 2 * pi * i / count, speed) for i in range(count))
 
 

@@ -12,7 +12,16 @@ from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
 
 
 def clearance_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> RunPhysics:
-    """Physics of a clearance sweep."""
+    """Physics of a clearance sweep.
+
+    Parameters
+    ----------
+    run : PlannedRun
+    truth : RigTruth
+    noise : Noise
+    seed : int
+        Of the random numbers.
+    """
     sweep = run.test
     if not isinstance(sweep, ClearanceSweep):
         raise VirtualRigError(f"run {run.id} is not a clearance sweep")
@@ -33,6 +42,18 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
     of the load and gives by its own law. It slides along a pad's side to the next corner when the load has
     passed that pad by `lag`, over about `width` (friction). On its way that pad alone carries, push times the cosine
     of the angle between them: there the side stands at clearance + deflection(that).
+
+    Parameters
+    ----------
+    truth : RigTruth
+    push : float
+        [N]
+    direction : (n,) ndarray
+        Of the load [rad].
+    lag : float
+        By which the shaft follows late [rad].
+    width : float
+        Over which a corner is rounded [rad].
     """
     pads = _sides(truth)
     normals = np.array([[np.cos(truth.pivot_angles[k]), np.sin(truth.pivot_angles[k])] for k in pads])
@@ -62,7 +83,12 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
 
 
 def corners(truth: RigTruth) -> FloatArray:
-    """Corners (n_sides, 2) [m] of the cold polygon without load, counter-clockwise."""
+    """Corners (n_sides, 2) [m] of the cold polygon without load, counter-clockwise.
+
+    Parameters
+    ----------
+    truth : RigTruth
+    """
     pads = _sides(truth)
     return np.array([_corner(truth, k, pads[(i + 1) % len(pads)]) for i, k in enumerate(pads)])
 

@@ -100,7 +100,13 @@ class VirtualRig:
         return tuple(run for run in self.runs() if run.record == run.id)
 
     def simulate(self, run_id: str) -> SimulatedRun:
-        """Make the record of one run (or the one that it shares)."""
+        """Make the record of one run (or the one that it shares).
+
+        Parameters
+        ----------
+        run_id : str
+            Id of the plan.
+        """
         runs = {run.id: run for run in self.runs()}
         if run_id not in runs:
             raise VirtualRigError(f"no run {run_id!r} in the plan")
@@ -112,7 +118,13 @@ class VirtualRig:
             yield self._recorded(run)
 
     def faults_of(self, record: str) -> tuple[Fault, ...]:
-        """Faults that strike one of the runs of a record, made to strike it."""
+        """Faults that strike one of the runs of a record, made to strike it.
+
+        Parameters
+        ----------
+        record : str
+            Run id of the record.
+        """
         if not self.faults:
             return ()
         members = [run.id for run in self.runs() if run.record == record]

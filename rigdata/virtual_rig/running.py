@@ -20,6 +20,15 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
 
     The actuators' force goes through the film: F_oil = H d at every line, d shaft relative to housing. The
     housing stands on its cells, so F_oil = F_cell + m_h a_h with F_cell = k_cell x_h.
+
+    Parameters
+    ----------
+    run : PlannedRun
+    truth : RigTruth
+    instruments : Instruments
+    noise : Noise
+    seed : int
+        Of the random numbers.
     """
     if run.point is None:
         raise VirtualRigError(f"run {run.id} needs a set point")
@@ -50,7 +59,14 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
 
 
 def missed(point: OperatingPoint, noise: Noise, rng: np.random.Generator) -> OperatingPoint:
-    """Draw the point that is really run when the set point is `point`."""
+    """Draw the point that is really run when the set point is `point`.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+    noise : Noise
+    rng : numpy.random.Generator
+    """
     miss = noise.set_point
     load, direction, speed = rng.standard_normal(3)
     return replace(
@@ -62,7 +78,14 @@ def missed(point: OperatingPoint, noise: Noise, rng: np.random.Generator) -> Ope
 
 
 def actuator_forces(run: PlannedRun, noise: Noise, rng: np.random.Generator) -> list[tuple[float, ComplexArray]]:
-    """Force phasors (2,) [N] of the actuators, with their frequencies [rad/s]."""
+    """Force phasors (2,) [N] of the actuators, with their frequencies [rad/s].
+
+    Parameters
+    ----------
+    run : PlannedRun
+    noise : Noise
+    rng : numpy.random.Generator
+    """
     forces: list[tuple[float, ComplexArray]] = []
     if run.direction is None:
         return forces
@@ -84,6 +107,16 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
     """How shaft and housing answer an oil force phasor (2,) [N] at one frequency [rad/s].
 
     The film passes the force on to the housing: k_cell x_h - m_h omega^2 x_h = F_oil.
+
+    Parameters
+    ----------
+    frequency : float
+        [rad/s]
+    force : (2,) complex ndarray
+        Oil force phasor [N].
+    h : (2, 2) complex ndarray
+        Dynamic stiffness [N/m].
+    instruments : Instruments
     """
     cells = np.array(instruments.cell_stiffness)
     # written with the compliance, so that rigid cells (infinite stiffness) are no special case
@@ -99,7 +132,16 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
 
 
 def surface_runout(noise: Noise, seed: int, shaft_angle: float) -> ComplexArray:
-    """Runout phasors of 1X, 2X, ... [m] at a shaft angle [rad]; the surface is the same in the whole campaign."""
+    """Runout phasors of 1X, 2X, ... [m] at a shaft angle [rad]; the surface is the same in the whole campaign.
+
+    Parameters
+    ----------
+    noise : Noise
+    seed : int
+        Of the random numbers.
+    shaft_angle : float
+        [rad]
+    """
     sizes = np.array(noise.shaft.runout, dtype=float)
     orders = np.arange(1, len(sizes) + 1)
     phases = stream(seed, "", "campaign").uniform(0, 2 * np.pi, len(sizes))

@@ -36,7 +36,18 @@ class Readings:
 def analogue_readings(
     physics: RunPhysics, instruments: Instruments, noise: Noise, seed: int, run: str
 ) -> dict[str, FloatArray]:
-    """Readings of all sensors before the converter, each (n,) in its own unit."""
+    """Readings of all sensors before the converter, each (n,) in its own unit.
+
+    Parameters
+    ----------
+    physics : RunPhysics
+    instruments : Instruments
+    noise : Noise
+    seed : int
+        Of the random numbers.
+    run : str
+        Run id.
+    """
     time = physics.time
     disturbance = channel_noise(instruments.sensors, noise, time, seed, run)
     vectors: dict[tuple[str, float], FloatArray] = {}
@@ -55,7 +66,16 @@ def analogue_readings(
 
 
 def sensed(sensor: Sensor, instruments: Instruments, physics: RunPhysics, vector: FloatArray | None) -> FloatArray:
-    """Quantity (n,) [SI, degC for temperatures] that a sensor feels, from the vector (n, 2) at its delayed time."""
+    """Quantity (n,) [SI, degC for temperatures] that a sensor feels, from the vector (n, 2) at its delayed time.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    instruments : Instruments
+    physics : RunPhysics
+    vector : (n, 2) ndarray or None
+        X and Y of the quantity at the delayed time; None for one without a direction.
+    """
     n = len(physics.time)
     if sensor.quantity == "temperature":
         return np.full(n, physics.motion.temperature[(sensor.pad or 1) - 1])
@@ -69,7 +89,13 @@ def sensed(sensor: Sensor, instruments: Instruments, physics: RunPhysics, vector
 
 
 def felt_direction(sensor: Sensor, instruments: Instruments) -> FloatArray:
-    """Vector (2,) whose product with the quantity gives what the sensor feels: its axis, and cross-talk."""
+    """Vector (2,) whose product with the quantity gives what the sensor feels: its axis, and cross-talk.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    instruments : Instruments
+    """
     direction = sensor.direction
     if sensor.error.cross:
         direction = direction + sensor.error.cross * instruments.partner(sensor).direction
@@ -77,7 +103,19 @@ def felt_direction(sensor: Sensor, instruments: Instruments) -> FloatArray:
 
 
 def draw_glitches(instruments: Instruments, noise: Noise, samples: int, seed: int, run: str) -> tuple[Glitch, ...]:
-    """Draw the glitches of a run."""
+    """Draw the glitches of a run.
+
+    Parameters
+    ----------
+    instruments : Instruments
+    noise : Noise
+    samples : int
+        Of the run.
+    seed : int
+        Of the random numbers.
+    run : str
+        Run id.
+    """
     rules = noise.glitches
     channels = [s for s in instruments.sensors if s.quantity in ("displacement", "force")]
     rng = stream(seed, run, "glitches")
@@ -92,7 +130,15 @@ def draw_glitches(instruments: Instruments, noise: Noise, samples: int, seed: in
 
 
 def add_glitches(columns: dict[str, FloatArray], instruments: Instruments, glitches: Iterable[Glitch]) -> None:
-    """Put bursts into the readings, in place."""
+    """Put bursts into the readings, in place.
+
+    Parameters
+    ----------
+    columns : dict of str to (n,) ndarray
+        Readings by channel, changed in place.
+    instruments : Instruments
+    glitches : iterable of Glitch
+    """
     for glitch in glitches:
         sensor = instruments.named(glitch.channel)
         burst = slice(glitch.first, glitch.first + glitch.count)
@@ -100,7 +146,16 @@ def add_glitches(columns: dict[str, FloatArray], instruments: Instruments, glitc
 
 
 def converted(reading: FloatArray, sensor: Sensor, bits: int | None) -> FloatArray:
-    """Reading after the converter: limited to its span and rounded to its steps."""
+    """Reading after the converter: limited to its span and rounded to its steps.
+
+    Parameters
+    ----------
+    reading : (n,) ndarray
+        In the sensor's own unit.
+    sensor : Sensor
+    bits : int or None
+        Of the converter; None for none.
+    """
     if bits is None:
         return reading
     step = converter_step(sensor, bits)
@@ -109,5 +164,12 @@ def converted(reading: FloatArray, sensor: Sensor, bits: int | None) -> FloatArr
 
 
 def converter_step(sensor: Sensor, bits: int) -> float:
-    """One step of the converter, in the reading's unit."""
+    """One step of the converter, in the reading's unit.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    bits : int or None
+        Of the converter; None for none.
+    """
     return 2 * sensor.span / 2**bits

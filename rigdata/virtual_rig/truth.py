@@ -120,7 +120,12 @@ class RigTruth:
         )
 
     def h(self, point: OperatingPoint) -> ComplexArray:
-        """Dynamic stiffness at a point, (2, 2) complex [N/m], checked."""
+        """Dynamic stiffness at a point, (2, 2) complex [N/m], checked.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+        """
         h = np.asarray(self.stiffness(point), dtype=complex)
         if h.shape != (2, 2) or not np.isfinite(h).all():
             raise VirtualRigError(f"stiffness({point}) must be (2, 2) finite complex, got shape {h.shape}: {h}")
@@ -129,27 +134,56 @@ class RigTruth:
         return h
 
     def centre(self, point: OperatingPoint) -> FloatArray:
-        """Mean shaft position at a point, (2,) [m], checked."""
+        """Mean shaft position at a point, (2,) [m], checked.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+        """
         return _checked(self.position(point), (2,), f"position({point})")
 
     def temperatures(self, point: OperatingPoint) -> FloatArray:
-        """Film temperatures at a point, (n_pads,) [degC], checked."""
+        """Film temperatures at a point, (n_pads,) [degC], checked.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+        """
         return _checked(self.temperature(point), (len(self.pivot_angles),), f"temperature({point})")
 
     def deflection(self, pad: int, load: FloatArray) -> FloatArray:
-        """Pivot deflection of `pad` (1 is pad #1) under `load` (n,) [N] -> (n,) [m], checked; 0 where it lifts off."""
+        """Pivot deflection of `pad` (1 is pad #1) under `load` (n,) [N] -> (n,) [m], checked; 0 where it lifts off.
+
+        Parameters
+        ----------
+        pad : int
+            From 1.
+        load : array_like
+            [N], not negative.
+        """
         pushed = np.maximum(load, 0.0)
         return _checked(self.pivot_deflection(pad, pushed), pushed.shape, f"pivot_deflection({pad}, load)")
 
 
 def load_vector(point: OperatingPoint) -> FloatArray:
-    """Static load of a point as (2,) [N]: what pushes the shaft, and what the film puts on the housing."""
+    """Static load of a point as (2,) [N]: what pushes the shaft, and what the film puts on the housing.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+    """
     angle = point.static_load_direction
     return point.static_load * np.array([np.cos(angle), np.sin(angle)])
 
 
 def hz(frequency: float) -> float:
-    """Frequency in Hz as rad/s."""
+    """Frequency in Hz as rad/s.
+
+    Parameters
+    ----------
+    frequency : float
+        [Hz]
+    """
     return 2 * pi * frequency
 
 

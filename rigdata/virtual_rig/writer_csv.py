@@ -18,7 +18,17 @@ UNQUANTISED_BITS = 36  # without a converter, digits are written as if it had th
 
 
 def write_csv(folder: Path, rig: VirtualRig, manifest: str, records: Iterable[SimulatedRun], layout: CsvLayout) -> None:
-    """Write manifest, bearing and all records into an existing, empty folder."""
+    """Write manifest, bearing and all records into an existing, empty folder.
+
+    Parameters
+    ----------
+    folder : Path
+    rig : VirtualRig
+    manifest : str
+        Text of the manifest.
+    records : iterable of SimulatedRun
+    layout : CsvLayout
+    """
     (folder / "campaign.toml").write_bytes(manifest.encode())
     (folder / rig.truth.bearing_name).write_bytes(rig.truth.bearing_text.encode())
     (folder / "runs").mkdir()
@@ -67,7 +77,14 @@ def _rows(table: np.ndarray, forms: list[str], layout: CsvLayout, tail: str) -> 
 
 
 def decimals(sensor: Sensor, bits: int | None) -> int:
-    """Decimals that keep a hundredth of a converter step."""
+    """Decimals that keep a hundredth of a converter step.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    bits : int or None
+        Of the converter; None for none.
+    """
     return max(0, ceil(-log10(converter_step(sensor, bits or UNQUANTISED_BITS))) + 2)
 
 

@@ -18,6 +18,15 @@ def write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: Iterable[Sim
     """Write all records to a new file; runs that share a record share its group.
 
     No time stamps are stored: the same rig gives the same bytes.
+
+    Parameters
+    ----------
+    path : Path
+    rig : VirtualRig
+    manifest : str
+        Text of the manifest.
+    records : iterable of SimulatedRun
+    layout : Hdf5Layout
     """
     import h5py
 

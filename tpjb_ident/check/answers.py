@@ -41,7 +41,14 @@ class Answer:
 
 
 def answer_of(seen: Observation, mass: float) -> Answer | None:
-    """Take the phasors of a run; None where it does not show them, or its force is in doubt already."""
+    """Take the phasors of a run; None where it does not show them, or its force is in doubt already.
+
+    Parameters
+    ----------
+    seen : Observation
+    mass : float
+        Of the housing [kg]; NaN where not stated.
+    """
     where = seen.pick("displacement")
     force = oil_force(seen, mass)
     if len(where) != 2 or force is None or seen.lines is None or "force" in seen.report.doubts or not excited(seen):
@@ -53,7 +60,12 @@ def answer_of(seen: Observation, mass: float) -> Answer | None:
 
 
 def solve_stiffness(answers: Sequence[Answer]) -> ComplexArray | None:
-    """H of ``F = H D``, least squares; None where the runs excite one direction only."""
+    """H of ``F = H D``, least squares; None where the runs excite one direction only.
+
+    Parameters
+    ----------
+    answers : sequence of Answer
+    """
     displacement = np.stack([a.displacement for a in answers], axis=1)
     force = np.stack([a.force for a in answers], axis=1)
     scale = np.linalg.norm(displacement, axis=0)
@@ -67,14 +79,29 @@ def solve_stiffness(answers: Sequence[Answer]) -> ComplexArray | None:
 
 
 def misfit_of(answer: Answer, stiffness: ComplexArray, repair: FloatArray | None = None) -> float:
-    """Share of the force that H does not explain, after a repair (2, 2) of the displacement readings."""
+    """Share of the force that H does not explain, after a repair (2, 2) of the displacement readings.
+
+    Parameters
+    ----------
+    answer : Answer
+    stiffness : (2, 2) complex ndarray
+        H [N/m].
+    repair : (2, 2) ndarray, optional
+        On the readings of the two channels.
+    """
     readings = answer.readings if repair is None else repair @ answer.readings
     predicted = stiffness @ to_plane(answer.channels, readings)
     return float(np.linalg.norm(answer.force - predicted) / np.linalg.norm(answer.force))
 
 
 def robust_stiffness(group: Sequence[Answer]) -> ComplexArray | None:
-    """H with the least median misfit among all pairs of runs, so that a faulty run cannot pull it."""
+    """H with the least median misfit among all pairs of runs, so that a faulty run cannot pull it.
+
+    Parameters
+    ----------
+    group : sequence of Answer
+        Runs of one operating point.
+    """
     best: tuple[float, ComplexArray] | None = None
     for pair in combinations(group[:24], 2):
         stiffness = solve_stiffness(pair)

@@ -29,7 +29,12 @@ _CLEAR = 30.0
 
 
 def check_load_ratios(runs: Sequence[Observation]) -> None:
-    """Mean force over set point of every dynamic and locus run against that of all others."""
+    """Mean force over set point of every dynamic and locus run against that of all others.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+    """
     shown: list[tuple[Observation, complex]] = []
     for seen in runs:
         stated = seen.run.point.static_load
@@ -58,7 +63,13 @@ def check_load_ratios(runs: Sequence[Observation]) -> None:
 
 
 def check_housing(runs: Sequence[Observation]) -> None:
-    """Acceleration against cell force of the dynamic runs of one frequency: one matrix serves them all."""
+    """Acceleration against cell force of the dynamic runs of one frequency: one matrix serves them all.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+        Dynamic ones.
+    """
     groups: dict[tuple[float, tuple[str, ...]], list[tuple[Observation, ComplexArray, ComplexArray]]] = {}
     for seen in runs:
         where = seen.pick("acceleration")

@@ -43,11 +43,29 @@ class Reporter:
     doubts: set[str] = field(default_factory=set)
 
     def say(self, key: str, severity: Severity, place: str, what: str, cure: str) -> None:
-        """Note a finding; `key` is the same for equal findings in other runs."""
+        """Note a finding; `key` is the same for equal findings in other runs.
+
+        Parameters
+        ----------
+        key : str
+            The same for equal findings in other runs.
+        severity : Severity
+        place : str
+            Where in the file.
+        what : str
+            What is wrong.
+        cure : str
+            What to do.
+        """
         self.found.append(Finding(Problem(severity, self.run.file, place, what, cure, self.run.id), key))
 
     def take(self, problems: Sequence[Problem]) -> None:
-        """Note problems that a reader raised."""
+        """Note problems that a reader raised.
+
+        Parameters
+        ----------
+        problems : sequence of Problem
+        """
         self.found.extend(Finding(p, f"{p.place} {p.what}") for p in problems)
 
 

@@ -93,7 +93,12 @@ class Difference:
     spare: int
 
     def evidence(self, pattern: FloatArray) -> Evidence:
-        """Estimate the factor of `pattern` (m,) in the rest; of nothing where the pattern does not show."""
+        """Estimate the factor of `pattern` (m,) in the rest; of nothing where the pattern does not show.
+
+        Parameters
+        ----------
+        pattern : (m,) ndarray
+        """
         weights = np.linalg.solve(self.noise + self.honest, pattern)
         information = float(pattern @ weights)
         if not information > 0:
@@ -102,12 +107,27 @@ class Difference:
         return Evidence(float(weights @ self.rest) / information, information, share**2 / self.spare)
 
     def misfit(self, pattern: FloatArray, part: float) -> float:
-        """Squared distance of the rest from `part` times the pattern, per equation, in units of its covariance."""
+        """Squared distance of the rest from `part` times the pattern, per equation, in units of its covariance.
+
+        Parameters
+        ----------
+        pattern : (m,) ndarray
+        part : float
+            Factor of the pattern.
+        """
         left = self.rest - part * pattern
         return float(left @ np.linalg.solve(self.noise + self.honest, left)) / len(left)
 
     def widened(self, place: int, deviation: float) -> Difference:
-        """The same with one equation less certain."""
+        """The same with one equation less certain.
+
+        Parameters
+        ----------
+        place : int
+            Of the equation.
+        deviation : float
+            Standard deviation added.
+        """
         honest = self.honest.copy()
         honest[place, place] += deviation**2
         return Difference(self.rest, self.noise, honest, self.spare)
@@ -145,7 +165,12 @@ class Evidence:
         return float(2 * stdtr(min(self.freedom, 1e9), -abs(self.part) * np.sqrt(self.information)))
 
     def joined(self, other: Evidence) -> Evidence:
-        """Weighted mean of two independent estimates."""
+        """Weighted mean of two independent estimates.
+
+        Parameters
+        ----------
+        other : Evidence
+        """
         information = self.information + other.information
         if information <= 0:
             return self
@@ -159,6 +184,16 @@ def dynamic_difference(
     """Force of run `one` minus H of the `others` times its displacement: Re X, Re Y, Im X, Im Y [N].
 
     H is their `common_stiffness`; None where they leave no scatter.
+
+    Parameters
+    ----------
+    readings : PointReadings
+    one : int
+        Place of the run.
+    others : sequence of int
+        Places of the runs that it is held against.
+    stiffness : (2, 2) complex ndarray
+        H [N/m].
     """
     spare = 2 * (2 * len(others) - 4)
     if spare < 4:
@@ -212,7 +247,14 @@ def _noise_error(readings: PointReadings, runs: Sequence[int], stiffness: Comple
 
 
 def common_stiffness(readings: PointReadings, runs: Sequence[int]) -> ComplexArray | None:
-    """H (2, 2) of F = H D over some runs, weighted by one over their displacements; None where not determined."""
+    """H (2, 2) of F = H D over some runs, weighted by one over their displacements; None where not determined.
+
+    Parameters
+    ----------
+    readings : PointReadings
+    runs : sequence of int
+        Places.
+    """
     displacement, force = readings.displacement[list(runs)], readings.force[list(runs)]
     sizes = np.linalg.norm(displacement, axis=1)
     if len(sizes) < 2 or not np.all(sizes > 0) or not np.all(np.isfinite(sizes)):
@@ -225,7 +267,15 @@ def common_stiffness(readings: PointReadings, runs: Sequence[int]) -> ComplexArr
 
 
 def leverage(fitted: ComplexArray, own: ComplexArray) -> float:
-    """Variance that a matrix fitted to displacements (n, 2) gives to its answer to one more (2,), over theirs."""
+    """Variance that a matrix fitted to displacements (n, 2) gives to its answer to one more (2,), over theirs.
+
+    Parameters
+    ----------
+    fitted : (n, 2) complex ndarray
+        Displacements that the matrix was fitted to.
+    own : (2,) complex ndarray
+        The displacement asked for, in the same unit.
+    """
     return float(np.real(own.conj() @ np.linalg.solve(fitted.T @ fitted.conj(), own)))
 
 
@@ -236,6 +286,16 @@ def static_difference(
 
     A load that misses its set point shows in the cells and, over the stiffness, in the probes; what positions wander by
     besides is their scatter. None where the stiffness cannot carry a load.
+
+    Parameters
+    ----------
+    readings : PointReadings
+    one : int
+        Place of the run.
+    others : sequence of int
+        Places of the runs that it is held against.
+    stiffness : (2, 2) complex ndarray
+        H [N/m].
     """
     if len(others) < 2 or np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
         return None
@@ -264,17 +324,41 @@ def static_difference(
 
 
 def dynamic_pattern(readings: PointReadings, one: int, channel: int, stiffness: ComplexArray) -> FloatArray:
-    """What a channel (probes 0 and 1, cells 2 and 3) contributes to force minus H times displacement, as `stacked`."""
+    """What a channel (probes 0 and 1, cells 2 and 3) contributes to force minus H times displacement, as `stacked`.
+
+    Parameters
+    ----------
+    readings : PointReadings
+    one : int
+        Place of the run.
+    channel : int
+        0 and 1: probes, 2 and 3: cells.
+    stiffness : (2, 2) complex ndarray
+        H [N/m].
+    """
     if channel < 2:
         return stacked(-stiffness @ readings.probe_plane[:, channel] * readings.probes[one, channel])
     return stacked(readings.cell_plane[:, channel - 2] * readings.cells[one, channel - 2])
 
 
 def lever_slack(lever: float, part: float) -> float:
-    """How uncertain a shift of the mean is, because the zero from which a probe's gain counts is [m]."""
+    """How uncertain a shift of the mean is, because the zero from which a probe's gain counts is [m].
+
+    Parameters
+    ----------
+    lever : float
+        Distance of the mean from the zero of the probe's gain [m].
+    part : float
+        Of the gain that the mean shows.
+    """
     return abs(_LEVER_KNOWN * lever * part)
 
 
 def stacked(vector: ComplexArray) -> FloatArray:
-    """Real parts, then imaginary ones."""
+    """Real parts, then imaginary ones.
+
+    Parameters
+    ----------
+    vector : (m,) complex ndarray
+    """
     return np.concatenate([vector.real, vector.imag])

@@ -62,12 +62,23 @@ class Observation:
     report: Reporter = field(repr=False)
 
     def pick(self, quantity: str) -> list[int]:
-        """Places of the channels of `quantity` in `channels`."""
+        """Places of the channels of `quantity` in `channels`.
+
+        Parameters
+        ----------
+        quantity : str
+            ``"displacement"``, ``"force"`` or ``"acceleration"``.
+        """
         return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
 
 
 def observe(run: Run) -> Observation:
-    """Read every channel of `run` once, block by block, and judge each by itself."""
+    """Read every channel of `run` once, block by block, and judge each by itself.
+
+    Parameters
+    ----------
+    run : Run
+    """
     report = Reporter(run)
     try:
         length = run.length

@@ -115,6 +115,14 @@ def gain_of_run(readings: PointReadings, one: int, others: Sequence[int]) -> Wro
     """The gain of one channel that explains run `one` best beside the `others`; None where no single one does.
 
     Where the best is too small to be a fault, no worse one is named in its place.
+
+    Parameters
+    ----------
+    readings : PointReadings
+    one : int
+        Place of the run.
+    others : sequence of int
+        Places of the runs that it is held against.
     """
     tried = sorted(_tries(readings, one, others), key=lambda t: t.left)
     if not tried or abs(tried[0].joint.part) < _LEAST:

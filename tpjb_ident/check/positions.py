@@ -22,7 +22,12 @@ _LIKE_RUNS, _STEP, _LEAST_STEP = 4, 6.0, 15e-6
 
 
 def check_positions(runs: Sequence[Observation]) -> None:
-    """Mean readings of the probes (gap voltage included) run against run, and their travel."""
+    """Mean readings of the probes (gap voltage included) run against run, and their travel.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+    """
     places: dict[tuple[str, str], list[tuple[Observation, float]]] = {}
     for seen in runs:
         for index in seen.pick("displacement"):

@@ -59,7 +59,12 @@ def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[O
 
 
 def definiteness(matrix: NDArray) -> float:
-    """Least over greatest eigenvalue of the symmetric part; 1 is isotropic, not above 0 impossible."""
+    """Least over greatest eigenvalue of the symmetric part; 1 is isotropic, not above 0 impossible.
+
+    Parameters
+    ----------
+    matrix : (2, 2) ndarray
+    """
     low, high = np.linalg.eigvalsh((matrix + matrix.T) / 2)
     return float(low / high) if high > 0 else -1.0
 
@@ -69,7 +74,15 @@ def _film_like(stiffness: ComplexArray) -> float:
 
 
 def mirrored(channels: Sequence[Channel], repair: FloatArray) -> FloatArray:
-    """What a repair (2, 2) of the readings of two channels does to X, Y (2, 2)."""
+    """What a repair (2, 2) of the readings of two channels does to X, Y (2, 2).
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+        Two.
+    repair : (2, 2) ndarray
+        On the readings of the two channels.
+    """
     inverse = np.stack([to_plane(channels, e) for e in np.eye(2)], axis=1)
     return np.asarray(inverse @ repair @ np.linalg.inv(inverse))
 
@@ -111,7 +124,13 @@ def _check_scales(group: Sequence[Answer], stiffness: ComplexArray, names: str) 
 
 
 def check_accelerometers(runs: Sequence[Observation]) -> None:
-    """Housing acceleration against cell force: on springs, the two are in antiphase."""
+    """Housing acceleration against cell force: on springs, the two are in antiphase.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+        Dynamic ones.
+    """
     shown: dict[str, list[tuple[Observation, complex]]] = {}
     for seen in runs:
         for name, ratio in _accelerations(seen):

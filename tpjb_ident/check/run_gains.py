@@ -38,7 +38,13 @@ def check_gains(group: Sequence[Answer], known_outliers: Collection[int], readin
 
 
 def channel_names(group: Sequence[Answer]) -> list[str]:
-    """Names of the two probes and two cells."""
+    """Names of the two probes and two cells.
+
+    Parameters
+    ----------
+    group : sequence of Answer
+        Runs of one operating point.
+    """
     first = group[0]
     return [c.name for c in (*first.channels, *_cells(first.seen))]
 
@@ -85,7 +91,12 @@ def _plane(channels: Sequence[Channel]) -> FloatArray:
 
 
 def probe_centres(sweeps: Sequence[Observation]) -> dict[str, float]:
-    """What every probe reads at the bearing's centre [m], from clearance runs whose load goes around."""
+    """What every probe reads at the bearing's centre [m], from clearance runs whose load goes around.
+
+    Parameters
+    ----------
+    sweeps : sequence of Observation
+    """
     found: dict[str, list[float]] = {}
     for seen in sweeps:
         cells, probes = seen.pick("force"), seen.pick("displacement")
@@ -103,6 +114,13 @@ def swept_centre(load: FloatArray, reading: FloatArray) -> float | None:
     """Mean of a probe's readings (n,) over all directions of a sweeping load (n, 2); None where it does not go around.
 
     Sides and corners of the clearance polygon lie evenly around the centre.
+
+    Parameters
+    ----------
+    load : (n, 2) ndarray
+        X and Y [N].
+    reading : (n,) ndarray
+        [m]
     """
     known = np.isfinite(load).all(axis=1) & np.isfinite(reading)
     if not known.any():
@@ -120,7 +138,14 @@ def _tell(answer: Answer, found: WrongGain, names: Sequence[str]) -> None:
 
 
 def gain_in_words(found: WrongGain, names: Sequence[str]) -> str:
-    """What a wrong gain looks like; `names` are those of its channels, the likeliest first."""
+    """What a wrong gain looks like; `names` are those of its channels, the likeliest first.
+
+    Parameters
+    ----------
+    found : WrongGain
+    names : sequence of str
+        Of its channels, the likeliest first.
+    """
     off = found.gain - 1
     others = f" (or {' or '.join(names[1:])} another gain)" if len(names) > 1 else ""
     by = "phasor and mean say so" if found.means else "its phasor says so, its mean cannot"

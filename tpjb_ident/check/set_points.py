@@ -22,13 +22,29 @@ _LINE_OVER_FLOOR = 8.0
 
 
 def to_plane(channels: Sequence[Channel], readings: NDArray) -> NDArray:
-    """X, Y from one value per channel; complex stays complex."""
+    """X, Y from one value per channel; complex stays complex.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+    readings : (m,) or (m, n) ndarray
+        One row per channel, SI.
+    """
     inverse = inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
     return np.asarray(inverse @ readings)
 
 
 def plane_vector(seen: Observation, quantity: str, values: NDArray) -> NDArray | None:
-    """X, Y of one value per channel of `quantity`; None where its channels do not span the plane."""
+    """X, Y of one value per channel of `quantity`; None where its channels do not span the plane.
+
+    Parameters
+    ----------
+    seen : Observation
+    quantity : str
+        ``"displacement"``, ``"force"`` or ``"acceleration"``.
+    values : (m,) ndarray
+        One per channel of the run, SI.
+    """
     where = seen.pick(quantity)
     if len(where) < 2:
         return None
@@ -37,12 +53,27 @@ def plane_vector(seen: Observation, quantity: str, values: NDArray) -> NDArray |
 
 
 def angle_between(first: float, second: float, period: float = 360.0) -> float:
-    """Smallest angle between two directions [deg]."""
+    """Smallest angle between two directions [deg].
+
+    Parameters
+    ----------
+    first : float
+        [deg]
+    second : float
+        [deg]
+    period : float, optional
+        After which directions repeat [deg].
+    """
     return abs((first - second + period / 2) % period - period / 2)
 
 
 def check_static_load(seen: Observation) -> None:
-    """Mean force of a dynamic or locus run against the stated static load and its direction."""
+    """Mean force of a dynamic or locus run against the stated static load and its direction.
+
+    Parameters
+    ----------
+    seen : Observation
+    """
     run = seen.run
     if run.kind not in {"dynamic", "locus"} or seen.lines is None:
         return
@@ -86,7 +117,12 @@ def _check_size(seen: Observation, ratio: float) -> None:
 
 
 def check_speed(seen: Observation) -> None:
-    """Speed channel against the stated shaft speed."""
+    """Speed channel against the stated shaft speed.
+
+    Parameters
+    ----------
+    seen : Observation
+    """
     stated, measured = seen.run.point.shaft_speed, seen.speed
     if math.isnan(measured):
         return
@@ -104,7 +140,14 @@ def check_speed(seen: Observation) -> None:
 
 
 def oil_force(seen: Observation, mass: float) -> ComplexArray | None:
-    """Force phasor of the film on the housing, F_cell + m_h a_h, X and Y [N]; None where not measured."""
+    """Force phasor of the film on the housing, F_cell + m_h a_h, X and Y [N]; None where not measured.
+
+    Parameters
+    ----------
+    seen : Observation
+    mass : float
+        Of the housing [kg]; NaN where not stated.
+    """
     if seen.lines is None:
         return None
     force = plane_vector(seen, "force", seen.lines.phasor)
@@ -117,7 +160,12 @@ def oil_force(seen: Observation, mass: float) -> ComplexArray | None:
 
 
 def excited(seen: Observation) -> bool:
-    """Whether the force shows the excitation line above its noise."""
+    """Whether the force shows the excitation line above its noise.
+
+    Parameters
+    ----------
+    seen : Observation
+    """
     if seen.lines is None:
         return False
     where = seen.pick("force")
@@ -126,7 +174,15 @@ def excited(seen: Observation) -> bool:
 
 
 def check_excitation(runs: Sequence[Observation], mass: float) -> None:
-    """Excitation of dynamic runs: there at all, as strong as in the other runs, in the stated direction."""
+    """Excitation of dynamic runs: there at all, as strong as in the other runs, in the stated direction.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+        Dynamic ones.
+    mass : float
+        Of the housing [kg]; NaN where not stated.
+    """
     forces = {id(s): f for s in runs if (f := oil_force(s, mass)) is not None}
     relative = {
         id(s): float(np.linalg.norm(forces[id(s)])) / max(s.run.point.static_load, 1e-9)

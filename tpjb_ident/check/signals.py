@@ -21,7 +21,13 @@ _TEMPERATURES = (_CELSIUS - 50.0, _CELSIUS + 300.0)
 
 
 def needed(run: Run, channel: Channel) -> bool:
-    """Whether `run` cannot be used without `channel`."""
+    """Whether `run` cannot be used without `channel`.
+
+    Parameters
+    ----------
+    run : Run
+    channel : Channel
+    """
     return channel.quantity in NEEDED[run.kind]
 
 

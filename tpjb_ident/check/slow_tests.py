@@ -42,7 +42,13 @@ def _planes(seen: Observation) -> tuple[FloatArray, FloatArray] | None:
 
 
 def check_dry(runs: Sequence[Observation]) -> None:
-    """Dry pivot runs: a load that rises, its direction, pads told apart."""
+    """Dry pivot runs: a load that rises, its direction, pads told apart.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+        Dry ones.
+    """
     directions: list[tuple[Observation, float]] = []
     for seen in runs:
         planes = _planes(seen)
@@ -60,7 +66,13 @@ def check_dry(runs: Sequence[Observation]) -> None:
 
 
 def check_shaft_follows(runs: Sequence[Observation]) -> None:
-    """Dry pivot runs: the shaft goes toward the pad, where the force can be trusted."""
+    """Dry pivot runs: the shaft goes toward the pad, where the force can be trusted.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+        Dry ones.
+    """
     for seen in runs:
         planes = _planes(seen)
         push = None if planes is None or "force" in seen.report.doubts else _main_move(planes[0])
@@ -120,7 +132,13 @@ def _check_follows(seen: Observation, planes: tuple[FloatArray, FloatArray], pus
 
 
 def check_sweeps(runs: Sequence[Observation]) -> None:
-    """Clearance runs: the shaft moves to the side to which the small load pushes it."""
+    """Clearance runs: the shaft moves to the side to which the small load pushes it.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+        Clearance ones.
+    """
     for seen in runs:
         planes = _planes(seen)
         if planes is None:
@@ -136,7 +154,13 @@ def check_sweeps(runs: Sequence[Observation]) -> None:
 
 
 def check_locus(runs: Sequence[Observation]) -> None:
-    """Locus runs together: mean positions follow the directions of the loads."""
+    """Locus runs together: mean positions follow the directions of the loads.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+        Locus ones.
+    """
     groups: dict[object, list[Observation]] = {}
     for seen in runs:
         measured = len(seen.pick("displacement")) == 2 and len(seen.pick("force")) >= 2

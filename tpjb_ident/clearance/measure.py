@@ -169,7 +169,16 @@ def measure_clearances(
     curves: Sequence[PivotCurve] | None = None,
     rule: CentreRule = "least-absolute",
 ) -> tuple[ClearancePolygon, ...]:
-    """All clearance runs of a campaign (hot and cold, several push loads), each as `measure_clearance`."""
+    """All clearance runs of a campaign (hot and cold, several push loads), each as `measure_clearance`.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    pivot_angles : sequence of float
+        Pad directions [rad], pad #1 first.
+    curves : sequence of PivotCurve, optional
+    rule : CentreRule, optional
+    """
     return tuple(measure_run(run, pivot_angles, curves, rule) for run in campaign.of_kind("clearance"))
 
 
@@ -179,7 +188,17 @@ def measure_run(
     curves: Sequence[PivotCurve] | None = None,
     rule: CentreRule = "least-absolute",
 ) -> ClearancePolygon:
-    """Measure the polygon of one run; parameters as `measure_clearance`."""
+    """Measure the polygon of one run; parameters as `measure_clearance`.
+
+    Parameters
+    ----------
+    run : Run
+        Of kind ``clearance``.
+    pivot_angles : sequence of float
+        Pad directions [rad], pad #1 first.
+    curves : sequence of PivotCurve, optional
+    rule : CentreRule, optional
+    """
     angles = np.asarray(pivot_angles, dtype=float)
     touch = read_sweep(run, angles)
     reached = np.bincount(touch.pad, minlength=len(angles)) >= FEWEST_BLOCKS
@@ -264,7 +283,12 @@ def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[Con
 
 
 def mean_temperature(run: Run) -> float:
-    """Mean over time and over all temperature channels of a run [K]; NaN without any."""
+    """Mean over time and over all temperature channels of a run [K]; NaN without any.
+
+    Parameters
+    ----------
+    run : Run
+    """
     names = [name for name, channel in run.channels.items() if channel.quantity == "temperature"]
     records = [np.asarray(run.record(name).values) for name in names]
     means = [float(np.mean(v[np.isfinite(v)])) for v in records if np.isfinite(v).any()]
@@ -272,7 +296,13 @@ def mean_temperature(run: Run) -> float:
 
 
 def coldest_run(runs: Sequence[Run]) -> Run:
-    """The sweep at rest, or at the lowest speed, that is cold; of several such the one with the smallest push."""
+    """The sweep at rest, or at the lowest speed, that is cold; of several such the one with the smallest push.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Clearance runs.
+    """
     if len(runs) == 1:
         return runs[0]
     slowest = min(run.point.shaft_speed for run in runs)

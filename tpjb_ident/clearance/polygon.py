@@ -49,7 +49,13 @@ class Centre:
 
 
 def normals(angles: FloatArray) -> FloatArray:
-    """Unit vectors (n, 2) toward the pads at `angles` (n,) [rad]."""
+    """Unit vectors (n, 2) toward the pads at `angles` (n,) [rad].
+
+    Parameters
+    ----------
+    angles : (n,) ndarray
+        [rad]
+    """
     return np.column_stack([np.cos(angles), np.sin(angles)])
 
 

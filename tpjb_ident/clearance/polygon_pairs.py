@@ -163,7 +163,13 @@ def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> p
 
 
 def same_condition(one: ClearancePolygon, other: ClearancePolygon) -> bool:
-    """Whether two sweeps were made at one speed and one temperature (or nobody knows better)."""
+    """Whether two sweeps were made at one speed and one temperature (or nobody knows better).
+
+    Parameters
+    ----------
+    one : ClearancePolygon
+    other : ClearancePolygon
+    """
     apart = abs(one.temperature - other.temperature)
     return one.point.shaft_speed == other.point.shaft_speed and not apart > SAME_WARMTH
 

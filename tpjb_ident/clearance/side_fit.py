@@ -67,7 +67,16 @@ class SideFit:
 
 
 def known_give(curves: Sequence[PivotCurve], pad: IntArray, load: FloatArray) -> FloatArray:
-    """Deflection (m,) [m] of pads (m,) (index from 0) at loads (m,) [N]; zero for pads without a curve."""
+    """Deflection (m,) [m] of pads (m,) (index from 0) at loads (m,) [N]; zero for pads without a curve.
+
+    Parameters
+    ----------
+    curves : sequence of PivotCurve
+    pad : (m,) ndarray of int
+        From 0.
+    load : (m,) ndarray
+        [N]
+    """
     give = np.zeros(len(load))
     for curve in curves:
         mine = pad == curve.pad - 1

@@ -60,7 +60,12 @@ class Touch:
     alone: BoolArray
 
     def take(self, keep: BoolArray) -> Touch:
-        """The averages where `keep` (m,) is true."""
+        """The averages where `keep` (m,) is true.
+
+        Parameters
+        ----------
+        keep : (m,) ndarray of bool
+        """
         return Touch(
             self.time[keep],
             self.duration[keep],
@@ -108,7 +113,8 @@ def read_sweep(run: Run, angles: FloatArray, give: FloatArray | None = None, lon
     depth = CONTACT_DEPTH + (np.full(len(angles), LARGEST_GIVE) if give is None else 1.3 * give)
     touched = _touched(position, angles, depth)
     carried = _carried(load, angles, touched)
-    return _blocks(time, position, angles, touched, carried, push, _piece_length(run.point.shaft_speed))
+    swept = _Swept(time, position, touched, carried, push)
+    return _blocks(swept, angles, _piece_length(run.point.shaft_speed))
 
 
 def _piece_length(shaft_speed: float) -> float:
@@ -167,16 +173,20 @@ def _carried(load: FloatArray, angles: FloatArray, touched: BoolArray) -> FloatA
     return carried
 
 
-def _blocks(
-    time: FloatArray,
-    position: FloatArray,
-    angles: FloatArray,
-    touched: BoolArray,
-    carried: FloatArray,
-    push: float,
-    length: float,
-) -> Touch:
+@dataclass(frozen=True)
+class _Swept:
+    """Samples of a sweep: time (m,) [s], position (m, 2) [m], touched pads, their loads (m, n) [N], push load [N]."""
+
+    time: FloatArray
+    position: FloatArray
+    touched: BoolArray
+    carried: FloatArray
+    push: float
+
+
+def _blocks(swept: _Swept, angles: FloatArray, length: float) -> Touch:
     """Average per pad over pieces of `length` seconds in which the same pads are touched."""
+    time, touched = swept.time, swept.touched
     state = touched @ (1 << np.arange(len(angles)))
     piece = np.floor((time - time[0]) / length).astype(int)
     cuts = np.flatnonzero((np.diff(state) != 0) | (np.diff(piece) != 0)) + 1
@@ -191,9 +201,9 @@ def _blocks(
 
     period = float(time[-1] - time[0]) / (len(time) - 1)
     moment = means(time[:, None])[:, 0]
-    place = means(position)
-    load = means(np.nan_to_num(carried))
-    lost = means(np.isnan(carried).astype(float)) > 0.0
+    place = means(swept.position)
+    load = means(np.nan_to_num(swept.carried))
+    lost = means(np.isnan(swept.carried).astype(float)) > 0.0
     usable = touched[starts] & ~lost & _at_rest(moment, place, touched[starts])[:, None]
     row, pad = np.nonzero(usable)
     tangent = np.column_stack([-np.sin(angles), np.cos(angles)])
@@ -204,7 +214,7 @@ def _blocks(
         along=np.sum(place[row] * normals(angles)[pad], axis=1),
         across=np.sum(place[row] * tangent[pad], axis=1),
         load=load[row, pad],
-        push=push,
+        push=swept.push,
         alone=touched[starts][row].sum(axis=1) == 1,
     )
 

@@ -42,7 +42,14 @@ def contact_onset(fit: LawFit, tolerance: float) -> float:
 
 
 def contact_onset_se(fit: LawFit, tolerance: float) -> float:
-    """Standard error of the onset [N], by finite differences through the parameters."""
+    """Standard error of the onset [N], by finite differences through the parameters.
+
+    Parameters
+    ----------
+    fit : LawFit
+    tolerance : float
+        Share of the pivot's own compliance.
+    """
     if not fit.contact:
         return 0.0
     centre = contact_onset(fit, tolerance)

@@ -118,12 +118,24 @@ class PivotCurve:
         return self.load_direction.angle
 
     def deflection(self, load: ArrayLike) -> FloatArray:
-        """Deflection [m] at pad loads [N]; same shape as `load`, which must not be negative."""
+        """Deflection [m] at pad loads [N]; same shape as `load`, which must not be negative.
+
+        Parameters
+        ----------
+        load : array_like
+            [N], not negative.
+        """
         values = _loads(load)
         return self.law.deflection(values.ravel()).reshape(values.shape)
 
     def load(self, deflection: ArrayLike) -> FloatArray:
-        """Pad load [N] at deflections [m] (the inverse of `deflection`)."""
+        """Pad load [N] at deflections [m] (the inverse of `deflection`).
+
+        Parameters
+        ----------
+        deflection : array_like
+            [m], not negative.
+        """
         wanted = np.asarray(deflection, dtype=float)
         if np.any(~(wanted >= 0.0)):
             raise ArgumentError("deflection must be zero or positive, and not NaN")
@@ -138,12 +150,24 @@ class PivotCurve:
         return float(optimize.brentq(lambda w: float(self.deflection(w)) - deflection, 0.0, top, xtol=1e-9 * top))
 
     def stiffness(self, load: ArrayLike) -> FloatArray:
-        """Tangent stiffness dW/d delta [N/m] at pad loads [N], what small vibrations feel (paper, Eq. 18)."""
+        """Tangent stiffness dW/d delta [N/m] at pad loads [N], what small vibrations feel (paper, Eq. 18).
+
+        Parameters
+        ----------
+        load : array_like
+            [N], not negative.
+        """
         values = _loads(load)
         return np.asarray(1.0 / self.law.compliance(values.ravel())).reshape(values.shape)
 
     def secant(self, load: ArrayLike) -> FloatArray:
-        """Secant stiffness W/delta [N/m] at pad loads [N], what the printed formulas mean (Eq. 16, 17)."""
+        """Secant stiffness W/delta [N/m] at pad loads [N], what the printed formulas mean (Eq. 16, 17).
+
+        Parameters
+        ----------
+        load : array_like
+            [N], not negative.
+        """
         values = _loads(load)
         return np.asarray(values / self.deflection(values))
 
@@ -169,20 +193,39 @@ class PivotCurve:
         return np.asarray(centre * np.exp(-half)), np.asarray(centre * np.exp(half))
 
     def secant_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
-        """Interval of the secant stiffness [N/m]; as `stiffness_band`."""
+        """Interval of the secant stiffness [N/m]; as `stiffness_band`.
+
+        Parameters
+        ----------
+        load : array_like
+            [N], not negative.
+        level : float, optional
+            Of the interval, 0 to 1.
+        """
         values = _loads(load)
         half = self._quantile(level) * self._spread(values, secant=True)
         centre = self.secant(values)
         return np.asarray(centre * np.exp(-half)), np.asarray(centre * np.exp(half))
 
     def relative_stiffness_se(self, load: ArrayLike) -> FloatArray:
-        """Standard error of ln(tangent stiffness) at pad loads [N]."""
+        """Standard error of ln(tangent stiffness) at pad loads [N].
+
+        Parameters
+        ----------
+        load : array_like
+            [N]
+        """
         return self._spread(_loads(load), secant=False)
 
     def relative_stiffness_covariance(self, load: ArrayLike) -> FloatArray:
         """Covariance of ln(tangent stiffness) between pad loads (n,) [N], (n, n).
 
         A curve that is off is off as a whole: contact and friction bend it, noise hardly scatters it.
+
+        Parameters
+        ----------
+        load : (n,) array_like
+            [N]
         """
         values = np.maximum(_loads(load).ravel(), 1e-6 * self.valid_to)
         beyond = EXTRAPOLATION_SPREAD * self._beyond(values)
@@ -222,7 +265,13 @@ class PivotCurve:
         return tuple(np.asarray(part).reshape(values.shape) for part in (value, value - half, value + half))  # type: ignore[return-value]
 
     def is_extrapolated(self, load: ArrayLike) -> BoolArray:
-        """True where a load lies outside what was measured with full contact."""
+        """True where a load lies outside what was measured with full contact.
+
+        Parameters
+        ----------
+        load : array_like
+            [N]
+        """
         values = _loads(load)
         return np.asarray((values < self.valid_from) | (values > self.valid_to))
 

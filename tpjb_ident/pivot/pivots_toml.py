@@ -6,8 +6,6 @@ than any reader's interpolation can spoil; no parameters are written, so a reade
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +15,7 @@ import numpy as np
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.runtime.tables import write_text
 from tpjb_ident.schema import TANGENT
 
 SCHEMA = "tpjb-pivots/1"
@@ -26,7 +25,12 @@ EXTRAPOLATE_TO = 2.5
 
 
 def table_loads(curve: PivotCurve) -> FloatArray:
-    """Loads of the table [N]: zero, then geometric steps (n,)."""
+    """Loads of the table [N]: zero, then geometric steps (n,).
+
+    Parameters
+    ----------
+    curve : PivotCurve
+    """
     return np.r_[0.0, np.geomspace(SMALLEST * curve.valid_to, EXTRAPOLATE_TO * curve.valid_to, ROWS)]
 
 
@@ -76,16 +80,7 @@ def write_pivots(path: str | Path, curves: Sequence[PivotCurve], source: str) ->
         The destination.
     """
     target = Path(path)
-    text = pivots_text(curves, source)
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".tmp")
-    temporary = Path(name)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
-        temporary.replace(target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    write_text(target, pivots_text(curves, source))
     return target
 
 

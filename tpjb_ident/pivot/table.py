@@ -21,7 +21,14 @@ ROWS = 20  # up to the largest measured load
 
 
 def load_grid(curves: Sequence[PivotCurve], extrapolate_to: float = 1.6) -> FloatArray:
-    """Round loads [N] up to `extrapolate_to` times the largest measured one (n,)."""
+    """Round loads [N] up to `extrapolate_to` times the largest measured one (n,).
+
+    Parameters
+    ----------
+    curves : sequence of PivotCurve
+    extrapolate_to : float, optional
+        Times the largest measured load.
+    """
     largest = max(curve.valid_to for curve in curves)
     raw = largest / ROWS
     decade = 10.0 ** np.floor(np.log10(raw))

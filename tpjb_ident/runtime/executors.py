@@ -178,7 +178,13 @@ class PoolWorkers:
         self._executor: Executor | None = None
 
     def close(self, wait: bool = True) -> None:
-        """End the executor; with it the jobs that have not begun."""
+        """End the executor; with it the jobs that have not begun.
+
+        Parameters
+        ----------
+        wait : bool, optional
+            Whether to wait for the jobs that run.
+        """
         if self._executor is not None:
             if isinstance(self._executor, ProcessPoolExecutor):
                 self._executor.shutdown(wait=wait, cancel_futures=True)

@@ -17,6 +17,10 @@ except ImportError:  # Windows: no advisory locks on folders; two runs into one 
 def locked(folder: Path) -> Iterator[None]:
     """Hold the lock of `folder` while the block runs; wait for whoever has it.
 
+    Parameters
+    ----------
+    folder : Path
+
     Yields
     ------
     None
@@ -29,18 +33,34 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def hold(folder: Path) -> int | None:
-    """Take the lock of a folder that nobody else knows yet; give it to `release`."""
+    """Take the lock of a folder that nobody else knows yet; give it to `release`.
+
+    Parameters
+    ----------
+    folder : Path
+    """
     return _open(folder, wait=False)
 
 
 def release(handle: int | None) -> None:
-    """Drop a lock."""
+    """Drop a lock.
+
+    Parameters
+    ----------
+    handle : int or None
+        Given by `hold`.
+    """
     if handle is not None:
         os.close(handle)
 
 
 def is_abandoned(folder: Path) -> bool:
-    """Whether the process that held the lock of `folder` is gone; False where that cannot be told."""
+    """Whether the process that held the lock of `folder` is gone; False where that cannot be told.
+
+    Parameters
+    ----------
+    folder : Path
+    """
     if fcntl is None:
         return False
     try:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import importlib.metadata
+import importlib.util
+import json
 import platform
 from pathlib import Path
 
@@ -22,6 +25,29 @@ def versions() -> dict[str, str]:
 
 
 def sha256(path: Path) -> str:
-    """SHA-256 of a file, in hexadecimal."""
+    """SHA-256 of a file, in hexadecimal.
+
+    Parameters
+    ----------
+    path : Path
+    """
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@functools.cache
+def source_stamp(packages: tuple[str, ...] = ("rigdata", "tpjb_ident")) -> str:
+    """SHA-256 of the versions of all packages and of the sources of some: kept results of other code count for nothing.
+
+    Parameters
+    ----------
+    packages : tuple of str
+        Whose sources count.
+    """
+    digest = hashlib.sha256(json.dumps(versions(), sort_keys=True).encode())
+    for package in packages:
+        found = importlib.util.find_spec(package)
+        for folder in sorted(found.submodule_search_locations or ()) if found else ():
+            for source in sorted(Path(folder).rglob("*.py")):
+                digest.update(source.relative_to(folder).as_posix().encode() + b"\0" + source.read_bytes())
+    return digest.hexdigest()

@@ -45,7 +45,13 @@ def write_atomic(path: Path, write: Callable[[Path], None]) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8 text with Unix line ends, whole or not at all."""
+    """Write UTF-8 text with Unix line ends, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    text : str
+    """
     write_atomic(path, lambda temporary: _write_utf8(temporary, text))
 
 
@@ -80,7 +86,12 @@ def write_table(folder: Path, name: str, frame: pd.DataFrame) -> tuple[Path, Pat
 
 
 def safe_for_spreadsheets(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return a copy whose text cells and column names no spreadsheet takes for formulas."""
+    """Return a copy whose text cells and column names no spreadsheet takes for formulas.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+    """
     safe = frame.copy()
     for column in safe.columns:
         if safe[column].dtype.kind not in "biufcmM":
@@ -98,5 +109,11 @@ def _disarm(cell: Any) -> Any:
 
 
 def printable(text: object) -> str:
-    """Text from outside without control characters: nothing that steers a terminal or turns writing round."""
+    """Text from outside without control characters: nothing that steers a terminal or turns writing round.
+
+    Parameters
+    ----------
+    text : object
+        From a file or a name.
+    """
     return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", str(text))

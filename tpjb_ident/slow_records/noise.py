@@ -75,7 +75,13 @@ class NoiseModel:
         )
 
     def mean_variance(self, duration: float) -> float:
-        """Variance of one average over `duration` seconds about the run's own level [m^2]."""
+        """Variance of one average over `duration` seconds about the run's own level [m^2].
+
+        Parameters
+        ----------
+        duration : float
+            [s]
+        """
         m = 40
         time = (np.arange(m) + 0.5) * duration / m
         total = NoiseModel(self.white, self.flicker, 0.0).covariance(time, np.full(m, duration / m))
@@ -83,7 +89,15 @@ class NoiseModel:
 
 
 def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> FloatArray:
-    """Covariance (m, m) of 1/f noise of unit power density at 1 Hz; of averages where `duration` is given."""
+    """Covariance (m, m) of 1/f noise of unit power density at 1 Hz; of averages where `duration` is given.
+
+    Parameters
+    ----------
+    time : (m,) ndarray
+        Middles [s].
+    duration : (m,) ndarray, optional
+        Averaging times [s].
+    """
     apart = np.abs(time[:, None] - time[None, :])
     kernel = np.zeros_like(apart)
     for tau in FLICKER_TIMES:

@@ -11,7 +11,6 @@ result. No pickles: a folder of results may come from anybody.
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import json
 import shutil
@@ -28,7 +27,7 @@ from tpjb_ident.dynamic.records.lines import Line, LineSet
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.dynamic.runs.run_result import RunResult
-from tpjb_ident.runtime.provenance import sha256, versions
+from tpjb_ident.runtime.provenance import sha256, source_stamp
 from tpjb_ident.runtime.tables import write_atomic
 
 _BLOCKS = ("displacement", "cell_force", "acceleration")
@@ -54,20 +53,8 @@ def fingerprint(run: Run, housing_mass: float, settings: PhasorSettings) -> str:
         return ""
     entry = (run.id, run.kind, run.point, run.excitation_direction, dict(run.channels), reader)
     described = (dict(getattr(reader, "channels", {})), housing_mass, settings)
-    text = "\n".join([record, repr(entry), repr(described), code_stamp()])
+    text = "\n".join([record, repr(entry), repr(described), source_stamp()])
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-@functools.cache
-def code_stamp() -> str:
-    """SHA-256 of the versions of all packages and of the sources of reading and fitting."""
-    digest = hashlib.sha256(json.dumps(versions(), sort_keys=True).encode())
-    import rigdata
-
-    for folder in (Path(__file__).parents[1], Path(rigdata.__file__).parent):
-        for source in sorted(folder.rglob("*.py")):
-            digest.update(source.relative_to(folder).as_posix().encode() + b"\0" + source.read_bytes())
-    return digest.hexdigest()
 
 
 class RunStore:

@@ -68,7 +68,14 @@ def _pad_weights(pad: Sequence[LawFit], share: dict[str, float]) -> FloatArray:
 
 
 def keep_likely(fits: Sequence[LawFit], weights: FloatArray) -> tuple[tuple[LawFit, ...], FloatArray]:
-    """The fits worth keeping, most likely first, with shares that sum to one."""
+    """The fits worth keeping, most likely first, with shares that sum to one.
+
+    Parameters
+    ----------
+    fits : sequence of LawFit
+    weights : (n,) ndarray
+        Shares of the fits.
+    """
     order = [k for k in np.argsort(-weights, kind="stable") if weights[k] >= SMALLEST_WEIGHT]
     kept = weights[order]
     return tuple(fits[k] for k in order), np.asarray(kept / kept.sum())

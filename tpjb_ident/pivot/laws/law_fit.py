@@ -97,22 +97,46 @@ class LawFit:
         return self.theta[SCALE + 1 : SCALE + 1 + len(self.law.parameters)]
 
     def deflection(self, load: FloatArray) -> FloatArray:
-        """Deflection (n,) [m] of the pivot alone at pad loads (n,) [N]."""
+        """Deflection (n,) [m] of the pivot alone at pad loads (n,) [N].
+
+        Parameters
+        ----------
+        load : array_like
+            [N], not negative.
+        """
         u = np.maximum(load, 0.0) / self.reference_load
         return np.asarray(np.exp(self.theta[SCALE]) * self.reference_load * self.law.phi(u, self.shape)[0])
 
     def compliance(self, load: FloatArray) -> FloatArray:
-        """Tangent compliance d delta / dW (n,) [m/N]."""
+        """Tangent compliance d delta / dW (n,) [m/N].
+
+        Parameters
+        ----------
+        load : (n,) ndarray
+            [N]
+        """
         u = np.maximum(load, 0.0) / self.reference_load
         return np.asarray(np.exp(self.theta[SCALE]) * self.law.psi(u, self.shape)[0])
 
     def log_compliance_gradient(self, load: FloatArray) -> FloatArray:
-        """Derivative (n, p) of ln(compliance) with respect to `theta`."""
+        """Derivative (n, p) of ln(compliance) with respect to `theta`.
+
+        Parameters
+        ----------
+        load : (n,) ndarray
+            [N]
+        """
         value, shape = self.law.psi(np.maximum(load, 0.0) / self.reference_load, self.shape)
         return self._gradient(value, shape)
 
     def log_deflection_gradient(self, load: FloatArray) -> FloatArray:
-        """Derivative (n, p) of ln(deflection) with respect to `theta`."""
+        """Derivative (n, p) of ln(deflection) with respect to `theta`.
+
+        Parameters
+        ----------
+        load : (n,) ndarray
+            [N]
+        """
         value, shape = self.law.phi(np.maximum(load, 0.0) / self.reference_load, self.shape)
         return self._gradient(value, shape)
 
@@ -123,18 +147,40 @@ class LawFit:
         return gradient
 
     def missing_compliance(self, load: FloatArray) -> FloatArray:
-        """What incomplete contact adds to the measured compliance (n,) [m/N]."""
+        """What incomplete contact adds to the measured compliance (n,) [m/N].
+
+        Parameters
+        ----------
+        load : (n,) ndarray
+            [N]
+        """
         if not self.contact:
             return np.zeros_like(load)
         gap, load_0 = self.theta[-2], np.exp(self.theta[-1])
         return np.asarray(gap / load_0 * np.exp(-load / load_0))
 
     def reading(self, load: FloatArray, branch: FloatArray) -> FloatArray:
-        """Expected displacement reading (n,) [m] at applied loads (n,) [N], contact loss included."""
+        """Expected displacement reading (n,) [m] at applied loads (n,) [N], contact loss included.
+
+        Parameters
+        ----------
+        load : (n,) ndarray
+            [N]
+        branch : (n,) ndarray
+            +1 loading, -1 unloading.
+        """
         return self.reading_gradient(load, branch)[0]
 
     def reading_gradient(self, load: FloatArray, branch: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Expected reading (n,) [m] and its derivative (n, p) with respect to `theta`."""
+        """Expected reading (n,) [m] and its derivative (n, p) with respect to `theta`.
+
+        Parameters
+        ----------
+        load : (n,) ndarray
+            [N]
+        branch : (n,) ndarray
+            +1 loading, -1 unloading.
+        """
         return _predict(self.law, self.theta, self.contact, load, branch, self.reference_load)
 
 
@@ -234,8 +280,7 @@ def fit_law(
     unit[OFFSET] = np.ptp(data.deflection)  # metres and pure numbers in one matrix: scale the metres
     if contact:
         unit[-2] = CONTACT_GAP
-    whitened = data.whitener @ data.deflection
-    theta, hessian, chi_square = _descend(law, contact, data, prior, theta, unit, whitened)
+    theta, hessian, chi_square = _descend(law, contact, data, prior, theta, unit)
     gap = theta - prior.mean
     quadratic = float(gap @ prior.precision @ gap)
     # the offset's unit enters every law alike; the others' units cancel against the prior's determinant
@@ -260,10 +305,11 @@ def _start(prior: _Prior, contact: bool, data: FitData) -> FloatArray:
 
 
 def _descend(
-    law: Law, contact: bool, data: FitData, prior: _Prior, theta: FloatArray, unit: FloatArray, whitened: FloatArray
+    law: Law, contact: bool, data: FitData, prior: _Prior, theta: FloatArray, unit: FloatArray
 ) -> tuple[FloatArray, FloatArray, float]:
     """Levenberg-Marquardt to the posterior mode: theta, Hessian in units of `unit`, chi-square."""
     precision = prior.precision * np.outer(unit, unit)
+    whitened = data.whitener @ data.deflection
 
     def state(at: FloatArray) -> tuple[float, float, FloatArray, FloatArray]:
         value, jacobian = _predict(law, at, contact, data.load, data.branch, data.reference_load)

@@ -56,10 +56,26 @@ class Law(Protocol):
         """Lowest and highest shape parameters (k,), (k,) at which the law is monotone."""
 
     def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Deflection shape (n,) and its derivative with respect to q (n, k)."""
+        """Deflection shape (n,) and its derivative with respect to q (n, k).
+
+        Parameters
+        ----------
+        u : (n,) ndarray
+            Load over the reference load.
+        q : (k,) ndarray
+            Parameters of the shape.
+        """
 
     def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compliance shape (n,) and its derivative with respect to q (n, k)."""
+        """Compliance shape (n,) and its derivative with respect to q (n, k).
+
+        Parameters
+        ----------
+        u : (n,) ndarray
+            Load over the reference load.
+        q : (k,) ndarray
+            Parameters of the shape.
+        """
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,12 @@ class Blocks:
         return len(self.time)
 
     def take(self, keep: BoolArray) -> Blocks:
-        """The blocks where `keep` (m,) is true."""
+        """The blocks where `keep` (m,) is true.
+
+        Parameters
+        ----------
+        keep : (m,) ndarray of bool
+        """
         return Blocks(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
 

@@ -137,7 +137,12 @@ def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: BoolArray) -> Pic
 
 
 def axial_channels(run: Run) -> dict[str, Channel]:
-    """Probes and cells of a run, by name."""
+    """Probes and cells of a run, by name.
+
+    Parameters
+    ----------
+    run : Run
+    """
     return {n: c for n, c in run.channels.items() if c.quantity in ("force", "displacement") and c.axis is not None}
 
 
@@ -154,5 +159,16 @@ def _quantisation(samples: Samples) -> float:
 
 
 def refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
-    """Error that names the run, the place, the trouble and the cure."""
+    """Error that names the run, the place, the trouble and the cure.
+
+    Parameters
+    ----------
+    run : Run
+    place : str
+        Channel or key.
+    what : str
+        What is wrong.
+    cure : str
+        What to do.
+    """
     return RigDataError(Problem("error", run.file, place, f"run {run.id} {what}", cure, run=run.id))

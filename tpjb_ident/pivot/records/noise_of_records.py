@@ -13,7 +13,14 @@ from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_nois
 
 
 def noise_within_holds(records: Sequence[DryRecord], drift_rate: float) -> NoiseModel:
-    """Noise from what happens within holds alone: every hold's level is free, so a bad step does no harm."""
+    """Noise from what happens within holds alone: every hold's level is free, so a bad step does no harm.
+
+    Parameters
+    ----------
+    records : sequence of DryRecord
+    drift_rate : float
+        Centre of the prior of the drift rate [m/s].
+    """
     series: list[NoiseSeries] = []
     for record in _with_holds(records):
         used = record.blocks.hold >= 0

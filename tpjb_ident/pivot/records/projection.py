@@ -55,7 +55,13 @@ class Projection:
 
 
 def pad_axes(angle: float) -> FloatArray:
-    """Rows: unit vectors along and across a pad direction [rad], (2, 2)."""
+    """Rows: unit vectors along and across a pad direction [rad], (2, 2).
+
+    Parameters
+    ----------
+    angle : float
+        [rad]
+    """
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, s], [-s, c]])
 
@@ -81,7 +87,13 @@ def project(blocks: Blocks, angle: float) -> Projection:
 
 
 def load_direction(projection: Projection, blocks: Blocks) -> PadDirection:
-    """PadDirection in which the load grows, relative to the pad."""
+    """PadDirection in which the load grows, relative to the pad.
+
+    Parameters
+    ----------
+    projection : Projection
+    blocks : Blocks
+    """
     vectors = np.column_stack([projection.load, projection.across_load])
     size = np.hypot(*vectors.T)
     # neighbouring blocks share one hold: their scatter about the line is counted hold by hold
@@ -93,6 +105,12 @@ def displacement_direction(projection: Projection, blocks: Blocks, noise: NoiseM
     """PadDirection in which the shaft moves as the load grows, relative to the pad.
 
     Both components carry the same noise, correlated and drifting as `noise` says.
+
+    Parameters
+    ----------
+    projection : Projection
+    blocks : Blocks
+    noise : NoiseModel
     """
     vectors = np.column_stack([projection.deflection, projection.across])
     size = np.hypot(projection.load, projection.across_load)
