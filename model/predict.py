@@ -23,9 +23,10 @@ from model.pivots import pivot_laws
 from model.possible import check_possible
 from model.setup import Mesh, Setup
 from model.statics.conditions import NOT_CONVERGED, UNSETTLED_GROWTH, largest_reynolds
-from model.statics.equilibrium import Equilibrium, solve_equilibrium
+from model.statics.equilibrium import Equilibrium
 from model.statics.pad_flow import PadFlow, pad_flow
 from model.statics.power import power_loss
+from model.statics.solve import solve_equilibrium
 from model.units import to_si
 
 #: No shaker excites faster [rad/s]; beyond, squares overflow.

@@ -19,7 +19,7 @@ from model.bearing import BearingError
 from model.predict import Prediction, predict_setup
 from model.setup import Setup
 from model.statics.equilibrium import Equilibrium
-from model.statics.warm_start import carried_on
+from model.statics.warm_start import extrapolated_state
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ def sweep(
     for at, (load, direction, speed, excitation) in enumerate(points):
         guess = start
         if behind is not None and start is not None:
-            guess = carried_on(behind, start, _step_share(points[at - 2], points[at - 1], points[at]))
+            guess = extrapolated_state(behind, start, _step_share(points[at - 2], points[at - 1], points[at]))
         prediction = predict_setup(setup, load, direction, speed, excitation, guess)
         out.append(prediction)
         behind, start = start if at else None, prediction.equilibrium if prediction.converged else None

@@ -15,7 +15,7 @@ import numpy as np
 from model.arrays import FloatArray
 from model.compilation import compiled
 from model.film.mesh import FilmGrid, FilmWork
-from model.film.slopes import warmer_pressure
+from model.film.slopes import pressure_change
 
 #: Least share of the Couette flow that is taken to run downstream. A pressure peak near a leading edge pushes oil
 #: back there; what the journal drags in mixes with what returns, so that the net flow is no measure of the heat
@@ -138,7 +138,7 @@ def heat_step(
     oil: tuple[float, float, float, float],
     heat: tuple[float, float],
     thermal: tuple[float, float, float],
-    warming: FloatArray,
+    shift: FloatArray,
 ) -> tuple[float, float, float, float]:
     """Temperature for the pressure at hand, and what it will do to that pressure: one call for one film.
 
@@ -150,8 +150,8 @@ def heat_step(
         See `model.statics.pad_film.oil_constants`.
     thermal : tuple of float
         Inlet temperature [degC]; relaxation of the temperature; largest step [K].
-    warming : (unknowns,) ndarray
-        Overwritten; see `model.film.slopes.warmer_pressure`.
+    shift : (unknowns,) ndarray
+        Overwritten with the change of pressure; see `model.film.slopes.pressure_change`.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def heat_step(
     for i in range(nt + 1):
         for j in range(nz + 1):
             work.temperature[i, j] += share * (new[i, j] - work.temperature[i, j])
-    force = warmer_pressure(grid, work, speed, oil, warming)
+    force = pressure_change(grid, work, speed, oil, shift)
     return change, limited, force[0], force[1]
 
 

@@ -26,27 +26,27 @@ _Force = Callable[[float, float], tuple[float, float]]
 
 @dataclass(frozen=True)
 class Branch:
-    """Loaded attitudes of one pad on its pivot, against the reach of the journal.
+    """Loaded attitudes of one pad on its pivot, against the approach of the journal to a rigid pivot.
 
-    The reach is Cp - Cb + n . (x, y): the approach `a` if the pivot did not give way. It rises along the branch.
+    The rigid approach is Cp - Cb + n . (x, y): what `a` would be on a rigid pivot. It rises along the branch.
 
     Attributes
     ----------
-    reach, approach, wedge : (n,) ndarray
-        Reach, a and b [m]; below the first reach the pad has no loaded attitude.
+    rigid_approach, approach, wedge : (n,) ndarray
+        Rigid approach, a and b [m]; below the first rigid approach the pad has no loaded attitude.
     load : (n,) ndarray
         [N]
     """
 
-    reach: FloatArray
+    rigid_approach: FloatArray
     approach: FloatArray
     wedge: FloatArray
     load: FloatArray
 
-    def at(self, reach: float) -> tuple[float, float]:
-        """Guess (a, b) [m] at a reach."""
-        a = float(np.interp(reach, self.reach, self.approach))
-        return a, float(np.interp(reach, self.reach, self.wedge))
+    def at(self, rigid_approach: float) -> tuple[float, float]:
+        """Guess (a, b) at a rigid approach, all [m]."""
+        a = float(np.interp(rigid_approach, self.rigid_approach, self.approach))
+        return a, float(np.interp(rigid_approach, self.rigid_approach, self.wedge))
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ class LoadedAttitude:
     wedge: FloatArray
     load: FloatArray
 
-    def branch(self, clearance: float, scale: float, give: Callable[[float], float]) -> Branch:
-        """The loaded attitudes of a pad; from an infinite reach on if it has none.
+    def branch(self, clearance: float, scale: float, deflection: Callable[[float], float]) -> Branch:
+        """The loaded attitudes of a pad; from an infinite approach on if it has none.
 
         Parameters
         ----------
@@ -76,8 +76,8 @@ class LoadedAttitude:
             Cp [m].
         scale : float
             mu U R^2 L [N m^2].
-        give : callable
-            Pivot deflection [m] by load [N].
+        deflection : callable
+            Of the pivot [m] by load [N].
         """
         if len(self.curvature) < 2:
             return Branch(np.array([math.inf, math.inf]), *np.zeros((3, 2)))
@@ -86,11 +86,11 @@ class LoadedAttitude:
         approach = clearance - room
         some = load[::4]
         order = np.argsort(some)
-        deflection = np.array([give(w) for w in some[order].tolist()])
-        reach = approach + np.interp(load, some[order], deflection)
-        falling = np.flatnonzero(np.diff(reach) <= 0.0)
+        deflected = np.array([deflection(w) for w in some[order].tolist()])
+        rigid = approach + np.interp(load, some[order], deflected)
+        falling = np.flatnonzero(np.diff(rigid) <= 0.0)
         rising = slice(int(falling[-1]) + 1 if len(falling) else 0, None)
-        return Branch(reach[rising], approach[rising], (self.wedge * room)[rising], load[rising])
+        return Branch(rigid[rising], approach[rising], (self.wedge * room)[rising], load[rising])
 
 
 #: A film that starts behind the pivot, or a pivot at an edge: never carries.

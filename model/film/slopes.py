@@ -1,6 +1,7 @@
-"""Perturbed film pressure: derivatives by approach, wedge and their rates, and by the pad's shape.
+"""Perturbed film pressure: derivatives by approach, wedge and their rates, by the film's shape and temperature.
 
-One factorisation serves all right-hand sides.
+All of them have one form. A perturbation changes what flows through every face at the present pressure; what then
+flows into each control volume too much is the right-hand side, and one factorisation serves all of them.
 """
 
 from __future__ import annotations
@@ -11,6 +12,44 @@ from model.arrays import FloatArray
 from model.compilation import compiled
 from model.film.matrix import substitute, substitute_four, substitute_many
 from model.film.mesh import FilmGrid, FilmWork
+
+
+@compiled
+def net_inflow(along: FloatArray, across: FloatArray, first: int, inflow: FloatArray) -> None:
+    """What flows into every control volume less what flows out.
+
+    Parameters
+    ----------
+    along : (nt, nz + 1, m) ndarray
+        Flow through the faces along the arc, positive with it, for m perturbations.
+    across : (nt + 1, nz, m) ndarray
+        The same through the faces across.
+    first : int
+        First unknown axial node, see `FilmGrid`.
+    inflow : (unknowns, >= m) ndarray
+        Its first m columns are overwritten.
+    """
+    nt, nz = along.shape[0], across.shape[1]
+    for i in range(1, nt):
+        for j in range(first, nz):
+            k = (i - 1) * (nz - first) + j - first
+            for m in range(along.shape[2]):
+                value = along[i - 1, j, m] - along[i, j, m] - across[i, j, m]
+                if j > 0:
+                    value += across[i, j - 1, m]
+                inflow[k, m] = value
+
+
+@compiled
+def keep_ruptured(work: FilmWork, first: int, inflow: FloatArray) -> None:
+    """Ruptured nodes keep their pressure: their rows have no right-hand side."""
+    nt, nz = work.pressure.shape[0] - 1, work.pressure.shape[1] - 1
+    for i in range(1, nt):
+        for j in range(first, nz):
+            if work.ruptured[i, j]:
+                k = (i - 1) * (nz - first) + j - first
+                for m in range(inflow.shape[1]):
+                    inflow[k, m] = 0.0
 
 
 @compiled
@@ -54,53 +93,43 @@ def derivatives(
     wedge: tuple[float, float, float],
     conductance: tuple[FloatArray, FloatArray],
 ) -> None:
-    """Right-hand sides of the perturbed equation, solved with the factor at hand; then the mass flows."""
+    """Derivatives of the pressure by a, b, da/dt, db/dt, into `work.slopes`; then the mass flows.
+
+    Parameters
+    ----------
+    grid, work
+        Solved for pressure and factorised; `work.flow_x` holds the Couette flow.
+    wedge : tuple of float
+        Cp, a, b [m].
+    conductance : tuple of ndarray
+        Of the faces along and across [kg/s/Pa].
+    """
     p, rhs, h = work.pressure, work.slopes, work.thickness
     gx, gz = conductance
     nt, nz = gx.shape[0], gz.shape[1]
-    first = grid.first
-    width = nz - first
-    for k in range(rhs.shape[0]):
-        for m in range(4):
-            rhs[k, m] = 0.0
+    along, across = np.empty((nt, nz + 1, 2)), np.empty((nt + 1, nz, 2))
     for i in range(nt):
         base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
         for j in range(nz + 1):
             poiseuille = gx[i, j] * (p[i + 1, j] - p[i, j])
-            hf = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
-            # d(outflow through the face)/dh, times dh/da = -cos, dh/db = -sin
-            slope = (work.flow_x[i, j] - 3.0 * poiseuille) / hf
+            thickness = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
+            # couette flow is as h, poiseuille flow as h^3; dh/da = -cos, dh/db = -sin
+            slope = (work.flow_x[i, j] - 3.0 * poiseuille) / thickness
             work.flow_x[i, j] -= poiseuille
-            if first <= j < nz:
-                k = i * width + j - first
-                if i + 1 < nt:
-                    rhs[k, 0] -= slope * grid.cos_face[i]
-                    rhs[k, 1] -= slope * grid.sin_face[i]
-                if i > 0:
-                    rhs[k - width, 0] += slope * grid.cos_face[i]
-                    rhs[k - width, 1] += slope * grid.sin_face[i]
+            along[i, j, 0], along[i, j, 1] = -slope * grid.cos_face[i], -slope * grid.sin_face[i]
     for i in range(nt + 1):
         for j in range(nz):
             poiseuille = gz[i, j] * (p[i, j + 1] - p[i, j])
             work.flow_z[i, j] = -poiseuille
-            if 0 < i < nt:
-                slope = -3.0 * poiseuille / (0.5 * (h[i, j] + h[i, j + 1]))
-                k = (i - 1) * width + j - first
-                if j >= first:
-                    rhs[k, 0] += slope * grid.cos[i]
-                    rhs[k, 1] += slope * grid.sin[i]
-                if j + 1 < nz:
-                    rhs[k + 1, 0] -= slope * grid.cos[i]
-                    rhs[k + 1, 1] -= slope * grid.sin[i]
+            slope = -3.0 * poiseuille / (0.5 * (h[i, j] + h[i, j + 1]))
+            across[i, j, 0], across[i, j, 1] = -slope * grid.cos[i], -slope * grid.sin[i]
+    net_inflow(along, across, grid.first, rhs)
     for i in range(1, nt):
-        for j in range(first, nz):
-            k = (i - 1) * width + j - first
+        for j in range(grid.first, nz):
+            k = (i - 1) * (nz - grid.first) + j - grid.first
             squeeze = work.density[i, j] * grid.dx * grid.height[j]
-            rhs[k, 2] = squeeze * grid.cos[i]
-            rhs[k, 3] = squeeze * grid.sin[i]
-            if work.ruptured[i, j]:
-                for m in range(4):
-                    rhs[k, m] = 0.0
+            rhs[k, 2], rhs[k, 3] = squeeze * grid.cos[i], squeeze * grid.sin[i]
+    keep_ruptured(work, grid.first, rhs)
     substitute_four(work.band, rhs)
 
 
@@ -115,7 +144,7 @@ def shape_slopes(
     grid, work
         As `model.film.reynolds.solve_film` left them: the factor of the matrix is read.
     conductance : tuple of ndarray
-        Of the faces along and across, at the present thickness.
+        Of the faces along and across, at the present thickness [kg/s/Pa].
     shapes : (nt + 1, nz + 1, m) ndarray
         What a unit amplitude adds to h [m].
 
@@ -126,44 +155,29 @@ def shape_slopes(
     """
     p, h = work.pressure, work.thickness
     gx, gz = conductance
-    nt, nz = gx.shape[0], gz.shape[1]
-    first, count = grid.first, shapes.shape[2]
-    width = nz - first
-    rhs = np.zeros((work.unknown.shape[0], count))
+    nt, nz, count = gx.shape[0], gz.shape[1], shapes.shape[2]
+    along, across = np.empty((nt, nz + 1, count)), np.empty((nt + 1, nz, count))
     for i in range(nt):
-        for j in range(first, nz):
-            # flow = couette - poiseuille; a thicker film takes more of both
+        for j in range(nz + 1):
             poiseuille = gx[i, j] * (p[i + 1, j] - p[i, j])
             couette = work.flow_x[i, j] + poiseuille
             slope = (couette - 3.0 * poiseuille) / (h[i, j] + h[i + 1, j])
-            k = i * width + j - first
             for m in range(count):
-                more = slope * (shapes[i, j, m] + shapes[i + 1, j, m])
-                if i + 1 < nt:
-                    rhs[k, m] += more
-                if i > 0:
-                    rhs[k - width, m] -= more
-    for i in range(1, nt):
+                along[i, j, m] = slope * (shapes[i, j, m] + shapes[i + 1, j, m])
+    for i in range(nt + 1):
         for j in range(nz):
             slope = -3.0 * gz[i, j] * (p[i, j + 1] - p[i, j]) / (h[i, j] + h[i, j + 1])
-            k = (i - 1) * width + j - first
             for m in range(count):
-                more = slope * (shapes[i, j, m] + shapes[i, j + 1, m])
-                if j >= first:
-                    rhs[k, m] -= more
-                if j + 1 < nz:
-                    rhs[k + 1, m] += more
-    for i in range(1, nt):
-        for j in range(first, nz):
-            if work.ruptured[i, j]:
-                for m in range(count):
-                    rhs[(i - 1) * width + j - first, m] = 0.0
+                across[i, j, m] = slope * (shapes[i, j, m] + shapes[i, j + 1, m])
+    rhs = np.empty((work.unknown.shape[0], count))
+    net_inflow(along, across, grid.first, rhs)
+    keep_ruptured(work, grid.first, rhs)
     substitute_many(work.band, rhs)
     return rhs
 
 
 @compiled
-def warmer_pressure(
+def pressure_change(
     grid: FilmGrid, work: FilmWork, speed: float, oil: tuple[float, float, float, float], change: FloatArray
 ) -> FloatArray:
     """Change of the pressure that the film's new temperature will make, to first order.
@@ -187,49 +201,47 @@ def warmer_pressure(
     """
     h = work.thickness
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    first = grid.first
-    width = nz - first
-    old = np.empty((nt + 1, nz + 1))
-    new = np.empty((nt + 1, nz + 1))
-    dense = np.empty((nt + 1, nz + 1))
-    for i in range(nt + 1):
-        for j in range(nz + 1):
-            t = work.temperature[i, j]
-            dense[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - t)) - work.density[i, j]
-            old[i, j] = work.density[i, j] / work.viscosity[i, j]
-            new[i, j] = (work.density[i, j] + dense[i, j]) / (oil[0] * np.exp(oil[1] * (40.0 - t)))
-    for k in range(change.shape[0]):
-        change[k] = 0.0
+    old, new, denser = _fluidity(work, oil)
+    along, across = np.empty((nt, nz + 1, 1)), np.empty((nt + 1, nz, 1))
     for i in range(nt):
-        for j in range(first, nz):
+        for j in range(nz + 1):
             couette = 0.25 * speed * 0.5 * (h[i, j] + h[i + 1, j]) * grid.height[j]
             poiseuille = couette * (work.density[i, j] + work.density[i + 1, j]) - work.flow_x[i, j]
             ratio = (new[i, j] + new[i + 1, j]) / (old[i, j] + old[i + 1, j]) - 1.0
-            more = couette * (dense[i, j] + dense[i + 1, j]) - poiseuille * ratio
-            k = i * width + j - first
-            if i + 1 < nt:
-                change[k] += more
-            if i > 0:
-                change[k - width] -= more
-    for i in range(1, nt):
+            along[i, j, 0] = couette * (denser[i, j] + denser[i + 1, j]) - poiseuille * ratio
+    for i in range(nt + 1):
         for j in range(nz):
             ratio = (new[i, j] + new[i, j + 1]) / (old[i, j] + old[i, j + 1]) - 1.0
-            more = work.flow_z[i, j] * ratio
-            k = (i - 1) * width + j - first
-            if j >= first:
-                change[k] -= more
-            if j + 1 < nz:
-                change[k + 1] += more
-    for i in range(1, nt):
-        for j in range(first, nz):
-            if work.ruptured[i, j]:
-                change[(i - 1) * width + j - first] = 0.0
+            across[i, j, 0] = work.flow_z[i, j] * ratio
+    rhs = change.reshape((change.shape[0], 1))
+    net_inflow(along, across, grid.first, rhs)
+    keep_ruptured(work, grid.first, rhs)
     substitute(work.band, change)
+    return _force(grid, change, nt, nz)
+
+
+@compiled
+def _fluidity(work: FilmWork, oil: tuple[float, float, float, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Density over viscosity as the pressure was solved with and at the new temperature; change of the density."""
+    rows, columns = work.temperature.shape
+    old, new, denser = np.empty((rows, columns)), np.empty((rows, columns)), np.empty((rows, columns))
+    for i in range(rows):
+        for j in range(columns):
+            t = work.temperature[i, j]
+            denser[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - t)) - work.density[i, j]
+            old[i, j] = work.density[i, j] / work.viscosity[i, j]
+            new[i, j] = (work.density[i, j] + denser[i, j]) / (oil[0] * np.exp(oil[1] * (40.0 - t)))
+    return old, new, denser
+
+
+@compiled
+def _force(grid: FilmGrid, pressure: FloatArray, nt: int, nz: int) -> FloatArray:
+    """Radial and tangential force of the pressure at the unknown nodes."""
     force = np.zeros(2)
     for i in range(1, nt):
         total = 0.0
-        for j in range(first, nz):
-            total += grid.area[i, j] * change[(i - 1) * width + j - first]
+        for j in range(grid.first, nz):
+            total += grid.area[i, j] * pressure[(i - 1) * (nz - grid.first) + j - grid.first]
         force[0] += grid.cos[i] * total
         force[1] += grid.sin[i] * total
     return force

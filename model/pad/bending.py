@@ -28,14 +28,14 @@ SHAPES = 8
 
 
 @dataclass(frozen=True, eq=False)
-class PadGive:
+class PadDeformation:
     """How a pad's face moves outward under its film; n = (nt + 1)(nz + 1) film nodes, raveled.
 
     Attributes
     ----------
     compliance : (n, n) ndarray
         Deformation by pressure [m/Pa].
-    warmth : (c, n) ndarray
+    to_coarse : (c, n) ndarray
         Temperatures of the pad's coarser nodes by those of the film.
     expansion : (n, c) ndarray
         Deformation by them [m/K].
@@ -47,18 +47,18 @@ class PadGive:
         Amplitudes of the shapes in a deformation.
     response : (m, unknowns) ndarray
         Amplitudes by the pressure at the film's unknown nodes.
-    frame : (2, unknowns) ndarray
+    weights : (2, unknowns) ndarray
         Radial and tangential force by that pressure [m^2].
     """
 
     compliance: FloatArray
-    warmth: FloatArray
+    to_coarse: FloatArray
     expansion: FloatArray
     flux: FloatArray
     shapes: FloatArray
     amplitudes: FloatArray
     response: FloatArray
-    frame: FloatArray
+    weights: FloatArray
 
 
 @dataclass(frozen=True)
@@ -86,14 +86,14 @@ class BendingStep:
     share: float
 
 
-def pad_give(pad: Pad, bearing: Bearing, grid: FilmGrid) -> PadGive:
+def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid) -> PadDeformation:
     """Matrices of a pad for its film's mesh; the same object for pads of the same shape."""
     geometry = PadGeometry.of(pad, bearing)
-    return _pad_give(geometry, grid.angle.tobytes(), grid.z.tobytes(), grid.area.tobytes())
+    return _pad_deformation(geometry, grid.angle.tobytes(), grid.z.tobytes(), grid.area.tobytes())
 
 
 @lru_cache(maxsize=8)
-def _pad_give(geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes) -> PadGive:
+def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes) -> PadDeformation:
     angle, z, area = (np.frombuffer(raw, dtype=float) for raw in (angles, zs, areas))
     ahead = 0
     if angle[0] - geometry.leading > 1e-9:  # a starved film: the dry arc ahead of it carries nothing
@@ -102,23 +102,23 @@ def _pad_give(geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes) -> 
     solid = solid_of(geometry, angle, z)
     wet = slice(ahead * len(z), None)
     compliance = np.ascontiguousarray(solid.compliance[wet, wet])
-    warmth, expansion, flux = solid.thermal_factors
+    to_coarse, expansion, flux = solid.thermal_factors
     shapes = _softest_shapes(compliance, area)
     amplitudes = (shapes * area[:, None]).T
     angle = angle[ahead:]
     inner = np.zeros((len(angle), len(z)), dtype=bool)
     inner[1:-1, 0 if abs(z[0]) < 1e-9 * z[-1] else 1 : -1] = True
     unknown = inner.ravel()
-    frame = area * np.repeat(np.stack([np.cos(angle), np.sin(angle)]), len(z), axis=1)
-    return PadGive(
+    weights = area * np.repeat(np.stack([np.cos(angle), np.sin(angle)]), len(z), axis=1)
+    return PadDeformation(
         compliance=compliance,
-        warmth=np.ascontiguousarray(warmth[:, wet]),
+        to_coarse=np.ascontiguousarray(to_coarse[:, wet]),
         expansion=np.ascontiguousarray(expansion[wet]),
         flux=np.ascontiguousarray(flux[wet]),
         shapes=shapes.reshape(-1, len(z), SHAPES),
         amplitudes=amplitudes,
         response=np.ascontiguousarray((amplitudes @ compliance)[:, unknown]),
-        frame=np.ascontiguousarray(frame[:, unknown]),
+        weights=np.ascontiguousarray(weights[:, unknown]),
     )
 
 
@@ -133,31 +133,31 @@ def _softest_shapes(compliance: FloatArray, area: FloatArray) -> FloatArray:
 
 
 def wanted_shapes(
-    gives: list[PadGive], pressures: list[FloatArray], rises: list[FloatArray], factor: float
+    bodies: list[PadDeformation], pressures: list[FloatArray], rises: list[FloatArray], factor: float
 ) -> list[FloatArray]:
     """Deformation that every film asks of its pad, Eq. (6)-(8) [m]; pads of one shape are done in one product.
 
     Parameters
     ----------
-    gives : list of PadGive
+    bodies : list of PadDeformation
     pressures, rises : list of (nt + 1, nz + 1) ndarray
         Pressure [Pa] and temperature above supply [K].
     factor : float
         On the computed deformation.
     """
-    wanted: list[FloatArray] = [np.empty(0)] * len(gives)
-    for give in {id(g): g for g in gives}.values():
-        same = [k for k, g in enumerate(gives) if g is give]
+    wanted: list[FloatArray] = [np.empty(0)] * len(bodies)
+    for body in {id(b): b for b in bodies}.values():
+        same = [k for k, b in enumerate(bodies) if b is body]
         pressure = np.column_stack([pressures[k].ravel() for k in same])
         rise = np.column_stack([rises[k].ravel() for k in same])
-        shape = factor * (give.compliance @ pressure + give.expansion @ (give.warmth @ rise))
+        shape = factor * (body.compliance @ pressure + body.expansion @ (body.to_coarse @ rise))
         for column, k in enumerate(same):
             wanted[k] = shape[:, column].reshape(pressures[k].shape)
     return wanted
 
 
 def bending_step(
-    give: PadGive,
+    body: PadDeformation,
     grid: FilmGrid,
     work: FilmWork,
     wedge: tuple[float, float, float],
@@ -169,7 +169,7 @@ def bending_step(
 
     Parameters
     ----------
-    give : PadGive
+    body : PadDeformation
     grid, work
         The film, solved at the present deformation.
     wedge : tuple of float
@@ -181,17 +181,17 @@ def bending_step(
     factor : float
         On the computed deformation.
     """
-    slopes = shape_slopes(grid, work, conductances(grid, work, *wedge), give.shapes)
-    response = factor * give.response
-    asked = give.amplitudes @ change.ravel()
+    slopes = shape_slopes(grid, work, conductances(grid, work, *wedge), body.shapes)
+    response = factor * body.response
+    asked = body.amplitudes @ change.ravel()
     right = np.empty((SHAPES, 3))
     right[:, 0] = asked
     right[:, 1:] = response @ work.slopes[:, :2]
     answer = np.asarray(np.linalg.solve(_UNIT - response @ slopes, right), dtype=float)
-    felt = (give.frame @ slopes) @ answer
+    felt = (body.weights @ slopes) @ answer
     return BendingStep(
         forces=forces._replace(force=forces.force + felt[:, 0], stiffness=forces.stiffness + felt[:, 1:]),
-        mismatch=change - give.shapes @ asked,
+        mismatch=change - body.shapes @ asked,
         amplitude=answer[:, 0],
         by_approach=answer[:, 1:],
         share=float(np.abs(change).max()) / forces.min_film,
@@ -201,6 +201,6 @@ def bending_step(
 _UNIT = np.eye(SHAPES)
 
 
-def change_of_shape(give: PadGive, step: BendingStep, da: float, db: float) -> FloatArray:
+def change_of_shape(body: PadDeformation, step: BendingStep, da: float, db: float) -> FloatArray:
     """Change of the deformation that belongs to a move (da, db) of the film [m]."""
-    return step.mismatch + give.shapes @ (step.amplitude + step.by_approach @ np.array([da, db]))
+    return step.mismatch + body.shapes @ (step.amplitude + step.by_approach @ np.array([da, db]))

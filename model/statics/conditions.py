@@ -66,7 +66,7 @@ def left_unloaded(pads: Sequence[int]) -> Condition:
     )  # fmt: skip
 
 
-def torn(pads: Sequence[int]) -> Condition:
+def undecided(pads: Sequence[int]) -> Condition:
     """Pads that find no state at all, numbers from 1."""
     return Condition(
         f"pads {_listed(pads)} can neither carry nor idle", "error",
@@ -74,7 +74,7 @@ def torn(pads: Sequence[int]) -> Condition:
     )  # fmt: skip
 
 
-def restless(pads: Sequence[int]) -> Condition:
+def alternating(pads: Sequence[int]) -> Condition:
     """Pads that went on taking up and shedding their load, numbers from 1."""
     return Condition(
         f"pads {_listed(pads)} take up and shed their load", "error", "the iteration finds no rest", tuple(pads)

@@ -14,7 +14,7 @@ from model.film.loaded_attitude import Branch
 GOOD_ENOUGH = 0.002
 
 
-def first_position(load: FloatArray, normals: FloatArray, gaps: FloatArray, branches: list[Branch]) -> FloatArray:
+def first_position(load: FloatArray, normals: FloatArray, distances: FloatArray, branches: list[Branch]) -> FloatArray:
     """Journal position that balances a load on tabulated isothermal films.
 
     Parameters
@@ -23,7 +23,7 @@ def first_position(load: FloatArray, normals: FloatArray, gaps: FloatArray, bran
         [N]
     normals : (n_pads, 2) ndarray
         Unit vectors at the pivots.
-    gaps : (n_pads,) ndarray
+    distances : (n_pads,) ndarray
         Cp - Cb [m].
     branches : list of Branch
 
@@ -32,14 +32,14 @@ def first_position(load: FloatArray, normals: FloatArray, gaps: FloatArray, bran
     (2,) ndarray
         [m]
     """
-    longest = max(len(b.reach) for b in branches)
+    longest = max(len(b.rigid_approach) for b in branches)
     curves = np.full((len(branches), 2, longest), math.nan)
     for row, branch in zip(curves, branches, strict=True):
-        row[0, : len(branch.reach)] = branch.reach
+        row[0, : len(branch.rigid_approach)] = branch.rigid_approach
         row[1, : len(branch.load)] = branch.load
-    lengths = np.array([len(b.reach) for b in branches])
-    room = min(float(b.approach[-1]) - g for b, g in zip(branches, gaps, strict=True))
-    return _first_position(np.asarray(load, float), np.column_stack([normals, gaps]), curves, lengths, room)
+    lengths = np.array([len(b.rigid_approach) for b in branches])
+    room = min(float(b.approach[-1]) - g for b, g in zip(branches, distances, strict=True))
+    return _first_position(np.asarray(load, float), np.column_stack([normals, distances]), curves, lengths, room)
 
 
 @compiled
@@ -89,18 +89,18 @@ def _missing(
     """Part of the load that the tabulated films do not carry at a position."""
     fx, fy = load[0], load[1]
     for m in range(pads.shape[0]):
-        reach = pads[m, 2] + pads[m, 0] * x + pads[m, 1] * y
-        if reach < curves[m, 0, 0]:
+        rigid = pads[m, 2] + pads[m, 0] * x + pads[m, 1] * y
+        if rigid < curves[m, 0, 0]:
             continue
         low, high = 0, lengths[m] - 1  # beyond the end: the last slope
         while high - low > 1:
             middle = (low + high) // 2
-            if curves[m, 0, middle] < reach:
+            if curves[m, 0, middle] < rigid:
                 low = middle
             else:
                 high = middle
         slope = (curves[m, 1, high] - curves[m, 1, low]) / (curves[m, 0, high] - curves[m, 0, low])
-        carried = curves[m, 1, low] + slope * (reach - curves[m, 0, low])
+        carried = curves[m, 1, low] + slope * (rigid - curves[m, 0, low])
         fx -= pads[m, 0] * carried
         fy -= pads[m, 1] * carried
     return fx, fy

@@ -24,7 +24,7 @@ import numpy as np
 
 from model.arrays import FloatArray
 from model.film.energy import dissipation, march
-from model.pad.bending import PadGive
+from model.pad.bending import PadDeformation
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
 from model.statics.pad_flow import flow_weighted, outlet_temperature, through_flow
@@ -123,8 +123,8 @@ class FilmHeat:
         fields[1, 0] = 1.0
         sources[0] = film.kept * dissipation(film.grid, work, self.surface_speed)
         sources[2] = work.exchange
-        give = film.give
-        if not self.setup.options.conduction or give is None:
+        pad = film.deformation
+        if not self.setup.options.conduction or pad is None:
             self._march(film, fields, sources)
             return fields
         if not np.abs(work.temperature).max() < BOUNDLESS:
@@ -132,19 +132,19 @@ class FilmHeat:
         # what the pad takes at the present temperature is known; its answer to the change is solved for
         station = film.grid.dx * film.grid.height[None, :]
         present, supply = work.temperature, self.setup.inlet_temperature
-        sources[0] -= (give.flux @ (give.warmth @ (present - supply).ravel())).reshape(present.shape) * station
+        sources[0] -= (pad.flux @ (pad.to_coarse @ (present - supply).ravel())).reshape(present.shape) * station
         self._march(film, fields, sources)
         if not np.abs(fields).max() < BOUNDLESS:
             return fields
         # as a correction, which vanishes at the equilibrium, and with it what the Krylov steps leave unsolved
         missing = fields[0] + film.inlet * fields[1] + self.journal * fields[2] - present
         for m in (1, 2):
-            fields[m] = self._with_pad(film, fields[m], give, station)
-        correction = self._with_pad(film, missing, give, station)
+            fields[m] = self._with_pad(film, fields[m], pad, station)
+        correction = self._with_pad(film, missing, pad, station)
         fields[0] = present + correction - film.inlet * fields[1] - self.journal * fields[2]
         return fields
 
-    def _with_pad(self, film: PadFilm, alone: FloatArray, give: PadGive, station: FloatArray) -> FloatArray:
+    def _with_pad(self, film: PadFilm, alone: FloatArray, pad: PadDeformation, station: FloatArray) -> FloatArray:
         """Temperature with the heat that the pad takes from it, given the one without: (I + A^-1 F) T = T_alone."""
         if not alone.any():
             return alone
@@ -152,7 +152,7 @@ class FilmHeat:
 
         def coupled(t: FloatArray) -> FloatArray:
             fields = np.zeros((1, *shape))
-            taken = (give.flux @ (give.warmth @ t)).reshape(shape) * station
+            taken = (pad.flux @ (pad.to_coarse @ t)).reshape(shape) * station
             self._march(film, fields, -taken[None])
             return np.asarray(t - fields[0].ravel())
 

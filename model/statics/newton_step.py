@@ -1,12 +1,14 @@
 """One Newton step of the equilibrium: every pad's tilt and deflection are eliminated, the journal's move is left.
 
 Per pad two equations stand beside the two of the journal: the film's moment about the pivot vanishes (or is held
-by k_theta), and the pivot has given way by delta(W).
+by k_theta), and the pivot has deflected by delta(W). With the film's own derivatives by (a, b) they are linear in the
+pad's tilt and deflection and in the journal's move; what they leave of the film's force is linear in the move alone.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,114 +19,177 @@ from model.statics.pad_film import PadFilm
 from model.statics.tilt_hold import tilt_hold
 
 
+class PadEquations(NamedTuple):
+    """What a Newton step needs to know of the n pads that carry, in the (radial, tangential) frame of each.
+
+    Attributes
+    ----------
+    frame : (n, 2, 2) ndarray
+        Rows: unit vectors along the pivot (normal) and across it (tangent).
+    force : (n, 2) ndarray
+        Of the film [N].
+    stiffness : (n, 2, 2) ndarray
+        Its derivatives by (a, b) [N/m].
+    pivot_radius : (n,) ndarray
+        R_P [m].
+    holding_force : (n,) ndarray
+        Moment that holds the tilt back, over R_P [N].
+    holding_slopes : (n, 2) ndarray
+        Its derivatives by the tilt, k_theta / R_P [N/rad], and by the pad's load.
+    missing_deflection : (n,) ndarray
+        delta(W) less the present deflection [m].
+    pivot_compliance : (n,) ndarray
+        d delta / d W [m/N].
+    """
+
+    frame: FloatArray
+    force: FloatArray
+    stiffness: FloatArray
+    pivot_radius: FloatArray
+    holding_force: FloatArray
+    holding_slopes: FloatArray
+    missing_deflection: FloatArray
+    pivot_compliance: FloatArray
+
+
 def newton_step(setup: Setup, load: FloatArray, films: list[PadFilm]) -> tuple[float, FloatArray, FloatArray]:
-    """One linear solve: the residual, the journal's move (2,), and every pad's (tilt, deflection) move (n_pads, 2)."""
-    laws = setup.pivots
+    """Solve the linearised equilibrium once.
+
+    Parameters
+    ----------
+    setup : Setup
+    load : (2,) ndarray
+        [N]
+    films : list of PadFilm
+        Solved; those without forces take no part.
+
+    Returns
+    -------
+    residual : float
+        Unbalanced share of the load, see `eliminate`.
+    shift : (2,) ndarray
+        The journal's move [m].
+    moves : (n_pads, 2) ndarray
+        Changes of every pad's tilt [rad] and deflection [m].
+    """
     carrying = [f for f in films if f.forces is not None]
-    pads = np.zeros((len(carrying), _COLUMNS))
-    for row, film in zip(pads, carrying, strict=True):
-        forces = film.foreseen if film.step is None else film.step.forces
-        assert forces is not None
-        law, radial = laws[film.number - 1], float(forces.force[0])
-        row[0:4] = *film.normal, *film.tangent
-        row[4:10] = *forces.force, *forces.stiffness.ravel()
-        row[10] = film.pivot_radius
-        hold = tilt_hold(setup, film.tilt, radial)
-        row[11] = hold.stiffness / film.pivot_radius
-        row[12] = hold.moment / film.pivot_radius
-        row[13] = law.deflection(max(radial, 0.0)) - film.deflection
-        row[14] = 1.0 / law.stiffness(max(radial, 1e-6))
-        row[15] = hold.arm / film.pivot_radius
-    residual, shift, moves = eliminate(load, pads)
+    residual, shift, moves = eliminate(load, pad_equations(setup, carrying))
     if setup.friction:
-        _stop_where_friction_turns(carrying, moves)
+        _stop_at_untilted(carrying, moves)
     every = np.zeros((len(films), 2))
     every[[f.number - 1 for f in carrying]] = moves
     return residual, shift, every
 
 
-def _stop_where_friction_turns(carrying: list[PadFilm], moves: FloatArray) -> None:
+def _stop_at_untilted(carrying: list[PadFilm], moves: FloatArray) -> None:
     """Let no pad tilt past the untilted attitude in one step: the friction turns round there."""
     for film, move in zip(carrying, moves, strict=True):
         if film.tilt * (film.tilt + move[0]) < 0.0:
             move[0] = -film.tilt
 
 
-#: What `eliminate` is told per pad: normal, tangent, force, stiffness, R_P, k_theta / R_P, moment that holds the tilt
-#: back over R_P, missing give, pivot compliance, slope of that moment by the pad's load over R_P.
-_COLUMNS = 16
+def pad_equations(setup: Setup, carrying: list[PadFilm]) -> PadEquations:
+    """Gather the equations of the pads that carry."""
+    n = len(carrying)
+    rows = PadEquations(
+        frame=np.empty((n, 2, 2)),
+        force=np.empty((n, 2)),
+        stiffness=np.empty((n, 2, 2)),
+        pivot_radius=np.empty(n),
+        holding_force=np.empty(n),
+        holding_slopes=np.empty((n, 2)),
+        missing_deflection=np.empty(n),
+        pivot_compliance=np.empty(n),
+    )
+    for m, film in enumerate(carrying):
+        forces = film.corrected if film.step is None else film.step.forces
+        assert forces is not None
+        law, radial = setup.pivots[film.number - 1], float(forces.force[0])
+        rows.frame[m] = film.normal, film.tangent
+        rows.force[m], rows.stiffness[m] = forces.force, forces.stiffness
+        rows.pivot_radius[m] = film.pivot_radius
+        hold = tilt_hold(setup, film.tilt, radial)
+        rows.holding_force[m] = hold.moment / film.pivot_radius
+        rows.holding_slopes[m] = hold.stiffness / film.pivot_radius, hold.arm / film.pivot_radius
+        rows.missing_deflection[m] = law.deflection(max(radial, 0.0)) - film.deflection
+        rows.pivot_compliance[m] = 1.0 / law.stiffness(max(radial, 1e-6))  # a Hertzian pivot has no stiffness at zero
+    return rows
 
 
 @compiled
-def eliminate(load: FloatArray, pads: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+def eliminate(load: FloatArray, pads: PadEquations) -> tuple[float, FloatArray, FloatArray]:
     """Eliminate every pad's tilt and deflection, and solve for the journal's move.
 
     Parameters
     ----------
     load : (2,) ndarray
         [N]
-    pads : (n, 16) ndarray
-        One row per pad that carries, see `_COLUMNS`.
+    pads : PadEquations
+        Of the n pads that carry.
 
     Returns
     -------
     residual : float
-        Unbalanced force, moment over R_P, or give times stiffness, as a share of the load.
+        Unbalanced force, moment over R_P, or deflection times stiffness, as a share of the load (or of 1 N).
     shift : (2,) ndarray
         [m]
     moves : (n, 2) ndarray
         Changes of tilt [rad] and deflection [m].
     """
-    n = pads.shape[0]
+    n = pads.pivot_radius.shape[0]
     size = max(math.hypot(load[0], load[1]), 1.0)
-    jxx, jxy, jyx, jyy = 1.0, 0.0, 0.0, 1.0  # a pad that only touches leaves a direction free: keep it regular
-    fx, fy = load[0], load[1]
     worst = 0.0
-    constant = np.empty((n, 2))
-    gradient = np.empty((n, 2, 2))
+    missing = load.copy()
+    jacobian = np.eye(2)  # 1 N/m: a pad that only touches leaves a direction free, which keeps the matrix regular
+    at_rest, by_shift = np.empty((n, 2)), np.empty((n, 2, 2))
     for m in range(n):
-        nx, ny, tx, ty = pads[m, 0], pads[m, 1], pads[m, 2], pads[m, 3]
-        radial, tangential = pads[m, 4], pads[m, 5]
-        kaa, kab, kba, kbb = pads[m, 6], pads[m, 7], pads[m, 8], pads[m, 9]
-        arm, hold, held, missing, compliance = pads[m, 10], pads[m, 11], pads[m, 12], pads[m, 13], pads[m, 14]
-        moment = tangential + held
-        # slopes of the moment by (a, b): the film's own, and what holds the tilt back grows with the load
-        kma, kmb = kba + pads[m, 15] * kaa, kbb + pads[m, 15] * kab
-        # d(a, b) = (n . dX - deta, t . dX + R_P dt); rows: tilting force, pivot
-        m11, m12 = kmb * arm + hold, -kma
-        m21, m22 = -compliance * kab * arm, 1.0 + compliance * kaa
-        det = m11 * m22 - m12 * m21
-        for axis in range(3):  # right-hand sides: constant, dx, dy
-            if axis == 0:
-                r1, r2 = -moment, missing
-            else:
-                da = nx if axis == 1 else ny
-                db = tx if axis == 1 else ty
-                r1, r2 = -(kma * da + kmb * db), compliance * (kaa * da + kab * db)
-            dt, deta = (r1 * m22 - m12 * r2) / det, (m11 * r2 - m21 * r1) / det
-            if axis == 0:
-                constant[m, 0], constant[m, 1] = dt, deta
-                da, db = -deta, arm * dt
-            else:
-                gradient[m, 0, axis - 1], gradient[m, 1, axis - 1] = dt, deta
-                da, db = da - deta, db + arm * dt
-            fr, ft = kaa * da + kab * db, kba * da + kbb * db
-            if axis == 0:
-                fx -= nx * (radial + fr) + tx * (tangential + ft)
-                fy -= ny * (radial + fr) + ty * (tangential + ft)
-            elif axis == 1:
-                jxx += nx * fr + tx * ft
-                jyx += ny * fr + ty * ft
-            else:
-                jxy += nx * fr + tx * ft
-                jyy += ny * fr + ty * ft
-        worst = max(worst, max(abs(moment), abs(missing * kaa)) / size)
-    worst = max(worst, math.hypot(fx, fy) / size)
-    det = jxx * jyy - jxy * jyx
-    shift = np.empty(2)
-    shift[0], shift[1] = (fx * jyy - jxy * fy) / det, (jxx * fy - jyx * fx) / det
-    moves = np.empty((n, 2))
+        frame, k = pads.frame[m], pads.stiffness[m]
+        arm, compliance = pads.pivot_radius[m], pads.pivot_compliance[m]
+        moment = pads.force[m, 1] + pads.holding_force[m]
+        # with the journal at rest: what the pad does by itself
+        tilt, deflection = _pad_moves(pads, m, -moment, pads.missing_deflection[m])
+        at_rest[m, 0], at_rest[m, 1] = tilt, deflection
+        radial, tangential = _force_change(k, -deflection, arm * tilt)
+        radial, tangential = radial + pads.force[m, 0], tangential + pads.force[m, 1]
+        for i in range(2):
+            missing[i] -= frame[0, i] * radial + frame[1, i] * tangential
+        # per metre of the journal's move: the film changes by it, and by how the pad follows
+        for axis in range(2):
+            da, db = frame[0, axis], frame[1, axis]
+            radial, tangential = _force_change(k, da, db)
+            turning = tangential + pads.holding_slopes[m, 1] * radial
+            tilt, deflection = _pad_moves(pads, m, -turning, compliance * radial)
+            by_shift[m, 0, axis], by_shift[m, 1, axis] = tilt, deflection
+            radial, tangential = _force_change(k, da - deflection, db + arm * tilt)
+            for i in range(2):
+                jacobian[i, axis] += frame[0, i] * radial + frame[1, i] * tangential
+        worst = max(worst, max(abs(moment), abs(pads.missing_deflection[m] * k[0, 0])) / size)
+    worst = max(worst, math.hypot(missing[0], missing[1]) / size)
+    determinant = jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0]
+    shift, moves = np.empty(2), np.empty((n, 2))
+    shift[0] = (missing[0] * jacobian[1, 1] - jacobian[0, 1] * missing[1]) / determinant
+    shift[1] = (jacobian[0, 0] * missing[1] - jacobian[1, 0] * missing[0]) / determinant
     for m in range(n):
         for q in range(2):
-            moves[m, q] = constant[m, q] + gradient[m, q, 0] * shift[0] + gradient[m, q, 1] * shift[1]
+            moves[m, q] = at_rest[m, q] + by_shift[m, q, 0] * shift[0] + by_shift[m, q, 1] * shift[1]
     return worst, shift, moves
+
+
+@compiled
+def _force_change(stiffness: FloatArray, da: float, db: float) -> tuple[float, float]:
+    """Change of the radial and tangential force for a change of (a, b)."""
+    return stiffness[0, 0] * da + stiffness[0, 1] * db, stiffness[1, 0] * da + stiffness[1, 1] * db
+
+
+@compiled
+def _pad_moves(pads: PadEquations, m: int, moment: float, deflection: float) -> tuple[float, float]:
+    """Tilt and deflection with which pad m gains a moment over R_P [N] and a pivot deflection [m] that are wanted.
+
+    The film's (a, b) change by (-deflection, R_P tilt); the first row is the moment over R_P, the second the pivot.
+    """
+    k, arm, compliance = pads.stiffness[m], pads.pivot_radius[m], pads.pivot_compliance[m]
+    hold, by_load = pads.holding_slopes[m]
+    m11, m12 = (k[1, 1] + by_load * k[0, 1]) * arm + hold, -(k[1, 0] + by_load * k[0, 0])
+    m21, m22 = -compliance * k[0, 1] * arm, 1.0 + compliance * k[0, 0]
+    determinant = m11 * m22 - m12 * m21
+    return (moment * m22 - m12 * deflection) / determinant, (m11 * deflection - m21 * moment) / determinant

@@ -16,8 +16,8 @@ from model.film.models import FilmSolver, film_solver
 from model.film.oil_state import set_viscosity
 from model.film.resting import RestingFilm, resting_film
 from model.film.reynolds import FilmForces, solve_film
-from model.film.slopes import warmer_pressure
-from model.pad.bending import BendingStep, PadGive, pad_give
+from model.film.slopes import pressure_change
+from model.pad.bending import BendingStep, PadDeformation, pad_deformation
 from model.setup import Setup
 
 
@@ -32,8 +32,8 @@ class PadFilm:
     pad : Pad
     normal, tangent : (2,) ndarray
         Unit vectors at the pivot.
-    gap : float
-        Cp - Cb: preload times Cp, plus running changes [m].
+    preload_distance : float
+        Cp - Cb, how far the pad is moved in from a concentric one, plus running changes [m].
     pivot_radius : float
         R_P [m].
     grid, work
@@ -46,16 +46,22 @@ class PadFilm:
         No loaded attitude: carries nothing.
     forces : FilmForces or None
         At the temperature that the pressure was solved with.
-    foreseen : FilmForces or None
+    corrected : FilmForces or None
         At the temperature found since, to first order: what a Newton step should go by.
-    warming : (unknowns,) ndarray
+    pressure_change : (unknowns,) ndarray
         The change of pressure from the one to the other [Pa].
     bent : (nt + 1, nz + 1) ndarray
         The pad's deformation, part of `work.extra` [m].
-    give : PadGive or None
-        How the pad gives way; None for a rigid one.
+    deformation : PadDeformation or None
+        How the pad deforms; None for a rigid one.
     step : BendingStep or None
         Its part of the present Newton step.
+    branch : Branch or None
+        Loaded attitudes, tabulated.
+    load_changes : int
+        How often the pad has taken up or shed its load.
+    temperature_change : float
+        What the last step asked for [K].
     kept : float
         Share of the dissipation that stays in the film.
     solver : callable
@@ -68,23 +74,22 @@ class PadFilm:
     pad: Pad
     normal: FloatArray
     tangent: FloatArray
-    gap: float
+    preload_distance: float
     pivot_radius: float
     grid: FilmGrid
     work: FilmWork
     inlet: float
     bent: FloatArray
-    warming: FloatArray
-    give: PadGive | None = None
+    pressure_change: FloatArray
+    deformation: PadDeformation | None = None
     step: BendingStep | None = None
     tilt: float = 0.0
     deflection: float = 0.0
     idle: bool = False
     forces: FilmForces | None = None
-    foreseen: FilmForces | None = None
+    corrected: FilmForces | None = None
     branch: Branch | None = None
-    flips: int = 0
-    held: int = 0
+    load_changes: int = 0
     temperature_change: float = field(default=math.inf)
     kept: float = 1.0
     solver: FilmSolver = solve_film
@@ -95,13 +100,13 @@ class PadFilm:
         """Whether the film closed, so that it has no pressure."""
         return not self.idle and self.forces is not None and self.forces.steps < 0
 
-    def reach(self, position: FloatArray) -> float:
-        """Approach a of the film if the pivot did not give way [m]."""
-        return self.gap + float(self.normal @ position)
+    def rigid_approach(self, position: FloatArray) -> float:
+        """Approach a of the film if the pivot were rigid [m]."""
+        return self.preload_distance + float(self.normal @ position)
 
     def approach(self, position: FloatArray) -> tuple[float, float]:
         """(a, b) of the film for a journal position and the pad's present tilt and deflection [m]."""
-        a = self.reach(position) - self.deflection
+        a = self.rigid_approach(position) - self.deflection
         b = float(self.tangent @ position) + self.pivot_radius * self.tilt
         return a, b
 
@@ -110,15 +115,15 @@ class PadFilm:
         a, b = self.approach(position)
         set_viscosity(self.work, oil_constants(oil))
         wedge = (self.pad.pad_clearance, a, b)
-        self.forces = self.foreseen = self.solver(self.grid, self.work, wedge, surface_speed, False)
+        self.forces = self.corrected = self.solver(self.grid, self.work, wedge, surface_speed, False)
 
     def rest(self, position: FloatArray, surface_speed: float, oil: Oil) -> None:
         """Say what the film of an idle pad does; nothing for one that carries."""
-        wedge = (self.pad.pad_clearance, self.reach(position))
+        wedge = (self.pad.pad_clearance, self.rigid_approach(position))
         idle = self.idle or self.forces is None
         self.resting = resting_film(self.grid, wedge, surface_speed, oil, self.inlet, self.kept) if idle else None
 
-    def warm(self, surface_speed: float, oil: Oil, limits: tuple[float, float]) -> float:
+    def heat(self, surface_speed: float, oil: Oil, limits: tuple[float, float]) -> float:
         """Move the temperature towards what the pressure makes it, by `limits`: relaxation, and largest step [K].
 
         Returns
@@ -130,23 +135,23 @@ class PadFilm:
         # what a share of the heat does to the oil, all of it does to oil that takes up more per kelvin
         change, limited, radial, tangential = heat_step(
             self.grid, self.work, surface_speed, oil_constants(oil),
-            (oil.specific_heat / self.kept, oil.conductivity / self.kept), (self.inlet, *limits), self.warming,
+            (oil.specific_heat / self.kept, oil.conductivity / self.kept), (self.inlet, *limits), self.pressure_change,
         )  # fmt: skip
         self.temperature_change = change
-        self.foreseen = self.forces._replace(force=self.forces.force + np.array([radial, tangential]))
+        self.corrected = self.forces._replace(force=self.forces.force + np.array([radial, tangential]))
         return limited
 
-    def foresee(self, surface_speed: float, oil: Oil) -> None:
-        """Say what a temperature that was found otherwise will do to the pressure; see `foreseen`."""
+    def correct(self, surface_speed: float, oil: Oil) -> None:
+        """Say what a temperature that was found otherwise will do to the pressure; see `corrected`."""
         assert self.forces is not None
-        change = warmer_pressure(self.grid, self.work, surface_speed, oil_constants(oil), self.warming)
-        self.foreseen = self.forces._replace(force=self.forces.force + change)
+        change = pressure_change(self.grid, self.work, surface_speed, oil_constants(oil), self.pressure_change)
+        self.corrected = self.forces._replace(force=self.forces.force + change)
 
-    def foreseen_pressure(self) -> FloatArray:
+    def corrected_pressure(self) -> FloatArray:
         """Pressure at the new temperature, (nt + 1, nz + 1) [Pa]."""
         pressure = self.work.pressure.copy()
         inner = pressure[1:-1, self.grid.first : -1]
-        inner += self.warming.reshape(inner.shape)
+        inner += self.pressure_change.reshape(inner.shape)
         return pressure
 
 
@@ -154,6 +159,7 @@ def pad_films(setup: Setup) -> list[PadFilm]:
     """Lay out every pad's film."""
     bearing = setup.bearing
     symmetric = setup.misalignment[0] == 0.0
+    solid = setup.flexible_pads or setup.options.conduction
     angle, toward = setup.misalignment
     films = []
     solver = film_solver(setup.options.cavitation)
@@ -171,14 +177,14 @@ def pad_films(setup: Setup) -> list[PadFilm]:
                 pad=pad,
                 normal=np.array([math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)]),
                 tangent=np.array([-math.sin(pad.pivot_angle), math.cos(pad.pivot_angle)]),
-                gap=pad.pad_clearance - pad.assembled_clearance - setup.clearance_change,
+                preload_distance=pad.pad_clearance - pad.assembled_clearance - setup.clearance_change,
                 pivot_radius=bearing.pivot_radius(pad),
                 grid=grid,
                 work=work,
                 inlet=setup.inlet_temperature,
                 bent=np.zeros_like(work.extra),
-                warming=np.zeros_like(work.unknown),
-                give=pad_give(pad, bearing, grid) if setup.flexible_pads or setup.options.conduction else None,
+                pressure_change=np.zeros_like(work.unknown),
+                deformation=pad_deformation(pad, bearing, grid) if solid else None,
                 kept=1.0 - setup.heat_loss,
                 solver=solver,
             )

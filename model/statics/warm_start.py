@@ -8,7 +8,7 @@ from dataclasses import replace
 from model.statics.equilibrium import Equilibrium
 
 
-def carried_on(before: Equilibrium, last: Equilibrium, share: float = 1.0) -> Equilibrium:
+def extrapolated_state(before: Equilibrium, last: Equilibrium, share: float = 1.0) -> Equilibrium:
     """Where a sweep is heading: a start for its next point.
 
     Parameters

@@ -29,8 +29,8 @@ def test_deformation_is_what_pressure_and_heat_ask_for(bearing, load):
     assert p.converged
     assert p.equilibrium.iterations <= 18  # followed one step behind, it swings for ever
     films = p.equilibrium.films
-    gives = [f.give for f in films if f.give is not None]
-    wanted = wanted_shapes(gives, [f.work.pressure for f in films], [f.work.temperature - 40.0 for f in films], 1.0)
+    bodies = [f.deformation for f in films if f.deformation is not None]
+    wanted = wanted_shapes(bodies, [f.work.pressure for f in films], [f.work.temperature - 40.0 for f in films], 1.0)
     for film, shape in zip(films, wanted, strict=True):
         np.testing.assert_allclose(film.bent, shape, atol=1e-5 * film.work.thickness.min())
     assert np.ptp(films[0].bent) > 1e-6
@@ -38,25 +38,25 @@ def test_deformation_is_what_pressure_and_heat_ask_for(bearing, load):
 
 def test_pads_of_one_shape_share_their_matrices(bearing):
     films = predict(bearing, 5000.0, speed=SPEED, thermal="tehd").equilibrium.films
-    assert len({id(f.give) for f in films}) == 1
+    assert len({id(f.deformation) for f in films}) == 1
 
 
 def test_pressure_slopes_by_shape_are_finite_differences(bearing):
     p = predict(bearing, 5000.0, speed=SPEED, thermal="tehd")
     film = p.equilibrium.films[0]
-    assert film.give is not None
+    assert film.deformation is not None
     grid, work = film.grid, film.work
     wedge = (film.pad.pad_clearance, *film.approach(p.equilibrium.position))
     surface = SPEED * bearing.journal_radius
 
     def pressure(amplitudes: np.ndarray) -> np.ndarray:
-        work.extra[:] = film.bent + film.give.shapes @ amplitudes
+        work.extra[:] = film.bent + film.deformation.shapes @ amplitudes
         assert solve_film(grid, work, wedge, surface, False).steps > 0
         return work.unknown.copy()
 
-    size = 1e-9 / np.abs(film.give.shapes).max()
-    pressure(np.zeros(film.give.shapes.shape[2]))
-    slopes = shape_slopes(grid, work, conductances(grid, work, *wedge), film.give.shapes)
+    size = 1e-9 / np.abs(film.deformation.shapes).max()
+    pressure(np.zeros(film.deformation.shapes.shape[2]))
+    slopes = shape_slopes(grid, work, conductances(grid, work, *wedge), film.deformation.shapes)
     for m in range(slopes.shape[1]):
         step = np.zeros(slopes.shape[1])
         step[m] = size
@@ -66,9 +66,11 @@ def test_pressure_slopes_by_shape_are_finite_differences(bearing):
 
 def test_shapes_are_orthonormal_by_area(bearing):
     film = predict(bearing, 5000.0, speed=SPEED, thermal="tehd").equilibrium.films[0]
-    assert film.give is not None
-    count = film.give.shapes.shape[2]
-    np.testing.assert_allclose(film.give.amplitudes @ film.give.shapes.reshape(-1, count), np.eye(count), atol=1e-10)
+    assert film.deformation is not None
+    count = film.deformation.shapes.shape[2]
+    np.testing.assert_allclose(
+        film.deformation.amplitudes @ film.deformation.shapes.reshape(-1, count), np.eye(count), atol=1e-10
+    )
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])

@@ -120,12 +120,12 @@ def test_limits_of_a_pad_are_told_apart(rocker):
 
 def test_singular_steps_are_named(rocker, monkeypatch):
     # no bearing is known that gets there: the guard is held by a step made of nothing
-    import model.statics.equilibrium as equilibrium
+    import model.statics.newton_iteration as newton_iteration
 
     def nothing(*_: object) -> tuple[float, np.ndarray, np.ndarray]:
         return 1.0, np.full(2, math.nan), np.zeros((5, 2))
 
-    monkeypatch.setattr(equilibrium, "newton_step", nothing)
+    monkeypatch.setattr(newton_iteration, "newton_step", nothing)
     p = run(rocker)
     assert "singular" in p.status
     assert not p.converged

@@ -166,7 +166,7 @@ def test_a_pad_that_cannot_keep_its_load_is_named(rocker):
     assert_equilibrium(p)
     # it would carry there, alone: its journal stands nearer than the edge of carrying, and the film opens both ways
     film = p.equilibrium.films[2]
-    assert film.branch.reach[0] + EDGE * film.pad.pad_clearance < film.reach(p.position) <= 0.0
+    assert film.branch.rigid_approach[0] + EDGE * film.pad.pad_clearance < film.rigid_approach(p.position) <= 0.0
 
 
 def test_accuracy_and_iterations_are_reported(rocker):

@@ -51,9 +51,9 @@ def test_heat_that_pads_take_is_what_their_solid_says(rocker):
     cooled = rocker.with_pads(tuple(replace(p, back_convection=3000.0) for p in rocker.pads))
     p = run(cooled, Options(conduction=True), thermal="tehd")
     film = p.equilibrium.films[0]
-    assert film.give is not None
+    assert film.deformation is not None
     work, oil = film.work, rocker.oil
-    into_pad = film.give.flux @ (film.give.warmth @ (work.temperature - 40.0).ravel())
+    into_pad = film.deformation.flux @ (film.deformation.to_coarse @ (work.temperature - 40.0).ravel())
     lost = float((film.grid.area.ravel() * into_pad).sum())
     assert lost > 0.2 * 2.0 * dissipation(film.grid, work, SPEED * rocker.journal_radius).sum()
     # the same heat taken away as a given loss, in one march, leaves the same temperature

@@ -169,7 +169,7 @@ def thickness(bearing: Bearing, film: PadFilm, position: np.ndarray, alpha: np.n
     pad, theta = film.pad, alpha + film.pad.pivot_angle
     return (
         pad.pad_clearance
-        - (film.gap - film.deflection) * np.cos(alpha)
+        - (film.preload_distance - film.deflection) * np.cos(alpha)
         - position[0] * np.cos(theta)
         - position[1] * np.sin(theta)
         - bearing.pivot_radius(pad) * film.tilt * np.sin(alpha)
@@ -209,7 +209,7 @@ def missed_attitude(p: Prediction, film: PadFilm) -> float:
     work.viscosity[:] = oil.viscosity(float(np.mean(warm)))
     work.density[:] = oil.density_40
     law = p.setup.pivots[film.number - 1]
-    reach = film.gap + float(film.normal @ p.bearing_position)
+    reach = film.preload_distance + float(film.normal @ p.bearing_position)
 
     def force(a: float, b: float) -> np.ndarray:
         work.ruptured[:] = False

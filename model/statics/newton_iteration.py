@@ -1,0 +1,149 @@
+"""One Newton iteration for journal, tilts and pivot deflections, from a start to an equilibrium or a named failure.
+
+The films' own derivatives with respect to (a, b) are the Jacobian; temperature and pad deformation follow one step
+behind and contract by a factor of about ten per iteration.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from model.arrays import FloatArray
+from model.conditions import Condition, has_answer
+from model.film.oil_state import least_share
+from model.pad.bending import change_of_shape
+from model.statics import conditions
+from model.statics.acceleration import Anderson
+from model.statics.carrying import (
+    MAX_LOAD_CHANGES,
+    leave_unstable,
+    longest_step,
+    unloaded_pads,
+    update_carrying,
+)
+from model.statics.equilibrium import Equilibrium
+from model.statics.film_step import HEAT_PER_FORCE, refine_derivatives, solve_films
+from model.statics.heat_paths import BOUNDLESS
+from model.statics.newton_step import newton_step
+from model.statics.search import RELAXATION, Search
+
+MAX_ITERATIONS = 80
+#: Below this residual, and this change of temperature [K], the iteration is accelerated and the temperature no longer
+#: relaxed.
+NEAR, NEAR_HEAT = 0.3, 25.0
+#: Steps that leave more than this share of what was left are accelerated; the others need no help.
+SLOW = 0.4
+#: A film may shrink to this share of itself in one step.
+SHRINK = 0.4
+#: A residual that has not fallen by this factor for so many steps has the steps halved.
+PROGRESS, PATIENCE = 0.7, 12
+
+
+def iterate(search: Search) -> Equilibrium:
+    """Iterate from where a search stands.
+
+    Returns
+    -------
+    Equilibrium
+        ``status`` names what is wrong, if anything is.
+    """
+    best, residual, heat, stalled = math.inf, math.inf, math.inf, 0
+    left = best_left = math.inf
+    memory, setup = Anderson(), search.setup
+    isothermal = setup.thermal == "isothermal" and not setup.flexible_pads
+    for iteration in range(1, MAX_ITERATIONS + 1):
+        if update_carrying(setup, search.films, search.position, search.surface_speed):
+            memory.reset()
+        before = search.vector() if left > SLOW * best_left and not isothermal else None
+        heat = solve_films(search)
+        if not heat < BOUNDLESS:
+            lost = any(f.lost for f in search.films)
+            return _failed(search, iteration, heat, conditions.FILM_LOST if lost else conditions.BOUNDLESS_HEAT)
+        residual, shift, moves = newton_step(setup, search.load, search.films)
+        if not (math.isfinite(residual) and np.isfinite([*search.position, *shift]).all() and np.isfinite(moves).all()):
+            return _failed(search, iteration, heat, conditions.SINGULAR)
+        best_left, left = min(best_left, left), max(residual, heat / HEAT_PER_FORCE)
+        near = residual < NEAR and heat < NEAR_HEAT
+        search.relaxation = 1.0 if near else RELAXATION
+        if residual < setup.accuracy and heat < HEAT_PER_FORCE * setup.accuracy:
+            if not leave_unstable(setup, search.films, search.position):
+                return _settled(search, iteration, residual, heat)
+            memory.reset()
+            continue
+        stalled = 0 if residual < PROGRESS * best else stalled + 1
+        best = min(best, residual)
+        whole = _move(search, (shift, moves), 0.5 if stalled > PATIENCE else 1.0)
+        # steps that were cut short, or still far off, say nothing of the iteration's slow modes
+        if before is not None and whole and near and left > SLOW * best_left:
+            search.set_vector(memory.next(before, search.vector()))
+        else:
+            memory.reset()
+    alternating = [f.number for f in search.films if f.load_changes >= MAX_LOAD_CHANGES]
+    names = (conditions.alternating(alternating),) if alternating else ()
+    return _result(search, (MAX_ITERATIONS, residual, heat), (*names, conditions.NOT_CONVERGED))
+
+
+def _move(search: Search, step: tuple[FloatArray, FloatArray], damping: float) -> bool:
+    """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
+    shift, moves = step
+    scale = min(damping, longest_step(search.films, shift))
+    bent: list[FloatArray | None] = []
+    for film, move in zip(search.films, moves, strict=True):
+        bent.append(None)
+        if film.forces is None:
+            continue
+        da = float(film.normal @ shift) - move[1]
+        db = float(film.tangent @ shift) + film.pivot_radius * move[0]
+        if film.deformation is not None and film.step is not None:
+            bent[-1] = change_of_shape(film.deformation, film.step, da, db)
+        worst = least_share(film.grid, film.work, da, db, _RIGID if bent[-1] is None else bent[-1])
+        if worst * damping < SHRINK - 1.0:
+            scale = min(scale, (SHRINK - 1.0) / worst)
+    search.position = search.position + scale * shift
+    for film, move, change in zip(search.films, moves, bent, strict=True):
+        film.tilt += float(scale * move[0])
+        film.deflection += float(scale * move[1])
+        if change is not None:
+            film.bent += scale * change
+            film.work.extra[:] += scale * change
+    return scale == 1.0
+
+
+#: What the film's thickness changes by besides its (a, b), where the pads are rigid.
+_RIGID = np.empty((0, 0))
+
+
+def _settled(search: Search, iterations: int, residual: float, heat: float) -> Equilibrium:
+    """What an iteration ends with whose residuals are below the tolerances."""
+    staying, restarting = unloaded_pads(search.films, search.position)
+    figures = iterations, residual, heat
+    if restarting:
+        return _result(search, figures, (conditions.undecided(restarting), conditions.NOT_CONVERGED))
+    refine_derivatives(search)
+    return _result(search, figures, (conditions.left_unloaded(staying),) if staying else ())
+
+
+def _failed(search: Search, iterations: int, heat: float, why: Condition) -> Equilibrium:
+    return _result(search, (iterations, math.inf, heat), (why, conditions.NOT_CONVERGED))
+
+
+def _result(search: Search, figures: tuple[int, float, float], status: tuple[Condition, ...]) -> Equilibrium:
+    """The state as an answer: iterations, residual and change of temperature, and what is to be said besides."""
+    names = list(status)
+    for film in search.films:
+        film.rest(search.position, search.surface_speed, search.setup.bearing.oil)
+    found = has_answer(names)
+    if not found and conditions.unsupported(search.setup, search.load):
+        names.insert(0, conditions.UNSUPPORTED)
+    overloaded = conditions.overloaded_pads(search.films)
+    if overloaded and found:
+        names.append(conditions.overloaded(overloaded))
+    idle = [f.number for f in search.films if f.idle]
+    if idle:
+        names.append(conditions.idle(idle))
+    if search.limited > 0:
+        names.append(conditions.FLOW_BACK)
+    names += conditions.regimes(search.setup, search.films, search.surface_speed)
+    return Equilibrium(search.position.copy(), tuple(search.films), *figures, search.journal, tuple(names))

@@ -1,0 +1,131 @@
+"""The state of a search for an equilibrium: journal, pads and films, how it starts, and all of it as one vector."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from model.arrays import FloatArray
+from model.setup import Setup
+from model.statics.carrying import find_branch, set_loaded
+from model.statics.equilibrium import Equilibrium
+from model.statics.first_position import first_position
+from model.statics.pad_film import PadFilm, pad_films
+
+#: Unit of lengths in the state vector [m]: a micrometre weighs as much as a kelvin.
+MICROMETRE = 1e-6
+#: Share of a change of temperature that is made far from the equilibrium: a much hotter film carries less and heats
+#: less, and undamped the two would swing.
+RELAXATION = 0.6
+#: How much hotter than the supply a film that makes heat is taken to be before it is solved [K].
+FIRST_HEATING = 3.0
+
+
+@dataclass
+class Search:
+    """What an iteration carries along.
+
+    Attributes
+    ----------
+    setup : Setup
+    load : (2,) ndarray
+        [N]
+    speed : float
+        [rad/s]
+    films : list of PadFilm
+    position : (2,) ndarray
+        Journal [m].
+    limited : float
+        Largest share of a film's flow that had to be limited, see `model.film.energy.solve_energy`.
+    journal : float
+        The journal's temperature [degC]; NaN where it takes no heat.
+    relaxation : float
+        Share of a change of temperature that is made.
+    """
+
+    setup: Setup
+    load: FloatArray
+    speed: float
+    films: list[PadFilm] = field(init=False)
+    position: FloatArray = field(default_factory=lambda: np.zeros(2))
+    limited: float = 0.0
+    journal: float = math.nan
+    relaxation: float = RELAXATION
+
+    def __post_init__(self) -> None:
+        self.lay_out()
+
+    @property
+    def surface_speed(self) -> float:
+        """Of the journal [m/s]."""
+        return self.speed * self.setup.bearing.journal_radius
+
+    @property
+    def carrying(self) -> list[PadFilm]:
+        """Films that were solved and are not lost."""
+        return [f for f in self.films if f.forces is not None and f.forces.steps > 0]
+
+    def lay_out(self) -> None:
+        """Make all films anew."""
+        self.films = pad_films(self.setup)
+
+    def start_from(self, start: Equilibrium) -> bool:
+        """Take over a neighbour's state; False if it has none or its mesh does not fit."""
+        if len(start.films) != len(self.films) or not start.converged:
+            return False
+        for film, other in zip(self.films, start.films, strict=True):
+            if film.work.pressure.shape != other.work.pressure.shape:
+                return False
+            film.tilt, film.deflection, film.idle = other.tilt, other.deflection, other.idle
+            film.work.temperature[:] = other.work.temperature
+            film.work.ruptured[:] = other.work.ruptured
+            film.work.pressure[:] = other.work.pressure
+            if self.setup.flexible_pads:
+                film.bent[:] = other.bent
+                film.work.extra[:] += other.bent
+        self.position = start.position.copy()
+        return True
+
+    def start_cold(self) -> None:
+        """Balance the load with the tabulated isothermal films, then put every pad on its loaded attitude."""
+        hotter = 0.0 if self.setup.thermal == "isothermal" else FIRST_HEATING
+        branches = []
+        for film in self.films:
+            film.work.temperature[:] = film.inlet
+            film.branch = find_branch(self.setup, film, self.surface_speed, hotter)
+            branches.append(film.branch)
+        normals = np.array([f.normal for f in self.films])
+        distances = np.array([f.preload_distance for f in self.films])
+        self.position = first_position(self.load, normals, distances, branches)
+        for film in self.films:
+            set_loaded(film, self.position)
+
+    def vector(self) -> FloatArray:
+        """Journal, pads and film temperatures as one vector, in micrometres and kelvins."""
+        parts = [self.position / MICROMETRE]
+        for film in self.films:
+            parts.append(np.array([film.tilt * film.pivot_radius, film.deflection]) / MICROMETRE)
+            parts.append(film.work.temperature.ravel() * (0.0 if film.idle else 1.0))
+            if self.setup.flexible_pads:
+                parts.append(film.bent.ravel() / MICROMETRE)
+        return np.concatenate(parts)
+
+    def set_vector(self, state: FloatArray) -> None:
+        """Undo `vector`."""
+        self.position = state[:2] * MICROMETRE
+        at = 2
+        for film in self.films:
+            film.tilt = float(state[at]) * MICROMETRE / film.pivot_radius
+            film.deflection = float(state[at + 1]) * MICROMETRE
+            at += 2
+            size = film.work.temperature.size
+            if not film.idle:
+                film.work.temperature.ravel()[:] = state[at : at + size]
+            at += size
+            if self.setup.flexible_pads:
+                bent = state[at : at + size].reshape(film.bent.shape) * MICROMETRE
+                film.work.extra[:] += bent - film.bent
+                film.bent[:] = bent
+                at += size
