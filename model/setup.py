@@ -7,99 +7,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from model.arrays import ComplexArray, FloatArray
+from model.arrays import FloatArray
 from model.bearing import Bearing, BearingError, Pad
+from model.instruments import Instruments
 from model.nearest import check_known
 from model.options import Options
 from model.pivots import PivotLaw
 
 THERMAL = ("isothermal", "adiabatic", "tehd")
-#: A sensor map: excitation frequency [rad/s] -> (2, 2) complex; 0 gives what static readings see.
-SensorMap = Callable[[float], NDArray[Any]]
-
-
-@dataclass(frozen=True)
-class Instruments:
-    """What stands between the bearing and the records: linear maps of displacement and force readings.
-
-    Attributes
-    ----------
-    displacement : tuple of SensorMap
-        Each turns true (X, Y) into read (X, Y); applied in order.
-    force : tuple of SensorMap
-        The same for the oil force as computed from cells and accelerometers.
-    housing_mass : float
-        Stated mass [kg] of the housing, for effects that need the force split.
-    cell_stiffness : tuple of float
-        Stiffness between housing and frame in X and Y [N/m] (the rig's; seen in a dry shake).
-    """
-
-    displacement: tuple[SensorMap, ...] = ()
-    force: tuple[SensorMap, ...] = ()
-    housing_mass: float = 30.0
-    cell_stiffness: tuple[float, float] = (4.0e8, 6.0e8)
-
-    def displacement_map(self, omega: float) -> ComplexArray:
-        """S(omega): read displacement = S @ true displacement."""
-        return _product(self.displacement, omega)
-
-    def force_map(self, omega: float) -> ComplexArray:
-        """G(omega): read force = G @ true force."""
-        return _product(self.force, omega)
-
-    def shown_stiffness(self, h: ComplexArray, lines: FloatArray) -> ComplexArray:
-        """G h S^-1 (n, 2, 2) [N/m]: what the records make of the bearing's `h` (n, 2, 2) at `lines` (n,) [rad/s]."""
-        at = zip(lines, h, strict=True)
-        return np.array([self.force_map(w) @ one @ np.linalg.inv(self.displacement_map(w)) for w, one in at])
-
-    def shown_position(self, position: FloatArray) -> FloatArray:
-        """S(0) position (2,) [m]: where static readings place a shaft that the housing's probes see at `position`."""
-        return np.asarray((self.displacement_map(0.0) @ position).real)
-
-    def shown_load(self, force: FloatArray) -> FloatArray:
-        """G(0) force (2,) [N]: the static load that the cells tell."""
-        return np.asarray((self.force_map(0.0) @ force).real)
-
-    def read_displacement(self, one: SensorMap) -> Instruments:
-        """Return a copy whose displacement readings pass through one more map."""
-        return replace(self, displacement=(*self.displacement, one))
-
-    def read_cells(self, gain: FloatArray) -> Instruments:
-        """Return a copy whose load cells read `gain` (2, 2) times the truth.
-
-        Only the cells' part of F_oil = F_cell + m a passes through the gain; with the housing on springs K,
-        F_cell = F_oil / (1 - m omega^2 / K).
-        """
-
-        def one(omega: float) -> ComplexArray:
-            share = 1.0 / (1.0 - self.housing_mass * omega**2 / np.array(self.cell_stiffness))
-            part = (np.asarray(gain) - np.eye(2)) * share[None, :]
-            return np.asarray(np.eye(2) + part, dtype=np.complex128)
-
-        return replace(self, force=(*self.force, one))
-
-    def weigh_housing(self, mass_error: float) -> Instruments:
-        """Return a copy whose housing weighs `mass_error` [kg] more than stated.
-
-        The force computed with the stated mass lacks mass_error times the housing's acceleration,
-        a = -omega^2 F_cell / K.
-        """
-
-        def one(omega: float) -> ComplexArray:
-            stiffness = np.array(self.cell_stiffness)
-            share = 1.0 / (stiffness - (self.housing_mass + mass_error) * omega**2)
-            return np.diag(1.0 + mass_error * omega**2 * share).astype(complex)
-
-        return replace(self, force=(*self.force, one))
-
-
-def _product(maps: tuple[SensorMap, ...], omega: float) -> ComplexArray:
-    total: ComplexArray = np.eye(2, dtype=np.complex128)
-    for one in maps:
-        total = np.asarray(np.asarray(one(omega)) @ total, dtype=np.complex128)
-    return total
 
 
 @dataclass(frozen=True)
@@ -158,6 +74,7 @@ class Setup:
     added_mass : float
         [kg]
     instruments : Instruments
+        What stands between this bearing and the records; the solver does not look at it.
     accuracy : float
         Unbalanced share of the load at which an equilibrium counts as found; 1e-5 is plenty where many models are
         compared.

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from model.arrays import ComplexArray
 from model.effects.kind import EffectKind, Parameter
-from model.setup import ComplexArray, Setup
+from model.setup import Setup
 
 
 def apply(setup: Setup, delay: float) -> Setup:

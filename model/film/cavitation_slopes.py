@@ -8,6 +8,7 @@ from model.arrays import FloatArray
 from model.compilation import compiled
 from model.film.cavitation_matrix import FaceFlows, assemble_columns, factorise_columns, substitute_columns
 from model.film.mesh import FilmGrid, FilmWork
+from model.film.slopes import net_inflow
 
 
 @compiled
@@ -92,36 +93,24 @@ def _displaced(grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, 
     """What more flows into a control volume when a or b grows and pressure and filling stay."""
     p, h = work.pressure, work.thickness
     nt, nz = faces.along.shape[0], faces.across.shape[1]
-    first = grid.first
-    width = nz - first
+    width = nz - grid.first
+    along, across = np.zeros((nt, nz + 1, 2)), np.empty((nt + 1, nz, 2))
     for i in range(nt):
-        for j in range(first, nz):
-            k = i * width + j - first
+        for j in range(grid.first, nz):
             if i == 0 and work.ruptured[0, j]:  # the supply follows the gap at the edge itself
-                rhs[k, 0] -= faces.supply[j] / h[0, j] * grid.cos[0]
-                rhs[k, 1] -= faces.supply[j] / h[0, j] * grid.sin[0]
-                continue
-            filling = 1.0 + (x[k - width, 0] if i > 0 and work.ruptured[i, j] else 0.0)
-            poiseuille = faces.along[i, j] * (p[i + 1, j] - p[i, j])
-            # dh/da = -cos, dh/db = -sin
-            slope = (faces.couette[i, j] * filling - 3.0 * poiseuille) / faces.height[i, j]
-            if i + 1 < nt:
-                rhs[k, 0] -= slope * grid.cos_face[i]
-                rhs[k, 1] -= slope * grid.sin_face[i]
-            if i > 0:
-                rhs[k - width, 0] += slope * grid.cos_face[i]
-                rhs[k - width, 1] += slope * grid.sin_face[i]
-    for i in range(1, nt):
+                slope, cos, sin = faces.supply[j] / h[0, j], grid.cos[0], grid.sin[0]
+            else:
+                upstream = (i - 1) * width + j - grid.first
+                filling = 1.0 + (x[upstream, 0] if i > 0 and work.ruptured[i, j] else 0.0)
+                poiseuille = faces.along[i, j] * (p[i + 1, j] - p[i, j])
+                slope = (faces.couette[i, j] * filling - 3.0 * poiseuille) / faces.height[i, j]
+                cos, sin = grid.cos_face[i], grid.sin_face[i]
+            along[i, j, 0], along[i, j, 1] = -slope * cos, -slope * sin  # dh/da = -cos, dh/db = -sin
+    for i in range(nt + 1):
         for j in range(nz):
-            poiseuille = faces.across[i, j] * (p[i, j + 1] - p[i, j])
-            slope = -3.0 * poiseuille / (0.5 * (h[i, j] + h[i, j + 1]))
-            k = (i - 1) * width + j - first
-            if j >= first:
-                rhs[k, 0] += slope * grid.cos[i]
-                rhs[k, 1] += slope * grid.sin[i]
-            if j + 1 < nz:
-                rhs[k + 1, 0] -= slope * grid.cos[i]
-                rhs[k + 1, 1] -= slope * grid.sin[i]
+            slope = -3.0 * faces.across[i, j] * (p[i, j + 1] - p[i, j]) / (0.5 * (h[i, j] + h[i, j + 1]))
+            across[i, j, 0], across[i, j, 1] = -slope * grid.cos[i], -slope * grid.sin[i]
+    net_inflow(along, across, grid.first, rhs)
 
 
 @compiled

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -59,6 +60,25 @@ class PadDeformation:
     amplitudes: FloatArray
     response: FloatArray
     weights: FloatArray
+
+
+class SolvedFilm(NamedTuple):
+    """A film whose pressure is solved.
+
+    Attributes
+    ----------
+    grid, work
+        Mesh and arrays.
+    wedge : tuple of float
+        Cp, a, b [m].
+    forces : FilmForces
+        At the temperature found since.
+    """
+
+    grid: FilmGrid
+    work: FilmWork
+    wedge: tuple[float, float, float]
+    forces: FilmForces
 
 
 @dataclass(frozen=True)
@@ -156,31 +176,20 @@ def wanted_shapes(
     return wanted
 
 
-def bending_step(
-    body: PadDeformation,
-    grid: FilmGrid,
-    work: FilmWork,
-    wedge: tuple[float, float, float],
-    forces: FilmForces,
-    change: FloatArray,
-    factor: float,
-) -> BendingStep:
+def bending_step(body: PadDeformation, film: SolvedFilm, change: FloatArray, factor: float) -> BendingStep:
     """Close the loop of pressure and deformation for one pad.
 
     Parameters
     ----------
     body : PadDeformation
-    grid, work
-        The film, solved at the present deformation.
-    wedge : tuple of float
-        Cp, a, b [m].
-    forces : FilmForces
-        Of the pad as it is.
+    film : SolvedFilm
+        At the present deformation.
     change : (nt + 1, nz + 1) ndarray
         Deformation asked for less the present one [m].
     factor : float
         On the computed deformation.
     """
+    grid, work, wedge, forces = film
     slopes = shape_slopes(grid, work, conductances(grid, work, *wedge), body.shapes)
     response = factor * body.response
     asked = body.amplitudes @ change.ravel()

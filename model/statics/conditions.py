@@ -137,11 +137,12 @@ def regimes(setup: Setup, films: Sequence[PadFilm], surface_speed: float) -> lis
 
 def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:
     """Largest local Reynolds number rho U h / mu of all films, the idle pads' too; NaN where there is none."""
-    numbers = [
-        float((f.work.density * f.work.thickness / f.work.viscosity).max()) * surface_speed
-        for f in films
-        if f.forces is not None
-    ]
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # a lost film may be as hot as numbers go
+        numbers = [
+            float((f.work.density * f.work.thickness / f.work.viscosity).max()) * surface_speed
+            for f in films
+            if f.forces is not None
+        ]
     numbers += [f.resting.reynolds for f in films if f.resting is not None]
     return max((n for n in numbers if math.isfinite(n)), default=math.nan)
 

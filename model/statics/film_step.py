@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from model.pad.bending import bending_step, wanted_shapes
+from model.pad.bending import SolvedFilm, bending_step, wanted_shapes
 from model.statics.carrying import set_loaded
 from model.statics.heat_paths import BOUNDLESS, couples_heat, settle_temperatures
 from model.statics.pad_film import PadFilm
@@ -96,8 +96,7 @@ def _bend_pads(search: Search) -> float:
     for film, body, shape in zip(carrying, bodies, wanted, strict=True):
         assert film.corrected is not None
         wedge = (film.pad.pad_clearance, *film.approach(search.position))
-        film.step = bending_step(
-            body, film.grid, film.work, wedge, film.corrected, shape - film.bent, setup.bending_factor
-        )
+        solved = SolvedFilm(film.grid, film.work, wedge, film.corrected)
+        film.step = bending_step(body, solved, shape - film.bent, setup.bending_factor)
         share = max(share, film.step.share)
     return share

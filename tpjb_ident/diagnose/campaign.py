@@ -19,7 +19,8 @@ from tpjb_ident.presentation import Presented
 
 from model.effects import Effect, apply_effects  # isort: skip
 from model.pivots import pivot_laws  # isort: skip
-from model.setup import Instruments, Setup  # isort: skip
+from model.instruments import Instruments  # isort: skip
+from model.setup import Setup  # isort: skip
 
 if TYPE_CHECKING:
     from collections.abc import Callable

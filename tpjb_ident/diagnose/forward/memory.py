@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from model.instruments import Instruments
 from model.predict import Prediction, predict_setup
-from model.setup import Instruments, Setup
+from model.setup import Setup
 from model.statics.equilibrium import Equilibrium
 from tpjb_ident.errors import TpjbError
 

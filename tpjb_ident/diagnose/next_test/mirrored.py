@@ -12,7 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from model.setup import ComplexArray, Instruments, SensorMap, Setup
+from model.arrays import ComplexArray
+from model.instruments import Instruments, SensorMap
+from model.setup import Setup
 from tpjb_ident.diagnose.observations.layout import DynamicTest, Layout
 
 _MIRROR = np.diag([-1.0, 1.0])
