@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdata.arrays import FloatArray
+from rigdata.channel_response import ChannelResponse
 from rigdata.units import (
     UnitError,
     is_bridge_ratio,
@@ -31,6 +32,8 @@ DIMENSIONS = {
     "speed": "speed",
     "time": "time",
 }
+#: Quantities of which only the course counts, not the size: their readings stay as they are.
+UNCALIBRATED = ("command", "keyphasor")
 #: Quantities with a direction in the bearing's plane.
 VECTOR_QUANTITIES = ("displacement", "force", "acceleration")
 _ZERO_CELSIUS = 273.15
@@ -48,7 +51,7 @@ class Channel:
         Column or dataset name, key of the manifest.
     quantity : str
         ``"displacement"``, ``"force"``, ``"acceleration"``, ``"temperature"``, ``"pressure"``,
-        ``"speed"``, ``"time"`` or ``"ignore"``.
+        ``"speed"``, ``"time"``, ``"command"``, ``"keyphasor"`` or ``"ignore"``.
     unit : str
         Unit of the reading, as the manifest gives it.
     gain : float
@@ -65,6 +68,16 @@ class Channel:
         Pad number from 1, for temperatures and pressures.
     position : float or None
         Fraction of the pad's arc from its leading edge.
+    axis_uncertainty : float
+        Of `axis`, one standard deviation [rad].
+    response : ChannelResponse
+        Filter and delay, which are taken out of the phasors.
+    delay_uncertainty : float
+        One standard deviation [s].
+    zero_uncertainty : float
+        Of `zero`, one standard deviation, SI.
+    clock : str
+        Channels of one clock share a letter; "" where the manifest says nothing.
     """
 
     name: str
@@ -77,6 +90,11 @@ class Channel:
     uncertainty: float | None = None
     pad: int | None = None
     position: float | None = None
+    axis_uncertainty: float = 0.0
+    response: ChannelResponse = ChannelResponse()
+    delay_uncertainty: float = 0.0
+    zero_uncertainty: float = 0.0
+    clock: str = ""
 
     @property
     def slope(self) -> float:

@@ -6,7 +6,7 @@ import hashlib
 import itertools
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -44,6 +44,12 @@ class Campaign:
     runs : tuple of Run
     notes : tuple of Problem
         Findings that did not stop loading.
+    files : mapping of str to Path
+        Everything that the campaign consists of, by display name.
+    mass_uncertainty : float
+        Of the housing's mass, one standard deviation [kg].
+    mains : float or None
+        Mains frequency as the manifest states it [Hz].
     """
 
     id: str
@@ -56,6 +62,8 @@ class Campaign:
     runs: tuple[Run, ...] = field(repr=False)
     notes: tuple[Problem, ...] = field(repr=False, default=())
     files: Mapping[str, Path] = field(repr=False, default_factory=dict)
+    mass_uncertainty: float = 0.0
+    mains: float | None = None
 
     def __str__(self) -> str:
         kinds = {k: sum(r.kind == k for r in self.runs) for k in dict.fromkeys(r.kind for r in self.runs)}
@@ -184,9 +192,9 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
     from rigdata.readers.text.csv import CsvReader, TableCache
 
     text = _read_text(manifest_path, manifest_path.name, MAX_MANIFEST)
-    manifest = parse_manifest(text, manifest_path.name)
-    problems: list[Problem] = []
     files: dict[str, Path] = {manifest_path.name: manifest_path}
+    manifest = parse_manifest(text, manifest_path.name, _named_file(folder, manifest_path.name, files))
+    problems: list[Problem] = []
     bearing = _bearing_text(folder, manifest, manifest_path.name, files, problems)
     channels = {n: c for n, c in manifest.channels.items() if c.quantity != "ignore"}
     cache = TableCache()
@@ -231,7 +239,8 @@ def _load_hdf5(path: Path) -> Campaign:
     from rigdata.readers.hdf5.reader import Hdf5Reader, read_texts
 
     text, bearing = read_texts(path, path.name)
-    manifest = parse_manifest(text, f"{path.name}:manifest")
+    files = {path.name: path}
+    manifest = parse_manifest(text, f"{path.name}:manifest", _named_file(path.parent, path.name, files))
     problems: list[Problem] = []
     if not bearing or len(bearing) > _MAX_BEARING:
         cure = "Store the bearing's TOML text there, or give --bearing where one is needed"
@@ -245,7 +254,7 @@ def _load_hdf5(path: Path) -> Campaign:
         rate = entry.sample_rate or manifest.sample_rate
         reader = Hdf5Reader(path, entry.id, path.name, rate, described, clock)
         runs.append(_make_run(entry, channels, reader))
-    return _finish(manifest, path, bearing, channels, runs, problems, {path.name: path})
+    return _finish(manifest, path, bearing, channels, runs, problems, files)
 
 
 def _make_run(entry: RunEntry, channels: Mapping[str, Channel], reader: RunReader) -> Run:
@@ -259,7 +268,19 @@ def _make_run(entry: RunEntry, channels: Mapping[str, Channel], reader: RunReade
         channels=channels,
         stated=entry.stated,
         reader=reader,
+        excitation_kind=entry.excitation,
+        band=entry.band,
     )
+
+
+def _named_file(folder: Path, file: str, files: dict[str, Path]) -> Callable[[str, str], str]:
+    """Reads small text files of the campaign that the manifest names, and notes them in `files`."""
+
+    def read(name: str, place: str) -> str:
+        files[name] = inside(folder, name, file, place)
+        return _read_text(files[name], name, _MAX_BEARING)
+
+    return read
 
 
 def _finish(
@@ -284,4 +305,6 @@ def _finish(
         runs=tuple(runs),
         notes=(*manifest.notes, *problems),
         files=files,
+        mass_uncertainty=manifest.mass_uncertainty,
+        mains=manifest.mains,
     )

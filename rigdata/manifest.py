@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rigdata.calibration import Channel
-from rigdata.manifest_channels import read_channels
+from rigdata.manifest_channels import TextFile, read_channels
 from rigdata.manifest_runs import RunEntry, read_runs
 from rigdata.manifest_table import Findings, Table
 from rigdata.problem import Problem, RigDataError
@@ -64,6 +64,10 @@ class Manifest:
     runs : tuple of RunEntry
     notes : tuple of Problem
         Findings that do not stop a campaign from being used.
+    mass_uncertainty : float
+        Of `housing_mass`, one standard deviation [kg].
+    mains : float or None
+        Mains frequency [Hz]; None where the manifest gives none.
     """
 
     id: str
@@ -75,9 +79,11 @@ class Manifest:
     channels: Mapping[str, Channel] = field(repr=False)
     runs: tuple[RunEntry, ...] = field(repr=False)
     notes: tuple[Problem, ...] = ()
+    mass_uncertainty: float = 0.0
+    mains: float | None = None
 
 
-def parse_manifest(text: str, file: str = "campaign.toml") -> Manifest:
+def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | None = None) -> Manifest:
     """Read and check the text of a manifest.
 
     Parameters
@@ -86,6 +92,8 @@ def parse_manifest(text: str, file: str = "campaign.toml") -> Manifest:
         TOML.
     file : str
         What to call it in messages.
+    files : callable, optional
+        Called with the name of a file that the manifest names and the place where it does; gives its text.
 
     Returns
     -------
@@ -103,13 +111,13 @@ def parse_manifest(text: str, file: str = "campaign.toml") -> Manifest:
     schema = top.text("schema", required=True)
     if schema is not None and schema != SCHEMA:
         findings.error(("schema",), f"schema is {schema!r}, not {SCHEMA!r}", "Export in the format tpjb-rig/1")
-    channels = read_channels(top.subtable("channels"), findings)
+    channels = read_channels(top.subtable("channels"), findings, files)
     runs = read_runs(data.get("runs"), findings)
     housing = top.subtable("housing")
-    housing.only(("mass",), "[housing]")
-    mass = housing.quantity("mass", "mass", low=0.0, required=any(r.kind == "dynamic" for r in runs))
+    housing.only(("mass", "mass_uncertainty"), "[housing]")
+    mass = housing.quantity("mass", "mass", low=0.0, required=any(r.kind in {"dynamic", "baseline"} for r in runs))
     acquisition = top.subtable("acquisition")
-    acquisition.only(("sample_rate",), "[acquisition]")
+    acquisition.only(("sample_rate", "mains"), "[acquisition]")
     rate = acquisition.quantity("sample_rate", "frequency", above=0.0)
     manifest = Manifest(
         id=top.text("id", required=True) or "",
@@ -121,10 +129,20 @@ def parse_manifest(text: str, file: str = "campaign.toml") -> Manifest:
         channels=channels,
         runs=runs,
         notes=tuple(p for p in findings.problems if p.severity != "error"),
+        mass_uncertainty=housing.quantity("mass_uncertainty", "mass", low=0.0) or 0.0,
+        mains=_mains(acquisition),
     )
     if findings.failed:
         raise RigDataError(findings.problems)
     return manifest
+
+
+def _mains(table: Table) -> float | None:
+    value = table.quantity("mains", "frequency", low=0.0)
+    if value is not None and value not in (50.0, 60.0):
+        table.error("mains", f"mains is {value:g} Hz", 'Give "50 Hz" or "60 Hz"')
+        return None
+    return value
 
 
 def _load_toml(text: str, file: str) -> dict[str, Any]:

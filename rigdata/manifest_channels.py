@@ -2,8 +2,20 @@
 
 from __future__ import annotations
 
-from rigdata.calibration import DIMENSIONS, VECTOR_QUANTITIES, Channel, reading_gain, reading_zero
+from collections.abc import Callable
+from typing import Any
+
+from rigdata.calibration import (
+    DIMENSIONS,
+    UNCALIBRATED,
+    VECTOR_QUANTITIES,
+    Channel,
+    reading_gain,
+    reading_zero,
+)
+from rigdata.channel_response import ChannelResponse, parse_filter, parse_response_table
 from rigdata.manifest_table import Findings, Table, shown
+from rigdata.problem import RigDataError
 from rigdata.units import UnitError, is_signal
 
 _KEYS = (
@@ -18,12 +30,23 @@ _KEYS = (
     "pad",
     "position",
     "zero",
+    "axis_uncertainty",
+    "delay",
+    "delay_uncertainty",
+    "filter",
+    "filter_table",
+    "clock",
+    "zero_uncertainty",
 )
-_QUANTITIES = (*DIMENSIONS, "ignore")
+_QUANTITIES = (*DIMENSIONS, *UNCALIBRATED, "ignore")
+#: Gives the text of a file of the campaign, by its name in the manifest; raises RigDataError.
+TextFile = Callable[[str, str], str]
+#: Delays beyond this are another run's [s].
+_MAX_DELAY = 10.0
 _MAX_CHANNELS = 4096
 
 
-def read_channels(table: Table, findings: Findings) -> dict[str, Channel]:
+def read_channels(table: Table, findings: Findings, files: TextFile | None = None) -> dict[str, Channel]:
     """Read every channel; what is wrong is noted in `findings`, and that channel left out.
 
     Parameters
@@ -32,6 +55,8 @@ def read_channels(table: Table, findings: Findings) -> dict[str, Channel]:
         ``channels`` of the manifest.
     findings : Findings
         Receives the problems.
+    files : callable, optional
+        Reads the tables that `filter_table` names; without it they are refused.
     """
     channels: dict[str, Channel] = {}
     if not table.data:
@@ -41,7 +66,7 @@ def read_channels(table: Table, findings: Findings) -> dict[str, Channel]:
         return channels
     for name in table.data:
         before = len(findings.problems)
-        channel = _read_channel(name, table.subtable(name))
+        channel = _read_channel(name, table.subtable(name), files)
         if not any(p.severity == "error" for p in findings.problems[before:]) and channel is not None:
             channels[name] = channel
     if sum(c.quantity == "time" for c in channels.values()) > 1:
@@ -49,7 +74,7 @@ def read_channels(table: Table, findings: Findings) -> dict[str, Channel]:
     return channels
 
 
-def _read_channel(name: str, table: Table) -> Channel | None:
+def _read_channel(name: str, table: Table, files: TextFile | None) -> Channel | None:
     table.only(_KEYS, f"[channels.{name[:40]}]")
     if not name.strip() or len(name) > 200 or not name.isprintable() or "/" in name or name in {".", ".."}:
         table.findings.error(table.path, f"channel name {shown(name)} cannot be used", "Use letters and digits")
@@ -57,8 +82,9 @@ def _read_channel(name: str, table: Table) -> Channel | None:
     quantity = table.choice("quantity", _QUANTITIES, required=True)
     if quantity is None or quantity == "ignore":
         return Channel(name, "ignore") if quantity else None
-    unit = table.text("unit", required=True)
-    directed = quantity in VECTOR_QUANTITIES
+    plain = quantity in UNCALIBRATED
+    unit = table.text("unit", required=not plain) or ("" if plain else None)
+    directed = quantity in VECTOR_QUANTITIES or quantity == "command"
     axis = table.quantity("axis", "angle", required=directed)
     polarity = table.data.get("polarity", 1)
     if isinstance(polarity, bool) or polarity not in (1, -1):
@@ -67,7 +93,7 @@ def _read_channel(name: str, table: Table) -> Channel | None:
     position = table.quantity("position", "ratio", low=0.0)
     if position is not None and position > 1.0:
         table.error("position", f"position is {position:g}", "It is the fraction of the arc, 0 to 1")
-    gain, zero = _calibration(table, quantity, unit)
+    gain, zero = (1.0, 0.0) if plain else _calibration(table, quantity, unit)
     if gain is None or zero is None or unit is None:
         return None
     return Channel(
@@ -81,7 +107,45 @@ def _read_channel(name: str, table: Table) -> Channel | None:
         uncertainty=_uncertainty(table),
         pad=table.integer("pad", low=1, high=100),
         position=position,
+        axis_uncertainty=table.quantity("axis_uncertainty", "angle", low=0.0) or 0.0,
+        response=_response(table, files),
+        delay_uncertainty=table.quantity("delay_uncertainty", "time", low=0.0) or 0.0,
+        zero_uncertainty=_zero_uncertainty(table, quantity),
+        clock=table.text("clock") or "",
     )
+
+
+def _zero_uncertainty(table: Table, quantity: str) -> float:
+    if "zero_uncertainty" not in table.data:
+        return 0.0
+    if quantity not in DIMENSIONS:
+        table.error("zero_uncertainty", f"a {quantity} channel has no zero", "Delete zero_uncertainty")
+        return 0.0
+    return table.quantity("zero_uncertainty", DIMENSIONS[quantity], low=0.0) or 0.0
+
+
+def _response(table: Table, files: TextFile | None) -> ChannelResponse:
+    """Filter and delay; what is wrong is noted and left out."""
+    delay = table.quantity("delay", "time") or 0.0
+    if abs(delay) > _MAX_DELAY:
+        table.error("delay", f"delay is {shown(table.data['delay'])}", f"It must be below {_MAX_DELAY:g} s")
+    found: list[Any] = []
+    stated, file = table.text("filter"), table.text("filter_table")
+    try:
+        if stated is not None:
+            found.append(parse_filter(stated))
+    except UnitError as error:
+        table.error("filter", f"filter: {error}", "Or give filter_table, a measured response")
+    if file is not None and files is None:
+        table.error("filter_table", "a table cannot be read here", "Give filter, or a campaign in a folder")
+    elif file is not None and files is not None:
+        try:
+            found.append(parse_response_table(files(file, ".".join(str(p) for p in table.path))))
+        except UnitError as error:
+            table.error("filter_table", f"{shown(file)}: {error}", "Give lines of frequency_Hz, gain, phase_deg")
+        except RigDataError as error:
+            table.findings.problems.extend(error.problems)
+    return ChannelResponse(tuple(found), delay)
 
 
 def _uncertainty(table: Table) -> float | None:

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 
 from rigdata.manifest_table import Findings, Table, shown
 from rigdata.operating_point import OperatingPoint
+from rigdata.units import UnitError, parse_quantity
 
-KINDS = ("dynamic", "dry_pivot", "locus", "clearance")
+KINDS = ("dynamic", "dry_pivot", "locus", "clearance", "baseline")
+#: How a dynamic run is excited.
+EXCITATIONS = ("sine", "multisine", "sweep", "random", "impact")
 BRANCHES = ("up", "down", "cycle")
 _KEYS = (
     "id",
@@ -23,13 +26,18 @@ _KEYS = (
     "pad",
     "branch",
     "sample_rate",
+    "excitation",
+    "excitation_band",
 )
 _NEEDED = {
     "dynamic": ("shaft_speed", "static_load", "static_load_direction", "excitation_frequency"),
     "locus": ("shaft_speed", "static_load", "static_load_direction"),
     "dry_pivot": ("pad",),
     "clearance": (),
+    "baseline": ("excitation_frequency",),
 }
+#: What a run needs in place of a frequency where it is no sine.
+_BAND_NEEDED = {"excitation_frequency": "excitation_band"}
 _ID = re.compile(r"[\w][\w .+=@-]{0,199}")
 _MAX_RUNS = 100_000
 
@@ -55,6 +63,10 @@ class RunEntry:
         Keys that the manifest gives, for what a default cannot tell.
     index : int
         Place among the runs, from 0.
+    excitation : str
+        "sine", "multisine", "sweep", "random" or "impact".
+    band : (float, float) or None
+        Lowest and highest frequency excited [Hz].
     """
 
     id: str
@@ -67,6 +79,8 @@ class RunEntry:
     sample_rate: float | None
     stated: frozenset[str]
     index: int
+    excitation: str = "sine"
+    band: tuple[float, float] | None = None
 
 
 def read_runs(data: object, findings: Findings) -> tuple[RunEntry, ...]:
@@ -106,7 +120,9 @@ def _read_run(table: Table, index: int) -> RunEntry | None:
     if name is not None and not _ID.fullmatch(name):
         table.error("id", f"run id {shown(name)} cannot be used", "Use letters, digits, '-', '_' and '.'")
     kind = table.choice("kind", KINDS, required=True)
+    excitation = table.choice("excitation", EXCITATIONS) or "sine"
     for key in _NEEDED.get(kind or "", ()):
+        key = key if excitation == "sine" else _BAND_NEEDED.get(key, key)
         if key not in table.data:
             table.error(key, f"{key} is missing in a {kind} run", f"Add {key} to this run")
     file = table.text("file")
@@ -123,7 +139,27 @@ def _read_run(table: Table, index: int) -> RunEntry | None:
     if name is None or kind is None:
         return None
     stated = frozenset(table.data)
-    return RunEntry(name, kind, file or "", point, direction, pad, branch, rate, stated, index)
+    band = _band(table)
+    return RunEntry(
+        name, kind, file or "", point, direction, pad, branch, rate, stated, index, excitation=excitation, band=band
+    )
+
+
+def _band(table: Table) -> tuple[float, float] | None:
+    """``"5..120 Hz"`` as two frequencies [Hz]."""
+    text = table.text("excitation_band")
+    if text is None:
+        return None
+    low, dots, high = text.partition("..")
+    unit = high.strip().lstrip("0123456789.,+-eE").strip()
+    try:
+        ends = tuple(parse_quantity(f"{end.strip()} {unit}", "frequency") for end in (low, high.strip()[: -len(unit)]))
+    except UnitError:
+        ends = (0.0, 0.0)
+    if not dots or not 0 < ends[0] < ends[1] < 1e12:
+        table.error("excitation_band", f"excitation_band is {shown(text)}", 'Give e.g. "5..120 Hz", lowest first')
+        return None
+    return ends[0], ends[1]
 
 
 def _quantity(

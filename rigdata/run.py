@@ -45,7 +45,7 @@ class Run:
     Attributes
     ----------
     id, kind : str
-        Kind is ``"dynamic"``, ``"dry_pivot"``, ``"locus"`` or ``"clearance"``.
+        Kind is ``"dynamic"``, ``"dry_pivot"``, ``"locus"``, ``"clearance"`` or ``"baseline"``.
     point : OperatingPoint
         Set points, SI.
     excitation_direction : float or None
@@ -58,6 +58,10 @@ class Run:
         Those with a quantity (not ``ignore``).
     stated : frozenset of str
         Keys that the manifest gives for this run.
+    excitation_kind : str
+        ``"sine"``, ``"multisine"``, ``"sweep"``, ``"random"`` or ``"impact"``.
+    band : (float, float) or None
+        Lowest and highest frequency excited [Hz].
     """
 
     id: str
@@ -69,6 +73,8 @@ class Run:
     channels: Mapping[str, Channel] = field(repr=False)
     stated: frozenset[str] = field(repr=False)
     reader: RunReader = field(repr=False, compare=False)
+    excitation_kind: str = "sine"
+    band: tuple[float, float] | None = None
 
     @property
     def file(self) -> str:

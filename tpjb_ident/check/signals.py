@@ -14,6 +14,7 @@ NEEDED = {
     "dry_pivot": ("displacement", "force"),
     "locus": ("displacement", "force"),
     "clearance": ("displacement", "force"),
+    "baseline": ("displacement", "force"),
 }
 _CELSIUS = 273.15
 #: Film and housing temperatures of a rig that is not on fire [K].
