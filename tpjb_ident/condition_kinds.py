@@ -37,6 +37,22 @@ class ConditionKind:
 
 #: With one of these a number is not to be trusted: the command ends with exit code 3.
 ERRORS = {
+    "1X on excitation line": "The excitation stands on the running speed: unbalance and runout cannot be told "
+    "from it. Excite beside the running speed.",
+    "2X on excitation line": "The excitation stands on twice the running speed: runout cannot be told from it. "
+    "Excite beside it.",
+    "3X on excitation line": "The excitation stands on three times the running speed: runout cannot be told from it. "
+    "Excite beside it.",
+    "accelerometers-contradict-cells": "The housing's acceleration is not what its springs, the load cells, make of "
+    "their force: accelerometers are exchanged, or have the wrong sign. Check channels, axes and polarity.",
+    "cells-and-accelerometers-out-of-phase": "Between the load cells and the housing on them there is a lag: a device "
+    "that records late, or a filter. Damping is wrong by stiffness times that lag. State delay or filter in the "
+    "manifest, or filter all channels alike.",
+    "film-not-linear": "The film was shaken so hard that it answers at twice the excitation frequency: K and C of "
+    "small motion cannot be had from this. Excite less.",
+    "runs-disagree": "The runs of the point do not belong to one dynamic stiffness: what it leaves of their forces is "
+    "far more than load and noise explain. Look at the runs one by one.",
+    "most-windows-lost": "More than half of the record's windows gave no phasors. Look at the records.",
     "cells-contradict-set-points": "In all runs the load cells read many times more or less than the set points, "
     "or a load in quite another direction; the coefficients are then off by as much. Check sensitivity, "
     "full_scale, excitation, polarity and axes of the cells.",
@@ -61,9 +77,15 @@ ERRORS = {
 }
 #: The number holds as far as its interval goes; somebody should look.
 WARNINGS = {
-    "1X on excitation line": "The excitation stands on the running speed: unbalance and runout cannot be told "
-    "from it. Excite beside the running speed.",
-    "2X on excitation line": "The excitation stands on twice the running speed: runout cannot be told from it.",
+    "accelerometers-doubtful": "The housing's acceleration is not what its springs make of the cells' force; it is "
+    "too small a part of the force to matter here. Check channels, axes and polarity of the accelerometers.",
+    "cells-not-tared": "The load cells read something at no load: a constant in their mean over the campaign's loads. "
+    "It was taken off before runs were held against their set points. Tare the cells.",
+    "clocks-differ": "Probes and cells were recorded by clocks of different rate; the drift of their phase gave it "
+    "away and was put right. How exactly they were started together the records do not tell: state delay and "
+    "delay_uncertainty in the manifest.",
+    "slower-channels": "Channels were sampled slower than the export says and filled up by interpolation; what that "
+    "does to a sine was taken out. Export them at their own rate.",
     "accelerometer-dead": "An accelerometer reads one value throughout: the housing's inertia along it stays in "
     "the force. Check it, or set the channel to ignore.",
     "calibration-uncertainty-unstated": "The manifest states no calibration uncertainty for some channels; the "
@@ -110,6 +132,8 @@ WARNINGS = {
 }
 #: For information.
 NOTES = {
+    "no-static-force": "The load cells show no static force, as piezo-electric ones: whether runs meet their set "
+    "point is not known.",
     "bad-steps": "Some load steps were left out because the record was disturbed there.",
     "contact-incomplete": "At low load the shaft is not fully in contact with this pad; the curve holds above the "
     "load named.",
@@ -135,7 +159,7 @@ NOTES = {
 WARNINGS |= {
     f"{line} on excitation line": "Another line stands on the excitation, and cannot be told from it. Excite elsewhere."
     for line in (
-        *(f"{n}X" for n in range(3, 11)),
+        *(f"{n}X" for n in range(4, 11)),
         *(f"{kind} {n}" for kind in ("mains", "harmonic") for n in range(2, 11)),
         "found",
     )

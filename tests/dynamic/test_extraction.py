@@ -20,6 +20,7 @@ from tpjb_ident.dynamic.records.extraction import MAX_JITTER, extract
 from tpjb_ident.dynamic.records.lines import known_lines
 from tpjb_ident.dynamic.records.phasors import LineFitter, fit_uneven
 from tpjb_ident.dynamic.records.run_data import PhasorSettings
+from tpjb_ident.dynamic.records.shaft_course import ShaftCourse
 from tpjb_ident.dynamic.records.stretches import open_stretches
 from tpjb_ident.dynamic.records.windows import WindowSettings
 
@@ -250,13 +251,14 @@ def test_a_shaft_that_creeps_is_followed_window_by_window():
     speeds = 22.0 + 0.1 * np.arange(10)
     turns = np.concatenate([[0.0], np.cumsum(np.repeat(speeds, 400) / RATE)[:-1]])
     run = Held(turns=turns)
-    followed = taken(run, speeds)
+    middles = (np.arange(10) + 0.5) * 400 / RATE
+    followed = taken(run, ShaftCourse(middles, speeds))
     exact(followed)
     plain = taken(run)
     assert np.abs(plain.displacement.phasors[-1, 0] - Z["displacement"]).max() > 0.02e-6
     # where the speed is not known the run's own is taken; as in the first window
     holes = np.where(np.arange(10) == 9, np.nan, speeds)
-    some = taken(run, holes)
+    some = taken(run, ShaftCourse(middles, holes))
     exact(some, but=(9,))
     np.testing.assert_allclose(some.displacement.phasors[9], plain.displacement.phasors[9], atol=1e-15)
     np.testing.assert_allclose(some.displacement.phasors[0], plain.displacement.phasors[0], atol=1e-14)
@@ -265,7 +267,7 @@ def test_a_shaft_that_creeps_is_followed_window_by_window():
 def test_following_keeps_to_windows_of_their_own_clock():
     stamps = np.arange(4000) / RATE
     stamps[500] += 0.4 / RATE
-    found = taken(Held(stamps=stamps), np.full(10, 22.0))
+    found = taken(Held(stamps=stamps), ShaftCourse(np.array([0.2, 3.8]), np.full(2, 22.0)))
     exact(found)
 
 

@@ -117,7 +117,8 @@ def test_windows_of_a_point_follow_their_runs():
         blocks = [complex_normal(rng, n, 2, 2) for _ in range(3)]
         means = [rng.standard_normal((n, 2)) for _ in range(2)]
         return SimpleNamespace(
-            run=name, displacement=SimpleNamespace(phasors=blocks[0], mean=means[0]),
+            run=name, lines=SimpleNamespace(excitation=(SimpleNamespace(frequency=25.0),) * 2),
+            displacement=SimpleNamespace(phasors=blocks[0], mean=means[0]),
             cell_force=SimpleNamespace(mean=means[1]), oil_force=lambda line: blocks[1][:, line],
             acceleration=SimpleNamespace(phasors=blocks[2]) if accelerated else None,
         )  # fmt: skip

@@ -12,23 +12,35 @@ from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change, gain_draws
 from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
+from tpjb_ident.dynamic.corrections.mains import MAINS_ON_LINE, force_pickup, force_pickup_spread
+from tpjb_ident.dynamic.corrections.systematic_sources import SystematicSources, systematic_sources
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table
 from tpjb_ident.dynamic.estimators.methods import TABLED
 from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
 from tpjb_ident.dynamic.estimators.rlm import RlmSettings
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.instruments.findings import InstrumentFindings, amplitude_findings, look_at_instruments
+from tpjb_ident.dynamic.records.mains_frequency import mains_frequency
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
 from tpjb_ident.dynamic.results.amplitude import amplitude_slope
+from tpjb_ident.dynamic.results.budget import with_systematic
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.left_out_runs import lost_points, named_at_points
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.results.probe_scale import with_probe_doubts
-from tpjb_ident.dynamic.results.quality import amplitude, coherence, directional_pattern, flags, rejected_windows
-from tpjb_ident.dynamic.results.run_gains import channel_pairs, with_gain_doubts
+from tpjb_ident.dynamic.results.quality import (
+    amplitude,
+    coherence,
+    directional_pattern,
+    disagreeing_runs,
+    flags,
+    rejected_windows,
+)
+from tpjb_ident.dynamic.results.run_gains import Pairs, channel_pairs, with_gain_doubts
 from tpjb_ident.dynamic.runs.left_out import named_runs
 from tpjb_ident.dynamic.runs.nominal_drive import nominal_drive
 from tpjb_ident.dynamic.runs.point_data import PointData
-from tpjb_ident.dynamic.runs.point_source import point_sources
+from tpjb_ident.dynamic.runs.point_source import PointSource, point_sources
 from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.runs.run_shelf import RunShelf
 from tpjb_ident.dynamic.runs.run_store import RunStore
@@ -109,37 +121,106 @@ def identify(
     if not runs:
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     tell = progress or (lambda text, done, total: None)
+    settings = _with_mains(settings, campaign)
     with all_runs(campaign, settings.phasors, tell, workers, store) as shelf:
         return assemble(campaign, shelf, settings, tell)
 
 
+def _with_mains(settings: IdentifySettings, campaign: Campaign) -> IdentifySettings:
+    lines = settings.phasors.lines
+    mains = mains_frequency(campaign, lines.mains)
+    if mains == lines.mains:
+        return settings
+    return replace(settings, phasors=replace(settings.phasors, lines=replace(lines, mains=mains)))
+
+
 def assemble(campaign: Campaign, shelf: RunShelf, settings: IdentifySettings, tell: Progress) -> Identification:
     """Estimate all points from runs already turned to phasors, one point's windows in memory at a time."""
-    draws = gain_draws(campaign.channels, settings.n_calibration, settings.seed)
-    sources, digests = point_sources(shelf), shelf.digests
-    temperatures = {digest.run: digest.temperatures for digest in digests}
+    digests = shelf.digests
+    findings, sources = look_at_instruments(point_sources(shelf), delays_stated(campaign))
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
     tell("estimating", 0, len(sources))
     first = [_first_estimate(source.load(), settings) for source in sources]
-    corrections = find_corrections(sources, [digest.mains for digest in digests], axes, first)
-    differ, pairs = directions_differ(first), channel_pairs(campaign)
+    mains = [digest.mains for digest in digests]
+    corrections = find_corrections(sources, mains, axes, first, cell_zero_uncertainty(campaign))
+    work = _Points(
+        settings,
+        findings,
+        {digest.run: digest.temperatures for digest in digests},
+        directions_differ(first),
+        channel_pairs(campaign),
+        gain_draws(campaign.channels, settings.n_calibration, settings.seed),
+        systematic_sources(campaign, settings.n_calibration, settings.seed + 1),
+        force_pickup(digest.mains_force for digest in digests),
+    )
     points, changes = [], []
     for source, correction in zip(sources, corrections):
-        data = source.load()
-        used = correction if settings.correct else correction.measured_only()
-        point = with_gain_doubts(identify_point(used.apply(data), temperatures, settings, differ), data, pairs)
-        by_method = {name: used.widened(est) for name, est in point.by_method.items()}
-        change = apparent_change(data, by_method[settings.method], draws)
+        point, change = work.finish(source, correction)
+        points.append(point)
         changes.append(change)
-        if not settings.keep_weights:
-            by_method = {name: _counted_only(est) for name, est in by_method.items()}
-        points.append(_completed(point, by_method, np.cov(change.T, bias=True), settings.method, used))
         tell("estimating", len(points), len(sources))
     joint = np.concatenate(changes, axis=1)
     left, several = shelf.left_out, bool(settings.phasors.excitation_lines)
     told = named_runs(left, len(digests) + len(left)) + lost_points(points, left, several)
     named = with_probe_doubts(campaign, named_at_points(points, left, several), settings.clearance)
-    return Identification(campaign.id, settings.method, named, joint, _campaign_conditions(draws) + told)
+    return Identification(campaign.id, settings.method, named, joint, _campaign_conditions(work.draws) + told)
+
+
+@dataclass(frozen=True)
+class _Points:
+    """What all points of a campaign are finished with."""
+
+    settings: IdentifySettings
+    findings: InstrumentFindings
+    temperatures: dict[str, dict[int, float]]
+    differ: bool
+    pairs: Pairs | None
+    draws: GainDraws
+    sources: SystematicSources
+    mains_force: FloatArray
+
+    def finish(self, source: PointSource, correction: Correction) -> tuple[PointResult, FloatArray]:
+        """One point with all its uncertainties, and what the draws of the systematic ones do to it."""
+        settings, data = self.settings, source.load()
+        used = correction if settings.correct else correction.measured_only()
+        point = identify_point(used.apply(data), self.temperatures, settings, self.differ)
+        point = with_gain_doubts(point, data, self.pairs)
+        before = point.by_method[settings.method]
+        by_method = {name: used.widened(est) for name, est in point.by_method.items()}
+        best = by_method[settings.method]
+        changes = {"calibration": apparent_change(data, best, self.draws), **self.sources.changes(data, best)}
+        bent, amplitude_part = amplitude_findings(source, best)
+        systematic = {name: np.cov(change.T, bias=True) for name, change in changes.items()}
+        systematic |= self.findings.spreads(data, best) | amplitude_part
+        if source.found(MAINS_ON_LINE) and self.mains_force.any():
+            systematic["mains on the cells"] = force_pickup_spread(data, self.mains_force)
+        if not settings.keep_weights:
+            by_method = {name: _counted_only(est) for name, est in by_method.items()}
+        with_both = {name: with_systematic(est, systematic) for name, est in by_method.items()}
+        told = (used.conditions, self.findings.conditions(data), bent)
+        finished = replace(
+            point,
+            stiffness=with_both[settings.method],
+            by_method=with_both,
+            load_miss=used.miss,
+            quality=merged(point.quality, *told),
+            budget={**used.budget(before), **systematic},
+        )
+        return finished, np.sum(list(changes.values()), axis=0)
+
+
+def delays_stated(campaign: Campaign) -> bool:
+    """Whether the manifest says how late channels are, or how well that is known."""
+    return any(
+        getattr(c, "delay_uncertainty", 0.0) > 0 or getattr(getattr(c, "response", None), "delay", 0.0) != 0.0
+        for c in campaign.channels.values()
+    )
+
+
+def cell_zero_uncertainty(campaign: Campaign) -> float:
+    """Standard uncertainty of the cells' zero by the manifest [N]; 0 where it says nothing."""
+    cells = [c for c in campaign.channels.values() if c.quantity == "force"]
+    return float(max((getattr(c, "zero_uncertainty", 0.0) for c in cells), default=0.0))
 
 
 def _first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffness:
@@ -164,23 +245,6 @@ def directions_differ(first: list[DynamicStiffness]) -> bool:
     dof = sum(est.spare_equations for est in known)
     total = sum(est.chi_square * est.spare_equations for est in known)
     return dof > 0 and float(chi2.sf(total, dof)) < 1e-4
-
-
-def _completed(
-    point: PointResult,
-    by_method: dict[str, DynamicStiffness],
-    systematic: FloatArray,
-    method: str,
-    correction: Correction,
-) -> PointResult:
-    with_both = {name: replace(est, systematic=systematic) for name, est in by_method.items()}
-    return replace(
-        point,
-        stiffness=with_both[method],
-        by_method=with_both,
-        load_miss=correction.miss,
-        quality=merged(point.quality, correction.conditions),
-    )
 
 
 def _campaign_conditions(draws: GainDraws) -> tuple[Condition, ...]:
@@ -217,12 +281,12 @@ def identify_point(
     figure = coherence(data.D, data.F, best.h, weights)
     size = amplitude(data, weights)
     linearity = amplitude_slope(data, best.h, weights)
-    pattern = directional_pattern(data, weights)
+    patterns = (directional_pattern(data, weights), disagreeing_runs(data, best.h, weights))
     conditions = merged(
         *(run.conditions for run in data.runs),
         best.status,
         flags(data, best, figure, size, settings.clearance),
-        () if pattern is None else (pattern,),
+        tuple(pattern for pattern in patterns if pattern is not None),
         () if linearity is None else linearity.condition(),
         disagreement(by_method, settings.method),
     )

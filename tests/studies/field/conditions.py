@@ -37,7 +37,8 @@ def devices(names: Sequence[str], device: Device) -> dict[str, Device]:
 
 def filtered(design: Callable, order: int, corner: float) -> Callable[[float], complex]:
     """Response of an analogue low-pass over frequency [Hz]."""
-    b, a = design(order, 2 * np.pi * corner, analog=True)
+    norm = {"norm": "mag"} if design is bessel else {}
+    b, a = design(order, 2 * np.pi * corner, analog=True, **norm)
     return lambda f: complex(freqs(b, a, [2 * np.pi * f])[1][0])
 
 
@@ -116,7 +117,7 @@ def _clocks() -> list[Row]:
     ]
     found += [
         Row(f"cells' clock {ppm:g} ppm off, 3 s", replace(Rig(), devices=devices(CELLS, Device(ppm * 1e-6))))
-        for ppm in (100, 1000)
+        for ppm in (100, 300)
     ]
     found += [
         Row(f"cells at {slow:g} Hz, interpolated", replace(Rig(), devices=devices(CELLS, Device(slow=slow))))
@@ -212,21 +213,20 @@ def _loads() -> list[Row]:
     film = Bearing(second=3.0, third=5.0)
     untared = {"F1": Device(zero=120.0), "F2": Device(zero=300.0)}
     amplitudes = plans_of(loads=(5000.0,), amplitudes=(0.3, 0.6, 1.0))
-    dry = Rig(baseline=(2e6, 3e6))
     return [
         Row("cells not tared, three loads", replace(base, devices=untared)),
         Row("cells not tared, one load", replace(base, devices=untared), plans_of(loads=(5000.0,))),
         Row("piezo cells", replace(base, static=False)),
         Row("piezo cells, one load", replace(base, static=False), plans_of(loads=(5000.0,))),
-        Row("amplitude 8 % of clearance", replace(base, bearing=film, amplitude=0.35), plans_of(loads=(5000.0,))),
+        Row("amplitude 8 % of clearance", replace(base, bearing=film, amplitude=0.35), plans_of(loads=(5000.0,)),
+            wish="told"),
         Row("amplitude 20 % of clearance", replace(base, bearing=film, amplitude=0.9), plans_of(loads=(5000.0,)),
             wish="told"),
         Row("amplitude 40 % of clearance", replace(base, bearing=film, amplitude=2.0), plans_of(loads=(5000.0,)),
             wish="told"),
         Row("three amplitudes up to 8 %", replace(base, bearing=film, amplitude=0.35), amplitudes),
         Row("runs differ by 20 %", replace(base, gain_by_run=0.2), wish="told"),
-        Row("rig's own stiffness not taken off, stiff rig", dry),
-    ][:9]  # fmt: skip
+    ]  # fmt: skip
 
 
 def _samples() -> list[Row]:

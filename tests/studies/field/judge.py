@@ -101,7 +101,7 @@ def _judge_point(outcome: Outcome, p: object, rig: Rig, campaign_refused: bool) 
     outcome.entries += 8
     outcome.worst = max(outcome.worst, float(ratio.max()))
     scale = np.repeat([np.abs(np.diag(h.real)).mean(), np.abs(np.diag(h.imag)).mean() / omega], 4)
-    outcome.width.append(float(np.median(half / scale)))
+    outcome.width.append(float(np.max(half / scale)))
     good = (ratio <= 1).sum() >= 5 and ratio.max() <= 2.5
     outcome.right += bool(good)
     outcome.wrong += not good

@@ -195,6 +195,7 @@ def write_identification(folder: Path, result: Identification) -> None:
     write_table(folder, "estimators", result.estimators_frame())
     write_table(folder, "windows", result.windows_frame())
     write_table(folder, "frequency_fits", result.frequency_frame())
+    write_table(folder, "budget", result.budget_frame())
 
 
 def show_summary(result: Identification) -> None:

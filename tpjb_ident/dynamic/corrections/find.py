@@ -24,6 +24,7 @@ from tpjb_ident.dynamic.corrections.mains import (
 )
 from tpjb_ident.dynamic.corrections.static_load import (
     LoadMiss,
+    campaign_zero,
     load_conditions,
     load_misses,
     load_slopes,
@@ -64,10 +65,20 @@ class Correction:
 
     def widened(self, est: DynamicStiffness) -> DynamicStiffness:
         """The estimate with what the corrections leave uncertain."""
-        wide = widened(est, self.miss, self.slope)
-        if self.turn is not None:
-            wide = replace(wide, covariance=wide.covariance + self.turn.left)
+        wide = self._load_known(est)
         return wide if self.mains is None else with_mains_uncertainty(wide, self.mains)
+
+    def _load_known(self, est: DynamicStiffness) -> DynamicStiffness:
+        wide = widened(est, self.miss, self.slope)
+        return wide if self.turn is None else replace(wide, covariance=wide.covariance + self.turn.left)
+
+    def budget(self, est: DynamicStiffness) -> dict[str, FloatArray]:
+        """Random covariance (8, 8) of `widened` by source, from the estimate before it [N^2/m^2]."""
+        loaded = self._load_known(est).covariance
+        parts = {"random": est.covariance, "load miss": loaded - est.covariance}
+        if self.mains is not None:
+            parts["mains"] = self.widened(est).covariance - loaded
+        return parts
 
     def measured_only(self) -> Correction:
         """The same findings, nothing corrected."""
@@ -80,6 +91,7 @@ def find_corrections(
     mains_lines: Sequence[ComplexArray | None],
     probe_axes: FloatArray,
     first: list[DynamicStiffness],
+    zero_uncertainty: float = 0.0,
 ) -> list[Correction]:
     """Work out the corrections of all points of a campaign.
 
@@ -92,8 +104,11 @@ def find_corrections(
         Axes of the displacement probes [rad].
     first : list of DynamicStiffness
         Estimates without corrections, one per point.
+    zero_uncertainty : float
+        Of the cells' zero by the manifest [N]; 0 where it says nothing.
     """
-    misses, common = load_misses(points)
+    zero = campaign_zero(points, zero_uncertainty)
+    misses, common = load_misses(points, zero.force)
     slopes = load_slopes(points, first)
     turns = _turns(points, first, misses, slopes)
     struck = [source.found(MAINS_ON_LINE) for source in points]
@@ -108,7 +123,7 @@ def find_corrections(
         mains = None
         if hit and pickup is not None:
             mains = fit_mains(_at_set_point(source.load(), miss, slope, turn), pickup, scatter)
-        conditions = load_conditions(miss, common) + _mains_conditions(pickup, mains)
+        conditions = load_conditions(miss, common) + zero.conditions() + _mains_conditions(pickup, mains)
         result.append(Correction(miss, slope, turn, mains, conditions))
     return result
 

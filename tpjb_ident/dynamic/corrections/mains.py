@@ -201,3 +201,28 @@ def relative_scatter(points: Iterable[PointData], first: list[DynamicStiffness])
         residual = (F - D @ est.h.T) / np.linalg.norm(F, axis=1)[:, None]
         sizes.append(np.mean(np.abs(residual) ** 2) * len(D) / (len(D) - 2))
     return float(np.sqrt(np.median(sizes))) if sizes else 0.003
+
+
+def force_pickup(lines: Iterable[ComplexArray | None]) -> FloatArray:
+    """Usual size of the mains line in the oil force, X and Y (2,) [N], from runs where nothing else sits on it."""
+    seen = [np.abs(line) for line in lines if line is not None]
+    return np.median(seen, axis=0) if seen else np.zeros(2)
+
+
+def force_pickup_spread(data: PointData, size: FloatArray) -> FloatArray:
+    """Covariance (8, 8) that mains in the cells leaves in H: its phase is another one in every run [N^2/m^2].
+
+    Parameters
+    ----------
+    data : PointData
+        With mains on the excitation line.
+    size : (2,) ndarray
+        As of `force_pickup`.
+    """
+    means = _direction_means(data)
+    if means is None:
+        return np.zeros((8, 8))
+    D, _ = means
+    inverse = np.linalg.pinv(D.conj().T @ D).real.diagonal()
+    variance = 0.5 * np.outer(size**2, inverse).ravel()
+    return np.diag(np.tile(variance, 2))

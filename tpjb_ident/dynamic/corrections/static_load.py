@@ -20,6 +20,7 @@ import numpy as np
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.corrections.cell_zero import CellZero, cell_zero, without_static_part
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.runs.point_data import PointData
 
@@ -66,24 +67,46 @@ class Loaded(Protocol):
         """Mean cell force of every run, (n_runs, 2) [N]."""
 
 
-def load_ratio(data: Loaded) -> ComplexArray:
-    """Measured mean load over set point for every run, as a complex number (size, direction)."""
+def load_ratio(data: Loaded, zero: complex = 0.0) -> ComplexArray:
+    """Measured mean load (less the cells' zero) over set point for every run: size and direction, complex."""
     loads = data.mean_loads
-    point = data.point
-    if point.static_load <= 0:
+    set_point = _set_point(data)
+    if data.point.static_load <= 0:
         return np.full(len(loads), np.nan + 0j)
-    return np.asarray((loads[:, 0] + 1j * loads[:, 1]) / (point.static_load * np.exp(1j * point.static_load_direction)))
+    return np.asarray((loads[:, 0] + 1j * loads[:, 1] - zero) / set_point)
 
 
-def load_misses(points: Sequence[Loaded]) -> tuple[list[LoadMiss], complex]:
+def _set_point(data: Loaded) -> complex:
+    return complex(data.point.static_load * np.exp(1j * data.point.static_load_direction))
+
+
+def campaign_zero(points: Sequence[Loaded], stated: float = 0.0) -> CellZero:
+    """Zero of the cells from all runs of a campaign; see `cell_zero`.
+
+    Parameters
+    ----------
+    points : sequence of Loaded
+    stated : float
+        Standard uncertainty of the zero by the manifest [N].
+    """
+    loads = [data.mean_loads for data in points]
+    means = np.concatenate([each[:, 0] + 1j * each[:, 1] for each in loads] or [np.empty(0)])
+    set_points = np.concatenate([np.full(len(each), _set_point(d)) for each, d in zip(loads, points)] or [np.empty(0)])
+    return cell_zero(means, set_points, stated)
+
+
+def load_misses(points: Sequence[Loaded], zero: complex = 0.0) -> tuple[list[LoadMiss], complex]:
     """Misses of all runs relative to the campaign, and the campaign's own ratio (cell gain, rotation).
 
-    The ratio is the mean over the runs without outliers; what it is uncertain by, all misses are.
+    The ratio is the mean over the runs without outliers; what it is uncertain by, all misses are. Cells that show
+    no static force have no ratio: it is zero then.
     """
-    ratios = [load_ratio(data) for data in points]
+    ratios = [load_ratio(data, zero) for data in points]
     known = np.concatenate(ratios)
     known = known[np.isfinite(known)]
     middle = complex(np.median(known.real), np.median(known.imag)) if len(known) else complex(1.0)
+    if without_static_part(known):
+        return [LoadMiss(np.zeros(len(r)), np.zeros(len(r)), 0.0) for r in ratios], 0j
     if not len(known) or not 0.5 < abs(middle.real) < 2.0:
         # nothing to correct by such cells, but the ratio itself must be told
         return [LoadMiss(np.zeros(len(r)), np.zeros(len(r)), 0.0) for r in ratios], middle
@@ -204,6 +227,9 @@ def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
 def _common_conditions(common: complex) -> tuple[Condition, ...]:
     """What all runs share: a gain of the cells, or what no gain explains."""
     size, turn = abs(common), float(np.angle(common))
+    if size == 0.0:
+        told = "the cells show no static force: whether the loads meet their set points is not known"
+        return (Condition("no-static-force", told),)
     if not CONTRADICTS[0] <= size <= CONTRADICTS[1]:
         return (
             Condition(

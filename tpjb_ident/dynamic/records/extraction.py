@@ -13,6 +13,7 @@ from tpjb_ident.dynamic.records.lines import LineSet
 from tpjb_ident.dynamic.records.measured_run import MeasuredRun
 from tpjb_ident.dynamic.records.phasors import SCALE_LIMIT, LineFitter, PhasorBlock, fit_uneven, usual_scale
 from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.dynamic.records.shaft_course import ShaftCourse
 from tpjb_ident.dynamic.records.shaft_speed import window_speeds
 from tpjb_ident.dynamic.records.stretches import Stretches, open_stretches
 from tpjb_ident.dynamic.records.windows import plan_windows
@@ -25,7 +26,7 @@ MAX_JITTER = 0.02
 
 
 def extract(
-    run: MeasuredRun, housing_mass: float, settings: PhasorSettings, lines: LineSet, follow: FloatArray | None = None
+    run: MeasuredRun, housing_mass: float, settings: PhasorSettings, lines: LineSet, follow: ShaftCourse | None = None
 ) -> RunPhasors:
     """Fit all windows of a run.
 
@@ -36,13 +37,15 @@ def extract(
         [kg]
     settings : PhasorSettings
     lines : LineSet
-    follow : (n_windows,) ndarray, optional
-        Shaft speed of every window [Hz]: 1X and its harmonics then take each window's own.
+    follow : ShaftCourse, optional
+        Shaft speed over the run: 1X and its harmonics then take each window's own.
     """
     length, count = plan_windows(run.length, run.sample_rate, lines, settings.windows)
     present = {c.quantity for c in run.channels.values()}
     quantities = tuple(q for q in QUANTITIES if q in present or q != "acceleration")
-    work = _Work(length, run.sample_rate, lines, follow, run.point.shaft_speed_hz)
+    middles = (np.arange(count) + 0.5) * length / run.sample_rate
+    speeds = None if follow is None else follow.at(np.asarray(middles, dtype=float))
+    work = _Work(length, run.sample_rate, lines, speeds, run.point.shaft_speed_hz)
     parts: list[_Fitted] = []
     with open_stretches(run, quantities) as stretches:
         for first, stop in _chunks(length, count):
@@ -51,7 +54,7 @@ def extract(
         if len(parts) > 1:
             _look_again(work, stretches, blocks)
     starts = np.concatenate([part.start for part in parts])
-    speeds = np.concatenate([part.speeds for part in parts])
+    tach = np.concatenate([part.speeds for part in parts])
     found = {q: _undelayed(block, lines, settings.delays.get(q, 0.0)) for q, block in blocks.items()}
     return RunPhasors(
         run.id,
@@ -64,7 +67,7 @@ def extract(
         found["force"],
         found.get("acceleration"),
         housing_mass,
-        speeds,
+        tach,
     )
 
 
@@ -98,11 +101,11 @@ class _Work:
     """What all windows of a run are fitted with."""
 
     def __init__(
-        self, length: int, rate: float, lines: LineSet, follow: FloatArray | None, nominal_speed: float
+        self, length: int, rate: float, lines: LineSet, speeds: FloatArray | None, nominal_speed: float
     ) -> None:
         self.length, self.nominal_speed = length, nominal_speed
         self.fitter = LineFitter(length, rate, lines.frequencies)
-        self.followers = _Followers(length, rate, lines, follow)
+        self.followers = _Followers(length, rate, lines, speeds)
 
     def fit(self, stretches: Stretches, first: int, stop: int, usual: dict[str, FloatArray] | None = None) -> _Fitted:
         """Read and fit windows first..stop-1; `usual` is the residual scale that windows of the run have."""

@@ -15,6 +15,7 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.lines import LineSet, known_lines
 from tpjb_ident.dynamic.records.measured_run import MeasuredRun
 from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.dynamic.records.shaft_course import ShaftCourse
 
 #: Name of the condition that a shaft's changing speed gives rise to.
 DRIFT = "speed drifts"
@@ -34,13 +35,13 @@ class Tuning:
     Attributes
     ----------
     lines : LineSet
-    follow : (n_windows,) ndarray or None
-        Shaft speeds to follow window by window [Hz].
+    follow : ShaftCourse or None
+        Shaft speed over the run, to be followed window by window.
     conditions : tuple of Condition
     """
 
     lines: LineSet
-    follow: FloatArray | None
+    follow: ShaftCourse | None
     conditions: tuple[Condition, ...]
 
 
@@ -137,7 +138,7 @@ def tuned(
         drift = (
             Condition(
                 DRIFT,
-                f"shaft speed between {np.nanmin(follow):.4g} and {np.nanmax(follow):.4g} Hz; followed by window",
+                f"shaft speed between {follow.speed.min():.4g} and {follow.speed.max():.4g} Hz; followed by window",
             ),
         )
     return Tuning(lines, follow, off_set_point + drift)
@@ -184,8 +185,8 @@ def _phasor_noise(result: RunPhasors, rate: float) -> float:
     return _typical(result.displacement.noise) / np.sqrt(result.length * rate)
 
 
-def _drifting(result: RunPhasors, rate: float) -> FloatArray | None:
-    """Window speeds, where the shaft's phase runs away within a window.
+def _drifting(result: RunPhasors, rate: float) -> ShaftCourse | None:
+    """Course of the speed, where the shaft's phase runs away within a window.
 
     The runout tells them ten times better than a tachometer, whose own noise looks like a drift.
     """
@@ -194,7 +195,8 @@ def _drifting(result: RunPhasors, rate: float) -> FloatArray | None:
     known = speeds[np.isfinite(speeds)]
     if len(known) < 2 or np.ptp(known) / 2 <= max(MAX_WINDOW_SLIP / result.length, 4 * doubt):
         return None
-    return speeds
+    good = np.isfinite(speeds)
+    return ShaftCourse(result.start[good] + 0.5 * result.length, speeds[good])
 
 
 def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, float] | None:

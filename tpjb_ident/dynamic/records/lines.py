@@ -83,6 +83,9 @@ class LineSettings:
         How far mains and shaft speed may be from their nominal values [Hz].
     shaft_harmonics, drive_harmonics, mains_harmonics : int
         Highest harmonic of each that is fitted.
+    named_harmonics : int
+        Highest harmonic of the shaft that is named where it stands on the excitation; elsewhere it is fitted only if
+        the record shows it.
     """
 
     mains: float = 50.0
@@ -91,6 +94,7 @@ class LineSettings:
     shaft_harmonics: int = 2
     drive_harmonics: int = 2
     mains_harmonics: int = 1
+    named_harmonics: int = 3
 
 
 def known_lines(
@@ -129,6 +133,10 @@ def known_lines(
     conditions: list[Condition] = []
     nuisance: list[Line] = []
     others = [Line("found", f, 1e-6) for f in extra]
+    for n in range(settings.shaft_harmonics + 1, settings.named_harmonics + 1):
+        line = Line(f"{n}X", n * speed)
+        struck = [e for e in driven if speed > 0 and abs(e.frequency - n * speed) <= n * settings.speed_wander]
+        conditions += [_on_excitation(line, e) for e in struck[:1]]
     for line in _candidates(driven, speed, settings) + others:
         if not 0.0 < line.frequency < top:
             continue

@@ -10,10 +10,24 @@ from tpjb_ident.dynamic.records.run_data import RunPhasors
 
 def mains_line(run: RunPhasors) -> ComplexArray | None:
     """Typical displacement phasor (2,) at a run's mains line [m]; None where something else sits on it."""
+    place = _place(run)
+    return None if place is None else _typical(run.displacement.phasors[:, place])
+
+
+def mains_force(run: RunPhasors) -> ComplexArray | None:
+    """The same of the oil force [N]."""
+    place = _place(run)
+    return None if place is None else _typical(run.oil_force(place))
+
+
+def _place(run: RunPhasors) -> int | None:
     names = [line.name for line in run.lines.nuisance]
     if "mains" not in names or _shared(run, names.index("mains")):
         return None
-    z = run.displacement.phasors[:, len(run.lines.excitation) + names.index("mains")]
+    return len(run.lines.excitation) + names.index("mains")
+
+
+def _typical(z: ComplexArray) -> ComplexArray | None:
     z = z[np.isfinite(z).all(axis=1)]
     return complex_median(z) if len(z) else None
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.records.compensation import compensated
 from tpjb_ident.dynamic.records.extra_lines import unexpected_lines
 from tpjb_ident.dynamic.records.extraction import extract
 from tpjb_ident.dynamic.records.line_tuning import DRIFT, retuned, tuned
 from tpjb_ident.dynamic.records.lines import LineSet, known_lines
 from tpjb_ident.dynamic.records.measured_run import MeasuredRun
+from tpjb_ident.dynamic.records.raw_look import look_at_readings
 from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.dynamic.records.shaft_speed import shaft_speed
 from tpjb_ident.dynamic.records.short_record import SHORT, ShortRecord
@@ -38,6 +40,13 @@ def run_phasors(run: MeasuredRun, housing_mass: float, settings: PhasorSettings 
         The file cannot give what the manifest promises.
     """
     settings = settings or PhasorSettings()
+    slower, told = look_at_readings(run)
+    result = compensated(_fitted(run, housing_mass, settings), run, slower)
+    return replace(result, conditions=merged(result.conditions, told)) if told else result
+
+
+def _fitted(run: MeasuredRun, housing_mass: float, settings: PhasorSettings) -> RunPhasors:
+    """The run's phasors as recorded."""
     if run.length <= SHORT:
         return _looked_at(ShortRecord(run), housing_mass, settings)
     try:

@@ -9,9 +9,11 @@ import numpy as np
 
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.results.budget import BUDGET_COLUMNS, budget_rows
 from tpjb_ident.dynamic.results.frequency_fit import LoadFits, fits_per_load
 from tpjb_ident.dynamic.results.identification_tables import (
     FIT_COLUMNS,
+    POINT_COLUMNS,
     WINDOW_COLUMNS,
     coefficient_columns,
     estimate_row,
@@ -119,6 +121,13 @@ class Identification(Presented):
             for w in p.rejected
         ]
         return pd.DataFrame(rows, columns=list(WINDOW_COLUMNS))
+
+    def budget_frame(self) -> pd.DataFrame:
+        """What every source adds to every coefficient's uncertainty: ``budget.csv``."""
+        import pandas as pd
+
+        rows = [row for p in self.points for row in budget_rows(point_columns(p), p.stiffness, p.budget)]
+        return pd.DataFrame(rows, columns=[*POINT_COLUMNS, *BUDGET_COLUMNS])
 
     def frequency_fits(self) -> list[LoadFits]:
         """K-C and K-C-M over the excitation frequencies, for every load that was run at several."""

@@ -71,6 +71,8 @@ class PointResult:
         Whether the housing's inertia was added to the cells' force.
     clearance : float or None
         Assembled clearance, where the campaign carries a bearing [m].
+    budget : dict of str to (8, 8) ndarray
+        Covariance of the default method's H by source [N^2/m^2]; the interval is their sum.
     """
 
     point: OperatingPoint
@@ -92,6 +94,7 @@ class PointResult:
     linearity: AmplitudeSlope | None = field(default=None, repr=False)
     inertia_corrected: bool = False
     clearance: float | None = field(default=None, repr=False)
+    budget: dict[str, FloatArray] = field(default_factory=dict, repr=False)
 
     @property
     def condition_number(self) -> float:

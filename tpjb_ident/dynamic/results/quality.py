@@ -13,6 +13,10 @@ from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: Coefficients are linear below this share of the clearance.
 MAX_AMPLITUDE = 0.05
+#: Share of the windows without phasors beyond which what is left may not stand for the record.
+MAX_LOST = 0.6
+#: Share of the force that H leaves in the runs' means beyond which they have no H in common.
+MAX_DISAGREEMENT = 0.06
 
 
 def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatArray) -> float:
@@ -132,6 +136,9 @@ def _missing(data: PointData) -> list[Condition]:
     empty = [run.run for i, run in enumerate(data.runs) if not whole[data.run_index == i].any()]
     if empty:
         return [Condition("run-without-data", f"no usable window in {', '.join(empty)}")]
+    if whole.mean() < 1 - MAX_LOST:
+        told = f"{int((~whole).sum())} of {len(whole)} windows gave no phasors"
+        return [Condition("most-windows-lost", told)]
     if whole.mean() < 0.9:
         return [Condition("windows-missing", f"{int((~whole).sum())} of {len(whole)} windows gave no phasors")]
     return []
@@ -169,3 +176,36 @@ def directional_pattern(data: PointData, weights: FloatArray) -> Condition | Non
     if not named:
         return None
     return Condition("directional-rejection", f"rejected windows gather in {', '.join(named)}: look before discarding")
+
+
+def disagreeing_runs(data: PointData, h: ComplexArray, weights: FloatArray) -> Condition | None:
+    """Runs whose mean forces H does not explain: noise averages out of means, other faults do not.
+
+    Parameters
+    ----------
+    data : PointData
+    h : (2, 2) complex ndarray
+    weights : (n,) ndarray
+        Window weights.
+    """
+    if len(data.runs) < 3 or not np.isfinite(h).all():
+        return None
+    good = _complete(data) & (weights > 0)
+    shares = []
+    for i in range(len(data.runs)):
+        mine = good & (data.run_index == i)
+        if mine.any():
+            # repeats of one motion, whatever phase the drive had in each
+            gram = data.D[mine].conj().T @ data.D[mine]
+            first = np.linalg.eigh(gram)[1][:, -1]
+            along = data.D[mine] @ first.conj()
+            rest = (data.F[mine] - data.D[mine] @ h.T) * np.exp(-1j * np.angle(along))[:, None]
+            shares.append(float(np.linalg.norm(rest.mean(axis=0)) / np.linalg.norm(data.F[mine], axis=1).mean()))
+    if len(shares) < 3:
+        return None
+    # two runs fix H: what is left over is shared by all of them
+    share = float(np.sqrt(np.mean(np.square(shares)) * len(shares) / (len(shares) - 2)))
+    if share <= MAX_DISAGREEMENT:
+        return None
+    told = f"the runs' mean forces are {100 * share:.0f} % away from one H (limit {100 * MAX_DISAGREEMENT:.0f} %)"
+    return Condition("runs-disagree", told)

@@ -25,6 +25,8 @@ class PointData:
         Displacement [m], oil force [N], housing acceleration [m/s^2] (zero where not measured).
     run_index : (n,) ndarray of int
         Windows of one run are repeats of one excitation.
+    found : float
+        Excitation frequency that the runs show, where it is not the set one [rad/s]; else 0.
     """
 
     point: OperatingPoint
@@ -34,11 +36,12 @@ class PointData:
     F: ComplexArray
     A: ComplexArray
     run_index: IntArray
+    found: float = 0.0
 
     @property
     def omega(self) -> float:
-        """Excitation frequency as set [rad/s]."""
-        return self.point.excitation
+        """Excitation frequency as found in the runs, else as set [rad/s]."""
+        return self.found or self.point.excitation
 
     @property
     def mean_loads(self) -> FloatArray:
@@ -105,4 +108,10 @@ def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> 
         for run, i, d in zip(runs, lines, D)
     ]
     index = np.repeat(np.arange(len(runs)), [len(d) for d in D])
-    return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), np.concatenate(A), index)
+    found = _found(point, members)
+    return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), np.concatenate(A), index, found)
+
+
+def _found(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> float:
+    middle = float(np.median([run.lines.excitation[i].frequency for run, i in members]))
+    return 0.0 if abs(middle - point.excitation_hz) < 1e-6 else 2 * np.pi * middle

@@ -8,6 +8,7 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arrays import FloatArray
+from tpjb_ident.dynamic.instruments.clock_rates import ClockRates
 from tpjb_ident.dynamic.runs.point_data import PointData, group, point_data
 from tpjb_ident.dynamic.runs.run_shelf import RunDigest, RunShelf
 
@@ -23,16 +24,19 @@ class PointSource:
         Place on the shelf, and line, of every run.
     digests : tuple of RunDigest
     shelf : RunShelf
+    clocks : ClockRates
+        By which the channels' clocks differ, once that is known.
     """
 
     point: OperatingPoint
     members: tuple[tuple[int, int], ...]
     digests: tuple[RunDigest, ...]
     shelf: RunShelf = field(repr=False)
+    clocks: ClockRates = field(default_factory=ClockRates)
 
     def load(self) -> PointData:
-        """All windows of the point."""
-        return point_data(self.point, [(self.shelf.take(k), i) for k, i in self.members])
+        """All windows of the point, as if one clock had recorded them."""
+        return self.clocks.apply(point_data(self.point, [(self.shelf.take(k), i) for k, i in self.members]))
 
     @property
     def mean_loads(self) -> FloatArray:

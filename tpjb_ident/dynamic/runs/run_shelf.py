@@ -18,7 +18,8 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.mains_line import mains_line
+from tpjb_ident.dynamic.records.line_means import LineMean, second_harmonics
+from tpjb_ident.dynamic.records.mains_line import mains_force, mains_line
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.runs.left_out import DEAD_ACCELEROMETER, LeftOut
@@ -49,6 +50,12 @@ class RunDigest:
         Displacement at the mains line, where it stands apart [m].
     temperatures : dict of int to float
         Mean per pad [K].
+    harmonics : tuple of (LineMean, LineMean) or None
+        Every excitation line with its second harmonic.
+    sample_rate : float
+        [Hz]
+    mains_force : (2,) complex ndarray or None
+        Oil force at the mains line, where it stands apart [N].
     """
 
     run: str
@@ -58,10 +65,13 @@ class RunDigest:
     mean_load: FloatArray
     mains: ComplexArray | None
     temperatures: dict[int, float]
+    harmonics: tuple[tuple[LineMean, LineMean] | None, ...] = ()
+    sample_rate: float = 0.0
+    mains_force: ComplexArray | None = None
 
 
-def digest(result: RunResult) -> RunDigest:
-    """Sum up a finished run."""
+def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:
+    """Sum up a finished run that was recorded at `sample_rate` [Hz]."""
     phasors = result.phasors
     return RunDigest(
         phasors.run,
@@ -71,6 +81,9 @@ def digest(result: RunResult) -> RunDigest:
         finite_mean(phasors.cell_force.mean),
         mains_line(phasors),
         result.temperatures,
+        second_harmonics(phasors),
+        sample_rate,
+        mains_force(phasors),
     )
 
 
@@ -192,7 +205,7 @@ class RunShelf:
             result = self._store.load(run, mark, self._mass)
         if result is None:  # cleared by another command since
             result, mark = self._again(run), ""
-        self._digests[index] = digest(result)
+        self._digests[index] = digest(result, run.sample_rate)
         phasors = slim(result.phasors)
         size = _bytes(phasors)
         if size <= self._room:

@@ -1,0 +1,109 @@
+"""Load cells that were not tared: a constant in their mean that no set point explains.
+
+The mean force of the runs is regressed on the set points, with an intercept: F_mean = g W + z, both complex (X + i Y).
+Without the intercept a zero that is off looks like a load that misses its set point by more the smaller it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tpjb_ident.arrays import ComplexArray
+from tpjb_ident.conditions import Condition
+
+#: Set points must differ by this share for a zero to be told from a gain.
+MIN_RANGE = 0.15
+#: Standard errors beyond which an intercept is one,
+CLEAR = 5.0
+#: and share of the smallest load that it must have.
+NOTABLE = 0.004
+MIN_RUNS = 4
+#: A mean force below this share of the set point is none, if it is not clearly there.
+NO_STATIC = (0.002, 0.02)
+
+
+@dataclass(frozen=True)
+class CellZero:
+    """What the cells read at no load.
+
+    Attributes
+    ----------
+    force : complex
+        X + i Y [N]; zero where nothing tells one.
+    error : float
+        Its standard error [N].
+    stated : float
+        What the manifest allows [N]; 0 where it says nothing.
+    """
+
+    force: complex = 0.0
+    error: float = 0.0
+    stated: float = 0.0
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """What to say of it at the points."""
+        if not self.force:
+            return ()
+        size, angle = abs(self.force), np.degrees(np.angle(self.force))
+        return (
+            Condition(
+                "cells-not-tared",
+                f"over the loads of the campaign the cells' mean holds a constant of {size:.0f} N at {angle:.0f} deg "
+                f"(standard error {self.error:.0f} N); it was taken off",
+            ),
+        )
+
+
+def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0) -> CellZero:
+    """Zero of the cells from all runs.
+
+    Parameters
+    ----------
+    means : (n,) complex ndarray
+        Mean cell force of every run, X + i Y [N]; NaN where unknown.
+    set_points : (n,) complex ndarray
+        Static load as set [N].
+    stated : float
+        Standard uncertainty of the cells' zero by the manifest [N]; an intercept beyond three of it is a load that is
+        really off, and stays.
+    """
+    good = np.isfinite(means) & (np.abs(set_points) > 0)
+    y, x = means[good], set_points[good]
+    if len(y) < MIN_RUNS or (np.ptp(np.abs(x)) < MIN_RANGE * np.abs(x).max() and _one_direction(x)):
+        return CellZero()
+    size = np.abs(x)
+    design = np.stack([x, np.ones_like(x)], axis=1) / size[:, None]
+    answer, weight = y / size, np.ones(len(y))
+    for _ in range(10):
+        root = np.sqrt(weight)[:, None]
+        found = np.linalg.lstsq(design * root, answer * root[:, 0], rcond=None)[0]
+        rest = np.abs(answer - design @ found)
+        scale = 1.4826 * float(np.median(rest)) + 1e-9
+        weight = np.minimum(1.0, 1.5 * scale / np.maximum(rest, 1e-300))
+    spread = float(np.sum(weight * rest**2) / max(float(weight.sum()) - 2.0, 1.0))
+    covariance = np.linalg.inv((design * weight[:, None]).conj().T @ design).real * spread
+    zero, error = complex(found[1]), float(np.sqrt(covariance[1, 1]))
+    there = abs(zero) > CLEAR * error and abs(zero) > NOTABLE * size.min()
+    allowed = stated == 0.0 or abs(zero) < 3 * stated + 3 * error
+    return CellZero(zero, error, stated) if there and allowed else CellZero()
+
+
+def _one_direction(set_points: ComplexArray) -> bool:
+    return bool(np.abs(set_points / np.abs(set_points) - set_points[0] / abs(set_points[0])).max() < MIN_RANGE)
+
+
+def without_static_part(ratios: ComplexArray) -> bool:
+    """Whether the cells show no static force at all, as piezo-electric ones: not a little of it, but none.
+
+    Parameters
+    ----------
+    ratios : (n,) complex ndarray
+        Mean force over set point of the runs.
+    """
+    if not len(ratios):
+        return False
+    mean = abs(complex(ratios.mean()))
+    error = float(np.sqrt(np.mean(np.abs(ratios - ratios.mean()) ** 2) / max(len(ratios) - 1, 1)))
+    return bool(mean < NO_STATIC[0] or (mean < NO_STATIC[1] and mean < 4 * error))

@@ -1,0 +1,179 @@
+"""Accelerometers held against load cells: the housing stands on the cells, and a spring knows no phase.
+
+The cells are the housing's springs, so its acceleration is a = -omega^2 K^-1 F_cell with K symmetric, positive
+definite and real. Swapped or inverted accelerometers, a device that is late, a filter before the cells: each breaks
+one of these, whatever the bearing does. What is left of phase between the two, below the limit, enters the intervals:
+the cells may be late by that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.runs.point_data import PointData
+
+#: Phase between cells and accelerometers [rad] beyond which one of them is late; housings on bolted joints have 0.01.
+MAX_PHASE = 0.04
+#: Asymmetry, and cross over direct, beyond which channels are exchanged.
+MAX_CROSS = 0.5
+#: Inertia's share of the force below which wrong accelerometers do no harm worth refusing a point for.
+HARMLESS = 2e-3
+#: The ratio must stand this many standard errors above nothing to be judged.
+CLEAR = 8.0
+MIN_RUNS = 3
+
+
+@dataclass(frozen=True)
+class BalanceRun:
+    """Means of one run at its excitation line.
+
+    Attributes
+    ----------
+    frequency : float
+        [Hz]
+    cells, acceleration : (2,) complex ndarray
+        [N], [m/s^2]
+    inertia : float
+        |m a| over |F_oil|.
+    """
+
+    frequency: float
+    cells: ComplexArray
+    acceleration: ComplexArray
+    inertia: float
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Verdict on one excitation frequency.
+
+    Attributes
+    ----------
+    phase : float
+        By which the accelerometers are ahead of the cells [rad], beyond its own error.
+    conditions : tuple of Condition
+    """
+
+    phase: float = 0.0
+    conditions: tuple[Condition, ...] = ()
+
+    def spread(self, est: DynamicStiffness) -> FloatArray:
+        """Covariance (8, 8) of H if the cells are late by that phase: one standard deviation [N^2/m^2]."""
+        moved = 1j * self.phase * est.h
+        shift = np.concatenate([moved.real.ravel(), moved.imag.ravel()])
+        return np.outer(shift, shift)
+
+
+def balance_runs(data: PointData) -> list[BalanceRun]:
+    """Means of a point's runs; empty where the rig has no accelerometers."""
+    if data.runs[0].acceleration is None:
+        return []
+    found = []
+    mass = data.runs[0].housing_mass
+    for i, (run, line) in enumerate(zip(data.runs, data.lines)):
+        whole = np.isfinite(data.F).all(axis=1) & np.isfinite(data.A).all(axis=1) & np.isfinite(data.D).all(axis=1)
+        mine = (data.run_index == i) & whole
+        if not mine.any():
+            continue
+        F, A = _middle(data.F[mine], data.D[mine]), _middle(data.A[mine], data.D[mine])
+        share = float(mass * np.linalg.norm(A) / max(float(np.linalg.norm(F)), 1e-300))
+        found.append(BalanceRun(run.lines.excitation[line].frequency, F - mass * A, A, share))
+    return found
+
+
+def _middle(z: ComplexArray, d: ComplexArray) -> ComplexArray:
+    """Median of the windows, each turned to the phase of the first one's displacement: the drive may wander."""
+    turn = np.einsum("ni,i->n", d.conj(), d[0])
+    turned = z * np.where(np.abs(turn) > 0, turn / np.maximum(np.abs(turn), 1e-300), 1.0)[:, None]
+    return np.asarray(np.median(turned.real, axis=0) + 1j * np.median(turned.imag, axis=0))
+
+
+def balances(runs: Sequence[BalanceRun]) -> dict[float, Balance]:
+    """A verdict for every excitation frequency, rounded to 0.01 Hz, that enough runs were excited at."""
+    groups: dict[float, list[BalanceRun]] = {}
+    for run in runs:
+        groups.setdefault(frequency_key(run.frequency), []).append(run)
+    return {frequency: _judge(group) for frequency, group in groups.items() if len(group) >= MIN_RUNS}
+
+
+def frequency_key(frequency: float) -> float:
+    """Under which a frequency is found again."""
+    return round(frequency, 2)
+
+
+def _judge(group: Sequence[BalanceRun]) -> Balance:
+    cells = np.array([run.cells for run in group])
+    accelerations = np.array([run.acceleration for run in group])
+    size = np.linalg.norm(cells, axis=1, keepdims=True)
+    if np.linalg.svd(cells / size, compute_uv=False)[-1] < 0.3:
+        return Balance()
+    fit = _ratio(cells / size, accelerations / size)
+    if fit is None:
+        return Balance()
+    G, error = fit
+    if not np.abs(np.diag(G)).min() > CLEAR * error:
+        if np.abs(G).max() > CLEAR * error and np.abs(G - np.diag(np.diag(G))).max() > MAX_CROSS * np.abs(G).max():
+            return Balance(0.0, _contradiction(group, G, "each answers the force along the other's axis"))
+        return Balance()
+    direct = np.diag(G)
+    cross = float(np.sqrt(abs(G[0, 1] * G[1, 0]) / abs(direct[0] * direct[1])))
+    if cross > MAX_CROSS:
+        return Balance(0.0, _contradiction(group, G, "each answers the force along the other's axis"))
+    if (direct.real > 0).any():
+        return Balance(0.0, _contradiction(group, G, "they move with the cells' force, and not against it"))
+    phases = np.angle(-direct)
+    doubt = error / np.abs(direct)
+    worst = int(np.argmax(np.abs(phases) - 3 * doubt))
+    if abs(phases[worst]) > MAX_PHASE + 3 * doubt[worst]:
+        return Balance(0.0, (_out_of_phase(group, float(phases[worst])),))
+    left = np.sqrt(np.maximum(np.mean(phases**2 - doubt**2), 0.0))
+    return Balance(float(left))
+
+
+def _ratio(cells: ComplexArray, accelerations: ComplexArray) -> tuple[ComplexArray, float] | None:
+    """Robust a = G F and the standard error of G's entries."""
+    weight = np.ones(len(cells))
+    for _ in range(10):
+        root = np.sqrt(weight)[:, None]
+        G = np.linalg.lstsq(cells * root, accelerations * root, rcond=None)[0].T
+        rest = np.linalg.norm(accelerations - cells @ G.T, axis=1)
+        scale = 1.4826 * float(np.median(rest)) + 1e-300
+        weight = np.minimum(1.0, 1.5 * scale / np.maximum(rest, 1e-300))
+    gram = (cells * weight[:, None]).conj().T @ cells
+    if np.linalg.cond(gram) > 1e8:
+        return None
+    spread = float(np.sum(weight * rest**2) / max(2 * (float(weight.sum()) - 2.0), 1.0))
+    return G, float(np.sqrt(spread * np.linalg.inv(gram).real.diagonal().max()))
+
+
+def _contradiction(group: Sequence[BalanceRun], G: ComplexArray, what: str) -> tuple[Condition, ...]:
+    share = float(np.median([run.inertia for run in group]))
+    name = "accelerometers-contradict-cells" if share > HARMLESS else "accelerometers-doubtful"
+    return (
+        Condition(
+            name,
+            f"acceleration over cell force is {_shown(G)} 1/kg at {group[0].frequency:g} Hz: {what}; "
+            f"inertia is {100 * share:.2g} % of the force",
+        ),
+    )
+
+
+def _shown(G: ComplexArray) -> str:
+    return "[" + ", ".join(f"{z.real:.2e}{z.imag:+.1e}i" for z in G.ravel()) + "]"
+
+
+def _out_of_phase(group: Sequence[BalanceRun], phase: float) -> Condition:
+    frequency = group[0].frequency
+    lag = phase / (2 * np.pi * frequency)
+    late = "cells" if lag > 0 else "accelerometers"
+    return Condition(
+        "cells-and-accelerometers-out-of-phase",
+        f"{np.degrees(abs(phase)):.1f} deg at {frequency:g} Hz, as if the {late} were {1e3 * abs(lag):.2g} ms late or "
+        "behind a filter; between springs and their housing there is none. State `delay` or `filter` of the channels",
+    )

@@ -1,0 +1,89 @@
+"""Mains frequency of a campaign: as the manifest states it, else as the records show it.
+
+It matters where an excitation stands on 50 or 60 Hz; elsewhere a mains line of either frequency is found like any
+other. So only then a few records are looked at, those in which nothing else stands there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rigdata.problem import RigDataError
+from tpjb_ident.arrays import FloatArray
+
+CHOICES = (50.0, 60.0)
+#: Excitations this near to one of them make the question matter [Hz].
+NEAR = 0.3
+#: Runs and samples that are looked at.
+MAX_RUNS, LOOK = 6, 2**14
+#: A line stands this many times above what is around it,
+CLEAR = 6.0
+#: other lines are farther away than this [Hz].
+APART = 1.0
+
+
+def mains_frequency(campaign: Any, usual: float) -> float:
+    """Frequency of the mains [Hz].
+
+    Parameters
+    ----------
+    campaign : rigdata.campaign.Campaign
+    usual : float
+        What is taken where nothing tells [Hz].
+    """
+    stated = getattr(campaign, "mains", None)
+    if stated is not None:
+        return float(stated)
+    dynamic = campaign.of_kind("dynamic")
+    struck = [c for c in CHOICES if any(abs(run.point.excitation_hz - c) < NEAR for run in dynamic)]
+    if not struck or usual not in CHOICES:
+        return usual
+    votes = {c: _votes(campaign.runs, c) for c in CHOICES}
+    best = max(CHOICES, key=lambda c: (votes[c], c == usual))
+    if votes[best] == 0 and len(struck) == 1:
+        return struck[0]  # it cannot be ruled out, and must be named
+    return best
+
+
+def _votes(runs: Sequence[Any], choice: float) -> int:
+    """In how many runs a line stands at `choice` where nothing else does."""
+    count = seen = 0
+    for run in runs:
+        if seen >= MAX_RUNS:
+            break
+        point = run.point
+        others = [k * point.excitation_hz for k in (1, 2, 3)] + [k * point.shaft_speed_hz for k in range(1, 7)]
+        if any(abs(f - choice) < APART for f in others):
+            continue
+        shown = _stands_out(run, choice)
+        if shown is not None:
+            seen += 1
+            count += shown
+    return count
+
+
+def _stands_out(run: Any, choice: float) -> bool | None:
+    try:
+        rate, length = run.sample_rate, min(run.length, LOOK)
+        if rate < 3 * choice or length < rate:
+            return None
+        records = [run.vector(q, 0, length).values for q in ("displacement", "force")]
+    except RigDataError:  # the run's own reading says so
+        return None
+    return any(_line_in(values, rate, choice) for values in records)
+
+
+def _line_in(values: FloatArray, rate: float, choice: float) -> bool:
+    if not np.isfinite(values).all():
+        return False
+    n = len(values)
+    spectrum = np.abs(np.fft.rfft((values - values.mean(axis=0)) * np.hanning(n)[:, None], axis=0))
+    amplitude = np.linalg.norm(spectrum, axis=1)
+    frequency = np.fft.rfftfreq(n, 1 / rate)
+    width = max(0.2, 2 * rate / n)
+    line = np.abs(frequency - choice) <= width
+    around = (np.abs(frequency - choice) > 2 * width) & (np.abs(frequency - choice) < 2 * width + 4.0)
+    return bool(amplitude[line].max() > CLEAR * np.median(amplitude[around]))
