@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdata.arrays import FloatArray
-from rigdata.channel_response import ChannelResponse
+from rigdata.channel_response import NO_RESPONSE, ChannelResponse
 from rigdata.units import (
     UnitError,
     is_bridge_ratio,
@@ -91,7 +91,7 @@ class Channel:
     pad: int | None = None
     position: float | None = None
     axis_uncertainty: float = 0.0
-    response: ChannelResponse = ChannelResponse()
+    response: ChannelResponse = NO_RESPONSE
     delay_uncertainty: float = 0.0
     zero_uncertainty: float = 0.0
     clock: str = ""

@@ -148,3 +148,7 @@ class ChannelResponse:
         for each in self.filters:
             total = total * each.at(f)
         return np.asarray(total)
+
+
+#: Of a channel that records as it is.
+NO_RESPONSE = ChannelResponse()

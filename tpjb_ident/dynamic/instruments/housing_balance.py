@@ -141,7 +141,7 @@ def _ratio(cells: ComplexArray, accelerations: ComplexArray) -> tuple[ComplexArr
     weight = np.ones(len(cells))
     for _ in range(10):
         root = np.sqrt(weight)[:, None]
-        G = np.linalg.lstsq(cells * root, accelerations * root, rcond=None)[0].T
+        G = np.linalg.lstsq(cells * root, accelerations * root, rcond=None)[0].T.astype(np.complex128)
         rest = np.linalg.norm(accelerations - cells @ G.T, axis=1)
         scale = 1.4826 * float(np.median(rest)) + 1e-300
         weight = np.minimum(1.0, 1.5 * scale / np.maximum(rest, 1e-300))
