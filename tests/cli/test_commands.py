@@ -116,7 +116,7 @@ def test_identify_leaves_a_record_of_what_it_did(identified, small_campaign):
     assert entry["settings"]["method"] == "mm-eiv"
     digest = subprocess.run(["sha256sum", small_campaign], capture_output=True, text=True, check=False).stdout.split()
     assert not digest or digest[0] in entry["inputs_sha256"].values()
-    assert set(entry["outputs"]) == {f"{t}.{e}" for t in ("coefficients", "estimators", "windows", "frequency_fits")
+    assert set(entry["outputs"]) == {f"{t}.{e}" for t in ("coefficients", "estimators", "windows", "frequency_fits", "budget")
                                      for e in ("csv", "parquet")}  # fmt: skip
 
 

@@ -234,7 +234,7 @@ def _samples() -> list[Row]:
     found = [Row(f"one load, {n} directions", base, plans_of(loads=(5000.0,), directions=n)) for n in (3, 4, 5, 8)]
     found += [
         Row(f"{n} runs that differ by 2 %", replace(base, gain_by_run=0.02), plans_of(loads=(5000.0,), directions=n))
-        for n in (3, 4, 6)
+        for n in (3, 4, 5, 6)
     ]
     seven = plans_of(loads=(5000.0,), frequencies=(10, 20, 25, 30, 40, 60), directions=3)
     found.append(Row("true K-C bearing, 3 directions, 1.2 s",

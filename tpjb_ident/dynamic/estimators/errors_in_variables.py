@@ -21,6 +21,7 @@ from tpjb_ident.dynamic.estimators.uncertainty import (
     direction_covariances,
     direction_effect,
     information,
+    pooled_effect,
     spread_of,
 )
 
@@ -162,7 +163,9 @@ def eiv_fit(repeats: Repeats, directions_differ: bool = False) -> EivFit:
     residual = means.F - means.D @ h.T
     score = np.einsum("gac,gc,gb->gab", inverse, residual, D_true.conj()).reshape(-1, 4)
     parts = np.einsum("gac,gb,gd->gabcd", inverse, D_true.conj(), D_true).reshape(-1, 4, 4)
-    spread = spread_of(score, parts, bread @ meat @ bread.conj().T, chi_square, 2 * repeats.spare, directions_differ)
+    pooled = pooled_effect(residual, means) if len(means) > 2 else None
+    repeat = bread @ meat @ bread.conj().T
+    spread = spread_of(score, parts, repeat, chi_square, 2 * repeats.spare, directions_differ, pooled)
     return EivFit(h, spread.covariance, spread.dof, chi_square, _attenuation(means, noise))
 
 

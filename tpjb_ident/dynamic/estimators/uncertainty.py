@@ -16,6 +16,10 @@ from scipy.stats import chi2
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable
 
+#: Up to so many directions their effects are pooled over directions and axes: a jackknife of three or four is none.
+FEW_DIRECTIONS = 5
+#: Degrees of freedom per spare direction of the pooled variance: effects are real gains as a rule, not circular noise.
+POOLED_DOF = 3.0
 #: Significance from which direction effects take part in weighting the directions.
 CLEAR = 1e-3
 
@@ -141,6 +145,7 @@ def spread_of(
     chi_square: float,
     dof_repeat: float,
     known_effect: bool = False,
+    pooled: FloatArray | None = None,
 ) -> Spread:
     """Repeat noise as known, plus what leaving out one direction at a time shows beyond it.
 
@@ -162,12 +167,19 @@ def spread_of(
     dof_repeat : float
     known_effect : bool
         That directions differ is known from elsewhere; then this point's own chi-square is not asked.
+    pooled : (8, 8) ndarray, optional
+        Covariance of H by `pooled_effect`, which stands for the jackknife where the directions are few.
     """
     known = complex_to_real_covariance(repeat)
     g = len(score)
     spare = 4.0 * (g - 2)
     if g <= 2 or not (known_effect or chi_square > 1.0):
         return Spread(known, np.full(8, max(dof_repeat, 1.0)))
+    certain = min(1.0, (chi_square - 1.0) / (chi2.ppf(0.95, spare) / spare - 1.0)) if not known_effect else 1.0
+    if pooled is not None and g <= FEW_DIRECTIONS:
+        total = known + certain * pooled
+        between = np.full(8, POOLED_DOF * (g - 2))
+        return Spread(total, mixed_dof(np.diag(total), np.diag(known), dof_repeat, between))
     moved = np.linalg.solve(parts.sum(axis=0) - parts, score[:, :, None])[:, :, 0]
     moved = np.concatenate([moved.real, moved.imag], axis=1)
     jackknife = (g - 1) / g * moved.T @ moved
@@ -175,12 +187,33 @@ def spread_of(
     root = np.linalg.cholesky(known)
     white = np.linalg.solve(root, np.linalg.solve(root, jackknife).T)
     values, vectors = np.linalg.eigh(0.5 * (white + white.T))
-    certain = min(1.0, (chi_square - 1.0) / (chi2.ppf(0.95, spare) / spare - 1.0)) if not known_effect else 1.0
     extra = root @ (vectors * (certain * np.maximum(values - 1.0, 0.0))) @ vectors.T @ root.T
     total = known + extra
     effective = np.maximum((moved**2).sum(axis=0) ** 2 / (moved**4).sum(axis=0) - 1.0, 1.0)
     dof = mixed_dof(np.diag(total), np.diag(known), dof_repeat, np.maximum(effective, 0.5 * (g - 1)))
     return Spread(0.5 * (total + total.T), dof)
+
+
+def pooled_effect(residual: ComplexArray, means: DirectionMeans) -> FloatArray:
+    """Covariance of H from one relative variance of the directions' residuals, pooled over directions and axes.
+
+    Parameters
+    ----------
+    residual : (g, 2) complex ndarray
+        F - H D of the direction means, g > 2.
+    means : DirectionMeans
+
+    Returns
+    -------
+    (8, 8) ndarray
+        What errors of that share of each direction's force do to a regression of the means.
+    """
+    power = np.einsum("ga,ga->g", means.F, means.F.conj()).real
+    share = float((np.abs(residual) ** 2 / power[:, None]).sum() / (2 * (len(means) - 2)))
+    weighted = means.D.conj() * means.count[:, None]
+    inverse = np.linalg.inv(weighted.T @ means.D)
+    spread = (weighted * power[:, None]).T @ weighted.conj()
+    return complex_to_real_covariance(np.kron(np.eye(2), share * inverse @ spread @ inverse.conj().T))
 
 
 def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_between: FloatArray) -> FloatArray:
@@ -265,7 +298,13 @@ def with_repeats(
     meat = information(scaled, scaled, np.broadcast_to(small, (len(means), 2, 2)))
     score = np.einsum("ga,gb->gab", mean[kept, 4:] * means.count[:, None], means.D.conj()).reshape(-1, 4)
     spread = spread_of(
-        score, parts[kept], bread @ meat @ bread.conj().T, chi_square, 2 * spare, table.directions_differ
+        score,
+        parts[kept],
+        bread @ meat @ bread.conj().T,
+        chi_square,
+        2 * spare,
+        table.directions_differ,
+        pooled_effect(mean[kept, 4:], means) if kept.sum() > 2 else None,
     )
     return spread.covariance, spread.dof, chi_square
 

@@ -20,6 +20,8 @@ from tpjb_ident.errors import ArgumentError
 
 #: A model is refused below this probability of its chi-square.
 REFUSED = 0.01
+#: Draws of a chi-square with measured covariances, and their seed; above so many degrees of freedom one is known.
+DRAWN, LARGE_DOF = (4000, 5), 1e4
 MODELS = {"K-C": 8, "K-C-M": 12}
 
 
@@ -41,6 +43,8 @@ class FrequencyFit:
         Lowest and highest frequency [rad/s]; outside it the fit is extrapolation.
     misfit : float
         Largest ||h_model - h|| / ||h|| over the frequencies: what using the model costs.
+    noise_dof : tuple of float
+        Degrees of freedom behind the covariance of every point.
     """
 
     model: str
@@ -53,11 +57,12 @@ class FrequencyFit:
     n_frequencies: int
     omega_range: tuple[float, float]
     misfit: float
+    noise_dof: tuple[float, ...] = ()
 
     @property
     def probability(self) -> float:
         """Probability of a chi-square this large if the model were true; NaN without spare data."""
-        return float(chi2.sf(self.chi_square, self.dof)) if self.dof > 0 else float("nan")
+        return chance_of(self.chi_square, self.dof, self.noise_dof) if self.dof > 0 else float("nan")
 
     @property
     def refused(self) -> bool:
@@ -73,6 +78,36 @@ class FrequencyFit:
     def h(self, omega: float) -> np.ndarray:
         """Dynamic stiffness of the model at `omega` [rad/s], (2, 2) complex."""
         return np.asarray(self.K - omega**2 * self.M + 1j * omega * self.C)
+
+
+def chance_of(chi_square: float, dof: int, noise_dof: tuple[float, ...]) -> float:
+    """Probability of a larger chi-square whose covariances are themselves measured, point by point.
+
+    A covariance from few repeats is too small as often as too large, and where it is too small its share of the
+    chi-square is huge. Each share is a chi-square over a mean square of its own; the sum is drawn, with a fixed seed.
+    A 2x2 complex covariance of nu degrees of freedom, inverted, is too large by nu / (nu - 4) on average: as a single
+    variance of nu / 2 is.
+
+    Parameters
+    ----------
+    chi_square : float
+    dof : int
+    noise_dof : tuple of float
+        Of every point; infinite where its covariance is known.
+    """
+    plain = float(chi2.sf(chi_square, dof))
+    finite = np.array([nu for nu in noise_dof if np.isfinite(nu) and nu < LARGE_DOF])
+    if not len(finite) or plain > 0.5:
+        return plain
+    rng = np.random.default_rng(DRAWN[1])
+    each = dof / len(noise_dof)
+    total = np.zeros(DRAWN[0])
+    for nu in noise_dof:
+        share = rng.chisquare(each, DRAWN[0])
+        half = max(nu / 2, 1.0)
+        total += share / (rng.chisquare(half, DRAWN[0]) / half) if nu < LARGE_DOF else share
+    above = float((total >= chi_square).mean())
+    return max(above, plain)
 
 
 def fit_over_frequency(estimates: list[DynamicStiffness], model: str) -> FrequencyFit:
@@ -125,6 +160,7 @@ def fit_over_frequency(estimates: list[DynamicStiffness], model: str) -> Frequen
         len(usable),
         (float(omegas.min()), float(omegas.max())),
         misfit,
+        tuple(float(np.median(e.dof)) for e in usable),
     )
 
 
