@@ -116,8 +116,8 @@ def test_identify_leaves_a_record_of_what_it_did(identified, small_campaign):
     assert entry["settings"]["method"] == "mm-eiv"
     digest = subprocess.run(["sha256sum", small_campaign], capture_output=True, text=True, check=False).stdout.split()
     assert not digest or digest[0] in entry["inputs_sha256"].values()
-    assert set(entry["outputs"]) == {f"{t}.{e}" for t in ("coefficients", "estimators", "windows", "frequency_fits", "budget")
-                                     for e in ("csv", "parquet")}  # fmt: skip
+    tables = ("coefficients", "estimators", "windows", "frequency_fits", "budget")
+    assert set(entry["outputs"]) == {f"{table}.{end}" for table in tables for end in ("csv", "parquet")}
 
 
 def test_one_direction_is_no_answer_and_exits_3(small_campaign, tmp_path):

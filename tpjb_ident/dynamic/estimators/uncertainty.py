@@ -168,7 +168,7 @@ def spread_of(
     known_effect : bool
         That directions differ is known from elsewhere; then this point's own chi-square is not asked.
     pooled : (8, 8) ndarray, optional
-        Covariance of H by `pooled_effect`, which stands for the jackknife where the directions are few.
+        Covariance of H by `pooled_effect`, which stands beside the jackknife where the directions are few.
     """
     known = complex_to_real_covariance(repeat)
     g = len(score)
@@ -176,13 +176,15 @@ def spread_of(
     if g <= 2 or not (known_effect or chi_square > 1.0):
         return Spread(known, np.full(8, max(dof_repeat, 1.0)))
     certain = min(1.0, (chi_square - 1.0) / (chi2.ppf(0.95, spare) / spare - 1.0)) if not known_effect else 1.0
-    if pooled is not None and g <= FEW_DIRECTIONS:
-        total = known + certain * pooled
-        between = np.full(8, POOLED_DOF * (g - 2))
-        return Spread(total, mixed_dof(np.diag(total), np.diag(known), dof_repeat, between))
     moved = np.linalg.solve(parts.sum(axis=0) - parts, score[:, :, None])[:, :, 0]
     moved = np.concatenate([moved.real, moved.imag], axis=1)
     jackknife = (g - 1) / g * moved.T @ moved
+    if pooled is not None and g <= FEW_DIRECTIONS:
+        # an effect that strikes one entry alone shows in the jackknife, and is spread over all in the pooled variance
+        stretch = np.sqrt(np.maximum(np.diag(jackknife) / np.diag(pooled), 1.0))
+        total = known + certain * pooled * np.outer(stretch, stretch)
+        between = np.full(8, POOLED_DOF * (g - 2))
+        return Spread(total, mixed_dof(np.diag(total), np.diag(known), dof_repeat, between))
     # Beyond repeat noise, in coordinates where that is the unit matrix; never negative.
     root = np.linalg.cholesky(known)
     white = np.linalg.solve(root, np.linalg.solve(root, jackknife).T)
