@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from tpjb_ident.rounding import plain, with_interval
+from tpjb_ident.rounding import fixed, plain, with_interval
 
 
 class Found(Protocol):
@@ -193,6 +193,61 @@ WORDS: dict[str, EffectWords] = {
         "Film pressure bends the pads open. Their clearance grows with the load, which lowers stiffness and damping.",
         "Coefficients fall short more and more as the load rises.",
         "thickness and support of the pads",
+    ),
+    "uneven_pads": EffectWords(
+        lambda p: (
+            "the pads stand unevenly: "
+            + ", ".join(f"#{key.rpartition('_')[2]} {amount(one)}" for key, one in p.items())
+        ),
+        "Machining of pads and seats leaves each pad at its own assembled clearance. The load shares itself out anew "
+        "among them.",
+        "The clearance polygon is irregular; coefficients part where the load turns.",
+        "the clearance sweep, pad by pad",
+    ),
+    "structure_compliance": EffectWords(
+        lambda p: (
+            f"the structure gives like a spring of {amount(p['stiffness'])} in one direction, "
+            f"{plain(math.degrees(p['direction'].value), 0)}°"
+        ),
+        "A cap, a foot or a joint between bearing and probes bends under the dynamic load. It stands in series with "
+        "the bearing in that direction only.",
+        "Stiffness is short in one direction; dry tests of pads that lie there give too much.",
+        "bolts, joints and feet along that direction",
+    ),
+    "pivot_rolling": EffectWords(
+        lambda p: f"the pivots resist rolling with {amount(p['factor'])} of what their radii give",
+        "A rocker rolls on its seat, so the contact walks away from the pivot line. The pad resists tilting in "
+        "proportion to its load.",
+        "Cross-coupled stiffness and a loss of damping that grow with the load.",
+        "the radii of rocker and seat",
+    ),
+    "pivot_friction": EffectWords(
+        lambda p: f"the pivots rub with a friction coefficient of {fixed(p['coefficient'].value, 3)}",
+        "A sphere that rubs in its seat holds the pad until the moment is large enough. A pad that is held behaves "
+        "like a fixed one.",
+        "Coefficients depend on the amplitude; loading and unloading differ.",
+        "wear and lubrication of the seats",
+    ),
+    "viscosity_law": EffectWords(
+        lambda p: (
+            f"the oil's viscosity falls {_away(p['factor'], 'faster', 'more slowly')} with temperature than stated"
+        ),
+        "The viscosity at film temperature differs from what two points of a data sheet give. Hot films are then "
+        "thinner or thicker than computed.",
+        "Coefficients agree when cool and part as the films warm up.",
+        "the oil's viscosity at 40 and 100 °C",
+    ),
+    "heat_loss": EffectWords(
+        lambda p: f"pads, shaft and drained oil take {amount(p['share'])} of the films' heat",
+        "Heat that leaves the film lowers its temperature. Films are cooler and more viscous than an adiabatic one.",
+        "Pad temperatures are lower than predicted, stiffness and damping higher.",
+        "pad temperatures over speed and load",
+    ),
+    "pad_conduction": EffectWords(
+        lambda p: f"the pads' backs lose heat with {fixed(p['back_convection'].value, 0)} W/m²/K",
+        "Pads conduct the film's heat to the oil around them. The film's temperature evens out along the pad.",
+        "Pad temperatures are lower and flatter than predicted.",
+        "the oil around the pads, and sprays on their backs",
     ),
     "pivot_damping": EffectWords(
         lambda p: f"every pivot damps with {amount(p['damping'])}",

@@ -132,8 +132,11 @@ def effects_sentences(comparison: Comparison) -> tuple[str, ...]:
     effects = comparison.settings.effects
     if not effects:
         return ()
+    pads = len(comparison.bearing.pads)
     listed = "; ".join(
-        finding(e.name, {p.name: Fixed(float(e.parameters[p.name]), p.unit) for p in kind_of(e.name).parameters})
+        finding(
+            e.name, {p.name: Fixed(float(e.parameters[p.name]), p.unit) for p in kind_of(e.name).parameters_of(pads)}
+        )
         for e in effects
     )
     return (
