@@ -174,6 +174,7 @@ class Shaken:
 class _Vector:
     def __init__(self, values):
         self.values = values
+        self.time = np.arange(len(values)) / Shaken.sample_rate
 
     def __len__(self):
         return len(self.values)
@@ -222,6 +223,7 @@ CASES = {
     "residual_series": lambda: plots.residual_series(comparison(), "frequency"),
     "coherence": lambda: plots.coherence(comparison()[:9]),
     "coherence_spectrum": lambda: plots.coherence_spectrum(Shaken()),
+    "orbit": lambda: plots.orbit(Shaken()),
     "window_weights": lambda: plots.window_weights(windows()),
     "isolability": lambda: plots.isolability(SEPARATION, EFFECTS),
     "gap": lambda: plots.gap(GAPS),

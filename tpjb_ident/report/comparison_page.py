@@ -22,6 +22,7 @@ from tpjb_ident.report.comparison_tables import (
     predicted_table,
 )
 from tpjb_ident.report.figure import Panel, save_panels
+from tpjb_ident.report.laboratory_sections import budget_table, evidence_section, set_up_section
 from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.report.pivot_panels import pivot_panels
 from tpjb_ident.report.plots.colours import VARIANT_LABEL
@@ -123,6 +124,8 @@ def _sections(comparison: Comparison, frame: pd.DataFrame) -> list[Section]:
         groups.setdefault(panel.group, []).append(panel)
     sections = [Section(heading, panels=group) for heading, group in groups.items()]
     sections += _pivot_sections(comparison) + _position_sections(comparison)
+    evidence = evidence_section(comparison.campaign, comparison.identification)
+    sections += [] if evidence is None else [evidence]
     sections.append(
         Section(
             "Operating points",
@@ -130,12 +133,17 @@ def _sections(comparison: Comparison, frame: pd.DataFrame) -> list[Section]:
                 "Intervals are 95 %, random and calibration errors together. Outliers is the share of record windows "
                 "that got no weight."
             ],
-            tables=[measured_table(comparison.identification), predicted_table(frame)],
+            tables=[
+                measured_table(comparison.identification),
+                budget_table(comparison.identification),
+                predicted_table(frame),
+            ],
         )
     )
     flags = flag_table(comparison)
     text = [] if flags.rows else ["No flags: nothing about the records calls for caution."]
     sections.append(Section("Quality flags", notes=text, tables=[flags] if flags.rows else []))
+    sections.append(set_up_section(comparison.campaign, comparison.bearing))
     return sections
 
 

@@ -73,8 +73,8 @@ def _sentence(text: str) -> str:
 
 
 def _percent(share: float) -> str:
-    return "no gap to close" if share is None or math.isnan(share) else f"{100 * share:.0f} %"
+    return "no gap to close" if share is None or math.isnan(share) else f"{min(100 * share, 100.0):.0f} %"
 
 
 def _range(low: float, high: float) -> str:
-    return "" if math.isnan(low) else f"{100 * low:.0f} .. {100 * high:.0f} %"
+    return "" if math.isnan(low) else f"{min(100 * low, 100.0):.0f} to {min(100 * high, 100.0):.0f} %"

@@ -32,4 +32,4 @@ def diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
     if len(frame):
         panels.append(panel("residual-map", "Residuals of every coefficient and point", residual_map(frame), GROUP))
     title = "Gap by observable, held-out points where there are any (* fitted points)"
-    return [*panels, panel("gap-by-observable", title, gap(diagnosis.verdict), GROUP)]
+    return [*panels, panel("gap-by-observable", title, gap(diagnosis.verdict, logarithmic=False), GROUP)]

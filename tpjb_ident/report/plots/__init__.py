@@ -22,6 +22,7 @@ from tpjb_ident.report.plots.gap import gap
 from tpjb_ident.report.plots.gap_controls import gap_controls
 from tpjb_ident.report.plots.isolability import isolability
 from tpjb_ident.report.plots.load_deflection import load_deflection
+from tpjb_ident.report.plots.orbit import orbit
 from tpjb_ident.report.plots.pad_deformation import pad_deformation
 from tpjb_ident.report.plots.pad_projection import pad_projection
 from tpjb_ident.report.plots.pivot_stiffness import pivot_stiffness
@@ -40,6 +41,7 @@ __all__ = [
     "gap_controls",
     "isolability",
     "load_deflection",
+    "orbit",
     "pad_deformation",
     "pad_projection",
     "pivot_stiffness",

@@ -1,0 +1,170 @@
+"""What a test laboratory's report holds beside results: set-up, sensors, bearing and oil, run matrix, raw evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rigdata.problem import RigDataError
+from tpjb_ident.report.comparison_tables import point_label
+from tpjb_ident.report.figure import Panel, panel
+from tpjb_ident.report.page import Section, Table
+from tpjb_ident.report.plots import coherence, coherence_spectrum, orbit
+from tpjb_ident.rounding import fixed
+from tpjb_ident.schema import DAMPING, STIFFNESS
+
+if TYPE_CHECKING:
+    from model.bearing import Bearing
+    from rigdata.calibration import Channel
+    from rigdata.campaign import Campaign
+    from rigdata.run import Run
+    from tpjb_ident.dynamic.results.identification import Identification
+
+#: SI unit of a calibrated quantity, what people read, and its size in SI.
+SENSITIVITY = {
+    "displacement": ("µm", 1e-6),
+    "force": ("N", 1.0),
+    "acceleration": ("m/s²", 1.0),
+    "temperature": ("K", 1.0),
+    "pressure": ("MPa", 1e6),
+    "speed": ("rad/s", 1.0),
+}
+KINDS_IN_WORDS = {"dynamic": "dynamic", "locus": "shaft locus", "clearance": "clearance sweep",
+                  "dry_pivot": "dry pivot test"}  # fmt: skip
+EVIDENCE = "Raw evidence of one run"
+
+
+def set_up_section(campaign: Campaign, bearing: Bearing) -> Section:
+    """Sensors with their calibration, bearing and oil, and what was run.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    bearing : Bearing
+    """
+    return Section(
+        "Set-up",
+        notes=[f"{bearing}."],
+        tables=[sensor_table(tuple(campaign.channels.values())), bearing_table(bearing), run_matrix(campaign.runs)],
+    )
+
+
+def sensor_table(channels: Sequence[Channel]) -> Table:
+    """Channels with their calibration.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+    """
+    rows = []
+    for one in channels:
+        if one.quantity not in SENSITIVITY:
+            continue
+        unit, scale = SENSITIVITY[one.quantity]
+        axis = "" if one.axis is None else f"{math.degrees(one.axis):g}°"
+        place = axis if one.pad is None else f"pad #{one.pad}"
+        known = "not stated" if one.uncertainty is None else f"{100 * one.uncertainty:.2g} %"
+        rows.append([one.name, one.quantity, place, f"{one.slope / scale:.5g} {unit} per {one.unit or 'unit'}", known])
+    columns = ["channel", "quantity", "direction or pad", "calibration", "uncertainty (1 standard deviation)"]
+    return Table("Sensors", columns, rows, frozenset({0, 1, 2, 3}))
+
+
+def bearing_table(bearing: Bearing) -> Table:
+    """Geometry of the bearing, its pivots and its oil, as the bearing file states them.
+
+    Parameters
+    ----------
+    bearing : Bearing
+    """
+    pad, oil = bearing.pads[0], bearing.oil
+    rows = [
+        ["journal diameter", f"{1e3 * bearing.journal_diameter:.5g} mm"],
+        ["pad length", f"{1e3 * bearing.length:.4g} mm"],
+        ["pads", f"{len(bearing.pads)}, {math.degrees(pad.arc):.3g}° of arc, pivots at "
+                 + ", ".join(f"{math.degrees(p.pivot_angle):g}°" for p in bearing.pads)],
+        ["assembled clearance (radial)", f"{1e6 * pad.assembled_clearance:.4g} µm"],
+        ["pad clearance (radial)", f"{1e6 * pad.pad_clearance:.4g} µm, preload {pad.preload:.3g}"],
+        ["pivots", bearing.pivot.kind],
+        ["oil", f"{oil.grade or 'grade not stated'}, {1e3 * oil.viscosity_40:.3g} mPa s at 40 °C, supplied at "
+                f"{oil.supply_temperature:g} °C"],
+        ["oil, at 40 °C", f"{oil.density_40:g} kg/m³, {oil.specific_heat:g} J/kg/K, {oil.conductivity:g} W/m/K"],
+    ]  # fmt: skip
+    return Table("Bearing and oil", ["", "as stated"], rows, frozenset({0, 1}))
+
+
+def run_matrix(runs: Sequence[Run]) -> Table:
+    """Operating points with their number of runs.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    """
+    counted: dict[tuple[str, ...], int] = {}
+    for run in runs:
+        p = run.point
+        several = run.kind in {"locus", "dry_pivot"}
+        key = (
+            KINDS_IN_WORDS.get(run.kind, run.kind), f"{p.static_load / 1e3:g}" if p.static_load else "–",
+            "several" if several else f"{p.static_load_direction_deg:g}", f"{p.shaft_speed_hz:g}",
+            f"{p.excitation_hz:g}" if p.excitation else "–", f"{run.sample_rate:g}",
+        )  # fmt: skip
+        counted[key] = counted.get(key, 0) + 1
+    columns = ["kind", "load, kN", "load direction, °", "shaft speed, Hz", "excitation, Hz", "rate, Hz", "runs"]
+    return Table("Runs", columns, [[*key, str(n)] for key, n in counted.items()], frozenset({0}))
+
+
+def evidence_section(campaign: Campaign, result: Identification) -> Section | None:
+    """Orbit and coherence of one run in the middle of the campaign, and the coherence of every point.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    result : Identification
+        Of it.
+
+    Returns
+    -------
+    Section or None
+        None where there is nothing to draw.
+    """
+    if not result.points:
+        return None
+    point = result.points[len(result.points) // 2]
+    panels: list[Panel] = []
+    for run in (r for r in campaign.of_kind("dynamic") if r.id in point.runs):
+        try:
+            label = f"run {run.id}, {point_label(point)}"
+            panels = [
+                panel("orbit", f"Orbit of the shaft in the housing, {label}; thick: its part at the excitation",
+                      orbit(run), EVIDENCE),
+                panel("coherence-spectrum", f"Multiple coherence of force and displacement, {label}",
+                      coherence_spectrum(run), EVIDENCE),
+            ]  # fmt: skip
+        except (RigDataError, ValueError):  # a damaged or short run: the next one shows the same
+            continue
+        break
+    panels.append(panel("coherence-points", "Force that the displacements do not explain", coherence(result), EVIDENCE))
+    return Section(EVIDENCE, panels=panels)
+
+
+def budget_table(result: Identification) -> Table:
+    """What the 95 % intervals of the direct coefficients are made of.
+
+    Parameters
+    ----------
+    result : Identification
+    """
+    rows = []
+    for p in result.points:
+        both, random = p.stiffness.half_width(), p.stiffness.half_width(systematic=False)
+        cells = []
+        for offset in (0, 4):
+            for j in (0, 3):
+                value = abs(p.stiffness.vector[offset + j])
+                systematic = math.sqrt(max(float(both[offset + j] ** 2 - random[offset + j] ** 2), 0.0))
+                cells += [fixed(100 * float(random[offset + j]) / value, 2), fixed(100 * systematic / value, 2)]
+        rows.append([point_label(p), *cells])
+    named = [f"{kind.symbol}{e}" for kind in (STIFFNESS, DAMPING) for e in ("xx", "yy")]
+    columns = ["point", *(f"{name}, {part} %" for name in named for part in ("random", "calibration"))]
+    return Table("Uncertainty budget: half of each part's 95 % interval, per cent of the value", columns, rows)
