@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rigdata.survey.channel_guess import ChannelGuess, guess_channel, quantity_of_unit
 from rigdata.survey.exports import Export
@@ -23,6 +24,9 @@ _EXAMPLE = {
     "speed": '"100 mV/Hz"',
 }
 _NEAR = 0.02
+#: Directions [deg] no farther apart than this are meant to be one.
+_ALIKE = 3.0
+_MAINS_NEAR = 0.005
 #: Share of the running records in which the shaft speed must show.
 _MOST_OF = 0.8
 
@@ -67,7 +71,7 @@ def survey(exports: Sequence[Export]) -> Survey:
             if one.name not in channels:
                 channels[one.name] = guess_channel(one.name, one.unit)
     quantities = {name: guess.quantity for name, guess in channels.items()}
-    runs = tuple(guess_run(export, channels) for export in exports)
+    runs = _one_direction([guess_run(export, channels) for export in exports])
     return Survey(
         exports=tuple(e.name for e in exports),
         rates=tuple(e.rate for e in exports),
@@ -76,6 +80,28 @@ def survey(exports: Sequence[Export]) -> Survey:
         speed_line=_common_line(exports, quantities, runs),
         clock=next((e.clock for e in exports if e.clock), ""),
     )
+
+
+def _one_direction(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
+    """Directions that lie within a few degrees of each other become one: -89 and -91 deg are a load on one pad."""
+    known = sorted({r.direction for r in runs if math.isfinite(r.direction)})
+    groups: list[list[float]] = []
+    for angle in known:
+        if groups and angle - groups[-1][-1] <= _ALIKE and angle - groups[-1][0] <= 2 * _ALIKE:
+            groups[-1].append(angle)
+        else:
+            groups.append([angle])
+    common: dict[float, float] = {}
+    for group in groups:
+        every = sorted(r.direction for r in runs if r.direction in group)
+        middle = every[len(every) // 2]
+        round_one = 5.0 * round(middle / 5.0)
+        common |= dict.fromkeys(group, round_one if abs(round_one - middle) <= _ALIKE / 2 else middle)
+    return tuple(replace(r, direction=common.get(r.direction, r.direction)) for r in runs)
+
+
+def _is_mains(frequency: float) -> bool:
+    return any(abs(frequency - mains) < _MAINS_NEAR * mains for mains in (50.0, 60.0))
 
 
 def _common_line(exports: Sequence[Export], quantities: dict[str, str], runs: Sequence[RunGuess]) -> float:
@@ -88,7 +114,8 @@ def _common_line(exports: Sequence[Export], quantities: dict[str, str], runs: Se
             running.append([x.frequency for x in found if abs(x.frequency - driven) > _NEAR * x.frequency])
     if len(running) < 2:
         return float("nan")
-    for candidate in sorted({f for lines in running for f in lines}):
+    # the mains stand in every record as well: they are the speed only where nothing else is
+    for candidate in sorted({f for lines in running for f in lines}, key=lambda f: (_is_mains(f), f)):
         near = [f for lines in running for f in lines if abs(f - candidate) < _NEAR * candidate]
         if len(near) >= _MOST_OF * len(running):
             return sorted(near)[len(near) // 2]
@@ -152,7 +179,9 @@ def _channel_lines(name: str, guess: ChannelGuess) -> list[str]:
     if guess.quantity == "displacement":
         lines.append("# polarity = -1   # an eddy-current probe reads less as the shaft comes nearer")
     if guess.quantity == "temperature":
-        lines += ["# pad = 1", "# position = 0.75   # fraction of the arc from the leading edge"]
+        pad = re.search(r"(?:pad|t|tc|temp\w*?)[-_ #]*(\d{1,2})(?!\d)", name, re.IGNORECASE)
+        lines.append(f"pad = {int(pad[1])}   # (guess) by its name" if pad and int(pad[1]) else "# pad = 1")
+        lines.append("# position = 0.75   # fraction of the arc from the leading edge")
     return lines
 
 
@@ -163,7 +192,11 @@ def _run_lines(export: str, run: RunGuess, found: Survey) -> list[str]:
         kind = f'kind = "{run.kind}"   # (guess) {run.why}'
     lines = ["[[runs]]", f"id = {toml_string(stem)}", f"file = {toml_string(export)}", kind]
     if run.kind in ("dynamic", "locus", ""):
-        lines.append(_line("shaft_speed", found.speed_line, "Hz", "this line stands in most records"))
+        if math.isfinite(run.speed):
+            lines.append(_line("shaft_speed", run.speed, "Hz", run.why_speed))
+        else:
+            mains = "; it may be the mains" if _is_mains(found.speed_line) else ""
+            lines.append(_line("shaft_speed", found.speed_line, "Hz", f"this line stands in most records{mains}"))
         lines.append(_line("static_load", run.load / 1e3, "kN", "by the file's name; per bearing", "per bearing"))
     if run.kind == "dry_pivot":
         known = f"pad = {run.pad}   # (guess) by the file's name"
@@ -172,8 +205,10 @@ def _run_lines(export: str, run: RunGuess, found: Survey) -> list[str]:
         where = "where it pushes the shaft; down is -90 deg"
         lines.append(_line("static_load_direction", run.direction, "deg", f"by the cells; {where}", where))
     if run.kind in ("dynamic", ""):
-        frequency = run.lines[0].frequency if run.lines else float("nan")
-        lines.append(_line("excitation_frequency", frequency, "Hz", "strongest line of the record"))
+        frequency, why = run.excitation, "by the file's name, and a line of the record"
+        if not math.isfinite(frequency):
+            frequency, why = run.lines[0].frequency if run.lines else float("nan"), "strongest line of the record"
+        lines.append(_line("excitation_frequency", frequency, "Hz", why))
         lines.append(f'# excitation_direction = "{MARK} deg"')
     return lines
 

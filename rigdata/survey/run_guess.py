@@ -18,6 +18,10 @@ from rigdata.survey.spectrum import SpectralPeak, amplitude_spectrum, strongest
 #: Share of slow movement above which a record is a quasi-static test, and of one direction for load steps.
 _SLOW, _STRAIGHT = 0.9, 0.97
 _BLOCK = 0.25
+#: How far a line may lie from the frequency that a file's name states, as a share.
+_CONFIRMS = 0.02
+#: Units of a tachometer, in Hz.
+_TURNS = {"rpm": 1.0 / 60.0, "Hz": 1.0, "1/s": 1.0, "rad/s": 1.0 / (2.0 * math.pi)}
 _BY_NAME = (
     ("dry_pivot", r"pivot|dry|trocken|steps?|^p-"),
     ("clearance", r"clear|spiel|^c-"),
@@ -43,6 +47,12 @@ class RunGuess:
         Of the load on the shaft [deg], by the cells: of its change in load steps, of its mean else; NaN if unknown.
     pad : int
         Number of the pad that the file's name states; 0 without one.
+    speed : float
+        Shaft speed [Hz] that a tachometer in engineering units or the file's name states; NaN without one.
+    excitation : float
+        Excitation frequency [Hz] that the file's name states and the record's lines confirm; NaN without one.
+    why_speed : str
+        Where the speed comes from.
     """
 
     kind: str
@@ -51,6 +61,9 @@ class RunGuess:
     load: float = float("nan")
     direction: float = float("nan")
     pad: int = 0
+    speed: float = float("nan")
+    excitation: float = float("nan")
+    why_speed: str = ""
 
 
 def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
@@ -75,14 +88,48 @@ def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
     elif seen and {seen, named} != {"dynamic", "locus"}:
         kind, reason = seen, f"{why} (its name says {named})"
     pad = re.search(r"(?:^p|pad)[-_ #]?(\d{1,2})(?!\d)", stem, re.IGNORECASE)
+    direction = _direction(forces, channels, steps=kind == "dry_pivot")
+    speed, why_speed = _speed(export, channels, stem)
     return RunGuess(
         kind=kind,
         why=reason,
         lines=lines,
         load=_load_of(stem),
-        direction=_direction(forces, channels, steps=kind == "dry_pivot"),
+        direction=direction if math.isfinite(direction) else _stated(stem, r"deg(?:ree)?s?|°|grad"),
         pad=int(pad[1]) if pad else 0,
+        speed=speed,
+        excitation=_confirmed(stem, lines),
+        why_speed=why_speed,
     )
+
+
+def _stated(stem: str, unit: str) -> float:
+    """Number before a unit in a file's name: ``-90deg``, ``1320_rpm``; NaN without one."""
+    found = re.search(rf"(?<![\d.,])((?<![a-z0-9])[-+])?(\d+(?:[.,]\d+)?)[ _]?(?:{unit})(?![a-z])", stem, re.IGNORECASE)
+    if found is None:
+        return float("nan")
+    size = float(found[2].replace(",", "."))
+    return -size if found[1] == "-" else size  # behind a letter it is a hyphen
+
+
+def _speed(export: Export, channels: Mapping[str, ChannelGuess], stem: str) -> tuple[float, str]:
+    """Shaft speed [Hz] by a tachometer in engineering units, else by the file's name, and which of them said so."""
+    for one in export.series:
+        guess = channels.get(one.name)
+        if guess is not None and guess.quantity == "speed" and guess.unit in _TURNS:
+            good = one.values[np.isfinite(one.values)]
+            mean = float(np.median(good)) * _TURNS[guess.unit] if len(good) else 0.0
+            if mean > 0:
+                return mean, f"by the tachometer {one.name}"
+    turns = _stated(stem, r"rpm|u[-_]?min|1[-_]min") / 60.0
+    return turns, "by the file's name" if math.isfinite(turns) else ""
+
+
+def _confirmed(stem: str, lines: tuple[Line, ...]) -> float:
+    """Frequency [Hz] that a file's name states and one of the record's lines confirms; NaN without one."""
+    stated = [float(n.replace(",", ".")) for n in re.findall(r"(\d+(?:[.,]\d+)?)[ _]?Hz(?![a-z])", stem, re.IGNORECASE)]
+    seen = [f for f in stated if any(abs(x.frequency - f) <= _CONFIRMS * f for x in lines)]
+    return seen[0] if len(seen) == 1 else float("nan")
 
 
 def _direction(forces: list[Series], channels: Mapping[str, ChannelGuess], steps: bool) -> float:

@@ -185,3 +185,43 @@ def test_a_look_finds_lines_and_dead_channels():
     assert nothing.missing == 100
     assert math.isnan(nothing.mean)
     assert look_at(rng.standard_normal(2000), RATE).lines == ()
+
+
+def export_of(name, forces, speed=None):
+    """Half-swinging horizontal and vertical force, and a tachometer in rpm where asked for."""
+    time = np.arange(2000) / RATE
+    series = [Series(n, "N", f + 0.0 * time, time) for n, f in zip(("Fx", "Fy"), forces, strict=True)]
+    if speed is not None:
+        series.append(Series("tach", "rpm", np.full(2000, speed), time))
+    return Export(name, tuple(series))
+
+
+def test_directions_a_degree_apart_are_one():
+    angles = (-89.0, -91.0, -90.0, -18.4, 54.0)
+    made = [export_of(f"l-{i}.csv", 1000.0 * np.array([math.cos(math.radians(a)), math.sin(math.radians(a))]))
+            for i, a in enumerate(angles)]  # fmt: skip
+    found = survey(made)
+    assert [run.direction for run in found.runs] == [-90.0, -90.0, -90.0, -18.0, 55.0]
+
+
+def test_speed_comes_from_the_tachometer_before_the_name_before_the_lines():
+    forces = np.array([0.0, -1000.0])
+    first, second = survey([export_of("run-900rpm.csv", forces, 1320.0), export_of("run-900rpm.csv", forces)]).runs
+    assert first.speed == pytest.approx(22.0)
+    assert "tachometer tach" in first.why_speed
+    assert second.speed == pytest.approx(15.0)
+
+
+def test_units_in_names_are_understood():
+    time = np.arange(4000) / RATE
+    swing = 500.0 * np.sin(2 * np.pi * 25.0 * time)
+    one = Export("dyn_5kN_-90deg_1320rpm_25Hz.csv", (Series("Force", "N", swing, time),))
+    run = survey([one]).runs[0]
+    assert (run.load, run.direction, run.excitation) == (5000.0, -90.0, 25.0)
+    assert run.speed == pytest.approx(22.0)
+
+
+def test_the_pad_of_a_thermometer_is_read_from_its_name():
+    time = np.arange(100) / 10.0
+    text = draft_manifest(survey([Export("a.csv", (Series("T3", "degC", 40.0 + 0 * time, time),))]), "x", None)
+    assert "pad = 3   # (guess) by its name" in text
