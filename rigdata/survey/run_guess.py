@@ -125,7 +125,7 @@ def _speed(export: Export, channels: Mapping[str, ChannelGuess], stem: str) -> t
     return turns, "by the file's name" if math.isfinite(turns) else ""
 
 
-def _confirmed(stem: str, lines: tuple[Line, ...]) -> float:
+def _confirmed(stem: str, lines: tuple[SpectralPeak, ...]) -> float:
     """Frequency [Hz] that a file's name states and one of the record's lines confirms; NaN without one."""
     stated = [float(n.replace(",", ".")) for n in re.findall(r"(\d+(?:[.,]\d+)?)[ _]?Hz(?![a-z])", stem, re.IGNORECASE)]
     seen = [f for f in stated if any(abs(x.frequency - f) <= _CONFIRMS * f for x in lines)]
