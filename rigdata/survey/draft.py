@@ -64,7 +64,7 @@ def survey(exports: Sequence[Export]) -> Survey:
     Parameters
     ----------
     exports : sequence of Export
-    """
+            """
     channels: dict[str, ChannelGuess] = {}
     for export in exports:
         for one in export.series:
@@ -226,7 +226,7 @@ def toml_string(text: str) -> str:
     Parameters
     ----------
     text : str
-    """
+            """
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

@@ -106,7 +106,13 @@ class Comparison(Presented):
     remarks: tuple[str, ...] = ()
 
     def variant(self, name: str) -> Variant:
-        """The predictions with one pivot model."""
+        """The predictions with one pivot model.
+
+        Parameters
+        ----------
+        name : str
+            Of the pivot model.
+        """
         return next(v for v in self.variants if v.name == name)
 
     def to_dataframe(self) -> pd.DataFrame:

@@ -18,6 +18,11 @@ Formula = Callable[[int, float], tuple[float, float]]
 def printed_formula(bearing: Bearing) -> Formula | None:
     """Kirk and Reedy's formula for a bearing's pivots, Eq. (16) or (17); None if its pivots are rigid.
 
+    Parameters
+    ----------
+    bearing : Bearing
+        Its pivots count.
+
     Returns
     -------
     callable or None

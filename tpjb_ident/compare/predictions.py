@@ -139,7 +139,13 @@ def _static(point: OperatingPoint) -> OperatingPoint:
 
 
 def point_columns(point: OperatingPoint) -> dict[str, float]:
-    """Key columns of every table over operating points (outputs.md)."""
+    """Key columns of every table over operating points (outputs.md).
+
+    Parameters
+    ----------
+    point : OperatingPoint
+        Without an excitation: synchronous.
+    """
     return {
         "static_load_N": point.static_load,
         "static_load_direction_deg": point.static_load_direction_deg,
@@ -149,7 +155,13 @@ def point_columns(point: OperatingPoint) -> dict[str, float]:
 
 
 def coefficient_names(kind: str) -> tuple[str, ...]:
-    """Column names of the four stiffnesses (``"k"``) or dampings (``"c"``), row by row."""
+    """Column names of the four stiffnesses (``"k"``) or dampings (``"c"``), row by row.
+
+    Parameters
+    ----------
+    kind : str
+        "k" or "c".
+    """
     return KINDS[kind].columns
 
 

@@ -82,7 +82,15 @@ def rig_truth(bearing: Bearing, settings: ModelSettings, bearing_text: str = "")
 
 
 def erring_instruments(instruments: Instruments, effects: Iterable[Effect]) -> Instruments:
-    """Add the effects that act on the records to a rig's instruments; other effects do nothing here."""
+    """Add the effects that act on the records to a rig's instruments; other effects do nothing here.
+
+    Parameters
+    ----------
+    instruments : Instruments
+        Of the rig.
+    effects : Iterable[Effect]
+        Of any side.
+    """
     for effect in effects:
         if effect.name in INSTRUMENT_ERRORS:
             argument, parameter = INSTRUMENT_ERRORS[effect.name]

@@ -58,7 +58,14 @@ class Deviation:
 
 
 def deviations(comparison: Comparison, frame: pd.DataFrame | None = None) -> tuple[Deviation, ...]:
-    """Deviation of every pivot model in every direct coefficient."""
+    """Deviation of every pivot model in every direct coefficient.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    frame : DataFrame, optional
+        As comparison.csv; default: made.
+    """
     table = comparison_frame(comparison) if frame is None else frame
     found = []
     for variant in comparison.variants:
@@ -75,7 +82,13 @@ def deviations(comparison: Comparison, frame: pd.DataFrame | None = None) -> tup
 
 
 def closest(found: tuple[Deviation, ...]) -> str | None:
-    """Pivot model with the smallest mean size of its four medians; None if nothing could be compared."""
+    """Pivot model with the smallest mean size of its four medians; None if nothing could be compared.
+
+    Parameters
+    ----------
+    found : tuple of Deviation
+        Of all pivot models.
+    """
     scores: dict[str, list[float]] = {}
     for d in found:
         if math.isfinite(d.median):
@@ -146,7 +159,14 @@ def effects_sentences(comparison: Comparison) -> tuple[str, ...]:
 
 
 def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None) -> tuple[str, ...]:
-    """Say what the comparison found, the answer first."""
+    """Say what the comparison found, the answer first.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    frame : DataFrame, optional
+        As comparison.csv; default: made.
+    """
     found = deviations(comparison, frame)
     best = closest(found)
     sentences = []

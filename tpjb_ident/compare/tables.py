@@ -22,6 +22,10 @@ DIRECT = tuple(name for name in NAMES if name[1:3] in ("xx", "yy"))
 def comparison_frame(comparison: Comparison) -> pd.DataFrame:
     """Build comparison.csv.
 
+    Parameters
+    ----------
+    comparison : Comparison
+
     Returns
     -------
     DataFrame
@@ -63,7 +67,12 @@ def _row(variant: Variant, measured: PointResult, predicted: PointPrediction) ->
 
 
 def pivot_extrapolated(predicted: PointPrediction) -> bool:
-    """Whether a pad that carries presses its pivot harder than the dry test did."""
+    """Whether a pad that carries presses its pivot harder than the dry test did.
+
+    Parameters
+    ----------
+    predicted : PointPrediction
+    """
     p = predicted.prediction
     loads = zip(p.setup.pivots, p.pad_load, strict=True)
     return any(load > getattr(law, "valid_to", np.inf) for law, load in loads)

@@ -52,7 +52,13 @@ def _compiled_before() -> bool:
 
 
 def main(path: str) -> None:
-    """Predict one point with yielding pivots, which runs through all compiled code of the adiabatic model."""
+    """Predict one point with yielding pivots, which runs through all compiled code of the adiabatic model.
+
+    Parameters
+    ----------
+    path : str
+        A bearing file.
+    """
     from model.bearing_file import load_bearing
     from model.predict import predict
 

@@ -66,7 +66,13 @@ class SpeedTable:
 
 
 def speed_tables(points: tuple[StaticPoint, ...]) -> tuple[SpeedTable, ...]:
-    """Sort coefficients by load, direction and excitation frequency, each over shaft speed."""
+    """Sort coefficients by load, direction and excitation frequency, each over shaft speed.
+
+    Parameters
+    ----------
+    points : tuple of StaticPoint
+        Of one export.
+    """
     rows = []
     for p in points:
         for i, omega in enumerate(p.frequency):
@@ -92,7 +98,15 @@ def _rows(table: SpeedTable) -> Iterator[tuple[float, FloatArray, FloatArray]]:
 
 
 def xltrc_text(table: SpeedTable, source: str) -> str:
-    """Tab-separated table in the order of XLTRC's user-defined bearing sheet: paste it below the sheet's head."""
+    """Tab-separated table in the order of XLTRC's user-defined bearing sheet: paste it below the sheet's head.
+
+    Parameters
+    ----------
+    table : SpeedTable
+        Of one load and frequency.
+    source : str
+        Where the coefficients come from.
+    """
     names = [f"{kind}{e}" for kind in "KC" for e in ENTRIES]
     head = "\t".join(["Speed (rpm)", *(f"{n} ({'N/m' if n[0] == 'K' else 'N-s/m'})" for n in names)])
     lines = [f"* {_one_line(source)}", f"* {table.words}; SI units", f"* 95 % intervals and flags: {INTERVALS}"]
@@ -103,14 +117,30 @@ def xltrc_text(table: SpeedTable, source: str) -> str:
 
 
 def dyrobes_text(table: SpeedTable, source: str) -> str:
-    """External bearing file of Dyrobes: points, unit system 4 (N, m, s), 8 coefficients, then one line per speed."""
+    """External bearing file of Dyrobes: points, unit system 4 (N, m, s), 8 coefficients, then one line per speed.
+
+    Parameters
+    ----------
+    table : SpeedTable
+        Of one load and frequency.
+    source : str
+        Where the coefficients come from.
+    """
     lines = [f"{len(table.speed)}, 4, 8, 0, 0, 0, 0   {_one_line(source)}; {table.words}{_appendix(table)}"]
     lines += [", ".join([f"{rpm:.6g}", *(f"{v:.8e}" for v in (*k, *c))]) for rpm, k, c in _rows(table)]
     return "\n".join(lines) + "\n"
 
 
 def ansys_text(table: SpeedTable, source: str) -> str:
-    """File that ANSYS reads for COMBI214: titles, count and unit keys (0: SI; 1: rpm to rad/s), K and C by speed."""
+    """File that ANSYS reads for COMBI214: titles, count and unit keys (0: SI; 1: rpm to rad/s), K and C by speed.
+
+    Parameters
+    ----------
+    table : SpeedTable
+        Of one load and frequency.
+    source : str
+        Where the coefficients come from.
+    """
     third = table.warning or f"K11 .. K22, C11 .. C22 in N/m, N s/m; intervals: {INTERVALS}"
     lines = [_one_line(source)[:80], table.words[:80], third[:80]]
     lines.append(f"{len(table.speed):10d}{0:10d}{1:10d}")

@@ -68,7 +68,16 @@ def write_comparison_report(
 def comparison_page(
     comparison: Comparison, settings: Mapping[str, Any] | None = None, inputs: Mapping[str, str] | None = None
 ) -> Page:
-    """Gather the content of the report; see `write_comparison_report`."""
+    """Gather the content of the report; see `write_comparison_report`.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    settings : mapping of str to object, optional
+        How it was made; default: the comparison's own settings.
+    inputs : mapping of str to str, optional
+        SHA-256 by file name.
+    """
     frame = comparison_frame(comparison)
     answer, *more = summary_sentences(comparison, frame)
     campaign, bearing = comparison.campaign, comparison.bearing

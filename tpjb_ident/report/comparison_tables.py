@@ -29,12 +29,22 @@ PIVOT_LOADS = (2000.0, 4000.0)
 
 
 def point_label(p: PointResult) -> str:
-    """Load and excitation of a point, in words."""
+    """Load and excitation of a point, in words.
+
+    Parameters
+    ----------
+    p : PointResult
+    """
     return f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz"
 
 
 def measured_table(result: Identification) -> Table:
-    """K and C of every point with intervals."""
+    """K and C of every point with intervals.
+
+    Parameters
+    ----------
+    result : Identification
+    """
     rows = []
     for p in result.points:
         lo, hi = p.stiffness.interval()
@@ -50,7 +60,13 @@ def measured_table(result: Identification) -> Table:
 
 
 def predicted_table(frame: pd.DataFrame) -> Table:
-    """Direct coefficients predicted with every pivot model, and how far off each is."""
+    """Direct coefficients predicted with every pivot model, and how far off each is.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        As comparison.csv.
+    """
     rows = []
     ordered = frame.sort_values(["static_load_N", "excitation_Hz"], kind="stable")
     for _, row in ordered.iterrows():
@@ -70,7 +86,12 @@ def predicted_table(frame: pd.DataFrame) -> Table:
 
 
 def flag_table(comparison: Comparison) -> Table:
-    """Every flag of points, pivot curves, polygon and locus, in plain words; what says the same stands in one row."""
+    """Every flag of points, pivot curves, polygon and locus, in plain words; what says the same stands in one row.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    """
     identified = comparison.identification
     parts: list[tuple[str, Sequence[Condition]]] = [(point_label(p), p.quality) for p in identified.points]
     parts.append(("campaign", identified.conditions))
@@ -96,7 +117,14 @@ def _gathered(rows: Sequence[Sequence[str]]) -> list[list[str]]:
 
 
 def pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -> Table:
-    """Tangent stiffness of every pad at two loads beside the printed formula's."""
+    """Tangent stiffness of every pad at two loads beside the printed formula's.
+
+    Parameters
+    ----------
+    curves : sequence of PivotCurve
+    formula : Formula, optional
+        ``formula(pad, load)`` gives the printed (secant, tangent) stiffness [N/m].
+    """
     columns = ["pad", "law"]
     for load in PIVOT_LOADS:
         columns += [f"at {load / 1e3:g} kN, MN/m", "of Kirk's tangent"]
@@ -114,7 +142,14 @@ def pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) ->
 
 
 def clearance_table(polygon: ClearancePolygon, drawn: NDArray[np.float64]) -> Table:
-    """Clearance per pad beside the drawing's, in µm."""
+    """Clearance per pad beside the drawing's, in µm.
+
+    Parameters
+    ----------
+    polygon : ClearancePolygon
+    drawn : ndarray
+        Assembled clearances of the drawing [m], (n_pads,).
+    """
     rows = []
     for k, drawing in enumerate(drawn):
         value, half = polygon.clearance[k], 1.96 * polygon.clearance_se[k]

@@ -47,19 +47,42 @@ class Panel:
 
 
 def is_wide(figure: Figure) -> bool:
-    """Whether a picture holds several panels side by side and wants the whole width of a page."""
+    """Whether a picture holds several panels side by side and wants the whole width of a page.
+
+    Parameters
+    ----------
+    figure : Figure
+    """
     width, height = figure.get_size_inches()
     return bool(width > 1.35 * height and width > 6.5)
 
 
 def panel(name: str, title: str, figure: Figure, group: str) -> Panel:
-    """Make a panel of a picture, without its white ground: the page's own shows through."""
+    """Make a panel of a picture, without its white ground: the page's own shows through.
+
+    Parameters
+    ----------
+    name : str
+        File name without suffix.
+    title : str
+        What it shows, in words.
+    figure : Figure
+    group : str
+        Heading under which it stands.
+    """
     figure.patch.set_alpha(0.0)
     return Panel(name, title, figure, group)
 
 
 def svg_text(figure: Figure, name: str) -> str:
-    """Draw a figure as SVG with text as text, markers with their values; the same figure gives the same bytes."""
+    """Draw a figure as SVG with text as text, markers with their values; the same figure gives the same bytes.
+
+    Parameters
+    ----------
+    figure : Figure
+    name : str
+        From which its ids are made.
+    """
     buffer = io.StringIO()
     spots = mark_lines(figure)
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
@@ -92,12 +115,27 @@ def inline_svg(text: str, name: str, title: str) -> str:
 
 
 def prefixed_ids(svg: str, prefix: str) -> str:
-    """Rename every id and what refers to it, so that several drawings can share one page."""
+    """Rename every id and what refers to it, so that several drawings can share one page.
+
+    Parameters
+    ----------
+    svg : str
+        Text of the drawing.
+    prefix : str
+        Put before every id.
+    """
     return _ID.sub(rf"\g<1>{prefix}-\g<2>", svg)
 
 
 def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:
-    """Write every panel as SVG and PNG, on white ground; return the SVG texts, without ground, by name."""
+    """Write every panel as SVG and PNG, on white ground; return the SVG texts, without ground, by name.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+    folder : Path
+        Made if need be.
+    """
     folder.mkdir(exist_ok=True)
     texts = {panel.name: svg_text(panel.figure, panel.name) for panel in panels}
     for panel in panels:

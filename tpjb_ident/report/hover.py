@@ -90,7 +90,15 @@ def _with_unit(label: str, value: float, spread: str = "") -> str:
 
 
 def with_titles(svg: str, spots: tuple[Spots, ...]) -> str:
-    """Put a title into every marker of the drawing that `mark_lines` knows."""
+    """Put a title into every marker of the drawing that `mark_lines` knows.
+
+    Parameters
+    ----------
+    svg : str
+        Text of the drawing.
+    spots : tuple of Spots
+        As `mark_lines` gives them.
+    """
     for one in spots:
         start = svg.find(f'<g id="{one.gid}"')
         if start < 0:

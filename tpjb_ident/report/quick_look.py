@@ -26,7 +26,19 @@ _POINTS = 4000
 
 
 def write_quick_look(folder: Path, title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> None:
-    """Write ``figures/quick-look.svg`` and ``.png``."""
+    """Write ``figures/quick-look.svg`` and ``.png``.
+
+    Parameters
+    ----------
+    folder : Path
+        Existing.
+    title : str
+        Of the picture.
+    series : sequence of Series
+        Channels.
+    looks : mapping of str to Look
+        By channel name.
+    """
     save_panels([Panel("quick-look", title, quick_look(title, series, looks), "")], folder / "figures")
 
 

@@ -21,7 +21,13 @@ _NEAR = 0.02
 
 
 def model_tab(session: Session) -> Any:
-    """Build the tab; the session has a predictor and identified points."""
+    """Build the tab; the session has a predictor and identified points.
+
+    Parameters
+    ----------
+    session : Session
+        What the page shows.
+    """
     from bokeh.layouts import column, row
     from bokeh.models import Div
 
@@ -148,7 +154,17 @@ def _fill(sources: dict[str, Any], table: np.ndarray, frequency: np.ndarray, lin
 
 
 def measured_columns(points: list[PointResult], part: str, scale: float) -> dict[str, list[float]]:
-    """Measured direct coefficients of the points at a load, over their excitation."""
+    """Measured direct coefficients of the points at a load, over their excitation.
+
+    Parameters
+    ----------
+    points : list of PointResult
+        At the load that is shown.
+    part : str
+        "k" or "c".
+    scale : float
+        Size in SI of the unit that is shown.
+    """
     tables = [p.stiffness.k if part == "k" else p.stiffness.c for p in points]
     return {
         "x": [p.point.excitation_hz for p in points],
@@ -158,7 +174,21 @@ def measured_columns(points: list[PointResult], part: str, scale: float) -> dict
 
 
 def describe(curve: Curve, line: float, load: float, pivots: str, measured: int) -> str:
-    """What the sliders show, in one sentence; HTML."""
+    """What the sliders show, in one sentence; HTML.
+
+    Parameters
+    ----------
+    curve : Curve
+        What the model says over frequency.
+    line : float
+        Excitation [Hz].
+    load : float
+        [N]
+    pivots : str
+        Of the model.
+    measured : int
+        Points measured at that load.
+    """
     if curve.status:
         import html
 
@@ -171,7 +201,15 @@ def describe(curve: Curve, line: float, load: float, pivots: str, measured: int)
 
 
 def residual_columns(session: Session, pivots: str) -> dict[str, list[float]]:
-    """Predicted / measured - 1 in per cent, of the direct coefficients at every point."""
+    """Predicted / measured - 1 in per cent, of the direct coefficients at every point.
+
+    Parameters
+    ----------
+    session : Session
+        What the page shows.
+    pivots : str
+        Of the model.
+    """
     found = session.identification
     assert found is not None
     assert session.predict is not None

@@ -15,7 +15,13 @@ if TYPE_CHECKING:
 
 
 def points_tab(found: Identification) -> Any:
-    """Build the tab."""
+    """Build the tab.
+
+    Parameters
+    ----------
+    found : Identification
+        What was identified.
+    """
     from bokeh.layouts import column
     from bokeh.models import ColumnDataSource, DataTable, HoverTool, Select, TableColumn
 
@@ -46,7 +52,13 @@ def points_tab(found: Identification) -> Any:
 
 
 def label(p: PointResult) -> str:
-    """Name of a point that tells it from the others."""
+    """Name of a point that tells it from the others.
+
+    Parameters
+    ----------
+    p : PointResult
+        A point.
+    """
     point = p.point
     return (
         f"{point.static_load / 1e3:g} kN at {point.static_load_direction_deg:g} deg, {point.shaft_speed_hz:g} Hz, "
@@ -55,7 +67,12 @@ def label(p: PointResult) -> str:
 
 
 def coefficient_rows(p: PointResult) -> dict[str, list[str]]:
-    """Columns of the table: eight coefficients with half their intervals."""
+    """Columns of the table: eight coefficients with half their intervals.
+
+    Parameters
+    ----------
+    p : PointResult
+    """
     half, omega = p.stiffness.half_width(), p.stiffness.omega
     rows: dict[str, list[str]] = {"coefficient": [], "value": [], "interval": [], "unit": []}
     for i, name in enumerate(("kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy")):
@@ -68,7 +85,12 @@ def coefficient_rows(p: PointResult) -> dict[str, list[str]]:
 
 
 def window_rows(p: PointResult) -> dict[str, list[Any]]:
-    """Columns of the plot: weight of each window; the rejected ones carry their reason."""
+    """Columns of the plot: weight of each window; the rejected ones carry their reason.
+
+    Parameters
+    ----------
+    p : PointResult
+    """
     weights = np.asarray(p.stiffness.weights, dtype=float).min(axis=1)
     reasons = [""] * len(weights)
     low = np.argsort(weights, kind="stable")

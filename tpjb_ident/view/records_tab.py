@@ -27,7 +27,12 @@ _UNITS = {
 
 
 def records_tab(campaign: Campaign) -> Any:
-    """Build the tab."""
+    """Build the tab.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    """
     from bokeh.layouts import column, row
     from bokeh.models import ColumnDataSource, Div, Select
 
@@ -89,7 +94,15 @@ def _orbit(run: Any) -> dict[str, Any]:
 
 
 def thinned(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lows and highs of so many blocks that a screen can show them; short records as they are."""
+    """Lows and highs of so many blocks that a screen can show them; short records as they are.
+
+    Parameters
+    ----------
+    time : np.ndarray
+        [s]
+    values : np.ndarray
+        Samples.
+    """
     step = -(-len(values) // (MOST_POINTS // 2))
     if step <= 2:
         return time, values

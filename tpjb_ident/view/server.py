@@ -59,7 +59,15 @@ def serve(session: Session, port: int, ready: Callable[[str], None], seconds: fl
 
 
 def build(document: Any, session: Session) -> None:
-    """Fill a Bokeh document with the tabs that the session has something for."""
+    """Fill a Bokeh document with the tabs that the session has something for.
+
+    Parameters
+    ----------
+    document : object
+        A Bokeh document.
+    session : Session
+        What the page shows.
+    """
     from bokeh.layouts import column
     from bokeh.models import Div, TabPanel, Tabs
 

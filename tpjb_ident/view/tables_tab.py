@@ -15,7 +15,13 @@ MOST_ROWS = 5000
 
 
 def tables_tab(tables: Mapping[str, pd.DataFrame]) -> Any:
-    """Build the tab."""
+    """Build the tab.
+
+    Parameters
+    ----------
+    tables : mapping of str to DataFrame
+        By name.
+    """
     from bokeh.layouts import column
     from bokeh.models import ColumnDataSource, DataTable, Select, TableColumn
 

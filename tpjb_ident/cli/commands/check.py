@@ -144,7 +144,16 @@ def _against_drawing(campaign: Campaign, known: list[Problem]) -> list[Problem]:
 
 
 def check_summary(path: Path, problems: list[Problem], campaign: Campaign | None) -> dict[str, Any]:
-    """Gather the content of check.json; without a campaign, where it could not even be opened."""
+    """Gather the content of check.json; without a campaign, where it could not even be opened.
+
+    Parameters
+    ----------
+    path : Path
+        The campaign as it was given.
+    problems : list of Problem
+        All that were found.
+    campaign : Campaign, optional
+    """
     kinds: dict[str, int] = {}
     files: dict[str, str] = {}
     if campaign is not None:

@@ -89,7 +89,20 @@ def _variants(text: str) -> tuple[str, ...]:
 def write_comparison(
     folder: Path, result: Comparison, options: dict[str, Any], inputs: dict[str, str], show: Progress
 ) -> None:
-    """Write every table, pivots.toml, the figures and report.html."""
+    """Write every table, pivots.toml, the figures and report.html.
+
+    Parameters
+    ----------
+    folder : Path
+        Existing.
+    result : Comparison
+    options : mapping of str to object
+        As they are to be shown.
+    inputs : mapping of str to str
+        SHA-256 by file name.
+    show : Progress
+        Called with what is being done, how much is done, of how much.
+    """
     from tpjb_ident.compare.pivot_formula import printed_formula
     from tpjb_ident.compare.positions import locus_frame
     from tpjb_ident.compare.tables import comparison_frame
@@ -156,6 +169,10 @@ def next_command(result: Comparison, campaign: Path, bearing: Path | None) -> st
 
 def refuse_comparison(result: Comparison) -> None:
     """End with exit code 3 if a point is not to be trusted, on either side.
+
+    Parameters
+    ----------
+    result : Comparison
 
     Raises
     ------

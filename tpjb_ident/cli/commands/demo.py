@@ -62,14 +62,27 @@ def demo(out: Out = None) -> None:
 
 
 def sample(name: str) -> Path:
-    """Path of a bundled file."""
+    """Path of a bundled file.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, without its folder.
+    """
     import rigdata
 
     return Path(rigdata.__path__[0]) / "samples" / name
 
 
 def truth_sentence(result: Comparison, truth: dict[str, Any]) -> str:
-    """Say how far the identified direct coefficients are from what was put into the computed records."""
+    """Say how far the identified direct coefficients are from what was put into the computed records.
+
+    Parameters
+    ----------
+    result : Comparison
+    truth : mapping of str to object
+        Content of the truth file.
+    """
     import numpy as np
 
     known = {(p["static_load_N"], p["excitation_Hz"]): p for p in truth["points"]}

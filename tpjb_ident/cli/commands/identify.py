@@ -99,6 +99,11 @@ def finished_runs(target: Path) -> Iterator[RunStore]:
 
     Results come into the folder whole or not at all; what is kept for a rerun stands apart from them, in a folder of
     its own, and goes when the command ends, well or with an error.
+
+    Parameters
+    ----------
+    target : Path
+        Output folder of the command.
     """
     from tpjb_ident.dynamic.runs.run_store import RunStore
 
@@ -113,6 +118,14 @@ def finished_runs(target: Path) -> Iterator[RunStore]:
 
 def worker_count(campaign: Campaign, asked: int | None, scheduler: str | None) -> int | None:
     """Processes to use: as asked, else one per core where the records are long enough to pay for starting them.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    asked : int, optional
+        Option --workers; None: as it pays.
+    scheduler : str, optional
+        Address of a Dask scheduler.
 
     Raises
     ------
@@ -131,6 +144,13 @@ def worker_count(campaign: Campaign, asked: int | None, scheduler: str | None) -
 
 def phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:
     """Build `PhasorSettings` from ``--lines`` and ``--delay``.
+
+    Parameters
+    ----------
+    lines : str, optional
+        Option --lines.
+    delays : sequence of str
+        Options --delay, ``QUANTITY=TIME``.
 
     Raises
     ------
@@ -155,6 +175,14 @@ def phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:
 
 def identify_settings(campaign: Campaign, method: str, norm: str | None) -> Any:
     """Build `IdentifySettings` from options, with the campaign's clearance for the amplitude check.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    method : str
+        Name of the estimator.
+    norm : str, optional
+        Norm of ``rlm``.
 
     Raises
     ------
@@ -190,7 +218,14 @@ def _clearance(campaign: Campaign) -> float | None:
 
 
 def write_identification(folder: Path, result: Identification) -> None:
-    """Write coefficients, estimators, windows and the models over frequency."""
+    """Write coefficients, estimators, windows and the models over frequency.
+
+    Parameters
+    ----------
+    folder : Path
+        Existing.
+    result : Identification
+    """
     write_table(folder, "coefficients", result.to_frame())
     write_table(folder, "estimators", result.estimators_frame())
     write_table(folder, "windows", result.windows_frame())
@@ -303,7 +338,12 @@ def cross_coupling_matters(values: FloatArray, halves: FloatArray) -> bool:
 
 
 def show_frequency_fits(result: Identification) -> None:
-    """Print which model over frequency the data of every load support."""
+    """Print which model over frequency the data of every load support.
+
+    Parameters
+    ----------
+    result : Identification
+    """
     rows = []
     for group in result.frequency_fits():
         point = group.points[0].point
@@ -326,6 +366,10 @@ def show_frequency_fits(result: Identification) -> None:
 
 def refuse_untrusted(result: Identification) -> None:
     """End with exit code 3 if a point has no answer, or one that is not to be trusted, or no run any more.
+
+    Parameters
+    ----------
+    result : Identification
 
     Raises
     ------

@@ -69,7 +69,13 @@ def init(folder: Folder, bearing: Bearing = None, out: Out = None) -> None:
 
 
 def bearing_file(folder: Path) -> str | None:
-    """Name of the one bearing file in a folder; None if there is none, or several."""
+    """Name of the one bearing file in a folder; None if there is none, or several.
+
+    Parameters
+    ----------
+    folder : Path
+        Looked through, without what is below it.
+    """
     found = [
         p.name for p in sorted(folder.glob("*.toml")) if "tpjb-bearing/1" in p.read_text("utf-8", "replace")[:4000]
     ]
@@ -77,7 +83,15 @@ def bearing_file(folder: Path) -> str | None:
 
 
 def show_survey(found: Survey, name: str) -> None:
-    """Print what the channels and the files may be."""
+    """Print what the channels and the files may be.
+
+    Parameters
+    ----------
+    found : Survey
+        Of the folder's records.
+    name : str
+        Of the folder.
+    """
     rows = [[n, g.quantity or "?", g.unit or "?", g.axis or "", g.why] for n, g in found.channels.items()]
     table(f"{name}: channels, guessed", ["channel", "quantity", "unit", "axis", "why"], rows, words=range(5))
     runs = [

@@ -83,7 +83,16 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
 def other_polygons(
     source: Campaign, drawn: Bearing, static: StaticTests
 ) -> tuple[tuple[ClearancePolygon, ...], tuple[str, ...]]:
-    """Polygons of the sweeps beside the one that counts, and what is wrong with those that cannot be used."""
+    """Polygons of the sweeps beside the one that counts, and what is wrong with those that cannot be used.
+
+    Parameters
+    ----------
+    source : Campaign
+    drawn : Bearing
+        The bearing, for the angles of its pads.
+    static : StaticTests
+        Static tests as measured.
+    """
     from rigdata.problem import RigDataError
     from tpjb_ident.clearance.measure import measure_run
 
@@ -101,7 +110,16 @@ def other_polygons(
 
 
 def write_pairs(folder: Path, polygon: ClearancePolygon, others: Sequence[ClearancePolygon]) -> None:
-    """Write all polygons, and each beside the one that counts."""
+    """Write all polygons, and each beside the one that counts.
+
+    Parameters
+    ----------
+    folder : Path
+        Existing.
+    polygon : ClearancePolygon
+    others : sequence of ClearancePolygon
+        Polygons of the other sweeps.
+    """
     import pandas as pd
 
     from tpjb_ident.clearance.polygon_pairs import pairs_frame
@@ -112,7 +130,15 @@ def write_pairs(folder: Path, polygon: ClearancePolygon, others: Sequence[Cleara
 
 
 def show_clearance(polygon: ClearancePolygon, bearing: Bearing, name: str) -> None:
-    """Print the clearance per pad beside the drawing's."""
+    """Print the clearance per pad beside the drawing's.
+
+    Parameters
+    ----------
+    polygon : ClearancePolygon
+    bearing : Bearing
+    name : str
+        Of the campaign.
+    """
     rows = [
         [f"#{k + 1}", f"{1e6 * pad.assembled_clearance:.1f}", f"{1e6 * polygon.clearance[k]:.2f}",
          f"{1.96e6 * polygon.clearance_se[k]:.2f}", f"{1e6 * polygon.clearance_pushed[k]:.2f}"]

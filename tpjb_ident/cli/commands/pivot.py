@@ -63,7 +63,16 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
 
 
 def show_curves(curves: Any, name: str, formula: Any = None) -> None:
-    """Print the tangent stiffness of every pad at half and at full measured load, and the share of Kirk's formula."""
+    """Print the tangent stiffness of every pad at half and at full measured load, and the share of Kirk's formula.
+
+    Parameters
+    ----------
+    curves : object
+    name : str
+        Of the campaign.
+    formula : object, optional
+        ``formula(pad, load)`` gives the printed (secant, tangent) stiffness [N/m].
+    """
     rows = []
     for curve in curves:
         cells = [f"#{curve.pad}"]

@@ -81,7 +81,19 @@ def predict(
 
 
 def operating_points(load: str, load_direction: str, speed: str, excitation: str | None) -> list[Any]:
-    """Every combination of the four options as `OperatingPoint`, SI."""
+    """Every combination of the four options as `OperatingPoint`, SI.
+
+    Parameters
+    ----------
+    load : str
+        Option --load.
+    load_direction : str
+        Option --load-direction.
+    speed : str
+        Option --speed.
+    excitation : str, optional
+        Option --excitation; None: synchronous.
+    """
     loads = parse_values(load, "force", "--load")
     directions = parse_values(load_direction, "angle", "--load-direction")
     speeds = parse_values(speed, "angular speed", "--speed")
@@ -103,7 +115,13 @@ def _positive(values: tuple[float, ...], option: str, cure: str) -> None:
 
 
 def pivot_choice(text: str) -> str | float | Path:
-    """What --pivots means: a name, a stiffness [N/m], or the path of a file."""
+    """What --pivots means: a name, a stiffness [N/m], or the path of a file.
+
+    Parameters
+    ----------
+    text : str
+        Option --pivots.
+    """
     if text in NAMED_PIVOTS:
         return text
     path = Path(text)
@@ -118,6 +136,15 @@ def pivot_choice(text: str) -> str | float | Path:
 
 def model_settings(pivots: Any, thermal: str, effects: Path | None) -> Any:
     """Build `ModelSettings` from options.
+
+    Parameters
+    ----------
+    pivots : object
+        As `pivot_choice` gives it.
+    thermal : str
+        "isothermal", "adiabatic" or "tehd".
+    effects : Path, optional
+        An effects file.
 
     Raises
     ------
@@ -137,7 +164,15 @@ def model_settings(pivots: Any, thermal: str, effects: Path | None) -> Any:
 
 
 def show_predictions(frame: Any, name: str) -> None:
-    """Print the direct coefficients, at most 20 rows."""
+    """Print the direct coefficients, at most 20 rows.
+
+    Parameters
+    ----------
+    frame : object
+        As prediction.csv.
+    name : str
+        Of the bearing.
+    """
     columns = ["load kN", "dir deg", "speed Hz", "exc. Hz", "kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m",
                "h_min µm"]  # fmt: skip
     rows = [

@@ -58,7 +58,12 @@ def show(source: Source, run: Wanted = None, picture: Picture = False, out: Out 
 
 
 def show_campaign(campaign: Campaign) -> None:
-    """Print the runs of a campaign."""
+    """Print the runs of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    """
     print_line(str(campaign))
     if campaign.description:
         print_line(campaign.description)
@@ -77,7 +82,13 @@ def show_campaign(campaign: Campaign) -> None:
 
 
 def run_series(run: Run) -> tuple[str, list[Series]]:
-    """Channels of a run, calibrated."""
+    """Channels of a run, calibrated.
+
+    Parameters
+    ----------
+    run : Run
+        Its records are read.
+    """
     from rigdata.problem import Problem, RigDataError
     from rigdata.readers.series import Series
 
@@ -100,7 +111,13 @@ def run_series(run: Run) -> tuple[str, list[Series]]:
 
 
 def file_series(path: Path) -> tuple[str, list[Series]]:
-    """Channels of a record file, as they are."""
+    """Channels of a record file, as they are.
+
+    Parameters
+    ----------
+    path : Path
+        A record file.
+    """
     from rigdata.survey.exports import read_export
 
     return path.name, list(read_export(path).series)
@@ -113,7 +130,16 @@ def _look(series: Series) -> Look:
 
 
 def show_channels(title: str, series: list[Series], looks: dict[str, Look]) -> None:
-    """Print statistics and a spectrum per channel."""
+    """Print statistics and a spectrum per channel.
+
+    Parameters
+    ----------
+    title : str
+    series : list of Series
+        Channels to show.
+    looks : mapping of str to Look
+        By channel name.
+    """
     rows = []
     for s in series:
         look = looks[s.name]

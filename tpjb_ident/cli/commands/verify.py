@@ -72,6 +72,11 @@ def verify(results: Folder, given: Inputs = None, out: Out = None) -> None:
 def recorded(results: Path) -> dict[str, dict[str, Any]]:
     """Entries of run.json by command.
 
+    Parameters
+    ----------
+    results : Path
+        Output folder of former commands.
+
     Raises
     ------
     BadInputError
@@ -152,7 +157,17 @@ def _state(folders: Sequence[Path], name: str, mark: str | None, absent: State) 
 
 
 def show_checked(results: Path, entries: dict[str, dict[str, Any]], checked: Sequence[Checked]) -> None:
-    """Print counts per command, what differs by name, and which versions are others now."""
+    """Print counts per command, what differs by name, and which versions are others now.
+
+    Parameters
+    ----------
+    results : Path
+        Output folder of former commands.
+    entries : mapping of str to dict[str, object]
+        Of run.json, by command.
+    checked : sequence of Checked
+        State of every file.
+    """
     rows = []
     for command, entry in entries.items():
         mine = [one for one in checked if one.command == command]
@@ -183,7 +198,17 @@ _WORDS: dict[State, str] = {
 
 
 def write_checked(target: Path, results: Path, checked: Sequence[Checked]) -> None:
-    """Write verify.json."""
+    """Write verify.json.
+
+    Parameters
+    ----------
+    target : Path
+        Output folder.
+    results : Path
+        Output folder of former commands.
+    checked : sequence of Checked
+        State of every file.
+    """
     with output_folder(target, "verify") as folder:
         answer = {"schema": "tpjb-verify/1", "folder": results.name, "files": [asdict(one) for one in checked]}
         write_text(folder / "verify.json", json.dumps(answer, indent=1, ensure_ascii=False) + "\n")
@@ -192,6 +217,13 @@ def write_checked(target: Path, results: Path, checked: Sequence[Checked]) -> No
 
 def judge(results: Path, checked: Sequence[Checked]) -> None:
     """Turn the states into the command's end.
+
+    Parameters
+    ----------
+    results : Path
+        Output folder that was checked.
+    checked : sequence of Checked
+        State of every file.
 
     Raises
     ------

@@ -18,6 +18,11 @@ HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
 def campaign_place(path: Path) -> Path:
     """Return `path`, or the one campaign that lies in it, as in the output folder of `tpjb simulate`.
 
+    Parameters
+    ----------
+    path : Path
+        As the user gave it.
+
     Raises
     ------
     BadInputError
@@ -39,6 +44,11 @@ def refuse_special(*paths: Path | None) -> None:
 
 def open_campaign(path: Path) -> Campaign:
     """Open a campaign.
+
+    Parameters
+    ----------
+    path : Path
+        As the user gave it.
 
     Raises
     ------

@@ -30,6 +30,13 @@ HousingTemperature = Annotated[
 def parse_physics(names: str | None, housing: str | None) -> Any:
     """Read `--physics` and `--housing-temperature`.
 
+    Parameters
+    ----------
+    names : str, optional
+        Option --physics.
+    housing : str, optional
+        Option --housing-temperature.
+
     Returns
     -------
     Options

@@ -103,5 +103,13 @@ def refuse_unknown(value: str, known: Iterable[str], option: str, several: bool 
 
 
 def out_folder(out: Path | None, command: str) -> Path:
-    """Return the folder for the results of `command`."""
+    """Return the folder for the results of `command`.
+
+    Parameters
+    ----------
+    out : Path, optional
+        Option --out.
+    command : str
+        Its name.
+    """
     return out if out is not None else Path(f"tpjb-{command}-out")

@@ -55,11 +55,25 @@ class CommandOutput:
         return self.as_json or self.quiet
 
     def add_files(self, folder: Path, outputs: Sequence[str]) -> None:
-        """Note where the results are."""
+        """Note where the results are.
+
+        Parameters
+        ----------
+        folder : Path
+            Output folder.
+        outputs : sequence of str
+            Names of files in it.
+        """
         self.folder, self.outputs = folder, (*self.outputs, *outputs)
 
     def document(self, exit_code: int) -> dict[str, Any]:
-        """Everything printed, as plain data; ``data`` holds the result tables and JSON files themselves."""
+        """Everything printed, as plain data; ``data`` holds the result tables and JSON files themselves.
+
+        Parameters
+        ----------
+        exit_code : int
+            With which the command ends.
+        """
         return {
             "schema": SCHEMA,
             "command": self.command,

@@ -71,6 +71,15 @@ def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
 def parse_value(text: str, dimension: str, option: str) -> float:
     """Read one quantity; like `parse_values`.
 
+    Parameters
+    ----------
+    text : str
+        As of `parse_values`, one value.
+    dimension : str
+        A key of `model.units.SI_UNITS`.
+    option : str
+        Name of the option, for messages.
+
     Raises
     ------
     BadInputError

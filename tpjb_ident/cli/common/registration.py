@@ -33,7 +33,15 @@ def add_command(app: typer.Typer, command: Callable[..., None], name: str | None
 
 
 def with_output_options(command: Callable[..., None], name: str) -> Callable[..., None]:
-    """Wrap a command so that it takes ``--json`` and ``--quiet`` after its own options."""
+    """Wrap a command so that it takes ``--json`` and ``--quiet`` after its own options.
+
+    Parameters
+    ----------
+    command : callable
+        Guarded already.
+    name : str
+        Of the command.
+    """
 
     @functools.wraps(command)
     def wrapper(*args: Any, as_json: bool = False, quiet: bool = False, **kwargs: Any) -> None:
@@ -53,7 +61,13 @@ def with_output_options(command: Callable[..., None], name: str) -> Callable[...
 
 
 def examples_text(name: str) -> str | None:
-    """Examples of a command, as they stand under its help; None if there are none."""
+    """Examples of a command, as they stand under its help; None if there are none.
+
+    Parameters
+    ----------
+    name : str
+        Of the command.
+    """
     lines = EXAMPLES.get(name)
     if not lines:
         return None

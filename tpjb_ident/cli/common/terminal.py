@@ -45,7 +45,13 @@ def width() -> int:
 
 
 def print_line(text: str) -> None:
-    """Print one line; text from outside is shown as it is, less its control characters."""
+    """Print one line; text from outside is shown as it is, less its control characters.
+
+    Parameters
+    ----------
+    text : str
+        One sentence.
+    """
     command_output().sentences.append(printable(text))
     if command_output().silent:
         return
@@ -68,7 +74,15 @@ def command_line(text: str) -> None:
 
 
 def error_line(kind: str, text: str) -> None:
-    """Print a message to stderr, its lines kept."""
+    """Print a message to stderr, its lines kept.
+
+    Parameters
+    ----------
+    kind : str
+        "error", "bug", "not to be trusted", ..
+    text : str
+        One or several lines.
+    """
     lines = "\n".join(printable(line) for line in text.splitlines())
     command_output().remarks.append({"kind": kind, "text": lines})
     style = "bold red" if kind == "bug" else None
@@ -76,7 +90,15 @@ def error_line(kind: str, text: str) -> None:
 
 
 def note_line(kind: str, text: str) -> None:
-    """Print a remark to stderr; of a quiet command only warnings."""
+    """Print a remark to stderr; of a quiet command only warnings.
+
+    Parameters
+    ----------
+    kind : str
+        "note", "warning" or "doing".
+    text : str
+        One sentence.
+    """
     if kind != "doing":
         command_output().remarks.append({"kind": kind, "text": printable(text)})
     if command_output().silent and kind != "warning":
@@ -114,6 +136,11 @@ def table(
 @contextlib.contextmanager
 def progress(what: str) -> Iterator[Progress]:
     """Show a bar with the time left on a terminal while the block runs; elsewhere a line now and then.
+
+    Parameters
+    ----------
+    what : str
+        What is being done, for people.
 
     Yields
     ------

@@ -110,7 +110,18 @@ def _fractions(figure: Figure, box: tuple[float, float, float, float]) -> tuple[
 
 
 def label(axes: Axes, x_label: str, y_label: str, heading: str | None = None) -> None:
-    """Label both axes; a heading stands above the panel, which gives way."""
+    """Label both axes; a heading stands above the panel, which gives way.
+
+    Parameters
+    ----------
+    axes : Axes
+    x_label : str
+        With its unit.
+    y_label : str
+        With its unit.
+    heading : str, optional
+        Above the panel.
+    """
     axes.set_xlabel(x_label, fontsize=FONT_SIZE, color=LIGHT["ink"])
     axes.set_ylabel(y_label, fontsize=FONT_SIZE, color=LIGHT["ink"])
     if heading:
@@ -119,7 +130,20 @@ def label(axes: Axes, x_label: str, y_label: str, heading: str | None = None) ->
 
 
 def shrink(axes: Axes, *, left: float = 0.0, right: float = 0.0, top: float = 0.0, bottom: float = 0.0) -> None:
-    """Take inches off the sides of a panel: room for names, a colour bar or a legend."""
+    """Take inches off the sides of a panel: room for names, a colour bar or a legend.
+
+    Parameters
+    ----------
+    axes : Axes
+    left : float, optional
+        Inches.
+    right : float, optional
+        Inches.
+    top : float, optional
+        Inches.
+    bottom : float, optional
+        Inches.
+    """
     box = axes.get_position()
     width, height = _size(axes)
     axes.set_position((
@@ -184,7 +208,16 @@ def _columns(names: Sequence[str], room: float) -> int:
 
 
 def add_colour_bar(axes: Axes, image: Any, text: str) -> None:
-    """Put a colour bar right of a panel, which makes room for it."""
+    """Put a colour bar right of a panel, which makes room for it.
+
+    Parameters
+    ----------
+    axes : Axes
+    image : object
+        What was drawn in colours.
+    text : str
+        What the colours mean, with the unit.
+    """
     shrink(axes, right=0.75)
     figure, box = axes.figure, axes.get_position()
     width = _size(axes)[0]
@@ -196,7 +229,16 @@ def add_colour_bar(axes: Axes, image: Any, text: str) -> None:
 
 
 def mark_extrapolated(axes: Axes, start: float, text: str = "extrapolated") -> None:
-    """Shade everything right of `start` (in the panel's units) and say why."""
+    """Shade everything right of `start` (in the panel's units) and say why.
+
+    Parameters
+    ----------
+    axes : Axes
+    start : float
+        In the panel's units.
+    text : str, optional
+        Why.
+    """
     end = axes.get_xlim()[1]
     if end > start:
         axes.axvspan(start, end, color=LIGHT["rule"], alpha=0.35, linewidth=0, zorder=0)
