@@ -152,7 +152,7 @@ def _sections(comparison: Comparison, frame: pd.DataFrame) -> list[Section]:
     flags = flag_table(comparison)
     text = [] if flags.rows else ["No flags: nothing about the records calls for caution."]
     sections.append(Section("Quality flags", notes=text, tables=[flags] if flags.rows else []))
-    sections.append(set_up_section(comparison.campaign, comparison.bearing))
+    sections.append(set_up_section(comparison))
     return sections
 
 

@@ -15,10 +15,10 @@ from tpjb_ident.rounding import fixed
 from tpjb_ident.schema import DAMPING, STIFFNESS
 
 if TYPE_CHECKING:
-    from model.bearing import Bearing
     from rigdata.calibration import Channel
     from rigdata.campaign import Campaign
     from rigdata.run import Run
+    from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.dynamic.results.identification import Identification
 
 #: SI unit of a calibrated quantity, what people read, and its size in SI.
@@ -35,18 +35,18 @@ KINDS_IN_WORDS = {"dynamic": "dynamic", "locus": "shaft locus", "clearance": "cl
 EVIDENCE = "Raw evidence of one run"
 
 
-def set_up_section(campaign: Campaign, bearing: Bearing) -> Section:
+def set_up_section(comparison: Comparison) -> Section:
     """Sensors with their calibration, bearing and oil, and what was run.
 
     Parameters
     ----------
-    campaign : Campaign
-    bearing : Bearing
+    comparison : Comparison
     """
+    campaign = comparison.campaign
     return Section(
         "Set-up",
-        notes=[f"{bearing}."],
-        tables=[sensor_table(tuple(campaign.channels.values())), bearing_table(bearing), run_matrix(campaign.runs)],
+        notes=[f"{comparison.bearing}."],
+        tables=[sensor_table(tuple(campaign.channels.values())), bearing_table(comparison), run_matrix(campaign.runs)],
     )
 
 
@@ -70,13 +70,14 @@ def sensor_table(channels: Sequence[Channel]) -> Table:
     return Table("Sensors", columns, rows, frozenset({0, 1, 2, 3}))
 
 
-def bearing_table(bearing: Bearing) -> Table:
+def bearing_table(comparison: Comparison) -> Table:
     """Geometry of the bearing, its pivots and its oil, as the bearing file states them.
 
     Parameters
     ----------
-    bearing : Bearing
+    comparison : Comparison
     """
+    bearing = comparison.bearing
     pad, oil = bearing.pads[0], bearing.oil
     rows = [
         ["journal diameter", f"{1e3 * bearing.journal_diameter:.5g} mm"],
