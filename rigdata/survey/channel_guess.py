@@ -69,8 +69,8 @@ def usable_unit(unit: str) -> str:
     Parameters
     ----------
     unit : str
-            As written by the logger or in the manifest.
-        """
+        As written by the logger or in the manifest.
+    """
     text = unit.strip().replace("°", "deg").replace("µ", "u").replace("μ", "u")
     text = _SPELT.get(text, text)
     try:
@@ -86,8 +86,8 @@ def quantity_of_unit(unit: str) -> str:
     Parameters
     ----------
     unit : str
-            As written by the logger or in the manifest.
-        """
+        As written by the logger or in the manifest.
+    """
     if not unit or _is_signal(unit):
         return ""
     for quantity, dimension in DIMENSIONS.items():

@@ -64,7 +64,7 @@ def survey(exports: Sequence[Export]) -> Survey:
     Parameters
     ----------
     exports : sequence of Export
-            """
+    """
     channels: dict[str, ChannelGuess] = {}
     for export in exports:
         for one in export.series:
@@ -95,7 +95,7 @@ def _one_direction(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
     for group in groups:
         every = sorted(r.direction for r in runs if r.direction in group)
         middle = every[len(every) // 2]
-        round_one = 5.0 * round(middle / 5.0)
+        round_one = 45.0 * round(middle / 45.0)  # an axis, or between two; pads may stand anywhere
         common |= dict.fromkeys(group, round_one if abs(round_one - middle) <= _ALIKE / 2 else middle)
     return tuple(replace(r, direction=common.get(r.direction, r.direction)) for r in runs)
 
@@ -226,7 +226,7 @@ def toml_string(text: str) -> str:
     Parameters
     ----------
     text : str
-            """
+    """
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

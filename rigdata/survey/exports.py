@@ -51,7 +51,7 @@ def record_files(folder: Path) -> list[Path]:
     Parameters
     ----------
     folder : Path
-        
+
     Raises
     ------
     RigDataError
@@ -78,9 +78,9 @@ def read_export(path: Path, name: str | None = None) -> Export:
     Parameters
     ----------
     path : Path
-        name : str or None, optional
+    name : str or None, optional
         Display name; default that of the file.
-    
+
     Raises
     ------
     RigDataError
@@ -98,9 +98,9 @@ def read_exports(folder: Path, problems: list[Problem]) -> Iterator[Export]:
     Parameters
     ----------
     folder : Path
-        problems : list of Problem
+    problems : list of Problem
         What cannot be read is added here.
-        """
+    """
     for path in record_files(folder):
         try:
             yield read_export(path, path.relative_to(folder).as_posix())

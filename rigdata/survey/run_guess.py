@@ -180,7 +180,7 @@ def strongest_lines(series: list[Series]) -> tuple[SpectralPeak, ...]:
     Parameters
     ----------
     series : list of Series
-            """
+    """
     best: tuple[SpectralPeak, ...] = ()
     size = 0.0
     for one in series:

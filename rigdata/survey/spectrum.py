@@ -93,9 +93,9 @@ def amplitude_spectrum(values: FloatArray, rate: float) -> tuple[FloatArray, Flo
 
     Parameters
     ----------
-        values : (n,) ndarray
+    values : (n,) ndarray
         SI; NaN where missing.
-        rate : float
+    rate : float
         [Hz]
     """
     good = np.isfinite(values)
@@ -116,13 +116,13 @@ def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> tuple[
 
     Parameters
     ----------
-        frequency : (m,) ndarray
+    frequency : (m,) ndarray
         [Hz]
     amplitude : (m,) ndarray
         Peak amplitudes, in the unit of the signal.
     most : int
         Peaks named at most.
-        """
+    """
     found: list[SpectralPeak] = []
     if len(amplitude) < 16:
         return ()
