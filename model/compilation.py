@@ -29,6 +29,7 @@ KERNELS = (
     "film/oil_state.py",
     "film/reynolds.py",
     "film/slopes.py",
+    "film/turbulence.py",
     "statics/first_position.py",
     "statics/newton_step.py",
 )

@@ -11,6 +11,7 @@ from model.nearest import check_known
 
 #: Names of the models of a rupturing film.
 CAVITATION = tuple(FILM_MODELS)
+TURBULENCE = ("none", "ng-pan")
 
 
 @dataclass(frozen=True)
@@ -28,14 +29,21 @@ class Options:
     cavitation : {"swift-stieber", "jfo"}
         What happens where the film ruptures: p = 0 and dp/dn = 0 alone, or with the oil conserved (Jakobsson, Floberg
         and Olsson), see `model.film.cavitation`.
+    turbulence : {"none", "ng-pan"}
+        Resistance and shear of the film: laminar at every Reynolds number, or Ng and Pan's linearised theory, see
+        `model.film.turbulence`. Films of idle pads stay laminar.
     """
 
     conduction: bool = False
     isothermal_journal: bool = False
     growth: Growth | None = None
     cavitation: str = "swift-stieber"
+    turbulence: str = "none"
 
     def __post_init__(self) -> None:
         check_known("cavitation", self.cavitation, FILM_MODELS)
+        check_known("turbulence", self.turbulence, TURBULENCE)
+        if self.turbulence != "none" and self.cavitation != "swift-stieber":
+            raise OptionError(f"a turbulent film ruptures by swift-stieber, not by {self.cavitation!r}")
         if not (self.growth is None or isinstance(self.growth, Growth)):
             raise OptionError(f"growth must be a Growth or None, got {self.growth!r}")

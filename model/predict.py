@@ -149,6 +149,18 @@ class Prediction:
         """Thinnest film [m]; infinite if no pad carries."""
         return min((float(f.work.thickness.min()) for f in self.equilibrium.films if not f.idle), default=math.inf)
 
+    @property
+    def face_temperature(self) -> tuple[FloatArray, ...]:
+        """Temperature of the pads' faces [degC], shapes as `temperature`.
+
+        The film's own, unless the journal takes part: then the parabola across the film that passes its heat, flat at
+        the pad, is hotter there by half of what the mean is hotter than the journal.
+        """
+        journal = self.equilibrium.journal_temperature
+        if not math.isfinite(journal):
+            return self.temperature
+        return tuple(t + 0.5 * (t - journal) for t in self.temperature)
+
     @functools.cached_property
     def pad_flow(self) -> tuple[PadFlow, ...]:
         """Per pad: oil in, out and over the sides [m^3/s], temperatures in and out [degC]."""
@@ -187,7 +199,8 @@ class Prediction:
     @property
     def power_loss(self) -> float:
         """Shear of all films, those of idle pads too [W]."""
-        return power_loss(self.equilibrium, self.speed * self.setup.bearing.journal_radius)
+        turbulent = self.setup.options.turbulence != "none"
+        return power_loss(self.equilibrium, self.speed * self.setup.bearing.journal_radius, turbulent)
 
     def pad_temperature(self, fraction: float = 0.75) -> FloatArray:
         """Film temperature at mid-length, at a fraction of the arc from the leading edge, per pad [degC]."""

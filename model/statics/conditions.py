@@ -122,8 +122,8 @@ def regimes(setup: Setup, films: Sequence[PadFilm], surface_speed: float) -> lis
     """Named regimes beyond what the equations hold for: pads in each other's way, films not laminar, oil too hot."""
     names = misfits(setup)
     reynolds = largest_reynolds(films, surface_speed)
-    if reynolds > LAMINAR:
-        detail = f"above Re {LAMINAR:.0f} turbulence, which the model leaves out, carries and heats"
+    if reynolds > LAMINAR and setup.options.turbulence == "none":
+        detail = f"above Re {LAMINAR:.0f} turbulence, which is off unless asked for, carries and heats"
         names.append(Condition(f"film not laminar: Re {reynolds:.0f}", "warning", detail))
     carrying = [f for f in films if f.forces is not None]
     low = min((float(f.work.temperature.min()) for f in carrying), default=OIL_DATA[0])

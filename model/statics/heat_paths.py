@@ -121,7 +121,7 @@ class FilmHeat:
         fields = np.zeros((3, *work.temperature.shape))
         sources = np.zeros_like(fields)
         fields[1, 0] = 1.0
-        sources[0] = film.kept * dissipation(film.grid, work, self.surface_speed)
+        sources[0] = film.kept * (dissipation(film.grid, work, self.surface_speed) + work.gained)
         sources[2] = work.exchange
         pad = film.deformation
         if not self.setup.options.conduction or pad is None:

@@ -17,6 +17,7 @@ from model.film.oil_state import set_viscosity
 from model.film.resting import RestingFilm, resting_film
 from model.film.reynolds import FilmForces, solve_film
 from model.film.slopes import pressure_change
+from model.film.turbulence import solve_turbulent_film
 from model.pad.bending import BendingStep, PadDeformation, pad_deformation
 from model.setup import Setup
 
@@ -162,7 +163,8 @@ def pad_films(setup: Setup) -> list[PadFilm]:
     solid = setup.flexible_pads or setup.options.conduction
     angle, toward = setup.misalignment
     films = []
-    solver = film_solver(setup.options.cavitation)
+    laminar = setup.options.turbulence == "none"
+    solver = film_solver(setup.options.cavitation) if laminar else solve_turbulent_film
     for number, pad in enumerate(bearing.pads, start=1):
         start = pad.leading_edge + setup.starvation * pad.arc
         shape = (setup.mesh.along, setup.mesh.across * (1 if symmetric else 2))

@@ -48,26 +48,33 @@ def pad_flow(film: PadFilm, oil: Oil) -> PadFlow:
 def through_flow(film: PadFilm) -> tuple[float, float]:
     """What passes the leading edge and the trailing edge [kg/s].
 
-    Of a ruptured film its streaks leave, not the full film of `FilmWork.flow_x`.
+    What enters and does not leave over the sides leaves at the trailing edge, in streaks where the film is ruptured:
+    by balance, because the rupture line of a mesh moves by whole nodes and what is found behind it jumps.
     """
     if film.resting is not None:
         return film.resting.flow, film.resting.flow
     if film.forces is None:
         return math.nan, math.nan
-    both = 2.0 if film.grid.first == 0 else 1.0
-    return both * float(film.work.flow_x[0].sum()), both * float(leaving_flow(film.work).sum())
+    entering = _both(film) * float(film.work.flow_x[0].sum())
+    return entering, entering - side_flow(film)
 
 
 def side_flow(film: PadFilm) -> float:
     """What leaves over both sides [kg/s]."""
     if film.forces is None:
         return 0.0 if film.resting is not None else math.nan
-    entering, leaving, across = film.work.flow_x[0], leaving_flow(film.work), film.work.flow_z
-    # through the last faces, and what the half cells at the edge itself lose along the arc
-    total = float(across[:, -1].sum() + entering[-1] - leaving[-1])
-    if film.grid.first == 0:
-        return 2.0 * total
-    return total + float(-across[:, 0].sum() + entering[0] - leaving[0])
+    entering, leaving, across = film.work.flow_x[0], film.work.flow_x[-1], film.work.flow_z
+    inner, edges = slice(film.grid.first, -1), [-1] if film.grid.first == 0 else [0, -1]
+    over = float(across[:, -1].sum()) - (float(across[:, 0].sum()) if film.grid.first == 1 else 0.0)
+    # the half cells at the edges have no pressure: they run as full at the trailing edge as the lines beside them
+    full = float(leaving[inner].sum())
+    filled = min(1.0, max(0.0, (float(entering[inner].sum()) - over) / full)) if full > 0.0 else 1.0
+    return _both(film) * (over + float((entering[edges] - filled * leaving[edges]).sum()))
+
+
+def _both(film: PadFilm) -> float:
+    """Two where the mesh holds one half of a symmetric film."""
+    return 2.0 if film.grid.first == 0 else 1.0
 
 
 def _side_temperature(film: PadFilm) -> float:
@@ -85,17 +92,10 @@ def outlet_temperature(film: PadFilm) -> float:
 
 
 def flow_weighted(film: PadFilm, fields: FloatArray) -> list[float]:
-    """Mean of every field at the trailing edge, weighted by the flow that leaves there."""
-    flow = leaving_flow(film.work)
+    """Mean of every field at the trailing edge, weighted by the flow of a full film there."""
+    flow = film.work.flow_x[-1]
     values: list[float] = (fields[:, -1] @ flow / float(flow.sum())).tolist()
     return values
-
-
-def leaving_flow(work: FilmWork) -> FloatArray:
-    """Mass flow through the trailing edge, per line of the mesh, (nz + 1,) [kg/s]: of a ruptured film its streaks."""
-    before, behind = work.thickness[-2], work.thickness[-1]
-    streaks = striation(work)[-2] * np.minimum(1.0, 2.0 * before / (before + behind))
-    return np.asarray(work.flow_x[-1] * np.where(_ruptured(work)[-2], streaks, 1.0))
 
 
 def _ruptured(work: FilmWork) -> BoolArray:

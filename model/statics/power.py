@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
+from model.film.turbulence import shear_factor
 from model.statics.equilibrium import Equilibrium
 from model.statics.pad_flow import striation
 
 
-def power_loss(equilibrium: Equilibrium, surface_speed: float) -> float:
+def power_loss(equilibrium: Equilibrium, surface_speed: float, turbulent: bool = False) -> float:
     """Work the journal does on all films [W]: wall shear mu U / h + h/2 dp/dx, times U, over the full film.
 
     Where the film is ruptured only its striated share shears; that share is h_rupture / h, taken from the film
@@ -23,6 +24,8 @@ def power_loss(equilibrium: Equilibrium, surface_speed: float) -> float:
         if not work.thickness.min() > 0:  # a lost film, of a prediction that did not converge
             return math.nan
         couette = work.viscosity * surface_speed**2 / work.thickness
+        if turbulent:
+            couette = couette * shear_factor(work, surface_speed)
         total += float((grid.area * couette * striation(work)).sum())
         slope = (work.pressure[1:] - work.pressure[:-1]) / grid.dx
         middle = 0.5 * (work.thickness[1:] + work.thickness[:-1])

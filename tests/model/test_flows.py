@@ -16,7 +16,7 @@ from model.film.mesh import film_grid
 from model.film.resting import resting_film
 from model.predict import predict
 from model.setup import Mesh
-from model.statics.pad_flow import side_flow, through_flow
+from model.statics.pad_flow import side_flow, striation, through_flow
 
 SPEED, LOAD, DOWN = 2 * math.pi * 22.0, 5000.0, -math.pi / 2
 
@@ -35,17 +35,17 @@ def test_what_enters_a_full_film_leaves_it(rocker):
 
 
 def test_streaks_carry_what_the_rupture_line_lets_pass(rocker):
-    # a pad pressed hard downstream of its pivot ruptures there: what leaves is what entered, less the sides
+    # pads pressed hard downstream of their pivots rupture there: what the balance leaves is what the streaks hold
     pads = tuple(replace(pad, pivot_offset=0.35) for pad in rocker.pads)
-    for mesh, tolerance in ((Mesh(80, 6), 0.02), (Mesh(320, 12), 0.015)):
+    for mesh, tolerance in ((Mesh(80, 6), 0.03), (Mesh(320, 12), 0.015)):
         p = predict(rocker.with_pads(pads), 8000.0, DOWN, SPEED, mesh=mesh, effects=[
             Effect("pivot_rotation", rotational_stiffness=1e6)])  # fmt: skip
         films = [f for f in p.equilibrium.films if f.forces is not None and f.work.ruptured[-2].any()]
         films = [f for f in films if not f.work.ruptured[1].any()]  # nothing made up at the inlet
         assert films
         for film in films:
-            entering, leaving = through_flow(film)
-            assert leaving == pytest.approx(entering - side_flow(film), rel=tolerance)
+            streaks = 2.0 * float((film.work.flow_x[-1] * striation(film.work)[-2]).sum())
+            assert through_flow(film)[1] == pytest.approx(streaks, rel=tolerance)
 
 
 @pytest.mark.parametrize("fraction", [0.3, 0.8, 0.98])

@@ -47,6 +47,19 @@ def test_a_journal_of_one_temperature_keeps_no_heat(rocker):
     assert min(t.min() for t in temperatures) < p.equilibrium.journal_temperature < p.max_temperature
 
 
+def test_the_pad_s_face_is_hotter_than_the_film_by_the_parabola(rocker):
+    p = run(rocker, Options(isothermal_journal=True))
+    journal = p.equilibrium.journal_temperature
+    # T(y) = Tj + 1.5 (T - Tj) (1 - (1 - y/h)^2): flat at the pad, mean T, wall gradient 3 (T - Tj) / h
+    y = (np.arange(1000) + 0.5) / 1000.0
+    for film, face in zip(p.equilibrium.films, p.face_temperature, strict=True):
+        mean = film.work.temperature
+        profile = journal + (face - journal)[..., None] * (1.0 - (1.0 - y) ** 2)
+        np.testing.assert_allclose(profile.mean(axis=-1), mean, rtol=1e-6)
+    assert run(rocker).face_temperature[0] is not None
+    np.testing.assert_array_equal(run(rocker).face_temperature[0], run(rocker).temperature[0])
+
+
 def test_heat_that_pads_take_is_what_their_solid_says(rocker):
     cooled = rocker.with_pads(tuple(replace(p, back_convection=3000.0) for p in rocker.pads))
     p = run(cooled, Options(conduction=True), thermal="tehd")

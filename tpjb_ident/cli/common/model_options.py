@@ -16,6 +16,7 @@ PHYSICS = {
     "journal": "the journal passes heat from hot films to cold ones",
     "growth": "clearances follow the temperatures of journal, housing and pads",
     "jfo": "mass-conserving cavitation",
+    "turbulence": "films turn turbulent above a local Reynolds number of 500 to 1,000 (Ng and Pan)",
 }
 Physics = Annotated[
     str | None,
@@ -56,6 +57,8 @@ def parse_physics(names: str | None, housing: str | None) -> Any:
 
     if "jfo" in chosen and "jfo" not in CAVITATION:
         raise BadInputError(f"--physics: this model has no cavitation 'jfo', only {', '.join(CAVITATION)}.")
+    if "jfo" in chosen and "turbulence" in chosen:
+        raise BadInputError("--physics: a turbulent film does not conserve mass where it ruptures. Leave out jfo.")
     growth = None
     if "growth" in chosen:
         at = None if housing is None else parse_value(housing, "temperature", "--housing-temperature")
@@ -68,4 +71,5 @@ def parse_physics(names: str | None, housing: str | None) -> Any:
         isothermal_journal="journal" in chosen,
         growth=growth,
         cavitation="jfo" if "jfo" in chosen else "swift-stieber",
+        turbulence="ng-pan" if "turbulence" in chosen else "none",
     )

@@ -1,0 +1,179 @@
+"""A turbulent film, as an option: Ng and Pan's linearised theory.
+
+The flow through the film meets more resistance than a laminar one, along and across the motion, and the journal more
+shear, all by the local Reynolds number Re = rho U h / mu:
+
+    h^3 / (k_x mu) dp/dx,  k_x = 12 + 0.0136 Re^0.90
+    h^3 / (k_z mu) dp/dz,  k_z = 12 + 0.0043 Re^0.96
+    tau = C mu U / h,      C = 1 + 0.0012 Re^0.94
+
+Below Re = 500 the film is laminar, above 1000 turbulent; between the two what the formulas add to 12 and 1 comes in
+smoothly, place by place. In the perturbation the factors follow the film thickness, at frozen viscosity and density,
+so that the slope of the static locus is the stiffness here too.
+
+C. W. Ng, C. H. T. Pan, ASME J. Basic Eng. 87 (1965) 675; the fitted constants as V. N. Constantinescu, J. Galetuse,
+ASME J. Lubr. Technol. 96 (1974) 109, and textbooks after them give them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from model.arrays import FloatArray
+from model.compilation import compiled
+from model.film.matrix import add_diagonal, assemble, factorise, substitute_four
+from model.film.mesh import FilmGrid, FilmWork
+from model.film.reynolds import FilmForces, _active_set, _integrate, _source, _thickness, conductances
+from model.film.slopes import keep_ruptured, net_inflow, rupture_line
+
+#: Factor and exponent of Re in k_x, k_z (beside 12) and C (beside 1).
+ALONG, ACROSS, SHEAR = (0.0136, 0.90), (0.0043, 0.96), (0.0012, 0.94)
+#: Local Reynolds numbers between which turbulence comes in.
+TRANSITION = (500.0, 1000.0)
+
+
+@compiled
+def excess(reynolds: float, factor: float, exponent: float) -> tuple[float, float]:
+    """What turbulence adds to a laminar coefficient, factor Re^exponent where it is whole, and d / d ln Re of it."""
+    if not reynolds > TRANSITION[0]:
+        return 0.0, 0.0
+    share = min(1.0, (reynolds - TRANSITION[0]) / (TRANSITION[1] - TRANSITION[0]))
+    whole = factor * reynolds**exponent
+    comes = share * share * (3.0 - 2.0 * share)
+    rate = 6.0 * share * (1.0 - share) * reynolds / (TRANSITION[1] - TRANSITION[0])
+    return whole * comes, whole * (exponent * comes + rate)
+
+
+@compiled
+def solve_turbulent_film(
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool
+) -> FilmForces:
+    """Pressure of one film and its derivatives; as `model.film.reynolds.solve_film`.
+
+    `work.gained` is set to the heat that is made beyond that of a laminar film in the same state [W].
+    """
+    clearance, a, b = wedge
+    min_film = _thickness(grid, work, clearance, a, b)
+    if not min_film > 0.0:
+        return FilmForces(np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2)), min_film, -1)
+    gx, gz = conductances(grid, work, clearance, a, b)
+    powers = _resist(grid, work, wedge, speed, (gx, gz))
+    source = _source(grid, work, clearance, a, b, speed)
+    steps = _active_set(grid, work, gx, gz, source)
+    weight = grid.area
+    if steps > 0:
+        if sharp:
+            diagonal, weight = rupture_line(grid, work, gx, gz, source)
+            assemble(work.band, gx, gz, work.ruptured, grid.first)
+            add_diagonal(work.band, diagonal, grid.first)
+            factorise(work.band)
+        _derivatives(grid, work, wedge, (gx, gz), powers)
+        _heat_beyond(grid, work, speed)
+    force, stiffness, damping = _integrate(grid, work, weight)
+    return FilmForces(force, stiffness, damping, min_film, steps)
+
+
+@compiled
+def _resist(
+    grid: FilmGrid,
+    work: FilmWork,
+    wedge: tuple[float, float, float],
+    speed: float,
+    conductance: tuple[FloatArray, FloatArray],
+) -> tuple[FloatArray, FloatArray]:
+    """Lower the conductances by 12 / k; returns with which power of h they grow, 3 - dln k / dln Re."""
+    gx, gz = conductance
+    px, pz = np.empty(gx.shape), np.empty(gz.shape)
+    h = work.thickness
+    for i in range(gx.shape[0]):
+        base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
+        for j in range(gx.shape[1]):
+            thick = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
+            light = 0.5 * (
+                work.density[i, j] / work.viscosity[i, j] + work.density[i + 1, j] / work.viscosity[i + 1, j]
+            )
+            more, rate = excess(light * speed * thick, ALONG[0], ALONG[1])
+            gx[i, j] *= 12.0 / (12.0 + more)
+            px[i, j] = 3.0 - rate / (12.0 + more)
+    for i in range(gz.shape[0]):
+        for j in range(gz.shape[1]):
+            thick = 0.5 * (h[i, j] + h[i, j + 1])
+            light = 0.5 * (
+                work.density[i, j] / work.viscosity[i, j] + work.density[i, j + 1] / work.viscosity[i, j + 1]
+            )
+            more, rate = excess(light * speed * thick, ACROSS[0], ACROSS[1])
+            gz[i, j] *= 12.0 / (12.0 + more)
+            pz[i, j] = 3.0 - rate / (12.0 + more)
+    return px, pz
+
+
+@compiled
+def _derivatives(
+    grid: FilmGrid,
+    work: FilmWork,
+    wedge: tuple[float, float, float],
+    conductance: tuple[FloatArray, FloatArray],
+    powers: tuple[FloatArray, FloatArray],
+) -> None:
+    """As `model.film.slopes.derivatives`, for conductances that grow with other powers of h than the third."""
+    p, rhs, h = work.pressure, work.slopes, work.thickness
+    gx, gz = conductance
+    px, pz = powers
+    nt, nz = gx.shape[0], gz.shape[1]
+    along, across = np.empty((nt, nz + 1, 2)), np.empty((nt + 1, nz, 2))
+    for i in range(nt):
+        base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
+        for j in range(nz + 1):
+            poiseuille = gx[i, j] * (p[i + 1, j] - p[i, j])
+            thickness = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
+            slope = (work.flow_x[i, j] - px[i, j] * poiseuille) / thickness
+            work.flow_x[i, j] -= poiseuille
+            along[i, j, 0], along[i, j, 1] = -slope * grid.cos_face[i], -slope * grid.sin_face[i]
+    for i in range(nt + 1):
+        for j in range(nz):
+            poiseuille = gz[i, j] * (p[i, j + 1] - p[i, j])
+            work.flow_z[i, j] = -poiseuille
+            slope = -pz[i, j] * poiseuille / (0.5 * (h[i, j] + h[i, j + 1]))
+            across[i, j, 0], across[i, j, 1] = -slope * grid.cos[i], -slope * grid.sin[i]
+    net_inflow(along, across, grid.first, rhs)
+    for i in range(1, nt):
+        for j in range(grid.first, nz):
+            k = (i - 1) * (nz - grid.first) + j - grid.first
+            squeeze = work.density[i, j] * grid.dx * grid.height[j]
+            rhs[k, 2], rhs[k, 3] = squeeze * grid.cos[i], squeeze * grid.sin[i]
+    keep_ruptured(work, grid.first, rhs)
+    substitute_four(work.band, rhs)
+
+
+@compiled
+def _heat_beyond(grid: FilmGrid, work: FilmWork, speed: float) -> None:
+    """Heat beyond that of a laminar film per station of length dx and control-volume height [W]."""
+    p, h, mu = work.pressure, work.thickness, work.viscosity
+    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
+    for i in range(nt + 1):
+        for j in range(nz + 1):
+            reynolds = work.density[i, j] * speed * h[i, j] / mu[i, j]
+            along, across = excess(reynolds, ALONG[0], ALONG[1])[0], excess(reynolds, ACROSS[0], ACROSS[1])[0]
+            squared, sides = 0.0, 0
+            if i > 0:
+                squared += ((p[i, j] - p[i - 1, j]) / grid.dx) ** 2
+                sides += 1
+            if i < nt:
+                squared += ((p[i + 1, j] - p[i, j]) / grid.dx) ** 2
+                sides += 1
+            if j == nz:
+                slope = (p[i, nz] - p[i, nz - 1]) / grid.dz[nz - 1]
+            elif j == 0:
+                slope = 0.0 if grid.first == 0 else (p[i, 1] - p[i, 0]) / grid.dz[0]
+            else:
+                slope = (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1])
+            shear = mu[i, j] * speed**2 / h[i, j] * excess(reynolds, SHEAR[0], SHEAR[1])[0]
+            less = along / (12.0 + along) * squared / sides + across / (12.0 + across) * slope**2
+            pressed = -(h[i, j] ** 3) / (12.0 * mu[i, j]) * less
+            work.gained[i, j] = (shear + pressed) * grid.dx * grid.height[j]
+
+
+def shear_factor(work: FilmWork, speed: float) -> FloatArray:
+    """C of the shear on the journal, (nt + 1, nz + 1)."""
+    reynolds = work.density * speed * work.thickness / work.viscosity
+    return np.asarray(1.0 + np.vectorize(lambda re: excess(re, *SHEAR)[0])(reynolds))
