@@ -71,13 +71,33 @@ class Oil:
     grade: str = ""
 
     def viscosity(self, temperature: Any) -> Any:
-        """mu(T) [Pa s], Eq. (4); temperature in degC, scalar or array."""
+        """mu(T) [Pa s], Eq. (4); temperature in degC, scalar or array.
+
+        Parameters
+        ----------
+        temperature : float or ndarray
+            [degC]
+
+        Returns
+        -------
+        float or ndarray
+        """
         import numpy as np
 
         return self.viscosity_40 * np.exp(self.viscosity_exponent * (40.0 - temperature))
 
     def density(self, temperature: Any) -> Any:
-        """rho(T) [kg/m^3], Eq. (5); temperature in degC, scalar or array."""
+        """rho(T) [kg/m^3], Eq. (5); temperature in degC, scalar or array.
+
+        Parameters
+        ----------
+        temperature : float or ndarray
+            [degC]
+
+        Returns
+        -------
+        float or ndarray
+        """
         return self.density_40 * (1.0 + self.thermal_expansion * (40.0 - temperature))
 
 
@@ -201,7 +221,16 @@ class Bearing:
         return 0.5 * self.journal_diameter
 
     def pivot_radius(self, pad: Pad) -> float:
-        """R_P = journal radius + Cp + pad thickness [m] (physics.md)."""
+        """R_P = journal radius + Cp + pad thickness [m] (docs/theory.md).
+
+        Parameters
+        ----------
+        pad : Pad
+
+        Returns
+        -------
+        float
+        """
         return self.journal_radius + pad.pad_clearance + pad.thickness
 
     def __str__(self) -> str:
@@ -213,5 +242,15 @@ class Bearing:
         )
 
     def with_pads(self, pads: tuple[Pad, ...]) -> Bearing:
-        """Return a copy with other pads."""
+        """Return a copy with other pads.
+
+        Parameters
+        ----------
+        pads : tuple of Pad
+            Pad #1 first.
+
+        Returns
+        -------
+        Bearing
+        """
         return replace(self, pads=pads)

@@ -96,7 +96,23 @@ def load_bearing(source: str | Path) -> Bearing:
 
 
 def parse_bearing(text: str, name: str) -> Bearing:
-    """Build a `Bearing` from TOML text; `name` is what error messages call the file."""
+    """Build a `Bearing` from TOML text; `name` is what error messages call the file.
+
+    Parameters
+    ----------
+    text : str
+    name : str
+        What error messages call the file.
+
+    Returns
+    -------
+    Bearing
+
+    Raises
+    ------
+    BearingError
+        Says section, key, what is wrong and what to do.
+    """
     try:
         data = parse_toml(text)
     except ValueError as error:

@@ -64,6 +64,16 @@ def _tell(what: str) -> None:
 def compiled(function: Function) -> Function:
     """Compile with numba, cached on disk under the stamp of all kernels.
 
+    Parameters
+    ----------
+    function : callable
+        A loop that numba understands.
+
+    Returns
+    -------
+    callable
+        The same, compiled at its first call.
+
     Warns
     -----
     RuntimeWarning

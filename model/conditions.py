@@ -43,5 +43,14 @@ class Condition(str):
 
 
 def has_answer(conditions: Iterable[Condition]) -> bool:
-    """Whether a result with these conditions has numbers: none of them is an error."""
+    """Whether a result with these conditions has numbers: none of them is an error.
+
+    Parameters
+    ----------
+    conditions : iterable of Condition
+
+    Returns
+    -------
+    bool
+    """
     return all(condition.severity != "error" for condition in conditions)

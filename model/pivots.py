@@ -36,15 +36,48 @@ class PivotLaw(Protocol):
         ...
 
     def deflection(self, load: float) -> float:
-        """delta(W) [m], for W >= 0 [N]."""
+        """delta(W) [m], for W >= 0 [N].
+
+        Parameters
+        ----------
+        load : float
+            Pad load [N], zero or positive.
+
+        Returns
+        -------
+        float
+            [m]
+        """
         ...
 
     def stiffness(self, load: float) -> float:
-        """Tangent dW/ddelta [N/m]; infinite for a rigid pivot."""
+        """Tangent dW/ddelta [N/m]; infinite for a rigid pivot.
+
+        Parameters
+        ----------
+        load : float
+            Pad load [N], zero or positive.
+
+        Returns
+        -------
+        float
+            [N/m]
+        """
         ...
 
     def vibration_stiffness(self, load: float) -> float:
-        """What small vibrations feel [N/m]: the tangent, unless the law says otherwise."""
+        """What small vibrations feel [N/m]: the tangent, unless the law says otherwise.
+
+        Parameters
+        ----------
+        load : float
+            Pad load [N], zero or positive.
+
+        Returns
+        -------
+        float
+            [N/m]
+        """
         ...
 
 
@@ -277,7 +310,17 @@ class MeasuredPivot:
     vibration_stiffness = stiffness
 
     def extrapolated(self, load: float) -> bool:
-        """Whether `load` lies beyond what was measured."""
+        """Whether `load` lies beyond what was measured.
+
+        Parameters
+        ----------
+        load : float
+            Pad load [N], zero or positive.
+
+        Returns
+        -------
+        bool
+        """
         return not self.valid_from <= load <= self.valid_to
 
     def without_housing(self, compliance: float) -> MeasuredPivot:
@@ -286,6 +329,15 @@ class MeasuredPivot:
         What is left keeps at least `LEAST_SHARE` of the measured give: a housing softer than the curve it is part of
         cannot be taken off it. A curve that holds no housing is returned as it is; of one that does, more than one
         part of the structure may be taken off.
+
+        Parameters
+        ----------
+        compliance : float
+            Of the housing [m/N].
+
+        Returns
+        -------
+        MeasuredPivot
         """
         if not self.includes_housing:
             return self
@@ -296,7 +348,19 @@ class MeasuredPivot:
 
 
 def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> PivotLaw:
-    """The printed formula for a contact geometry, Eq. (16) or (17)."""
+    """The printed formula for a contact geometry, Eq. (16) or (17).
+
+    Parameters
+    ----------
+    pivot : Pivot
+    secant_vibrations : bool
+        Use the printed secant for vibrations, as the paper does.
+
+    Returns
+    -------
+    PivotLaw
+        `RigidPivot` for a rigid one.
+    """
     modulus = pivot.youngs_modulus / (1.0 - pivot.poissons_ratio**2)
     name = "kirk-secant" if secant_vibrations else "kirk"
     if pivot.kind == "rocker":
@@ -356,6 +420,16 @@ def _other_choice(name: str) -> str:
 
 def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ...]:
     """Read measured pivot laws from a ``pivots.toml`` (schema ``tpjb-pivots/1``), pad #1 first.
+
+    Parameters
+    ----------
+    path : str or Path
+    pads : int, optional
+        How many laws are needed; default: as many as there are.
+
+    Returns
+    -------
+    tuple of PivotLaw
 
     Raises
     ------

@@ -60,6 +60,10 @@ _MAY_BE_ABSENT = {"contact_length", "housing_diameter", "pivot_diameter", "spher
 def check_possible(bearing: Bearing) -> None:
     """Refuse a bearing with a number that no bearing has.
 
+    Parameters
+    ----------
+    bearing : Bearing
+
     Raises
     ------
     BearingError

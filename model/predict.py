@@ -203,7 +203,18 @@ class Prediction:
         return power_loss(self.equilibrium, self.speed * self.setup.bearing.journal_radius, turbulent)
 
     def pad_temperature(self, fraction: float = 0.75) -> FloatArray:
-        """Film temperature at mid-length, at a fraction of the arc from the leading edge, per pad [degC]."""
+        """Film temperature at mid-length, at a fraction of the arc from the leading edge, per pad [degC].
+
+        Parameters
+        ----------
+        fraction : float
+            Of the arc, from the leading edge.
+
+        Returns
+        -------
+        (n_pads,) ndarray
+            [degC]
+        """
         out = []
         for film in self.equilibrium.films:
             angle = film.pad.leading_edge + fraction * film.pad.arc
@@ -328,7 +339,31 @@ def _number(value: Any, dimension: str, name: str) -> float:
 def predict_setup(
     setup: Setup, load: float, load_direction: float, speed: float, excitation: Any, start: Equilibrium | None = None
 ) -> Prediction:
-    """Predict for a `Setup` (effects applied); SI floats only, see `predict`."""
+    """Predict for a `Setup` (effects applied); SI floats only, see `predict`.
+
+    Parameters
+    ----------
+    setup : Setup
+    load : float
+        [N]
+    load_direction : float
+        [rad, counter-clockwise from +X]
+    speed : float
+        [rad/s]
+    excitation : float or (n,) array_like
+        [rad/s]
+    start : Equilibrium, optional
+        A neighbouring solution on the same mesh.
+
+    Returns
+    -------
+    Prediction
+
+    Raises
+    ------
+    OperatingPointError
+        A load, direction, speed or excitation that no bearing can have.
+    """
     try:
         omega = np.asarray(excitation, float)
     except TypeError as error:

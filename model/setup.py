@@ -116,7 +116,17 @@ class Setup:
         return replace(self, **changes)
 
     def change_pads(self, change: Callable[[int, Pad], Pad]) -> Setup:
-        """Return a copy with every pad replaced by ``change(number, pad)``; numbers from 1."""
+        """Return a copy with every pad replaced by ``change(number, pad)``; numbers from 1.
+
+        Parameters
+        ----------
+        change : callable
+            ``change(number, pad)`` returns a pad; numbers from 1.
+
+        Returns
+        -------
+        Setup
+        """
         pads = tuple(change(k, pad) for k, pad in enumerate(self.bearing.pads, start=1))
         return replace(self, bearing=self.bearing.with_pads(pads))
 

@@ -84,6 +84,16 @@ class PolygonSides:
 
         With `pushed` both sides are taken where the whole push load holds them; in a corner two pads share it, and
         the shaft stops a little short (see `corner_positions`).
+
+        Parameters
+        ----------
+        pushed : bool
+            Where the push load holds the sides, not at zero load.
+
+        Returns
+        -------
+        (n_pads, 2) ndarray
+            [m]
         """
         order = np.argsort(self.angle % (2.0 * math.pi))
         distance = (self.pushed if pushed else self.clearance)[order]
@@ -98,7 +108,18 @@ def _crossings(angle: FloatArray, distance: FloatArray) -> FloatArray:
 
 
 def polygon_sides(setup: Setup, push_load: float) -> PolygonSides:
-    """Predict a cold clearance sweep with a push load [N]."""
+    """Predict a cold clearance sweep with a push load [N].
+
+    Parameters
+    ----------
+    setup : Setup
+    push_load : float
+        [N]
+
+    Returns
+    -------
+    PolygonSides
+    """
     inverse = np.linalg.inv(setup.instruments.displacement_map(0.0).real)
     rows = []
     for pad, law in zip(setup.bearing.pads, setup.pivots, strict=True):
@@ -194,6 +215,16 @@ def _step_share(*points: tuple[float, float, float, FloatArray]) -> float:
 def locus(setup: Setup, load: float, directions: FloatArray, speed: float) -> FloatArray:
     """Journal positions over load directions, as read.
 
+    Parameters
+    ----------
+    setup : Setup
+    load : float
+        [N]
+    directions : (n,) ndarray
+        [rad]
+    speed : float
+        [rad/s]
+
     Returns
     -------
     (n, 2) ndarray
@@ -206,14 +237,48 @@ def locus(setup: Setup, load: float, directions: FloatArray, speed: float) -> Fl
 def load_sweep(
     setup: Setup, loads: FloatArray, direction: float, speed: float, excitation: FloatArray
 ) -> list[Prediction]:
-    """Predict over static loads [N] at one direction [rad], speed and excitation frequencies [rad/s]."""
+    """Predict over static loads [N] at one direction [rad], speed and excitation frequencies [rad/s].
+
+    Parameters
+    ----------
+    setup : Setup
+    loads : (n,) ndarray
+        [N]
+    direction : float
+        [rad]
+    speed : float
+        [rad/s]
+    excitation : (n,) ndarray
+        [rad/s]
+
+    Returns
+    -------
+    list of Prediction
+    """
     return sweep(setup, [(float(load), direction, speed, excitation) for load in loads])
 
 
 def speed_sweep(
     setup: Setup, load: float, direction: float, speeds: FloatArray, ratio: float = 1.0
 ) -> list[Prediction]:
-    """Predict over shaft speeds [rad/s], each excited at `ratio` times its speed (1: synchronous)."""
+    """Predict over shaft speeds [rad/s], each excited at `ratio` times its speed (1: synchronous).
+
+    Parameters
+    ----------
+    setup : Setup
+    load : float
+        [N]
+    direction : float
+        [rad]
+    speeds : (n,) ndarray
+        [rad/s]
+    ratio : float
+        Excitation over speed.
+
+    Returns
+    -------
+    list of Prediction
+    """
     return sweep(setup, [(load, direction, float(w), np.array([ratio * w])) for w in speeds])
 
 
@@ -225,6 +290,10 @@ SWEEP_COLUMNS = (
 
 def sweep_table(predictions: Sequence[Prediction]) -> dict[str, NDArray[Any]]:
     """What a sweep found, as columns (SI, degC): NaN where a point has no equilibrium.
+
+    Parameters
+    ----------
+    predictions : sequence of Prediction
 
     Returns
     -------

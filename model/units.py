@@ -1,4 +1,8 @@
-"""Quantities with units, as bearing files and notebooks give them, into SI floats."""
+"""Quantities with units, as bearing files and notebooks give them, into SI floats.
+
+Inside the model everything is SI and in radians. Temperatures are in degC, because Eq. (4) and (5) of the paper count
+from 40 degC; differences of temperatures, and what is per degree, are in K. No other place has kelvins from zero.
+"""
 
 from __future__ import annotations
 
@@ -39,6 +43,30 @@ SI_UNITS = {
 }
 
 
+#: What pint makes of the units that bearing files use, so that it need not be loaded for them; a test holds it so.
+COMMON_UNITS: dict[str, dict[str, float]] = {
+    "length": {"m": 1.0, "mm": 0.001, "um": 1e-06, "µm": 1e-06},
+    "angle": {"rad": 1.0, "deg": 0.017453292519943295},
+    "mass": {"kg": 1.0, "g": 0.001},
+    "force": {"N": 1.0, "kN": 1000.0},
+    "stiffness": {"N/m": 1.0, "N/um": 1000000.0, "MN/m": 1000000.0},
+    "damping": {"N*s/m": 1.0, "kN*s/m": 1000.0},
+    "rotational stiffness": {"N*m/rad": 1.0},
+    "moment of inertia": {"kg*m^2": 1.0, "kg m^2": 1.0},
+    "pressure": {"Pa": 1.0, "MPa": 1000000.0, "GPa": 1000000000.0},
+    "viscosity": {"Pa*s": 1.0, "Pa s": 1.0, "mPa*s": 0.001},
+    "density": {"kg/m^3": 1.0},
+    "temperature difference": {"K": 1.0},
+    "per kelvin": {"1/K": 1.0},
+    "specific heat": {"J/kg/K": 1.0},
+    "conductivity": {"W/m/K": 1.0},
+    "heat transfer": {"W/m^2/K": 1.0},
+    "angular speed": {"rad/s": 1.0},
+    "time": {"s": 1.0, "ms": 0.001, "us": 1e-06},
+    "ratio": {"": 1.0, "percent": 0.01},
+}
+
+
 class UnitError(ModelError):
     """A quantity that cannot be read, or has the wrong dimension."""
 
@@ -53,6 +81,30 @@ def _registry() -> Any:
 @functools.lru_cache(maxsize=512)
 def _factor(unit: str, dimension: str) -> float:
     """Multiplier from `unit` to the SI unit of `dimension` (not for degC)."""
+    if unit in COMMON_UNITS.get(dimension, {}):
+        return COMMON_UNITS[dimension][unit]
+    return pint_factor(unit, dimension)
+
+
+def pint_factor(unit: str, dimension: str) -> float:
+    """Multiplier from `unit` to the SI unit of `dimension`, by pint.
+
+    Parameters
+    ----------
+    unit : str
+        As pint reads it.
+    dimension : str
+        Key of `SI_UNITS`.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    UnitError
+        Not a unit, or one of another dimension.
+    """
     registry = _registry()
     target = SI_UNITS[dimension]
     try:

@@ -24,7 +24,22 @@ HALVINGS = 60
 
 
 def describing(amplitude: FloatArray, stick: float, slip: float) -> ComplexArray:
-    """N(A) [N m/rad] of a pivot with contact stiffness `stick` [N m/rad] and friction moment `slip` [N m]."""
+    """N(A) [N m/rad] of a pivot with contact stiffness `stick` [N m/rad] and friction moment `slip` [N m].
+
+    Parameters
+    ----------
+    amplitude : ndarray
+        Tilt [rad].
+    stick : float
+        Contact stiffness [N m/rad].
+    slip : float
+        Friction moment [N m].
+
+    Returns
+    -------
+    complex ndarray
+        [N m/rad]
+    """
     share = slip / (stick * np.maximum(amplitude, slip / stick))
     phi = np.arccos(np.clip(1.0 - 2.0 * share, -1.0, 1.0))
     turning = phi - 0.5 * np.sin(2.0 * phi)

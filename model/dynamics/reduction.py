@@ -3,7 +3,7 @@
 Per pad, in (x, y, theta, eta), the film gives Z = K + i omega C by J^T Z_film J with the film's own 2 x 2
 matrices in (a, b) and J = d(a, b)/d(x, y, theta, eta). Pad mass, inertia, k_theta, c_eta and the pivot's tangent
 stiffness stand on the pad's diagonal, Eq. (12); eliminating (theta, eta) gives the 2 x 2 of Eq. (10). Signs are
-those of `physics.md`: the force on the housing, dF = +h d.
+those of `docs/theory.md`: the force on the housing, dF = +h d.
 """
 
 from __future__ import annotations
@@ -49,7 +49,18 @@ class PadMatrices:
 
 
 def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
-    """Assemble the full matrices of one pad; None if it idles."""
+    """Assemble the full matrices of one pad; None if it idles.
+
+    Parameters
+    ----------
+    setup : Setup
+    film : PadFilm
+        Solved.
+
+    Returns
+    -------
+    PadMatrices or None
+    """
     if film.forces is None:
         return None
     pad, law = film.pad, setup.pivots[film.number - 1]
@@ -60,7 +71,8 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
         ]
     )
     load = float(film.forces.force[0])
-    hold = tilt_hold(setup.change(friction=0.0), film.tilt, load)
+    smooth = setup.change(friction=0.0) if setup.friction else setup
+    hold = tilt_hold(smooth, film.tilt, load)
     friction = friction_limits(setup, load) if setup.friction else (0.0, math.inf)
     # where the contact rolls away from the pivot line, a change of the pad's load has a moment
     moments = frame.copy()
@@ -79,7 +91,17 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
 
 
 def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
-    """b_G, the mass centre's distance from the pivot line [m], positive with rotation; zero for a central pivot."""
+    """b_G, the mass centre's distance from the pivot line [m], positive with rotation; zero for a central pivot.
+
+    Parameters
+    ----------
+    setup : Setup
+    film : PadFilm
+
+    Returns
+    -------
+    float
+    """
     pad = film.pad
     middle = (0.5 - pad.pivot_offset) * pad.arc
     inner = setup.bearing.journal_radius + pad.pad_clearance
@@ -139,7 +161,23 @@ def _reduce_with_friction(pad: PadMatrices, z: ComplexArray, film: ComplexArray,
 
 
 def broken_loose(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
-    """Rotational impedance (n, 2) of a pivot's friction [N m/rad] for the journal vibrating along X, along Y."""
+    """Rotational impedance (n, 2) of a pivot's friction [N m/rad] for the journal vibrating along X, along Y.
+
+    Parameters
+    ----------
+    pad : PadMatrices
+    z : (n, 4, 4) complex ndarray
+        Film impedance.
+    film : (n, m, m) complex ndarray
+        Of tilt and deflection, pad and pivot included.
+    vibration : float
+        Amplitude of the journal [m].
+
+    Returns
+    -------
+    (n, 2) complex ndarray
+        [N m/rad]
+    """
     stick, slip = pad.friction
     own, drive = film[:, 0, 0] - stick, z[:, 2, :2]
     if film.shape[1] == 2:  # the pivot gives way as well
@@ -150,6 +188,13 @@ def broken_loose(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibratio
 
 def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> ComplexArray:
     """h(omega) of the bearing inside the measured displacement, effects of the structure included.
+
+    Parameters
+    ----------
+    setup : Setup
+    equilibrium : Equilibrium
+    omega : (n,) ndarray
+        [rad/s]
 
     Returns
     -------
@@ -167,7 +212,19 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
 
 
 def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> tuple[Condition, ...]:
-    """Named regimes of pivots with friction: which ones it holds, and which ones the vibration breaks loose."""
+    """Named regimes of pivots with friction: which ones it holds, and which ones the vibration breaks loose.
+
+    Parameters
+    ----------
+    setup : Setup
+    equilibrium : Equilibrium
+    omega : (n,) ndarray
+        [rad/s]
+
+    Returns
+    -------
+    tuple of Condition
+    """
     held: list[int] = []
     loose: list[int] = []
     for film in equilibrium.films:

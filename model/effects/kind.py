@@ -29,7 +29,7 @@ class Parameter:
     Attributes
     ----------
     name : str
-        As in `physics.md`.
+        As in `docs/theory.md`.
     unit : str
         SI unit as text ("1" for a ratio, "pad" for a pad number).
     dimension : str

@@ -85,7 +85,23 @@ def solve_film_jfo(
 def solve_flooded_film(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool
 ) -> FilmForces:
-    """`solve_film_jfo` for a film that the supply fills where it enters; parameters as those of `solve_film`."""
+    """`solve_film_jfo` for a film that the supply fills where it enters; parameters as those of `solve_film`.
+
+    Parameters
+    ----------
+    grid : FilmGrid
+    work : FilmWork
+    wedge : tuple of float
+        Cp, a, b [m].
+    speed : float
+        Surface speed of the journal [m/s].
+    sharp : bool
+        See `model.film.reynolds.solve_film`.
+
+    Returns
+    -------
+    FilmForces
+    """
     return solve_film_jfo(grid, work, wedge, speed, sharp, 1.0)
 
 
@@ -247,6 +263,17 @@ def fluid_fraction(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, filling: float = 1.0
 ) -> FloatArray:
     """Filling theta of a film that `solve_film_jfo` has solved.
+
+    Parameters
+    ----------
+    grid : FilmGrid
+    work : FilmWork
+    wedge : tuple of float
+        Cp, a, b [m].
+    speed : float
+        Surface speed of the journal [m/s].
+    filling : float
+        Share of the gap that is full where the film enters.
 
     Returns
     -------

@@ -44,7 +44,23 @@ class FaceFlows(NamedTuple):
 def face_flows(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, filling: float
 ) -> FaceFlows:
-    """Conductances and drag of a film that is full everywhere but for its supply: `filling` of the gap there."""
+    """Conductances and drag of a film that is full everywhere but for its supply: `filling` of the gap there.
+
+    Parameters
+    ----------
+    grid : FilmGrid
+    work : FilmWork
+    wedge : tuple of float
+        Cp, a, b [m].
+    speed : float
+        Surface speed of the journal [m/s].
+    filling : float
+        Share of the gap that is full where the film enters.
+
+    Returns
+    -------
+    FaceFlows
+    """
     along, across = conductances(grid, work, wedge[0], wedge[1], wedge[2])
     couette, height = np.empty_like(along), np.empty_like(along)
     for i in range(along.shape[0]):
@@ -61,7 +77,17 @@ def face_flows(
 
 @compiled
 def assemble_columns(band: FloatArray, faces: FaceFlows, ruptured: BoolArray, first: int) -> None:
-    """Fill the band: entry (row, column) stands at ``band[row, width + column - row]``."""
+    """Fill the band: entry (row, column) stands at ``band[row, width + column - row]``.
+
+    Parameters
+    ----------
+    band : (n, 2 width + 1) ndarray
+        Overwritten.
+    faces : FaceFlows
+    ruptured : (nt + 1, nz + 1) ndarray of bool
+    first : int
+        First unknown axial node, see `FilmGrid`.
+    """
     gx, gz, couette = faces.along, faces.across, faces.couette
     nt, nz = gx.shape[0], gz.shape[1]
     width = nz - first
@@ -91,7 +117,13 @@ def assemble_columns(band: FloatArray, faces: FaceFlows, ruptured: BoolArray, fi
 
 @compiled
 def factorise_columns(band: FloatArray) -> None:
-    """L U in place, without pivoting."""
+    """L U in place, without pivoting.
+
+    Parameters
+    ----------
+    band : (n, 2 width + 1) ndarray
+        The matrix; overwritten with its factors.
+    """
     n, width = band.shape[0], band.shape[1] // 2
     for k in range(n):
         pivot = 1.0 / band[k, width]
@@ -105,7 +137,15 @@ def factorise_columns(band: FloatArray) -> None:
 
 @compiled
 def substitute_columns(band: FloatArray, x: FloatArray) -> None:
-    """Solve for the right-hand sides (n, m) in place."""
+    """Solve for the right-hand sides (n, m) in place.
+
+    Parameters
+    ----------
+    band : (n, 2 width + 1) ndarray
+        The factors.
+    x : (n, m) ndarray
+        Right-hand sides, overwritten with the solutions.
+    """
     n, width, count = band.shape[0], band.shape[1] // 2, x.shape[1]
     for k in range(n):
         for r in range(1, min(width, n - 1 - k) + 1):

@@ -44,7 +44,18 @@ class Branch:
     load: FloatArray
 
     def at(self, rigid_approach: float) -> tuple[float, float]:
-        """Guess (a, b) at a rigid approach, all [m]."""
+        """Guess (a, b) at a rigid approach, all [m].
+
+        Parameters
+        ----------
+        rigid_approach : float
+            [m]
+
+        Returns
+        -------
+        tuple of float
+            a, b [m].
+        """
         a = float(np.interp(rigid_approach, self.rigid_approach, self.approach))
         return a, float(np.interp(rigid_approach, self.rigid_approach, self.wedge))
 
@@ -103,6 +114,22 @@ def loaded_attitude(start: float, end: float, radius: float, length: float) -> L
 
     The film is solved at unit clearance scale; only ratios enter, so one table serves every clearance, speed and
     viscosity.
+
+    Parameters
+    ----------
+    start : float
+        Leading edge from the pivot [rad].
+    end : float
+        Trailing edge from the pivot [rad].
+    radius : float
+        Of the journal [m].
+    length : float
+        Of the pad [m].
+
+    Returns
+    -------
+    LoadedAttitude
+        The same object for the same arguments.
     """
     grid = film_grid(start, end, radius, length, _TABLE_MESH, True)
     work = film_work(grid, 40.0)

@@ -8,7 +8,20 @@ from model.compilation import compiled
 
 @compiled
 def assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArray, first: int) -> None:
-    """Lower band of the matrix: row k holds its diagonal and the entries below it; ruptured nodes stand alone."""
+    """Lower band of the matrix: row k holds its diagonal and the entries below it; ruptured nodes stand alone.
+
+    Parameters
+    ----------
+    band : (n, width + 1) ndarray
+        Lower band, overwritten.
+    gx : (nt, nz + 1) ndarray
+        Conductance of the faces along the arc [kg/s/Pa].
+    gz : (nt + 1, nz) ndarray
+        Conductance of the faces across [kg/s/Pa].
+    ruptured : (nt + 1, nz + 1) ndarray of bool
+    first : int
+        First unknown axial node, see `FilmGrid`.
+    """
     nt, nz = gx.shape[0], gz.shape[1]
     width = nz - first
     for k in range(band.shape[0]):
@@ -32,7 +45,13 @@ def assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArr
 
 @compiled
 def factorise(band: FloatArray) -> None:
-    """L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k]."""
+    """L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k].
+
+    Parameters
+    ----------
+    band : (n, width + 1) ndarray
+        The matrix; overwritten with its factor.
+    """
     n, width = band.shape[0], band.shape[1] - 1
     for k in range(n):
         pivot = band[k, 0]
@@ -47,7 +66,15 @@ def factorise(band: FloatArray) -> None:
 
 @compiled
 def substitute(band: FloatArray, x: FloatArray) -> None:
-    """Solve for one right-hand side in place, with the factor from `factorise`."""
+    """Solve for one right-hand side in place, with the factor from `factorise`.
+
+    Parameters
+    ----------
+    band : (n, width + 1) ndarray
+        The factor.
+    x : (n,) ndarray
+        Right-hand side, overwritten with the solution.
+    """
     n, width = band.shape[0], band.shape[1] - 1
     for k in range(n):
         for r in range(1, min(width, n - 1 - k) + 1):
@@ -61,7 +88,15 @@ def substitute(band: FloatArray, x: FloatArray) -> None:
 
 @compiled
 def substitute_four(band: FloatArray, x: FloatArray) -> None:
-    """`substitute` for the four derivatives side by side (n, 4): the inner loop fills a vector register."""
+    """`substitute` for the four derivatives side by side (n, 4): the inner loop fills a vector register.
+
+    Parameters
+    ----------
+    band : (n, width + 1) ndarray
+        The factor.
+    x : (n, 4) ndarray
+        Right-hand sides, overwritten with the solutions.
+    """
     n, width = band.shape[0], band.shape[1] - 1
     for k in range(n):
         for r in range(1, min(width, n - 1 - k) + 1):
@@ -80,7 +115,17 @@ def substitute_four(band: FloatArray, x: FloatArray) -> None:
 
 @compiled
 def add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
-    """Add to the diagonal, mesh shape (nt + 1, nz + 1), before factorising."""
+    """Add to the diagonal, mesh shape (nt + 1, nz + 1), before factorising.
+
+    Parameters
+    ----------
+    band : (n, width + 1) ndarray
+        Lower band, overwritten.
+    diagonal : (nt + 1, nz + 1) ndarray
+        [kg/s/Pa]
+    first : int
+        First unknown axial node, see `FilmGrid`.
+    """
     nt, nz = diagonal.shape[0] - 1, diagonal.shape[1] - 1
     for i in range(1, nt):
         for j in range(first, nz):
@@ -89,7 +134,15 @@ def add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
 
 @compiled
 def substitute_many(band: FloatArray, x: FloatArray) -> None:
-    """`substitute` for any number of right-hand sides, (n, m)."""
+    """`substitute` for any number of right-hand sides, (n, m).
+
+    Parameters
+    ----------
+    band : (n, width + 1) ndarray
+        The factor.
+    x : (n, m) ndarray
+        Right-hand sides, overwritten with the solutions.
+    """
     n, width, columns = band.shape[0], band.shape[1] - 1, x.shape[1]
     for k in range(n):
         for r in range(1, min(width, n - 1 - k) + 1):

@@ -177,7 +177,18 @@ def _parabolic_weights(z: FloatArray) -> FloatArray:
 
 
 def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:
-    """Allocate the arrays of one film, at rest at the inlet temperature."""
+    """Allocate the arrays of one film, at rest at the inlet temperature.
+
+    Parameters
+    ----------
+    grid : FilmGrid
+    inlet_temperature : float
+        [degC]
+
+    Returns
+    -------
+    FilmWork
+    """
     nt, nz = len(grid.angle) - 1, len(grid.z) - 1
     shape = (nt + 1, nz + 1)
     unknowns = nz - grid.first

@@ -83,5 +83,14 @@ def resting_film(
 
 
 def film_length(grid: FilmGrid) -> float:
-    """Axial length of a film [m]; its grid may hold one half of it."""
+    """Axial length of a film [m]; its grid may hold one half of it.
+
+    Parameters
+    ----------
+    grid : FilmGrid
+
+    Returns
+    -------
+    float
+    """
     return float(grid.z[-1] - grid.z[0]) * (2.0 if grid.first == 0 else 1.0)

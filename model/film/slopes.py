@@ -42,7 +42,16 @@ def net_inflow(along: FloatArray, across: FloatArray, first: int, inflow: FloatA
 
 @compiled
 def keep_ruptured(work: FilmWork, first: int, inflow: FloatArray) -> None:
-    """Ruptured nodes keep their pressure: their rows have no right-hand side."""
+    """Ruptured nodes keep their pressure: their rows have no right-hand side.
+
+    Parameters
+    ----------
+    work : FilmWork
+    first : int
+        First unknown axial node, see `FilmGrid`.
+    inflow : (unknowns, m) ndarray
+        Set to zero there.
+    """
     nt, nz = work.pressure.shape[0] - 1, work.pressure.shape[1] - 1
     for i in range(1, nt):
         for j in range(first, nz):
@@ -61,6 +70,24 @@ def rupture_line(
     A dry node is reached by the share `wet` of the flow that would wet it; the pressure rises as the square of
     the distance from the rupture line, so that the line lies (0.5 + wet) steps from the last wet node. A linear
     profile that vanishes there has (wet - 0.5) / (wet + 0.5) of the wet node's value at the dry node.
+
+    Parameters
+    ----------
+    grid : FilmGrid
+    work : FilmWork
+    gx : (nt, nz + 1) ndarray
+        Conductance of the faces along the arc [kg/s/Pa].
+    gz : (nt + 1, nz) ndarray
+        Conductance of the faces across [kg/s/Pa].
+    source : (nt + 1, nz + 1) ndarray
+        Couette inflow less outflow [kg/s].
+
+    Returns
+    -------
+    diagonal : (nt + 1, nz + 1) ndarray
+        To be added to the matrix [kg/s/Pa].
+    area : (nt + 1, nz + 1) ndarray
+        That a node's perturbed pressure stands for [m^2].
     """
     nt, nz = gx.shape[0], gz.shape[1]
     p, ruptured = work.pressure, work.ruptured

@@ -107,7 +107,18 @@ class BendingStep:
 
 
 def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid) -> PadDeformation:
-    """Matrices of a pad for its film's mesh; the same object for pads of the same shape."""
+    """Matrices of a pad for its film's mesh; the same object for pads of the same shape.
+
+    Parameters
+    ----------
+    pad : Pad
+    bearing : Bearing
+    grid : FilmGrid
+
+    Returns
+    -------
+    PadDeformation
+    """
     geometry = PadGeometry.of(pad, bearing)
     return _pad_deformation(geometry, grid.angle.tobytes(), grid.z.tobytes(), grid.area.tobytes())
 
@@ -211,5 +222,20 @@ _UNIT = np.eye(SHAPES)
 
 
 def change_of_shape(body: PadDeformation, step: BendingStep, da: float, db: float) -> FloatArray:
-    """Change of the deformation that belongs to a move (da, db) of the film [m]."""
+    """Change of the deformation that belongs to a move (da, db) of the film [m].
+
+    Parameters
+    ----------
+    body : PadDeformation
+    step : BendingStep
+    da : float
+        Change of a [m].
+    db : float
+        Change of b [m].
+
+    Returns
+    -------
+    (nt + 1, nz + 1) ndarray
+        [m]
+    """
     return step.mismatch + body.shapes @ (step.amplitude + step.by_approach @ np.array([da, db]))

@@ -99,7 +99,17 @@ class BlockCholesky:
 
     @classmethod
     def factor(cls, rows: Iterable[BlockRow]) -> BlockCholesky:
-        """Factor; arguments and errors as for `factor_rows`."""
+        """Factor; arguments and errors as for `factor_rows`.
+
+        Parameters
+        ----------
+        rows : iterable of dict
+            See `factor_rows`.
+
+        Returns
+        -------
+        BlockCholesky
+        """
         return cls(tuple(factor_rows(rows)))
 
     def solve(self, rhs: FloatArray) -> FloatArray:

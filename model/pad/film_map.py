@@ -34,14 +34,40 @@ class AxisMap:
 
 
 def plain_map(face: Line, film: Line) -> AxisMap:
-    """Map of two bases on the same interval."""
+    """Map of two bases on the same interval.
+
+    Parameters
+    ----------
+    face : Line
+        Basis of the solid.
+    film : Line
+        Basis of the film.
+
+    Returns
+    -------
+    LineMap
+    """
     points, weights = _points(face.breaks, film.breaks, face.degree)
     gather = face.tabulate(points).T @ (weights[:, None] * film.tabulate(points))
     return AxisMap(gather, _solve(film, gather.T))
 
 
 def mirror_map(face: Line, film: Line, even: bool) -> AxisMap:
-    """Map of a basis on 0 <= z <= L/2 and a film on -L/2 <= z <= L/2, for its even or its odd part."""
+    """Map of a basis on 0 <= z <= L/2 and a film on -L/2 <= z <= L/2, for its even or its odd part.
+
+    Parameters
+    ----------
+    face : Line
+        Basis of the solid.
+    film : Line
+        Basis of the film.
+    even : bool
+        The even part, not the odd one.
+
+    Returns
+    -------
+    LineMap
+    """
     points, weights = _points(face.breaks, np.unique(np.abs(film.breaks)), face.degree)
     sign = 1.0 if even else -1.0
     part = 0.5 * (film.tabulate(points) + sign * film.tabulate(-points))
@@ -68,7 +94,21 @@ class FilmMap:
 
     @classmethod
     def between(cls, face: tuple[Line, Line], film: tuple[Line, Line], even: bool | None) -> FilmMap:
-        """Build the maps; `even` is None for a film on the half length, else the part of a full one."""
+        """Build the maps; `even` is None for a film on the half length, else the part of a full one.
+
+        Parameters
+        ----------
+        face : tuple of Line
+            Along the arc and across, of the solid.
+        film : tuple of Line
+            The same, of the film.
+        even : bool or None
+            None: a film on the half length; else which part of a full one.
+
+        Returns
+        -------
+        FilmMap
+        """
         coarse = tuple(Line(line.breaks, 1) for line in face)
 
         def axial(line: Line) -> AxisMap:

@@ -150,7 +150,18 @@ def graded(start: float, stop: float, count: int, first: float, last: float) -> 
 
 
 def gauss_rule(breaks: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """Gauss-Legendre points and weights, `count` in every interval of `breaks`."""
+    """Gauss-Legendre points and weights, `count` in every interval of `breaks`.
+
+    Parameters
+    ----------
+    breaks : (n + 1,) ndarray
+    count : int
+        Points in each.
+
+    Returns
+    -------
+    points, weights : (n, count) ndarray
+    """
     points, weights = np.polynomial.legendre.leggauss(count)
     size = np.diff(breaks)
     x = breaks[:-1, None] + 0.5 * size[:, None] * (points + 1.0)

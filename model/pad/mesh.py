@@ -54,6 +54,11 @@ def pivot_face(pad: Pad, bearing: Bearing) -> PivotFace:
     1.22 um and 0.71 um, -0.08 um and 0.57 um. The thermal range (edges less pivot, 3.4 um and 2.9 um) goes to
     3.1 um and 2.5 um for half, 4.2 um and 3.6 um for twice the width.
 
+    Parameters
+    ----------
+    pad : Pad
+    bearing : Bearing
+
     Returns
     -------
     PivotFace
@@ -116,6 +121,22 @@ class PadGeometry:
 
         The inner radius, journal radius + Cp, is rounded to 0.1 mm: a fit that moves Cp by microns would
         otherwise ask for a new FE solution every time, for less than 0.1 % of the deformation.
+
+        Parameters
+        ----------
+        pad : Pad
+        bearing : Bearing
+        face : PivotFace, optional
+            Default: as `pivot_face` says.
+
+        Returns
+        -------
+        PadGeometry
+
+        Raises
+        ------
+        BearingError
+            The pivot face does not fit on the pad.
         """
         return cls(
             inner_radius=round(bearing.journal_radius + pad.pad_clearance, 4),
@@ -165,7 +186,17 @@ class SectorMesh:
             )
 
     def per_gauss_point(self, values: list[float]) -> FloatArray:
-        """Spread one value per radial element over the Gauss points of `r`; shape of ``r.gauss[0]``."""
+        """Spread one value per radial element over the Gauss points of `r`; shape of ``r.gauss[0]``.
+
+        Parameters
+        ----------
+        values : list of float
+            One per radial element.
+
+        Returns
+        -------
+        ndarray
+        """
         return np.repeat(np.asarray(values, dtype=float), self.r.degree + 2)
 
     @property
@@ -174,7 +205,16 @@ class SectorMesh:
         return self.theta.n_nodes * self.z.n_nodes
 
     def held(self, face: PivotFace) -> BoolArray:
-        """Nodes on the pivot face, shape (n_theta, n_r, n_z)."""
+        """Nodes on the pivot face, shape (n_theta, n_r, n_z).
+
+        Parameters
+        ----------
+        face : PivotFace
+
+        Returns
+        -------
+        (n_theta, n_r, n_z) ndarray of bool
+        """
         slack = 1e-9
         angle = 0.5 * face.width / self.r.breaks[-1]
         in_arc = np.abs(self.theta.nodes) <= angle * (1 + slack)
@@ -219,7 +259,16 @@ class MeshDensity:
             raise OptionError(f"A pad needs arc >= 2, half_length >= 3 and every other count >= 1, got {self}.")
 
     def refined(self, factor: int) -> MeshDensity:
-        """Return a density of `factor` times as many elements in every direction."""
+        """Return a density of `factor` times as many elements in every direction.
+
+        Parameters
+        ----------
+        factor : int
+
+        Returns
+        -------
+        MeshDensity
+        """
         return MeshDensity(
             arc=factor * self.arc,
             face=factor * self.face,
@@ -237,6 +286,15 @@ def sector_mesh(geometry: PadGeometry, density: MeshDensity) -> SectorMesh:
 
     The stress is singular along the rim of the held face, and steep near the free edges, where the babbitt's larger
     expansion ends: elements are small there and grow in between.
+
+    Parameters
+    ----------
+    geometry : PadGeometry
+    density : MeshDensity
+
+    Returns
+    -------
+    SectorMesh
     """
     outer, thickness = geometry.outer_radius, geometry.outer_radius - geometry.inner_radius
     rim, edge = density.rim * thickness, density.edge * thickness

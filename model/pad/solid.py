@@ -89,11 +89,36 @@ class PadSolid:
         return self._thermal(self._on_grid(rise, "rise"), "expansion")
 
     def deform(self, pressure: ArrayLike, rise: ArrayLike, factor: float = 1.0) -> FloatArray:
-        """Sum of `bend` and `expand`, times `factor` (the `compliance_factor` of physics.md) [m]."""
+        """Sum of `bend` and `expand`, times `factor` (the `compliance_factor` of docs/theory.md) [m].
+
+        Parameters
+        ----------
+        pressure : (n_theta, n_z) array_like
+            [Pa]
+        rise : (n_theta, n_z) array_like
+            Film temperature less supply temperature [K].
+        factor : float
+
+        Returns
+        -------
+        (n_theta, n_z) ndarray
+            [m]
+        """
         return factor * (self.bend(pressure) + self.expand(rise))
 
     def heat_flow(self, rise: ArrayLike) -> FloatArray:
-        """Heat flux density from film into pad [W/m^2], shape (n_theta, n_z), for a film temperature rise [K]."""
+        """Heat flux density from film into pad [W/m^2], shape (n_theta, n_z), for a film temperature rise [K].
+
+        Parameters
+        ----------
+        rise : (n_theta, n_z) array_like
+            Film temperature less supply temperature [K].
+
+        Returns
+        -------
+        (n_theta, n_z) ndarray
+            [W/m^2]
+        """
         return self._thermal(self._on_grid(rise, "rise"), "flux")
 
     @cached_property
@@ -158,7 +183,18 @@ class PadSolid:
         return even.theta.nodes, even.radius, field_
 
     def back_temperature(self, rise: ArrayLike) -> FloatArray:
-        """Temperature rise on the pad's back over the film nodes [K], shape (n_theta, n_z)."""
+        """Temperature rise on the pad's back over the film nodes [K], shape (n_theta, n_z).
+
+        Parameters
+        ----------
+        rise : (n_theta, n_z) array_like
+            Film temperature less supply temperature [K].
+
+        Returns
+        -------
+        (n_theta, n_z) ndarray
+            [K]
+        """
         return self._thermal(self._on_grid(rise, "rise"), "back")
 
     def peak_rise(self, rise: ArrayLike) -> float:
@@ -166,6 +202,16 @@ class PadSolid:
 
         The pad has no heat source, so it is hottest on a face; the film face has the film's temperature and the
         others lose heat. Hence it is the film's largest rise.
+
+        Parameters
+        ----------
+        rise : (n_theta, n_z) array_like
+            Film temperature less supply temperature [K].
+
+        Returns
+        -------
+        float
+            [K]
         """
         return max(0.0, float(np.max(self._on_grid(rise, "rise"))))
 
@@ -255,7 +301,26 @@ def pad_solid(
 def solid_of(
     geometry: PadGeometry, film_theta: ArrayLike, film_z: ArrayLike, density: MeshDensity | None = None
 ) -> PadSolid:
-    """`pad_solid` for a geometry at hand."""
+    """`pad_solid` for a geometry at hand.
+
+    Parameters
+    ----------
+    geometry : PadGeometry
+    film_theta : (n_theta,) array_like
+        [rad from the pivot]
+    film_z : (n_z,) array_like
+        [m from the mid-plane]
+    density : MeshDensity, optional
+
+    Returns
+    -------
+    PadSolid
+
+    Raises
+    ------
+    ModelError
+        The film grid does not span the pad.
+    """
     theta, z = np.asarray(film_theta, dtype=float), np.asarray(film_z, dtype=float)
     _check_span(theta, (geometry.leading, geometry.trailing), "film_theta", "rad")
     if z.ndim == 1 and z.size and abs(z[0]) < 1e-6 * geometry.length:

@@ -46,7 +46,17 @@ def cache_folder() -> Path | None:
 
 
 def storage_key(what: object) -> str:
-    """Hash of `what` (by its repr) and of the solver's source, so that neither can change unnoticed."""
+    """Hash of `what` (by its repr) and of the solver's source, so that neither can change unnoticed.
+
+    Parameters
+    ----------
+    what : object
+        Whose repr says all of it.
+
+    Returns
+    -------
+    str
+    """
     return hashlib.sha256(f"{_source_digest()}{what!r}".encode()).hexdigest()[:32]
 
 
@@ -59,7 +69,18 @@ def _source_digest() -> str:
 
 
 def load_arrays(key: str, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, FloatArray] | None:
-    """Arrays stored under `key`, or None if there are none, or none of these shapes and finite."""
+    """Arrays stored under `key`, or None if there are none, or none of these shapes and finite.
+
+    Parameters
+    ----------
+    key : str
+    shapes : mapping
+        Shape by name.
+
+    Returns
+    -------
+    dict of ndarray or None
+    """
     folder = cache_folder()
     if folder is None:
         return None
@@ -80,6 +101,12 @@ def load_arrays(key: str, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Fl
 
 def save_arrays(key: str, arrays: Mapping[str, FloatArray]) -> bool:
     """Store arrays whole or not at all; a folder that cannot be written leaves the solution in memory only.
+
+    Parameters
+    ----------
+    key : str
+    arrays : mapping
+        Array by name.
 
     Returns
     -------

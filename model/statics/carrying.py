@@ -34,7 +34,17 @@ LONGEST_STEP = 0.3
 
 
 def attitude_of(setup: Setup, film: PadFilm) -> LoadedAttitude:
-    """The pad shape's table."""
+    """The pad shape's table.
+
+    Parameters
+    ----------
+    setup : Setup
+    film : PadFilm
+
+    Returns
+    -------
+    LoadedAttitude
+    """
     angle, bearing = film.grid.angle, setup.bearing
     start, end = round(float(angle[0]), 12), round(float(angle[-1]), 12)
     return loaded_attitude(start, end, bearing.journal_radius, bearing.length)
@@ -59,19 +69,42 @@ def find_branch(setup: Setup, film: PadFilm, surface_speed: float, hotter: float
 
 
 def margin(film: PadFilm, position: FloatArray) -> float:
-    """How far a pad is from where it stops carrying, as a share of its clearance; negative beyond."""
+    """How far a pad is from where it stops carrying, as a share of its clearance; negative beyond.
+
+    Parameters
+    ----------
+    film : PadFilm
+    position : (2,) ndarray
+        Journal [m].
+
+    Returns
+    -------
+    float
+    """
     assert film.branch is not None
     return float(film.rigid_approach(position) - film.branch.rigid_approach[0]) / film.pad.pad_clearance
 
 
 def let_idle(film: PadFilm) -> None:
-    """Let a pad carry nothing."""
+    """Let a pad carry nothing.
+
+    Parameters
+    ----------
+    film : PadFilm
+    """
     film.idle = True
     film.deflection = film.tilt = 0.0
 
 
 def set_loaded(film: PadFilm, position: FloatArray) -> None:
-    """Put a pad on its loaded attitude for a journal position, or let it idle."""
+    """Put a pad on its loaded attitude for a journal position, or let it idle.
+
+    Parameters
+    ----------
+    film : PadFilm
+    position : (2,) ndarray
+        Journal [m].
+    """
     assert film.branch is not None
     let_idle(film)
     film.idle = margin(film, position) <= 0.0
@@ -123,6 +156,16 @@ def is_stable(setup: Setup, film: PadFilm) -> bool:
 
     The determinant of the pad's own two equations is positive: kbb (1 + c kaa) > c kba kab, c the pivot's compliance,
     with what holds the tilt back added to the film's moment.
+
+    Parameters
+    ----------
+    setup : Setup
+    film : PadFilm
+        Solved.
+
+    Returns
+    -------
+    bool
     """
     assert film.forces is not None
     (kaa, kab), (kba, kbb) = film.forces.stiffness
@@ -135,7 +178,19 @@ def is_stable(setup: Setup, film: PadFilm) -> bool:
 
 
 def leave_unstable(setup: Setup, films: list[PadFilm], position: FloatArray) -> bool:
-    """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any."""
+    """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any.
+
+    Parameters
+    ----------
+    setup : Setup
+    films : list of PadFilm
+    position : (2,) ndarray
+        Journal [m].
+
+    Returns
+    -------
+    bool
+    """
     found = False
     for film in films:
         if film.forces is None or setup.rotational_stiffness > 0 or is_stable(setup, film):
@@ -153,6 +208,12 @@ def leave_unstable(setup: Setup, films: list[PadFilm], position: FloatArray) -> 
 def unloaded_pads(films: list[PadFilm], position: FloatArray) -> tuple[list[int], list[int]]:
     """Pads that were left idle although they have a loaded attitude here: carrying, they would push the journal away.
 
+    Parameters
+    ----------
+    films : list of PadFilm
+    position : (2,) ndarray
+        Journal [m].
+
     Returns
     -------
     staying, restarting : list of int
@@ -165,6 +226,17 @@ def unloaded_pads(films: list[PadFilm], position: FloatArray) -> tuple[list[int]
 
 
 def longest_step(films: list[PadFilm], shift: FloatArray) -> float:
-    """Share of a step [m] that the journal may take."""
+    """Share of a step [m] that the journal may take.
+
+    Parameters
+    ----------
+    films : list of PadFilm
+    shift : (2,) ndarray
+        Move of the journal [m].
+
+    Returns
+    -------
+    float
+    """
     least = min(f.pad.pad_clearance for f in films)
     return LONGEST_STEP * least / max(math.hypot(shift[0], shift[1]), 1e-30)

@@ -44,14 +44,34 @@ FLOW_BACK = Condition(
 
 
 def idle(pads: Sequence[int]) -> Condition:
-    """Pads without a loaded attitude, numbers from 1."""
+    """Pads without a loaded attitude, numbers from 1.
+
+    Parameters
+    ----------
+    pads : sequence of int
+        Numbers from 1.
+
+    Returns
+    -------
+    Condition
+    """
     return Condition(
         f"idle pads {_listed(pads)}", "note", "they carry nothing and take no part in the dynamics", tuple(pads)
     )
 
 
 def overloaded(pads: Sequence[int]) -> Condition:
-    """Pads whose film no bearing has, numbers from 1."""
+    """Pads whose film no bearing has, numbers from 1.
+
+    Parameters
+    ----------
+    pads : sequence of int
+        Numbers from 1.
+
+    Returns
+    -------
+    Condition
+    """
     limits = f"{1e6 * THINNEST_FILM:g} um, {HIGHEST_PRESSURE / 1e6:g} MPa, {HOTTEST_FILM:g} degC"
     return Condition(
         f"overloaded pads {_listed(pads)}", "warning", f"thinnest film, pressure or heat beyond {limits}", tuple(pads)
@@ -59,7 +79,17 @@ def overloaded(pads: Sequence[int]) -> Condition:
 
 
 def left_unloaded(pads: Sequence[int]) -> Condition:
-    """Pads that were left idle on the way, although they could carry, numbers from 1."""
+    """Pads that were left idle on the way, although they could carry, numbers from 1.
+
+    Parameters
+    ----------
+    pads : sequence of int
+        Numbers from 1.
+
+    Returns
+    -------
+    Condition
+    """
     return Condition(
         f"pads {_listed(pads)} cannot keep their load", "warning", "carrying, they would push the journal off",
         tuple(pads),
@@ -67,7 +97,17 @@ def left_unloaded(pads: Sequence[int]) -> Condition:
 
 
 def undecided(pads: Sequence[int]) -> Condition:
-    """Pads that find no state at all, numbers from 1."""
+    """Pads that find no state at all, numbers from 1.
+
+    Parameters
+    ----------
+    pads : sequence of int
+        Numbers from 1.
+
+    Returns
+    -------
+    Condition
+    """
     return Condition(
         f"pads {_listed(pads)} can neither carry nor idle", "error",
         "idle they take up load at once, carrying they push the journal off", tuple(pads),
@@ -75,7 +115,17 @@ def undecided(pads: Sequence[int]) -> Condition:
 
 
 def alternating(pads: Sequence[int]) -> Condition:
-    """Pads that went on taking up and shedding their load, numbers from 1."""
+    """Pads that went on taking up and shedding their load, numbers from 1.
+
+    Parameters
+    ----------
+    pads : sequence of int
+        Numbers from 1.
+
+    Returns
+    -------
+    Condition
+    """
     return Condition(
         f"pads {_listed(pads)} take up and shed their load", "error", "the iteration finds no rest", tuple(pads)
     )
@@ -105,7 +155,16 @@ def unsupported(setup: Setup, load: FloatArray) -> bool:
 
 
 def overloaded_pads(films: Sequence[PadFilm]) -> list[int]:
-    """Numbers of the pads whose film is too thin, whose pressure too high or whose oil too hot for a pad to live."""
+    """Numbers of the pads whose film is too thin, whose pressure too high or whose oil too hot for a pad to live.
+
+    Parameters
+    ----------
+    films : sequence of PadFilm
+
+    Returns
+    -------
+    list of int
+    """
     return [
         f.number
         for f in films
@@ -119,7 +178,19 @@ def overloaded_pads(films: Sequence[PadFilm]) -> list[int]:
 
 
 def regimes(setup: Setup, films: Sequence[PadFilm], surface_speed: float) -> list[Condition]:
-    """Named regimes beyond what the equations hold for: pads in each other's way, films not laminar, oil too hot."""
+    """Named regimes beyond what the equations hold for: pads in each other's way, films not laminar, oil too hot.
+
+    Parameters
+    ----------
+    setup : Setup
+    films : sequence of PadFilm
+    surface_speed : float
+        Of the journal [m/s].
+
+    Returns
+    -------
+    list of Condition
+    """
     names = misfits(setup)
     reynolds = largest_reynolds(films, surface_speed)
     if reynolds > LAMINAR and setup.options.turbulence == "none":
@@ -136,7 +207,18 @@ def regimes(setup: Setup, films: Sequence[PadFilm], surface_speed: float) -> lis
 
 
 def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:
-    """Largest local Reynolds number rho U h / mu of all films, the idle pads' too; NaN where there is none."""
+    """Largest local Reynolds number rho U h / mu of all films, the idle pads' too; NaN where there is none.
+
+    Parameters
+    ----------
+    films : sequence of PadFilm
+    surface_speed : float
+        Of the journal [m/s].
+
+    Returns
+    -------
+    float
+    """
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # a lost film may be as hot as numbers go
         numbers = [
             float((f.work.density * f.work.thickness / f.work.viscosity).max()) * surface_speed
@@ -148,7 +230,16 @@ def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:
 
 
 def misfits(setup: Setup) -> list[Condition]:
-    """Pads that stand in each other's way, or in the journal's, in a bearing built in code (a file is refused)."""
+    """Pads that stand in each other's way, or in the journal's, in a bearing built in code (a file is refused).
+
+    Parameters
+    ----------
+    setup : Setup
+
+    Returns
+    -------
+    list of Condition
+    """
     pads = setup.bearing.pads
     names = []
     inside = [k for k, p in enumerate(pads, 1) if not p.assembled_clearance + setup.clearance_change > 0.0]

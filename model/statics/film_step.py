@@ -49,7 +49,12 @@ def solve_films(search: Search) -> float:
 
 
 def refine_derivatives(search: Search) -> None:
-    """Find the derivatives once more, with the rupture line between the nodes; the pressure stays."""
+    """Find the derivatives once more, with the rupture line between the nodes; the pressure stays.
+
+    Parameters
+    ----------
+    search : Search
+    """
     for film in search.films:
         if film.forces is not None:
             wedge = (film.pad.pad_clearance, *film.approach(search.position))

@@ -44,6 +44,11 @@ PROGRESS, PATIENCE = 0.7, 12
 def iterate(search: Search) -> Equilibrium:
     """Iterate from where a search stands.
 
+    Parameters
+    ----------
+    search : Search
+        Left where the iteration ends.
+
     Returns
     -------
     Equilibrium

@@ -89,7 +89,18 @@ def _stop_at_untilted(carrying: list[PadFilm], moves: FloatArray) -> None:
 
 
 def pad_equations(setup: Setup, carrying: list[PadFilm]) -> PadEquations:
-    """Gather the equations of the pads that carry."""
+    """Gather the equations of the pads that carry.
+
+    Parameters
+    ----------
+    setup : Setup
+    carrying : list of PadFilm
+        Solved.
+
+    Returns
+    -------
+    PadEquations
+    """
     n = len(carrying)
     rows = PadEquations(
         frame=np.empty((n, 2, 2)),

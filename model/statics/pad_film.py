@@ -102,30 +102,76 @@ class PadFilm:
         return not self.idle and self.forces is not None and self.forces.steps < 0
 
     def rigid_approach(self, position: FloatArray) -> float:
-        """Approach a of the film if the pivot were rigid [m]."""
+        """Approach a of the film if the pivot were rigid [m].
+
+        Parameters
+        ----------
+        position : (2,) ndarray
+            Journal [m].
+
+        Returns
+        -------
+        float
+        """
         return self.preload_distance + float(self.normal @ position)
 
     def approach(self, position: FloatArray) -> tuple[float, float]:
-        """(a, b) of the film for a journal position and the pad's present tilt and deflection [m]."""
+        """(a, b) of the film for a journal position and the pad's present tilt and deflection [m].
+
+        Parameters
+        ----------
+        position : (2,) ndarray
+            Journal [m].
+
+        Returns
+        -------
+        tuple of float
+        """
         a = self.rigid_approach(position) - self.deflection
         b = float(self.tangent @ position) + self.pivot_radius * self.tilt
         return a, b
 
     def solve(self, position: FloatArray, surface_speed: float, oil: Oil) -> None:
-        """Solve the film's pressure for a journal position, at its present temperature and shape."""
+        """Solve the film's pressure for a journal position, at its present temperature and shape.
+
+        Parameters
+        ----------
+        position : (2,) ndarray
+            Journal [m].
+        surface_speed : float
+            Of the journal [m/s].
+        oil : Oil
+        """
         a, b = self.approach(position)
         set_viscosity(self.work, oil_constants(oil))
         wedge = (self.pad.pad_clearance, a, b)
         self.forces = self.corrected = self.solver(self.grid, self.work, wedge, surface_speed, False)
 
     def rest(self, position: FloatArray, surface_speed: float, oil: Oil) -> None:
-        """Say what the film of an idle pad does; nothing for one that carries."""
+        """Say what the film of an idle pad does; nothing for one that carries.
+
+        Parameters
+        ----------
+        position : (2,) ndarray
+            Journal [m].
+        surface_speed : float
+            Of the journal [m/s].
+        oil : Oil
+        """
         wedge = (self.pad.pad_clearance, self.rigid_approach(position))
         idle = self.idle or self.forces is None
         self.resting = resting_film(self.grid, wedge, surface_speed, oil, self.inlet, self.kept) if idle else None
 
     def heat(self, surface_speed: float, oil: Oil, limits: tuple[float, float]) -> float:
         """Move the temperature towards what the pressure makes it, by `limits`: relaxation, and largest step [K].
+
+        Parameters
+        ----------
+        surface_speed : float
+            Of the journal [m/s].
+        oil : Oil
+        limits : tuple of float
+            Relaxation, and largest step [K].
 
         Returns
         -------
@@ -143,7 +189,14 @@ class PadFilm:
         return limited
 
     def correct(self, surface_speed: float, oil: Oil) -> None:
-        """Say what a temperature that was found otherwise will do to the pressure; see `corrected`."""
+        """Say what a temperature that was found otherwise will do to the pressure; see `corrected`.
+
+        Parameters
+        ----------
+        surface_speed : float
+            Of the journal [m/s].
+        oil : Oil
+        """
         assert self.forces is not None
         change = pressure_change(self.grid, self.work, surface_speed, oil_constants(oil), self.pressure_change)
         self.corrected = self.forces._replace(force=self.forces.force + change)
@@ -157,7 +210,17 @@ class PadFilm:
 
 
 def pad_films(setup: Setup) -> list[PadFilm]:
-    """Lay out every pad's film."""
+    """Lay out every pad's film.
+
+    Parameters
+    ----------
+    setup : Setup
+
+    Returns
+    -------
+    list of PadFilm
+        Pad #1 first.
+    """
     bearing = setup.bearing
     symmetric = setup.misalignment[0] == 0.0
     solid = setup.flexible_pads or setup.options.conduction
@@ -195,5 +258,15 @@ def pad_films(setup: Setup) -> list[PadFilm]:
 
 
 def oil_constants(oil: Oil) -> tuple[float, float, float, float]:
-    """What the compiled viscosity and density need: mu_40, kappa, rho_40, alpha_v."""
+    """What the compiled viscosity and density need: mu_40, kappa, rho_40, alpha_v.
+
+    Parameters
+    ----------
+    oil : Oil
+
+    Returns
+    -------
+    tuple of float
+        [Pa s], [1/K], [kg/m^3], [1/K]
+    """
     return oil.viscosity_40, oil.viscosity_exponent, oil.density_40, oil.thermal_expansion

@@ -72,7 +72,17 @@ class Search:
         self.films = pad_films(self.setup)
 
     def start_from(self, start: Equilibrium) -> bool:
-        """Take over a neighbour's state; False if it has none or its mesh does not fit."""
+        """Take over a neighbour's state; False if it has none or its mesh does not fit.
+
+        Parameters
+        ----------
+        start : Equilibrium
+            The neighbour.
+
+        Returns
+        -------
+        bool
+        """
         if len(start.films) != len(self.films) or not start.converged:
             return False
         for film, other in zip(self.films, start.films, strict=True):
@@ -113,7 +123,13 @@ class Search:
         return np.concatenate(parts)
 
     def set_vector(self, state: FloatArray) -> None:
-        """Undo `vector`."""
+        """Undo `vector`.
+
+        Parameters
+        ----------
+        state : (n,) ndarray
+            Micrometres and kelvins.
+        """
         self.position = state[:2] * MICROMETRE
         at = 2
         for film in self.films:

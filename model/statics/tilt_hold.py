@@ -42,7 +42,20 @@ class TiltHold(NamedTuple):
 
 
 def tilt_hold(setup: Setup, tilt: float, load: float) -> TiltHold:
-    """Moment that holds a pad back at a tilt [rad] and pad load [N]."""
+    """Moment that holds a pad back at a tilt [rad] and pad load [N].
+
+    Parameters
+    ----------
+    setup : Setup
+    tilt : float
+        [rad]
+    load : float
+        Pad load [N].
+
+    Returns
+    -------
+    TiltHold
+    """
     stiffness, arm = setup.rotational_stiffness, 0.0
     if setup.rolling:
         roll = setup.rolling * rolling_radius(setup.bearing.pivot)
@@ -63,7 +76,16 @@ def tilt_hold(setup: Setup, tilt: float, load: float) -> TiltHold:
 
 
 def rolling_radius(pivot: Pivot) -> float:
-    """R_H R_b / (R_H - R_b): how far the contact moves per radian of tilt [m]; zero for a knife edge."""
+    """R_H R_b / (R_H - R_b): how far the contact moves per radian of tilt [m]; zero for a knife edge.
+
+    Parameters
+    ----------
+    pivot : Pivot
+
+    Returns
+    -------
+    float
+    """
     if pivot.kind == "rocker":
         seat, back = 0.5 * pivot.housing_diameter, 0.5 * pivot.pivot_diameter
         return seat * back / (seat - back)
@@ -71,7 +93,19 @@ def rolling_radius(pivot: Pivot) -> float:
 
 
 def friction_limits(setup: Setup, load: float) -> tuple[float, float]:
-    """Rotational stiffness of a sphere that does not slide [N m/rad], and the moment at which it does [N m]."""
+    """Rotational stiffness of a sphere that does not slide [N m/rad], and the moment at which it does [N m].
+
+    Parameters
+    ----------
+    setup : Setup
+    load : float
+        Pad load [N].
+
+    Returns
+    -------
+    stick, slip : float
+        [N m/rad], [N m]
+    """
     pivot = setup.bearing.pivot
     radius, load = 0.5 * pivot.sphere_diameter, max(load, 0.0)
     modulus, ratio = pivot.youngs_modulus, pivot.poissons_ratio

@@ -1,6 +1,6 @@
 """The baseline model against the truth files of the sample campaigns: the same physics by another program.
 
-physics.md pins the baseline down, so that K and C must agree to what meshes leave (0.5 %), positions to 0.1 um,
+docs/theory.md pins the baseline down, so that K and C must agree to what meshes leave (0.5 %), positions to 0.1 um,
 mid-length film temperatures to 0.05 K.
 """
 

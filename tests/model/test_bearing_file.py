@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+import model.units
 from model.bearing import BABBITT, STEEL, BearingError
 from model.bearing_file import load_bearing
-from model.units import UnitError, parse_quantity, to_si
+from model.units import COMMON_UNITS, UnitError, parse_quantity, pint_factor, to_si
 
 SECTIONS = {
     "journal": ["diameter"],
@@ -59,7 +60,7 @@ def test_bundled_rocker_is_the_papers(rocker_file):
     assert pad.preload == pytest.approx(1 - 80 / 130)
     assert math.degrees(pad.arc) == pytest.approx(63.5)
     assert pad.leading_edge == pytest.approx(-0.5 * pad.arc)
-    assert b.pivot_radius(pad) == pytest.approx(0.04993 + 130e-6 + 0.016)  # physics.md: R_P
+    assert b.pivot_radius(pad) == pytest.approx(0.04993 + 130e-6 + 0.016)  # docs/theory.md: R_P
     assert pad.elastic_thickness == pad.thickness
     assert (pad.backing, pad.babbitt) == (STEEL, BABBITT)
     assert b.oil.viscosity(40.0) == pytest.approx(0.0396)
@@ -226,3 +227,18 @@ def test_pint_quantities():
     with pytest.raises(UnitError, match="load"):
         to_si(5 * u.mm, "force", "load")
     assert to_si("5 kN", "force", "load") == pytest.approx(5000.0)
+
+
+@pytest.mark.parametrize(("dimension", "unit"), [(d, u) for d, units in COMMON_UNITS.items() for u in units])
+def test_common_units_are_those_of_pint(dimension, unit):
+    assert COMMON_UNITS[dimension][unit] == pint_factor(unit, dimension)
+
+
+def test_bundled_bearings_do_without_pint(rocker_file, monkeypatch):
+    def forbidden(unit: str, dimension: str) -> float:
+        raise AssertionError(f"{unit} is not among the common units of {dimension}")
+
+    monkeypatch.setattr(model.units, "pint_factor", forbidden)
+    model.units._factor.cache_clear()
+    for name in ("rocker.toml", "spherical.toml"):
+        assert load_bearing(rocker_file.with_name(name)).pads

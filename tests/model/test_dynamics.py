@@ -36,7 +36,7 @@ def dense(p: Prediction, omega: float) -> np.ndarray:
     for m, film in enumerate(films):
         z = film.forces.stiffness + 1j * omega * film.forces.damping
         pad, arm = film.pad, setup.bearing.pivot_radius(film.pad)
-        # columns: x, y, tilt, eta -> a, b, by the film thickness formula of physics.md
+        # columns: x, y, tilt, eta -> a, b, by the film thickness formula of docs/theory.md
         chain = np.array([[*film.normal, 0.0, -1.0], [*film.tangent, arm, 0.0]])
         force = z @ chain  # radial (outward on the pad) and tangential film force per unknown
         columns = [0, 1, 2 + 2 * m, 3 + 2 * m]

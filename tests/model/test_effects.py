@@ -1,4 +1,4 @@
-"""Effects: neutral values change nothing, the others exactly what physics.md says; messages; files; one's own."""
+"""Effects: neutral values change nothing, the others exactly what each says of itself; messages; files; one's own."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from model.setup import Setup
 from model.static_tests import dry_curve
 
 SPEED, OMEGA, LOAD, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, 5000.0, -math.pi / 2
-PHYSICS_MD = {
+NAMES = {
     "pivot_flexibility", "soft_pivot", "pad_offset", "thermal_growth", "preload_error", "oil_viscosity",
     "supply_temperature", "hot_oil_carryover", "pad_bending", "housing_flexibility", "fluid_inertia",
     "pivot_rotation", "pivot_damping", "misalignment", "starvation", "probe_gain", "probe_rotation",
@@ -64,8 +64,8 @@ def neutral(name: str) -> Effect:
     return Effect(name, **{k: (2 if k == "pad" else 0.3) if math.isnan(v) else v for k, v in values.items()})
 
 
-def test_library_has_the_names_of_physics_md():
-    assert set(known_effects()) >= PHYSICS_MD
+def test_library_has_every_name_that_users_know():
+    assert set(known_effects()) >= NAMES
     for kind in known_effects().values():
         assert kind.source, kind.name
         for p in kind.parameters:
@@ -73,7 +73,7 @@ def test_library_has_the_names_of_physics_md():
             assert math.isnan(p.neutral) or p.low <= p.neutral <= p.high
 
 
-@pytest.mark.parametrize("name", sorted(PHYSICS_MD))
+@pytest.mark.parametrize("name", sorted(NAMES))
 def test_neutral_value_changes_nothing(rocker, base, name):
     if known_effects()[name].missing(rocker):
         rocker = replace(rocker, pivot=replace(rocker.pivot, kind="spherical", sphere_diameter=0.4))

@@ -71,7 +71,7 @@ def test_tangent_is_the_derivative(law, w):
     assert law.vibration_stiffness(w) == law.stiffness(w)
 
 
-def test_tangents_named_in_physics_md():
+def test_tangents_of_the_printed_secants():
     rocker, sphere = formula_pivot(ROCKER), formula_pivot(SPHERE)
     for w in LOADS:
         assert sphere.stiffness(w) == pytest.approx(1.5 * sphere.secant(w), rel=1e-12)

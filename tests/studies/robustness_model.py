@@ -3,7 +3,7 @@
     python tests/studies/robustness_model.py [--cases 2000] [--seed 1]
 
 Latin hypercube over pads, arc, preload, clearance, offset, size, load, speed, pivots, load direction and oil. Every
-answer is checked from scratch: film thickness by the formula of physics.md, Reynolds' equation by plain numpy, force,
+answer is checked from scratch: film thickness by its formula, Reynolds' equation by plain numpy, force,
 moment and pivot balance, the heat fixed point, and for idle pads a search for a loaded attitude that was missed.
 """
 
@@ -165,7 +165,7 @@ def errors(p: Prediction) -> dict[str, float]:
 
 
 def thickness(bearing: Bearing, film: PadFilm, position: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-    """Film thickness by the formula of physics.md [m]."""
+    """Film thickness by the formula of docs/theory.md [m]."""
     pad, theta = film.pad, alpha + film.pad.pivot_angle
     return (
         pad.pad_clearance

@@ -44,7 +44,7 @@ FINER = Mesh(112, 8)
 class OtherProgram:
     """How far the program that writes a campaign is from ours, one standard deviation.
 
-    Two programs that solve the equations of `physics.md` were found 0.05 % apart in the direct coefficients, 0.02 um
+    Two programs that solve the same equations were found 0.05 % apart in the direct coefficients, 0.02 um
     in positions, 0.005 K in temperatures, and closer than 1 % in what effects do.
 
     Attributes
