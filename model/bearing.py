@@ -205,6 +205,8 @@ class Bearing:
         Pad #1 first.
     pivot : Pivot
     oil : Oil
+    tolerances : tuple of (str, float)
+        Name and value of every line of ``[tolerances]``: how well the drawing is known, one standard deviation, SI.
     """
 
     name: str
@@ -214,6 +216,7 @@ class Bearing:
     pivot: Pivot
     oil: Oil
     source: str = field(default="", compare=False)
+    tolerances: tuple[tuple[str, float], ...] = field(default=(), compare=False)
 
     @property
     def journal_radius(self) -> float:

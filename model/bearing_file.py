@@ -57,8 +57,16 @@ _KEYS: dict[str, dict[str, str]] = {
 _OPTIONAL = {
     "schema", "name", "grade", "elastic_thickness", "babbitt_thickness", "back_convection", "pivot_offset",
     "contact_length", "housing_diameter", "pivot_diameter", "sphere_diameter", "youngs_modulus", "poissons_ratio",
-    "pads.backing", "pads.babbitt",
+    "pads.backing", "pads.babbitt", "tolerances",
 }  # fmt: skip
+#: How well drawing and data sheet are known, one standard deviation each (`rig-export.md`).
+_TOLERANCES = {
+    "viscosity": "ratio", "viscosity_exponent": "ratio", "supply_temperature": "temperature difference",
+    "assembled_clearance": "length", "pad_clearance": "length", "clearance_scatter": "length",
+    "pivot_stiffness_scatter": "ratio", "film_heat": "ratio", "thermometer": "temperature difference",
+    "probe_gain": "ratio", "model": "ratio",
+}  # fmt: skip
+_KEYS["tolerances"] = _TOLERANCES
 _MAY_BE_ZERO = {"babbitt_thickness", "back_convection", "viscosity_exponent", "thermal_expansion", "mass",
                 "moment_of_inertia", "conductivity"}  # fmt: skip
 _PER_PAD = {"pivot_angles", "arc", "pivot_offset", "assembled_clearance", "pad_clearance"}
@@ -142,6 +150,7 @@ def parse_bearing(text: str, name: str) -> Bearing:
             grade=oil.get("grade", ""),
         ),
         source=name,
+        tolerances=tuple(values["tolerances"].items()),
     )
     return bearing
 
@@ -175,6 +184,8 @@ def _read_section(section: dict[str, Any], key: str, name: str) -> dict[str, Any
     material = key.startswith("pads.")
     if material and not section:
         return out
+    if key == "tolerances":
+        return {entry: _read_tolerance(value, entry, name) for entry, value in section.items()}
     for entry, dimension in _KEYS[key].items():
         where = f"{name}, [{key}] {entry}" if key else f"{name}, {entry}"
         if entry not in section:
@@ -183,6 +194,17 @@ def _read_section(section: dict[str, Any], key: str, name: str) -> dict[str, Any
             raise BearingError(f"{where}: missing. Add it with its unit; see the bundled rocker.toml.")
         out[entry] = _read_value(section[entry], entry, dimension, where)
     return out
+
+
+def _read_tolerance(value: Any, entry: str, name: str) -> float:
+    where = f"{name}, [tolerances] {entry}"
+    try:
+        number = float(parse_quantity(value, _TOLERANCES[entry], where))
+    except UnitError as error:
+        raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
+    if not 0.0 <= number < math.inf:
+        raise BearingError(f"{where}: must be zero or more, got {value!r}.")
+    return number
 
 
 def _read_value(value: Any, entry: str, dimension: str, where: str) -> Any:

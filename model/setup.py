@@ -73,6 +73,8 @@ class Setup:
         xx, xy and yy of the compliance in series with the whole bearing [m/N].
     added_mass : float
         [kg]
+    parallel_stiffness, parallel_damping : tuple of float
+        xx, xy, yx and yy of what stands beside bearing and structure in dynamic tests [N/m], [N s/m].
     instruments : Instruments
         What stands between this bearing and the records; the solver does not look at it.
     accuracy : float
@@ -100,6 +102,8 @@ class Setup:
     heat_loss: float = 0.0
     series_compliance: tuple[float, float, float] = (0.0, 0.0, 0.0)
     added_mass: float = 0.0
+    parallel_stiffness: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    parallel_damping: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     instruments: Instruments = field(default_factory=Instruments)
     clearance_change: float = 0.0
     accuracy: float = 1e-7

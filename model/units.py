@@ -25,6 +25,7 @@ SI_UNITS = {
     "mass": "kg",
     "force": "N",
     "stiffness": "N/m",
+    "compliance": "m/N",
     "damping": "N*s/m",
     "rotational stiffness": "N*m/rad",
     "moment of inertia": "kg*m^2",

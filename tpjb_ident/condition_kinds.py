@@ -152,6 +152,8 @@ NOTES = {
     "no-physical-law": "No contact law describes the points; a smooth monotone curve stands in.",
     "no-spare-direction": "With two directions only, the interval holds how repeats differ, not how runs do. "
     "Excite in a third direction.",
+    "structure-gives": "A compliant structure between bearing and probes bends the displacements of the dry tests; the "
+    "curves hold it as well as the pivots.",
     "speed drifts": "The shaft speed moved during the record; its lines were followed window by window.",
     "unexpected lines": "The records hold lines that the manifest does not explain; they were fitted along.",
 }

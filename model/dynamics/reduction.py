@@ -202,12 +202,32 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
         With added mass and series compliance, before any instrument.
     """
     pads = [m for film in equilibrium.films if (m := pad_matrices(setup, film)) is not None]
-    h = reduce_pads(pads, omega, setup.vibration)
+    return with_structure(setup, reduce_pads(pads, omega, setup.vibration), omega)
+
+
+def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexArray:
+    """What the structure around a bearing makes of its impedance.
+
+    Parameters
+    ----------
+    setup : Setup
+    h : (n, 2, 2) complex ndarray
+        Of the bearing alone [N/m].
+    omega : (n,) ndarray
+        [rad/s]
+
+    Returns
+    -------
+    (n, 2, 2) complex ndarray
+    """
     if setup.added_mass:
         h = h - (omega**2)[:, None, None] * setup.added_mass * np.eye(2)
     if any(setup.series_compliance):
         # of C and h both may be singular: (1 + h C)^-1 h needs neither inverse
         h = np.linalg.solve(np.eye(2) + h @ setup.structure, h).astype(np.complex128, copy=False)
+    if any(setup.parallel_stiffness) or any(setup.parallel_damping):
+        k, c = (np.reshape(v, (2, 2)) for v in (setup.parallel_stiffness, setup.parallel_damping))
+        h = h + k + 1j * omega[:, None, None] * c
     return h
 
 

@@ -11,20 +11,10 @@ from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
-from tests.studies.diagnosis.bench import Bench
-from tests.studies.diagnosis.next_test_bench import followed_by_all, next_bench, of_data_set, tabled
-from tests.studies.diagnosis.next_test_trials import NextTrial, next_trials, run_next_trial
-from tests.studies.diagnosis.surrogate import EffectTable, Surrogate, tabulate
-from tpjb_ident.diagnose.diagnose import pose
-from tpjb_ident.diagnose.forward.forward import Forward
-from tpjb_ident.diagnose.forward.nuisance import whitener
-from tpjb_ident.diagnose.next_test.checks import CHECKS
 from tpjb_ident.diagnose.next_test.designs import Design, designs
 from tpjb_ident.diagnose.next_test.mirrored import mirrored, reversible
 from tpjb_ident.diagnose.observations.layout import Layout
-from tpjb_ident.diagnose.plan.data_sets import masks, part_of
-from tpjb_ident.diagnose.plan.planned import around, dry, dynamic, planned_observations
-from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+from tpjb_ident.diagnose.plan.planned import dynamic
 
 BEARINGS = Path(__file__).parents[2] / "model" / "bearings"
 SPEED = 2 * math.pi * 22
@@ -112,75 +102,3 @@ def test_plenty_of_oil_ends_starvation_and_is_no_test_for_carry_over(setup, foun
     assert not plenty.acting(starved)
     assert plenty.fits(starved, [])
     assert not plenty.fits(starved, carried)
-
-
-@pytest.fixture(scope="module")
-def bench(setup):
-    lines = [2 * math.pi * f for f in (20.0, 25.0, 30.0)]
-    sweep = dynamic([3000.0, 7000.0], lines, SPEED, -math.pi / 2, 5)
-    layout = Layout(sweep, around(5000.0, 3, SPEED), dry(range(1, 6)), 200.0)
-    planned = planned_observations(setup, layout)
-    forward = Forward(setup, layout, planned.elements)
-    posed = pose(planned, forward, DiagnoseSettings())
-    posed = replace(posed, pool=tuple(c for c in posed.pool if c.name in ALIKE))
-    factor = whitener(posed.observations, posed.nuisances.columns)
-    tables = tuple(tabulate(forward, posed.base, c, factor, 25.0) for c in posed.pool)
-    surrogate = Surrogate(planned.elements, posed.base, posed.pool, tables)
-    return Bench(planned, posed, surrogate, np.zeros_like(posed.base))
-
-
-@pytest.mark.slow
-def test_parts_of_a_campaign_have_their_elements_and_their_tests(bench):
-    layout = bench.observations.layout
-    speeds = {t.speed for t in layout.dynamic}
-    for name, mask in masks(bench.observations.elements, speeds).items():
-        if name in "ABCD":
-            alone = of_data_set(bench, name)
-            assert len(alone.observations) == mask.sum()
-            assert alone.observations.layout == part_of(layout, name)
-    assert part_of(layout, "A").dynamic[0].excitation == (LINE,)
-    assert not part_of(layout, "B").locus
-    assert part_of(layout, "C").push_load == 200.0
-
-
-@pytest.mark.slow
-def test_a_test_that_follows_settles_what_the_campaign_cannot_tell(setup, bench):
-    alone = of_data_set(bench, "B")
-    wanted = ("viscometer", "probes moved", "balance", "1000 N, cold")
-    options = [*designs(setup, alone.observations.layout), *CHECKS]
-    chosen = [o for o in options if any(w in o.words for w in wanted)]
-    assert len(chosen) == len(wanted)
-    nb = next_bench(alone, [tabled(setup, alone, o) for o in chosen])
-    assert len(nb.whole.observations) == len(alone.observations) + sum(len(p.seen) for p in nb.parts)
-    rows = [run_next_trial((nb, alone), t) for t in next_trials([c.label for c in alone.pool], "B", 3)]
-    asked = [r for r in rows if "then_tests" in r]
-    assert len(asked) >= 5
-    assert {r["verdict"] for r in asked} == {"ambiguous"}
-    assert np.mean([r["then_settled"] for r in asked]) >= 0.8
-    assert np.mean([r["then_settled"] for r in asked]) > np.mean([r["random_settled"] for r in asked])
-    first = asked[0]
-    trial = NextTrial("hidden", first["truth"], first["size"], 1.0, first["number"], "B")
-    assert run_next_trial((nb, alone), trial) == first
-    assert all(r["then_expected"] > r["apart_now"] for r in asked)
-
-
-def thinned(surrogate):
-    """Tables of the ends and the neutral amplitude alone: a few solves each, kept in files like any others."""
-    tables = []
-    for candidate, table in zip(surrogate.candidates, surrogate.tables, strict=True):
-        (neutral,) = np.flatnonzero(table.amplitudes == candidate.neutral)
-        kept = sorted({0, int(neutral), len(table.amplitudes) - 1})
-        tables.append(EffectTable(table.amplitudes[kept], table.changes[kept]))
-    return replace(surrogate, tables=tuple(tables))
-
-
-@pytest.mark.slow
-def test_tables_of_tests_are_kept_between_runs(setup, bench, tmp_path):
-    short = of_data_set(bench, "A")
-    short = replace(short, surrogate=thinned(short.surrogate))
-    first = followed_by_all(setup, short, lambda name: tmp_path / f"{name}.npz")
-    files = {p.name: p.stat().st_mtime_ns for p in tmp_path.iterdir()}
-    again = followed_by_all(setup, short, lambda name: tmp_path / f"{name}.npz")
-    assert {p.name: p.stat().st_mtime_ns for p in tmp_path.iterdir()} == files
-    assert np.array_equal(first.whole.surrogate.base, again.whole.surrogate.base)
-    assert len(files) == sum(isinstance(p.option, Design) for p in first.parts)

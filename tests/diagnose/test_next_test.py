@@ -9,7 +9,7 @@ from model.bearing_file import load_bearing
 from model.effects import Effect, kind_of
 from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
-from tpjb_ident.diagnose.forward.nuisance import Certificates
+from tpjb_ident.diagnose.forward.tolerances import Tolerances
 from tpjb_ident.diagnose.next_test.checks import CHECKS, Check
 from tpjb_ident.diagnose.next_test.designs import Design, designs
 from tpjb_ident.diagnose.next_test.rank import (
@@ -62,7 +62,7 @@ def test_probes_on_the_housing_do_not_see_its_spring(setup):
     point = Layout(dynamic([5000.0], [SPEED], SPEED, -math.pi / 2, 0))
     (blind,) = (d for d in designs(setup, point) if "housing_flexibility" in d.blind)
     seeing, not_seeing = Design("from the frame", point), Design("from the housing", point, blind.blind)
-    ranked = rank_designs(setup, spring, [[]], [seeing, not_seeing], Certificates())
+    ranked = rank_designs(setup, spring, [[]], [seeing, not_seeing], Tolerances())
     assert [s.design.words for s in ranked] == ["from the frame", "from the housing"]
     assert ranked[0].expected > 3.0
     assert ranked[1].expected == 0.0
@@ -72,7 +72,7 @@ def test_checks_are_ranked_beside_tests_on_the_rig(setup):
     slow, heavy = [Effect("channel_delay", delay=2e-5)], [Effect("fluid_inertia", added_mass=40.0)]
     options = [o for o in options_for(setup, Layout(())) if isinstance(o, Check)]
     assert len(options) == len(CHECKS)
-    ranked = rank_designs(setup, slow, [heavy], options, Certificates())
+    ranked = rank_designs(setup, slow, [heavy], options, Tolerances())
     assert ranked[0].design is by_effect("channel_delay")
 
 

@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.command_line import tpjb
-from tests.studies.diagnosis.evaluate import app
 from tests.studies.evidence.case import case_residuals, case_table
 from tests.studies.evidence.counts import abstention_table, confusion_matrix, impostors_table, plans_table
 from tests.studies.evidence.measures import closure_table, coverage_table, p_value_table, power_table, rules_table
@@ -16,14 +14,9 @@ from tests.studies.evidence.next_tests import next_test_pairs, next_test_table, 
 from tests.studies.evidence.rows import RowsError, read_rows, write_rows
 from tests.studies.evidence.shares import share_interval
 from tests.studies.evidence.tables import evidence_tables
-from tests.studies.evidence_cases import followed, row, rows
+from tests.studies.evidence_cases import row, rows
 
 ROCKER = Path(__file__).parents[2] / "model" / "bearings" / "rocker.toml"
-
-
-def evaluate(*words):
-    """Run the evaluation as from the shell."""
-    return tpjb(*words, app=app)
 
 
 def only(frame, **wanted):
@@ -148,63 +141,3 @@ def test_plans_are_told_apart():
 
 def test_a_table_without_a_line_is_left_out():
     assert set(evidence_tables([row("none", "consistent", p_before=0.5)])) == {"summary", "p_values"}
-
-
-@pytest.mark.slow
-def test_old_rows_become_tables_figures_and_a_page(tmp_path):
-    bearing = tmp_path / "rocker.toml"
-    bearing.write_text("not needed for old rows", encoding="utf-8")
-    file = tmp_path / "rows.jsonl"
-    write_rows(file, rows())
-    out = tmp_path / "out"
-    result = evaluate(bearing, "--rows", file, "--out", out)
-    assert result.exit_code == 0, result.output
-    page = (out / "report.html").read_text(encoding="utf-8")
-    assert "False alarms (surrogate): 1 of 21" in page
-    for name in ("power", "confusion-6", "left-out-12", "coverage", "closure-surrogate", "p-values", "rules"):
-        assert f'id="{name}"' in page
-        assert (out / "figures" / f"{name}.svg").exists()
-        assert (out / "figures" / f"{name}.png").exists()
-    assert len(read_rows([out / "rows.jsonl"])) == len(rows())
-    assert json.loads((out / "run.json").read_text(encoding="utf-8"))
-    assert "## impostors" in (out / "evidence.md").read_text(encoding="utf-8")
-
-
-@pytest.mark.slow
-def test_next_tests_alone_are_evidence_too(tmp_path):
-    bearing = tmp_path / "rocker.toml"
-    bearing.write_text("", encoding="utf-8")
-    write_rows(tmp_path / "rows.jsonl", followed())
-    arguments = [str(bearing), "--rows", str(tmp_path / "rows.jsonl"), "--out", str(tmp_path / "out")]
-    result = evaluate(*arguments)
-    assert result.exit_code == 0, result.output
-    assert "What the suggested next test settles" in result.output
-    assert (tmp_path / "out" / "figures" / "next-tests.png").exists()
-
-
-def test_rows_that_are_none_are_refused(tmp_path):
-    file = tmp_path / "rows.jsonl"
-    file.write_text("{}\n", encoding="utf-8")
-    bearing = tmp_path / "rocker.toml"
-    bearing.write_text("", encoding="utf-8")
-    result = evaluate(bearing, "--rows", file, "--out", tmp_path / "out")
-    assert result.exit_code == 2
-    assert "no trial" in result.output
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("option", "value", "said"),
-    [("--sizes", "six", "--sizes 'six'"), ("--noises", "-1", "positive"), ("--sizes", "1e9", "million")],
-)
-def test_evaluate_refuses_sizes_that_are_none(tmp_path, option, value, said):
-    result = evaluate(ROCKER, f"{option}={value}", "--out", tmp_path / "out")
-    assert result.exit_code == 2
-    assert said in result.output
-    assert not (tmp_path / "out").exists()
-
-
-def test_evaluate_takes_processes_or_a_cluster_not_both(tmp_path):
-    result = evaluate(ROCKER, "--workers", 2, "--scheduler", "tcp://nobody:1", "--out", tmp_path / "out")
-    assert result.exit_code == 2
-    assert "exclude each other" in result.output

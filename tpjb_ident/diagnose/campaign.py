@@ -10,11 +10,14 @@ from tpjb_ident.compare.comparison import ComparisonError
 from tpjb_ident.compare.measured_pivots import measured_laws
 from tpjb_ident.compare.static_tests import measure_static
 from tpjb_ident.diagnose.diagnose import Diagnosis, diagnose
-from tpjb_ident.diagnose.forward.nuisance import Certificates
+from tpjb_ident.diagnose.forward.forward import SENSOR
+from tpjb_ident.diagnose.forward.tolerances import Stated, Tolerances
+from tpjb_ident.diagnose.observations.from_table import observe_table
 from tpjb_ident.diagnose.observations.housing import with_housing
 from tpjb_ident.diagnose.observations.observe import observe
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.dynamic.identify import IdentifySettings, identify
+from tpjb_ident.errors import BadInputError
 from tpjb_ident.presentation import Presented
 
 from model.effects import Effect, apply_effects  # isort: skip
@@ -24,6 +27,7 @@ from model.setup import Setup  # isort: skip
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     import pandas as pd
 
@@ -59,7 +63,7 @@ class CampaignDiagnosis(Presented):
     """A diagnosis with what it was made from."""
 
     diagnosis: Diagnosis
-    identification: Identification
+    identification: Identification | None
     setup: Setup
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -73,8 +77,9 @@ class CampaignDiagnosis(Presented):
         from tpjb_ident.report.diagnosis_coefficients import median_deviations
         from tpjb_ident.report.diagnosis_words import verdict_sentences
 
+        name = self.identification.campaign if self.identification is not None else "table"
         off = median_deviations(self.to_dataframe())
-        return "\n".join(verdict_sentences(self.identification.campaign, self.diagnosis.verdict, off))
+        return "\n".join(verdict_sentences(name, self.diagnosis.verdict, off))
 
     def plot(self, **options: Any) -> Any:
         """Draw the gap by observable, before and after; see `tpjb_ident.report.plots.gap`.
@@ -90,6 +95,14 @@ class CampaignDiagnosis(Presented):
 
 
 @dataclass(frozen=True)
+class TableSource:
+    """A table of coefficients in the place of a campaign: what pages call it."""
+
+    id: str
+    description: str = "K and C from a table"
+
+
+@dataclass(frozen=True)
 class Measured:
     """All that a diagnosis needs of a campaign, without its records; it can be kept and diagnosed again.
 
@@ -101,7 +114,10 @@ class Measured:
     locus : Locus or None
     instruments : Instruments
         Housing mass and stiffness of the cells under it, as the campaign shows them.
-    certificates : Certificates
+    tolerances : Tolerances
+        What may be off, as bearing file, manifest and defaults state it.
+    sensors : tuple of float
+        Fraction of the arc at which every pad carries its thermometer.
     """
 
     identification: Identification = field(repr=False)
@@ -109,7 +125,8 @@ class Measured:
     polygon: ClearancePolygon | None = field(repr=False)
     locus: Locus | None = field(repr=False)
     instruments: Instruments
-    certificates: Certificates
+    tolerances: Tolerances
+    sensors: tuple[float, ...] = ()
 
 
 def diagnose_campaign(
@@ -128,7 +145,7 @@ def diagnose_campaign(
     bearing : Bearing
     baseline : Baseline, optional
     settings : DiagnoseSettings, optional
-        Certificates of probes and cells are read from the campaign's manifest.
+        Tolerances that the bearing file and the campaign's manifest state take the place of defaults.
     progress : callable, optional
         ``progress(text, done, total)``.
     estimator : IdentifySettings, optional
@@ -139,14 +156,14 @@ def diagnose_campaign(
         The campaign has no dynamic runs.
     """
     settings = settings or DiagnoseSettings()
-    measured = measure_campaign(campaign, bearing, settings.certificates, progress, estimator)
+    measured = measure_campaign(campaign, bearing, settings.tolerances, progress, estimator)
     return diagnose_measured(measured, bearing, baseline, settings, progress)
 
 
 def measure_campaign(
     campaign: Campaign,
     bearing: Bearing,
-    known: Certificates | None = None,
+    known: Tolerances | None = None,
     progress: Callable[[str, int, int], None] | None = None,
     estimator: IdentifySettings | None = None,
 ) -> Measured:
@@ -156,8 +173,8 @@ def measure_campaign(
     ----------
     campaign, bearing, progress, estimator
         As of `diagnose_campaign`.
-    known : Certificates, optional
-        What counts where the manifest is silent.
+    known : Tolerances, optional
+        What counts where bearing file and manifest are silent; what the command line states counts in any case.
 
     Raises
     ------
@@ -175,10 +192,10 @@ def measure_campaign(
     curves, polygon, locus = static.curves, static.clearance, static.locus
     found = replace(found, conditions=found.conditions + static.left_out)
     housing = with_housing(Setup(bearing, pivot_laws("rigid", bearing)), campaign).instruments
-    certain = certificates(campaign, known or Certificates())
+    certain = stated_tolerances(campaign, bearing, known or Tolerances())
     if polygon is None and locus is not None:
         certain = replace(certain, centre=unknown_centre(locus))
-    return Measured(found, tuple(curves), polygon, locus, housing, certain)
+    return Measured(found, tuple(curves), polygon, locus, housing, certain, sensor_positions(campaign, bearing))
 
 
 def diagnose_measured(
@@ -195,11 +212,12 @@ def diagnose_measured(
     ----------
     measured : Measured
     bearing, baseline, settings, progress
-        As of `diagnose_campaign`; the certificates are those of `measured`.
+        As of `diagnose_campaign`; the tolerances are those of `measured`.
     memory : Memory, optional
         Answers of the model at this bearing's baseline, known from before.
     """
     baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
+    settings = settings.with_tolerances(measured.tolerances)
     tell = progress or (lambda text, done, total: None)
     found, curves = measured.identification, measured.curves
     given = baseline.pivots == "measured"
@@ -210,11 +228,45 @@ def diagnose_measured(
     observations = observe(
         found, () if given else curves, measured.locus, measured.polygon, settings.tolerance
     )  # fmt: skip
-    certain = replace(settings, certificates=measured.certificates)
+    observations = replace(observations, layout=replace(observations.layout, temperature_position=measured.sensors))
     result = diagnose(
-        observations, setup, certain, lambda text, share: tell(f"diagnosing, {text}", 30 + int(70 * share), 100), memory
+        observations,
+        setup,
+        settings,
+        lambda text, share: tell(f"diagnosing, {text}", 30 + int(70 * share), 100),
+        memory,
     )
     return CampaignDiagnosis(result, found, setup)
+
+
+def diagnose_table(
+    path: Path,
+    bearing: Bearing,
+    baseline: Baseline | None = None,
+    settings: DiagnoseSettings | None = None,
+    reading_error: float | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> CampaignDiagnosis:
+    """Find what a model lacks to give the K and C of a table.
+
+    Parameters
+    ----------
+    path : Path
+        See `observe_table`.
+    bearing, baseline, settings, progress
+        As of `diagnose_campaign`.
+    reading_error : float, optional
+        Standard error of values without one in the table, as a share.
+    """
+    baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
+    tell = progress or (lambda text, done, total: None)
+    if baseline.pivots == "measured":
+        raise BadInputError("--pivots measured: a table holds no dry tests. Give kirk, rigid or a pivots.toml.")
+    settings = settings.with_tolerances(settings.tolerances.layered(bearing))
+    observations = observe_table(path, reading_error, settings.tolerance)
+    setup = apply_effects(Setup(bearing, pivot_laws(baseline.pivots, bearing), baseline.thermal), baseline.effects)
+    result = diagnose(observations, setup, settings, lambda text, share: tell(text, int(100 * share), 100))
+    return CampaignDiagnosis(result, None, setup)
 
 
 def unknown_centre(locus: Locus) -> float:
@@ -225,14 +277,34 @@ def unknown_centre(locus: Locus) -> float:
     return max(1e-3, 3.0 * max(math.hypot(*p.position) for p in locus.points))
 
 
-def certificates(campaign: Campaign, known: Certificates) -> Certificates:
-    """Calibration uncertainties that a manifest states; where it is silent the defaults stay."""
+def stated_tolerances(campaign: Campaign, bearing: Bearing, known: Tolerances) -> Tolerances:
+    """Tolerances by the weight of their source: command line, bearing file, manifest, defaults.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        Its manifest may state uncertainties of probes and cells.
+    bearing : Bearing
+        Its file may have ``[tolerances]``.
+    known : Tolerances
+        Defaults, and what the command line states.
+    """
+    found = known.layered(bearing)
     probes = [c for c in campaign.channels.values() if c.quantity == "displacement" and c.axis is not None]
     cells = [c for c in campaign.channels.values() if c.quantity == "force" and c.uncertainty]
+    gains = [float(p.uncertainty) for p in probes if p.uncertainty]
+    if gains and found.stated["probe_gain"].source == "default":
+        found = found.states({"probe_gain": max(gains)}, "manifest")
     if len(probes) == 2 and abs(math.sin(float(probes[0].axis or 0.0) - float(probes[1].axis or 0.0))) > 0.05:
-        axes = (float(probes[0].axis or 0.0), float(probes[1].axis or 0.0))
-        gains = tuple(float(p.uncertainty or g) for p, g in zip(probes, known.probe_gain, strict=True))
-        known = replace(known, probe_axes=axes, probe_gain=(gains[0], gains[1]))
+        found = replace(found, probe_axes=(float(probes[0].axis or 0.0), float(probes[1].axis or 0.0)))
     if cells:
-        known = replace(known, cell_gain=max(float(c.uncertainty or 0.0) for c in cells))
-    return known
+        gain = max(float(c.uncertainty or 0.0) for c in cells)
+        found = replace(found, cell_gain=Stated(gain, "1", "manifest"))
+    return found
+
+
+def sensor_positions(campaign: Campaign, bearing: Bearing) -> tuple[float, ...]:
+    """Fraction of the arc at which every pad carries its thermometer, as the manifest states it; else 0.75."""
+    given = {int(c.pad): float(c.position) for c in campaign.channels.values()
+             if c.quantity == "temperature" and c.pad is not None and c.position is not None}  # fmt: skip
+    return tuple(given.get(k, SENSOR) for k in range(1, len(bearing.pads) + 1))

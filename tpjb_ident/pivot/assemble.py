@@ -46,6 +46,8 @@ class Choice:
         Likely laws, most likely first.
     weights : (n,) ndarray
         Their shares.
+    structure : str
+        What is said of a structure that bends the displacements; empty where there is none.
     """
 
     records: tuple[DryRecord, ...]
@@ -53,6 +55,7 @@ class Choice:
     directions: tuple[tuple[PadDirection, PadDirection], ...]
     fits: tuple[LawFit, ...]
     weights: FloatArray
+    structure: str = ""
 
 
 def assemble_curve(choice: Choice, noise: NoiseModel, settings: PivotSettings, refused: tuple[str, ...]) -> PivotCurve:
@@ -184,7 +187,9 @@ def _status(
     if abs(choice.directions[0][0].angle) > settings.angle_warning:
         found.append(Condition("load-off-pad", str(choice.directions[0][0])))
     aside = choice.directions[0][1]
-    if abs(aside.angle) > 0.5 * settings.displacement_angle_limit:
+    if choice.structure:
+        found.append(Condition("structure-gives", choice.structure))
+    elif abs(aside.angle) > 0.5 * settings.displacement_angle_limit:
         found.append(Condition("moves-aside", f"the shaft goes {aside}"))
     if onset > 0.0:
         found.append(Condition("contact-incomplete", f"below {onset:.0f} N"))

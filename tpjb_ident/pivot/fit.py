@@ -21,7 +21,7 @@ from tpjb_ident.pivot.laws.spline_law import SplineLaw
 from tpjb_ident.pivot.records.dry_record import DryRecord, read_dry_run
 from tpjb_ident.pivot.records.noise_of_records import noise_about_curve, noise_within_holds
 from tpjb_ident.pivot.records.projection import PadDirection
-from tpjb_ident.pivot.records.refusals import check_directions, check_pickup, check_placement
+from tpjb_ident.pivot.records.refusals import check_directions, check_pickup, check_placement, structure_of
 from tpjb_ident.pivot.records.settings import PivotSettings
 from tpjb_ident.slow_records.noise import NoiseModel
 
@@ -44,6 +44,14 @@ class _Pad:
     records: tuple[DryRecord, ...]
     good: tuple[BoolArray, ...]
     directions: tuple[tuple[PadDirection, PadDirection], ...]
+
+
+@dataclass(frozen=True)
+class _Said:
+    """What is to be said of every curve: runs left out, and a structure that bends the displacements."""
+
+    refused: tuple[str, ...]
+    structure: str
 
 
 def fit_pivots(
@@ -78,10 +86,11 @@ def fit_pivots(
     problems += check_placement(records) + check_pickup(records)
     refused = {problem.run for problem in problems}
     noise = noise_within_holds(records, chosen.drift_rate) if records else NoiseModel(1.0, 1.0, 1.0)
+    structure = structure_of(records, noise, chosen)
     pads: dict[int, list[tuple[DryRecord, tuple[PadDirection, PadDirection]]]] = {}
     for record in records:
         try:
-            directions = check_directions(record, noise, chosen, angles)
+            directions = check_directions(record, noise, chosen, angles, structure)
         except RigDataError as error:
             problems += error.problems
             continue
@@ -91,7 +100,8 @@ def fit_pivots(
     many = 2 * len(reasons) >= len(campaign.of_kind("dry_pivot"))
     if problems and (chosen.on_refusal == "raise" or not pads or (chosen.on_refusal == "few" and many)):
         raise RigDataError(problems)
-    return _curves(pads, noise, chosen, tuple(f"{run} ({reasons[run]})" for run in sorted(reasons)))
+    left_out = tuple(f"{run} ({reasons[run]})" for run in sorted(reasons))
+    return _curves(pads, noise, chosen, _Said(left_out, str(structure or "")))
 
 
 def _read(campaign: Campaign, angles: FloatArray, settings: PivotSettings) -> tuple[list[DryRecord], list[Problem]]:
@@ -116,7 +126,7 @@ def _curves(
     pads: dict[int, list[tuple[DryRecord, tuple[PadDirection, PadDirection]]]],
     first_noise: NoiseModel,
     settings: PivotSettings,
-    refused: tuple[str, ...],
+    said: _Said,
 ) -> tuple[PivotCurve, ...]:
     """Drop bad holds, learn the noise about the curves, fit every law, weigh the laws over the pads."""
     numbers = sorted(pads)
@@ -135,8 +145,8 @@ def _curves(
     curves = []
     for member, candidates, shares in zip(members, fits, weights, strict=True):
         likely, kept = keep_likely(candidates, shares)
-        choice = Choice(member.records, member.good, member.directions, likely, kept)
-        curves.append(assemble_curve(choice, noise, settings, refused))
+        choice = Choice(member.records, member.good, member.directions, likely, kept, said.structure)
+        curves.append(assemble_curve(choice, noise, settings, said.refused))
     return tuple(curves)
 
 

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 BEFORE, AFTER = "model before", "with the effects found"
 
 
-def before_and_after(diagnosis: Diagnosis, identification: Identification) -> pd.DataFrame:
+def before_and_after(diagnosis: Diagnosis, identification: Identification | None) -> pd.DataFrame:
     """Make a table as comparison.csv of a diagnosis.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-    identification : Identification
-        That it was made from.
+    identification : Identification or None
+        That it was made from; without one, from a table of coefficients, there are no rows.
 
     Returns
     -------
@@ -38,12 +38,12 @@ def before_and_after(diagnosis: Diagnosis, identification: Identification) -> pd
     """
     import pandas as pd
 
-    models = [(BEFORE, diagnosis.found.baseline)]
-    models += [(AFTER, diagnosis.found.model)] if diagnosis.verdict.effects else []
+    models = [(BEFORE, diagnosis.problem.base)]
+    models += [(AFTER, diagnosis.after)] if diagnosis.verdict.effects else []
     frames = []
-    for name, fit in models:
-        predicted = _by_point(diagnosis, fit.prediction)
-        for p in identification.points:
+    for name, prediction in models:
+        predicted = _by_point(diagnosis, prediction)
+        for p in identification.points if identification is not None else ():
             own = predicted.get((round(p.point.static_load, 6), round(p.point.excitation, 6)), {})
             row: dict[str, Any] = {"pivots": name, **point_columns(p), **coefficient_columns(p.stiffness)}
             for kind, omega in ((STIFFNESS, 1.0), (DAMPING, p.point.excitation)):
@@ -78,7 +78,9 @@ def median_deviations(table: pd.DataFrame) -> dict[str, tuple[float, float]]:
     dict of str to (float, float)
         Equal where no effect was named.
     """
-    found = {}
+    found: dict[str, tuple[float, float]] = {}
+    if table.empty:
+        return found
     for name in ("kxx", "kyy", "cxx", "cyy"):
         off = (table[f"{coefficient_column(name)}_ratio"] - 1.0).groupby(table["pivots"]).median()
         if BEFORE in off and np.isfinite(off[BEFORE]):

@@ -85,7 +85,7 @@ def _effect_sections(verdict: Verdict) -> list[Section]:
 def _coefficient_sections(table: pd.DataFrame) -> list[Section]:
     """K and C over load and frequency: measured, before and after."""
     groups: dict[str, list[Panel]] = {}
-    for one in coefficient_panels(table):
+    for one in coefficient_panels(table) if len(table) else ():
         groups.setdefault(one.group, []).append(one)
     return [Section(heading, panels=panels) for heading, panels in groups.items()]
 
@@ -107,13 +107,14 @@ def _sections(result: CampaignDiagnosis, table: pd.DataFrame) -> list[Section]:
     verdict = result.diagnosis.verdict
     note = (
         "Sigma joins measurement noise and the stated model tolerance. Held-out points are whole operating points that "
-        "no fit has seen: an upper load, an upper frequency and every fifth locus direction."
+        "no fit has seen, and to which a model must extrapolate: the top load, the outer frequencies, another speed, "
+        "a sector of the locus."
     )
     places = [
         [observable(d.observable), place(d.where), f"{d.size_sigma:.2f}", f"{100 * d.share:.1f} %"]
         for d in verdict.disagreement
     ]
-    tried = [[in_words(c.name), f"{-c.score:.3f}", f"{c.heldout_gap:.2f}"] for c in verdict.candidates]
+    tried = [[in_words(c.name), f"{c.score:.1f}", f"{c.heldout_gap:.2f}"] for c in verdict.candidates]
     sections = _effect_sections(verdict) + _coefficient_sections(table) + _other_explanations(verdict)
     sections.append(
         Section(
@@ -132,8 +133,8 @@ def _sections(result: CampaignDiagnosis, table: pd.DataFrame) -> list[Section]:
     )
     sections += evidence_sections(verdict)
     if tried:
-        text = "Chi-square per element is the whitened misfit of the training points with calibration errors left free."
-        columns = ["explanation", "chi-square per element", "held-out gap"]
+        text = "Log evidence above the baseline's, in nats, everything that may be off left free within its tolerance."
+        columns = ["explanation", "log evidence", "held-out gap"]
         sections.append(Section("Explanations that were fitted", [text], tables=[Table("Best first", columns, tried)]))
     if verdict.effects:
         sections.append(Section("The gap", tables=[_gap_table(verdict)]))

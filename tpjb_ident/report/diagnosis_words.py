@@ -161,13 +161,13 @@ def _words(name: str) -> str:
 
 
 def effect_rows(verdict: Verdict) -> list[list[str]]:
-    """One row per effect: what was found with its size, and its share among the explanations that were fitted.
+    """One row per effect: what was found with its size, and what to beware of.
 
     Parameters
     ----------
     verdict : Verdict
     """
-    return [[_words(e.label), finding(e.name, e.parameters), f"{100 * e.probability:.0f} %"] for e in verdict.effects]
+    return [[_words(e.label), finding(e.name, e.parameters), in_words(e.stands_in)] for e in verdict.effects]
 
 
 def next_command(campaign: str, bearing: str, verdict: Verdict, folder: str) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,7 +12,7 @@ from tpjb_ident.cli.commands.identify import refuse_untrusted, write_identificat
 from tpjb_ident.cli.commands.predict import model_settings, pivot_choice
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
-from tpjb_ident.cli.common.options import BearingOption, CampaignPath, EffectsFile, Out, Thermal, out_folder
+from tpjb_ident.cli.common.options import BearingOption, EffectsFile, Out, Thermal, out_folder
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import command_line, print_line, progress, table
 from tpjb_ident.errors import BadInputError
@@ -20,61 +21,166 @@ from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnose.campaign import CampaignDiagnosis
+    from tpjb_ident.diagnose.campaign import Baseline, CampaignDiagnosis
+    from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+    from tpjb_ident.dynamic.results.identification import Identification
 
 Pivots = Annotated[str, typer.Option("--pivots", help="Where to start from: kirk, rigid, measured or a pivots.toml.")]
 ModelTolerance = Annotated[
-    float, typer.Option("--model-tolerance", help="What the model is trusted to, share of the direct coefficients.")
+    float | None,
+    typer.Option("--model-tolerance", help="What the model is trusted to, share of the direct coefficients [1.5 %]."),
+]
+MaybeCampaign = Annotated[
+    Path | None, typer.Argument(metavar="[CAMPAIGN]", help="Campaign: a folder with campaign.toml, or one HDF5 file.")
+]
+Coefficients = Annotated[
+    Path | None,
+    typer.Option("--coefficients", metavar="TABLE.csv", help="Instead of a campaign: K, C as in coefficients.csv."),
+]
+ReadingError = Annotated[
+    str | None, typer.Option("--reading-error", metavar="SHARE", help="How far values of the table hold, such as 5%.")
+]
+ToleranceOptions = Annotated[
+    list[str] | None,
+    typer.Option("--tolerance", metavar="NAME=VALUE", help="How well something is known: viscosity=4%; repeatable."),
+]
+Library = Annotated[
+    Path | None, typer.Option("--library", metavar="FILE.py", help="Effects of your own; the file's code is run.")
 ]
 
 
 @guarded
 def diagnose(
-    campaign: CampaignPath,
+    campaign: MaybeCampaign = None,
     bearing: BearingOption = None,
     pivots: Pivots = "kirk",
     thermal: Thermal = "adiabatic",
     effects: EffectsFile = None,
-    model_tolerance: ModelTolerance = 0.015,
+    model_tolerance: ModelTolerance = None,
+    tolerance: ToleranceOptions = None,
+    coefficients: Coefficients = None,
+    reading_error: ReadingError = None,
+    library: Library = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes [default: all cores].")] = None,
     out: Out = None,
 ) -> None:
     """Name what the model lacks where it and the rig disagree.
 
-    Says so when it does not know. Writes diagnosis.json, updated.effects.toml (for `tpjb predict --effects` and
-    `tpjb compare --effects`), report.html, and the identified coefficients.
+    Says what is left, and so when it does not know. Writes diagnosis.json, updated.effects.toml (for
+    `tpjb predict --effects` and `tpjb compare --effects`), report.html, and the identified coefficients.
     """
-    source = open_campaign(campaign)
-    if not 1e-4 <= model_tolerance <= 0.5:
+    if (campaign is None) == (coefficients is None):
+        raise BadInputError("diagnose: give a campaign, or --coefficients TABLE.csv with --bearing FILE; one of them.")
+    if model_tolerance is not None and not 1e-4 <= model_tolerance <= 0.5:
         raise BadInputError(f"--model-tolerance {model_tolerance:g}: must lie between 0.0001 and 0.5 (0.015 is 1.5 %).")
+    if library is not None:
+        from model.effects.user_library import load_library
+
+        load_library(library)
+    options = {"campaign": campaign, "bearing": bearing, "pivots": pivots, "thermal": thermal, "effects": effects,
+               "model_tolerance": model_tolerance, "tolerance": tolerance, "coefficients": coefficients,
+               "reading_error": reading_error, "library": library}  # fmt: skip
+    settings = _settings(model_tolerance, tolerance or [], workers)
     start = pivots if pivots == "measured" else pivot_choice(pivots)
     model = model_settings("kirk", thermal, effects)
-    drawn, given = open_bearing(source, bearing)
-    from tpjb_ident.diagnose.campaign import Baseline, diagnose_campaign
-    from tpjb_ident.diagnose.observations.tolerance import Tolerance
+    files = {f.name: sha256(f) for f in (effects, library, start if isinstance(start, Path) else None) if f}
+    from tpjb_ident.diagnose.campaign import Baseline
+
+    baseline = Baseline(start, thermal, model.effects)
+    target = out_folder(out, "diagnose")
+    if coefficients is not None:
+        _from_table(_Asked(baseline, settings, options, files, target), coefficients, bearing, reading_error)
+    elif campaign is not None:
+        _from_campaign(_Asked(baseline, settings, options, files, target), campaign, bearing)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What the options ask for, whatever the data come from."""
+
+    baseline: Baseline
+    settings: DiagnoseSettings
+    options: dict[str, Any]
+    files: dict[str, str]
+    target: Path
+
+
+def _settings(model_tolerance: float | None, stated: list[str], workers: int | None) -> DiagnoseSettings:
+    from tpjb_ident.diagnose.forward.tolerances import Tolerances
     from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+
+    typed: dict[str, str | float] = {}
+    for one in stated:
+        name, equals, value = one.partition("=")
+        if not equals or not value.strip():
+            raise BadInputError(f"--tolerance {one!r}: write NAME=VALUE, such as viscosity=4%.")
+        typed[name.strip()] = value.strip()
+    if model_tolerance is not None:
+        typed["model"] = model_tolerance
+    return DiagnoseSettings(tolerances=Tolerances().states(typed, "command line"), workers=workers)
+
+
+def _from_campaign(asked: _Asked, campaign: Path, bearing: Path | None) -> None:
+    from tpjb_ident.diagnose.campaign import diagnose_campaign
+
+    source = open_campaign(campaign)
+    drawn, given = open_bearing(source, bearing)
+    inputs = source.fingerprint() | given | asked.files
+    options = {**asked.options, "bearing": bearing or source.bearing_name}
+    with output_folder(asked.target, "diagnose", (campaign,)) as folder:
+        with progress("diagnosing") as show:
+            result = diagnose_campaign(source, drawn, asked.baseline, asked.settings, show)
+            write_identification(folder, found := _identified(result))
+            _write(folder, asked, source, result, inputs)
+        write_record(folder, asked.target, "diagnose", options, inputs)
+    _show(source.id, asked, result, str(campaign), bearing)
+    refuse_untrusted(found)
+
+
+def _identified(result: CampaignDiagnosis) -> Identification:
+    assert result.identification is not None  # a campaign was identified
+    return result.identification
+
+
+def _from_table(asked: _Asked, path: Path, bearing: Path | None, reading_error: str | None) -> None:
+    from model.bearing_file import load_bearing
+    from model.units import parse_quantity
+    from tpjb_ident.diagnose.campaign import TableSource, diagnose_table
+
+    if bearing is None:
+        raise BadInputError("diagnose --coefficients: a table names no bearing. Add --bearing FILE.")
+    error = None if reading_error is None else float(parse_quantity(reading_error, "ratio", "--reading-error"))
+    drawn = load_bearing(bearing)
+    inputs = {path.name: sha256(path), bearing.name: sha256(bearing)} | asked.files
+    source = TableSource(path.stem)
+    with output_folder(asked.target, "diagnose", (path,)) as folder:
+        with progress("diagnosing") as show:
+            result = diagnose_table(path, drawn, asked.baseline, asked.settings, error, show)
+            _write(folder, asked, source, result, inputs)
+        write_record(folder, asked.target, "diagnose", asked.options, inputs)
+    _show(source.id, asked, result, f"--coefficients {path}", bearing)
+
+
+def _write(  # type: ignore[no-untyped-def]
+    folder: Path, asked: _Asked, source, result: CampaignDiagnosis, inputs: dict[str, str]
+) -> None:
     from tpjb_ident.report.diagnosis_page import write_diagnosis_report
+
+    verdict = result.diagnosis.verdict
+    write_text(folder / "diagnosis.json", verdict.to_json())
+    write_text(folder / "updated.effects.toml", verdict.effects_toml(asked.baseline.effects))
+    if verdict.behaves_like:
+        write_text(folder / "with-terms.effects.toml", verdict.terms_toml(asked.baseline.effects))
+    named = {name: getattr(value, "name", value) for name, value in asked.options.items()}
+    write_diagnosis_report(folder, source, result, named, inputs)
+
+
+def _show(name: str, asked: _Asked, result: CampaignDiagnosis, source: str, bearing: Path | None) -> None:
     from tpjb_ident.report.diagnosis_words import next_command
 
-    settings = DiagnoseSettings(tolerance=Tolerance.scaled(model_tolerance), workers=workers)
-    files = [f for f in (effects, start if isinstance(start, Path) else None) if f]
-    inputs = source.fingerprint() | given | {f.name: sha256(f) for f in files}
-    options = {"campaign": campaign, "bearing": bearing or source.bearing_name, "pivots": pivots, "thermal": thermal,
-               "effects": effects, "model_tolerance": model_tolerance}  # fmt: skip
-    target = out_folder(out, "diagnose")
-    with output_folder(target, "diagnose", (campaign,)) as folder:
-        with progress("diagnosing") as show:
-            result = diagnose_campaign(source, drawn, Baseline(start, thermal, model.effects), settings, show)
-            verdict = result.diagnosis.verdict
-            write_identification(folder, result.identification)
-            write_text(folder / "diagnosis.json", verdict.to_json())
-            write_text(folder / "updated.effects.toml", verdict.effects_toml(model.effects))
-            named = {name: getattr(value, "name", value) for name, value in options.items()}
-            write_diagnosis_report(folder, source, result, named, inputs)
-        write_record(folder, target, "diagnose", options, inputs)
-    show_verdict(source.id, result, next_command(str(campaign), str(bearing or ""), verdict, str(target)))
-    print_line(f"Report: {target / 'report.html'}")
-    refuse_untrusted(result.identification)
+    then = next_command(source, str(bearing or ""), result.diagnosis.verdict, str(asked.target))
+    show_verdict(name, result, then)
+    print_line(f"Report: {asked.target / 'report.html'}")
 
 
 def show_verdict(name: str, result: CampaignDiagnosis, then: str) -> None:

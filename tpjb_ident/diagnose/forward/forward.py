@@ -21,6 +21,8 @@ from tpjb_ident.diagnose.observations.observe import Element
 __all__ = ["Forward", "ForwardModel", "NoEquilibriumError"]
 
 Change = Callable[[Setup], Setup]
+#: Fraction of the arc at which a pad carries its thermometer where nothing is said.
+SENSOR = 0.75
 
 
 class ForwardModel(Protocol):
@@ -115,8 +117,13 @@ class Forward:
             [self._shares.get(place, math.nan) if m else math.nan for place, m in zip(places, mine, strict=True)]
         )
 
+    @property
+    def _sensors(self) -> tuple[float, ...]:
+        given = self.layout.temperature_position
+        return (*given, *(SENSOR for _ in range(len(self.setup.bearing.pads) - len(given))))
+
     def _solve(self, setup: Setup, point: StaticPoint, excitation: Sequence[float]) -> Reading:
-        return self.memory.ask(setup, point, tuple(excitation), self.layout.temperature_position)
+        return self.memory.ask(setup, point, tuple(excitation), self._sensors)
 
 
 _ROW = {"xx": (0, 0), "xy": (0, 1), "yx": (1, 0), "yy": (1, 1)}

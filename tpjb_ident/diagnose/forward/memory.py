@@ -7,21 +7,24 @@ most of what is tried at another frequency. Campaigns of one bearing begin with 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.dynamics.reduction import with_structure
 from model.instruments import Instruments
 from model.predict import Prediction, predict_setup
 from model.setup import Setup
 from model.statics.equilibrium import Equilibrium
+from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.errors import TpjbError
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 StaticPoint = tuple[float, float, float]
 Key = tuple[Setup, StaticPoint, tuple[float, ...]]
-_PLAIN = Instruments()
+_PLAIN: dict[str, Any] = {
+    "instruments": Instruments(), "series_compliance": (0.0, 0.0, 0.0), "added_mass": 0.0,
+    "parallel_stiffness": (0.0,) * 4, "parallel_damping": (0.0,) * 4,
+}  # fmt: skip
 
 
 class NoEquilibriumError(TpjbError):
@@ -30,7 +33,7 @@ class NoEquilibriumError(TpjbError):
 
 @dataclass(frozen=True)
 class Solved:
-    """What a bearing does at one static point, before any instrument reads it.
+    """What a bearing alone does at one static point, before structure and instruments.
 
     Attributes
     ----------
@@ -51,10 +54,10 @@ class Solved:
     pad_load: FloatArray
 
     def read(self, setup: Setup, lines: tuple[float, ...]) -> Reading:
-        """As the instruments of a set-up show it."""
-        instruments = setup.instruments
+        """As the structure and the instruments of a set-up show it."""
+        instruments, omega = setup.instruments, np.array(lines)
         return Reading(
-            instruments.shown_stiffness(self.h, np.array(lines)),
+            instruments.shown_stiffness(with_structure(setup, self.h, omega), omega),
             instruments.shown_position(self.position + setup.structure @ self.force),
             instruments.shown_load(self.force), self.temperature, self.pad_load,
         )  # fmt: skip
@@ -78,7 +81,7 @@ class Memory:
     Attributes
     ----------
     solved : dict
-        By set-up (instruments apart), static point and lines.
+        By set-up (instruments and structure apart, which change no equilibrium), static point and lines.
     start : dict
         Equilibrium per static point.
     """
@@ -90,7 +93,7 @@ class Memory:
         """Return a memory of its own that begins with the same knowledge."""
         return Memory(dict(self.solved), dict(self.start))
 
-    def ask(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensor: float) -> Reading:
+    def ask(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]) -> Reading:
         """Look a point up, or solve it.
 
         Parameters
@@ -99,17 +102,17 @@ class Memory:
         point : (load [N], direction [rad], speed [rad/s])
         lines : tuple of float
             [rad/s]
-        sensor : float
-            Fraction of the arc at which pads carry thermometers.
+        sensors : tuple of float
+            Fraction of the arc at which every pad carries its thermometer.
 
         Raises
         ------
         NoEquilibriumError
         """
-        key = (setup.change(instruments=_PLAIN), point, (*lines, sensor))
+        key = (setup.change(**_PLAIN), point, (*lines, *sensors))
         known = self.solved.get(key)
         if known is None:
-            known = self.solved[key] = _kept(self._solve(key[0], point, lines), sensor)
+            known = self.solved[key] = _kept(self._solve(key[0], point, lines), sensors)
         return known.read(setup, lines)
 
     def _solve(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...]) -> Prediction:
@@ -120,8 +123,8 @@ class Memory:
         return prediction
 
 
-def _kept(found: Prediction, sensor: float) -> Solved:
+def _kept(found: Prediction, sensors: tuple[float, ...]) -> Solved:
     force = found.load * np.array([np.cos(found.load_direction), np.sin(found.load_direction)])
-    return Solved(
-        found.bearing_h, found.bearing_position, force, found.pad_temperature(sensor), found.pad_load
-    )  # fmt: skip
+    table = {place: found.pad_temperature(place) for place in set(sensors)}
+    warm = np.array([table[place][k] for k, place in enumerate(sensors)])
+    return Solved(found.bearing_h, found.bearing_position, force, warm, found.pad_load)

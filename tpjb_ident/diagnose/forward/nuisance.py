@@ -1,159 +1,250 @@
-"""Nuisances: what is always free within its certificate or tolerance, and never a finding by itself.
+"""Nuisances: what is always free within its stated tolerance, and never a finding by itself.
 
-An effect counts only if it explains more than these can. They enter the covariance as N diag(s^2) N^T, with N the
-change of the observation vector per unit of each.
+Each is a prior in every fit and a part of the covariance of every test, N diag(s^2) N^T with N the change of the
+observation vector; so the interval of an amplitude includes them. An effect that *is* one of these (oil of another
+viscosity, one pad that stands further out) counts only where it exceeds what is stated.
 """
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from model.effects import Effect
+from model.effects import Effect, kind_of
 from model.setup import Setup
-from tpjb_ident.diagnose.forward.forward import Forward
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.diagnose.forward.forward import ForwardModel
+from tpjb_ident.diagnose.forward.tolerances import Tolerances
 from tpjb_ident.diagnose.observations.gap import centre_shifts
-from tpjb_ident.diagnose.observations.observe import Observations
+from tpjb_ident.diagnose.observations.observe import Element
 
-FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Certificates:
-    """One standard deviation of every known-unknown.
-
-    Attributes
-    ----------
-    probe_axes : tuple of float
-        Directions of the two probes [rad].
-    probe_gain : tuple of float
-        Relative, per probe.
-    cell_gain : float
-        Relative, per cell.
-    viscosity : float
-        Relative.
-    supply_temperature : float
-        [K]
-    assembled_clearance, pad_clearance : float
-        Of the drawing [m].
-    thermometer : float
-        Zero of every pad's temperature sensor [K].
-    centre : float
-        How far the polygon's centre may lie from the bearing's [m]: it is a choice where pads stand unequal.
-        Without a polygon, that of the probes' zero.
-    coherent_stiffness : float
-        How far two programs may be apart in one coefficient at all points alike, relative.
-    coherent_dry : float
-        The same of all dry compliances.
-    pad_dry : float
-        Of one pad's dry compliances together: incomplete contact and friction bend a whole curve.
-    """
-
-    probe_axes: tuple[float, float] = (math.pi / 4, 3 * math.pi / 4)
-    probe_gain: tuple[float, float] = (0.005, 0.005)
-    cell_gain: float = 0.002
-    viscosity: float = 0.01
-    supply_temperature: float = 0.3
-    assembled_clearance: float = 0.5e-6
-    pad_clearance: float = 1.0e-6
-    thermometer: float = 0.2
-    centre: float = 10e-6
-    coherent_stiffness: float = 0.004
-    coherent_dry: float = 0.01
-    pad_dry: float = 0.015
+#: Step of derivatives, in standard deviations: small, so that a nuisance and the effect that does the same have the
+#: same derivative, and their curvature does not tell them apart.
+STEP = 0.3
 
 
 @dataclass(frozen=True)
-class Nuisances:
-    """Named columns with their standard deviations.
+class Nuisance:
+    """One thing that may be off.
 
     Attributes
     ----------
-    names : tuple of str
-    columns : (n, m) ndarray
-        Change of the observation vector per one standard deviation.
+    name : str
+        Stated tolerance that it belongs to.
+    sigma : float
+        One standard deviation, in `unit`.
+    unit : str
+    place : str
+        Which pad or probe; empty where there is one only.
+    change : callable, optional
+        ``change(setup, size) -> Setup``; without it the nuisance acts on the readings, by `column`.
+    column : (n,) ndarray, optional
+        Change of the observation vector per `sigma`.
+    twins : frozenset of str
+        Effects that do the same.
     """
 
-    names: tuple[str, ...]
-    columns: FloatArray
+    name: str
+    sigma: float
+    unit: str
+    place: str = ""
+    change: Callable[[Setup, float], Setup] | None = None
+    column: FloatArray | None = field(default=None, repr=False, compare=False)
+    twins: frozenset[str] = frozenset()
 
 
-def nuisances(forward: Forward, effects: Sequence[Effect], base: FloatArray, known: Certificates) -> Nuisances:
-    """Columns at a model with effects; `base` is what it predicts."""
-    names: list[str] = []
-    columns: list[FloatArray] = []
-    for name, change in _changes(known):
-        names.append(name)
-        columns.append(forward(effects, change) - base)
-    elements = forward.elements
-    shifts = centre_shifts(elements)
-    for axis, letter in enumerate("xy"):
-        names.append(f"centre {letter}")
-        columns.append(shifts[:, axis] * known.centre)
-    for observable in ("kxx", "kyy", "cxx", "cyy"):
-        names.append(f"model {observable}")
-        mine = np.array([e.observable == observable for e in elements])
-        columns.append(np.where(mine, base, 0.0) * known.coherent_stiffness)
-    compliances = np.array([e.observable == "dry_compliance" for e in elements])
-    names.append("model dry")
-    columns.append(np.where(compliances, known.coherent_dry, 0.0))
+@dataclass(frozen=True)
+class Shift:
+    """A change of a `Setup` by nuisances of given sizes, for `Forward`.
+
+    Attributes
+    ----------
+    nuisances : tuple of Nuisance
+    size : tuple of float
+        In standard deviations.
+    """
+
+    nuisances: tuple[Nuisance, ...]
+    size: tuple[float, ...]
+
+    def __call__(self, setup: Setup) -> Setup:
+        """Apply them one after the other."""
+        for one, size in zip(self.nuisances, self.size, strict=True):
+            if one.change is not None and size:
+                setup = one.change(setup, size * one.sigma)
+        return setup
+
+    @property
+    def readings(self) -> FloatArray | float:
+        """Change of the observation vector by those that act on readings."""
+        parts = [one.column * s for one, s in zip(self.nuisances, self.size, strict=True) if one.column is not None]
+        return np.sum(parts, axis=0) if parts else 0.0
+
+
+def nuisances(
+    elements: Sequence[Element], setup: Setup, known: Tolerances, by_pad: bool = True
+) -> tuple[Nuisance, ...]:
+    """List what may be off for an observation vector.
+
+    Parameters
+    ----------
+    elements : sequence of Element
+    setup : Setup
+    known : Tolerances
+        A tolerance of zero leaves its nuisance out.
+    by_pad : bool
+        Clearance and pivot of every pad too.
+    """
+    pads = range(1, len(setup.bearing.pads) + 1) if by_pad else ()
+    found = [
+        _whole("viscosity", "1", _viscosity, known, "oil_viscosity"),
+        _whole("viscosity_exponent", "1", _exponent, known, "viscosity_law"),
+        _whole("supply_temperature", "K", _supply, known, "supply_temperature"),
+        _whole("assembled_clearance", "m", _assembled, known),
+        _whole("pad_clearance", "m", _pad_clearance, known, "preload_error"),
+        _whole("film_heat", "1", _film_heat, known, "heat_loss"),
+    ]
+    for pad in pads:
+        offset = functools.partial(_offset, pad=pad)
+        scatter = known["clearance_scatter"], "m", f"pad {pad}", offset
+        found.append(Nuisance("clearance_scatter", *scatter, twins=frozenset({f"pad_offset pad {pad}", "uneven_pads"})))
+        softer = functools.partial(_softer, pad=pad)
+        twin = frozenset({f"soft_pivot pad {pad}"})
+        found.append(
+            Nuisance("pivot_stiffness_scatter", known["pivot_stiffness_scatter"], "1", f"pad {pad}", softer, twins=twin)
+        )
+    for i in range(2):
+        gain = functools.partial(_probe, axes=known.probe_axes, index=i)
+        found.append(Nuisance("probe_gain", known["probe_gain"], "1", f"probe {i + 1}", gain,
+                              twins=frozenset({"probe_gain"})))  # fmt: skip
+        cell = functools.partial(_cell, index=i)
+        found.append(Nuisance("cell_gain", known.cell_gain.value, "1", f"cell {'xy'[i]}", cell,
+                              twins=frozenset({"loadcell_gain"})))  # fmt: skip
+    found += _readings(elements, known)
+    return tuple(one for one in found if one.sigma > 0.0)
+
+
+def _whole(
+    name: str, unit: str, change: Callable[[Setup, float], Setup], known: Tolerances, *twins: str
+) -> Nuisance:  # fmt: skip
+    return Nuisance(name, known[name], unit, "", change, twins=frozenset(twins))
+
+
+def _readings(elements: Sequence[Element], known: Tolerances) -> list[Nuisance]:
+    shifts = centre_shifts(elements) * known.centre
+    out = [
+        Nuisance("centre", known.centre, "m", letter, column=shifts[:, axis])
+        for axis, letter in enumerate("xy") if np.any(shifts[:, axis])
+    ]  # fmt: skip
     pads = np.array([e.place("pad") for e in elements])
     warm = np.array([e.observable == "pad_temperature" for e in elements])
     for pad in sorted(set(pads[warm])):
-        names.append(f"thermometer of pad {pad:.0f}")
-        columns.append(np.where(warm & (pads == pad), known.thermometer, 0.0))
-    for pad in sorted(set(pads[compliances])):
-        names.append(f"dry test of pad {pad:.0f}")
-        columns.append(np.where(compliances & (pads == pad), known.pad_dry, 0.0))
-    return Nuisances(tuple(names), np.column_stack(columns))
+        column = np.where(warm & (pads == pad), known["thermometer"], 0.0)
+        out.append(Nuisance("thermometer", known["thermometer"], "K", f"pad {pad:.0f}", column=column))
+    return out
 
 
-def _changes(known: Certificates):  # type: ignore[no-untyped-def]
-    for i, (axis, gain) in enumerate(zip(known.probe_axes, known.probe_gain, strict=True)):
-        yield f"gain of probe {i + 1}", _probe(known.probe_axes, axis, gain)
-    for i, letter in enumerate("xy"):
-        yield f"gain of cell {letter}", _cell(i, known.cell_gain)
-    yield "viscosity", _oil(known.viscosity)
-    yield "supply temperature", lambda s: s.change(supply_change=s.supply_change + known.supply_temperature)
-    yield (
-        "assembled clearance",
-        lambda s: s.change_pads(
-            lambda k, p: replace(p, assembled_clearance=p.assembled_clearance + known.assembled_clearance)
-        ),
-    )
-    yield (
-        "pad clearance",
-        lambda s: s.change_pads(lambda k, p: replace(p, pad_clearance=p.pad_clearance + known.pad_clearance)),
-    )
+def columns_of(
+    forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], at: FloatArray, base: FloatArray
+) -> FloatArray:
+    """Change of the observation vector per standard deviation of every nuisance, (n, m).
+
+    Parameters
+    ----------
+    forward : ForwardModel
+    effects : sequence of Effect
+        In the model.
+    known : sequence of Nuisance
+    at : (m,) ndarray
+        Where the derivative is taken, in standard deviations.
+    base : (n,) ndarray
+        What the model predicts there.
+    """
+    return np.column_stack([column_of(forward, effects, known, at, base, i) for i in range(len(known))])
 
 
-def _probe(axes: tuple[float, float], axis: float, gain: float):  # type: ignore[no-untyped-def]
+def at_baseline(
+    forward: ForwardModel, effects: Sequence[Effect], setup: Setup, known: Tolerances, base: FloatArray
+) -> FloatArray:
+    """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m)."""
+    found = nuisances(forward.elements, setup, known, by_pad=False)
+    return columns_of(forward, effects, found, np.zeros(len(found)), base)
+
+
+def column_of(
+    forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], at: FloatArray, base: FloatArray,
+    index: int,
+) -> FloatArray:  # fmt: skip
+    """One column of `columns_of`."""
+    if known[index].column is not None:
+        return np.asarray(known[index].column)
+    # towards zero: there the model surely has an equilibrium
+    step = -STEP if at[index] > 0.0 else STEP
+    moved = at.copy()
+    moved[index] += step
+    return (predict(forward, effects, known, moved) - base) / step
+
+
+def predict(
+    forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], size: FloatArray
+) -> FloatArray:
+    """Predict with effects and with nuisances of given sizes (in standard deviations), (n,)."""
+    shift = Shift(tuple(known), tuple(map(float, size)))
+    return forward(effects, shift if np.any(size) else None) + shift.readings
+
+
+def _viscosity(setup: Setup, change: float) -> Setup:
+    return _oil(setup, viscosity_40=setup.bearing.oil.viscosity_40 * math.exp(change))
+
+
+def _exponent(setup: Setup, change: float) -> Setup:
+    return _oil(setup, viscosity_exponent=setup.bearing.oil.viscosity_exponent * math.exp(change))
+
+
+def _film_heat(setup: Setup, change: float) -> Setup:
+    # all heat goes into the oil: less of it is more capacity
+    return _oil(setup, specific_heat=setup.bearing.oil.specific_heat * math.exp(-change))
+
+
+def _oil(setup: Setup, **values: Any) -> Setup:
+    oil = replace(setup.bearing.oil, **values)
+    return setup.change(bearing=replace(setup.bearing, oil=oil))
+
+
+def _supply(setup: Setup, change: float) -> Setup:
+    return setup.change(supply_change=setup.supply_change + change)
+
+
+def _assembled(setup: Setup, change: float) -> Setup:
+    return setup.change_pads(lambda k, p: replace(p, assembled_clearance=p.assembled_clearance + change))
+
+
+def _pad_clearance(setup: Setup, change: float) -> Setup:
+    return setup.change_pads(lambda k, p: replace(p, pad_clearance=p.pad_clearance + change))
+
+
+def _offset(setup: Setup, change: float, pad: int) -> Setup:
+    return kind_of("pad_offset").apply(setup, pad=pad, radial_offset=change)
+
+
+def _softer(setup: Setup, change: float, pad: int) -> Setup:
+    return kind_of("soft_pivot").apply(setup, pad=pad, stiffness_factor=math.exp(change))
+
+
+def _probe(setup: Setup, change: float, axes: tuple[float, float], index: int) -> Setup:
     rows = np.array([[math.cos(a), math.sin(a)] for a in axes])
-    scale = np.diag([1.0 + gain * (a == axis) for a in axes])
-    turned = np.linalg.solve(rows, scale @ rows)
-    return lambda s: s.change(instruments=s.instruments.read_displacement(lambda omega: turned))
-
-
-def _cell(i: int, gain: float):  # type: ignore[no-untyped-def]
     scale = np.eye(2)
-    scale[i, i] += gain
-    return lambda s: s.change(instruments=s.instruments.read_cells(scale))
+    scale[index, index] += change
+    turned = np.linalg.solve(rows, scale @ rows)
+    return setup.change(instruments=setup.instruments.read_displacement(lambda omega: turned))
 
 
-def _oil(change: float):  # type: ignore[no-untyped-def]
-    def one(s: Setup) -> Setup:
-        oil = replace(s.bearing.oil, viscosity_40=s.bearing.oil.viscosity_40 * (1.0 + change))
-        return s.change(bearing=replace(s.bearing, oil=oil))
-
-    return one
-
-
-def whitener(observations: Observations, columns: FloatArray) -> FloatArray:
-    """Cholesky factor of the covariance for inference: identification, fine tolerance, nuisances."""
-    total = observations.covariance + np.diag(observations.fine**2) + columns @ columns.T
-    scale = np.sqrt(np.diag(total))
-    return scale[:, None] * np.linalg.cholesky(total / np.outer(scale, scale))
+def _cell(setup: Setup, change: float, index: int) -> Setup:
+    scale = np.eye(2)
+    scale[index, index] += change
+    return setup.change(instruments=setup.instruments.read_cells(scale))

@@ -11,31 +11,35 @@ from tpjb_ident.diagnose.forward.forward import ForwardModel
 from tpjb_ident.runtime.executors import cores, in_order, local_workers
 
 
-def _run(forward: ForwardModel, task: Callable[..., Any], *arguments: Any) -> Any:
+def _run(shared: tuple[ForwardModel, Any], task: Callable[..., Any], *arguments: Any) -> Any:
+    forward, problem = shared
     # every job starts from the baseline's equilibria: its answer depends on nothing that ran before it
-    return task(forward.fresh(), *arguments)
+    return task(forward.fresh(), problem, *arguments)
 
 
 Map = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterator[Any]]
 
 
 @contextmanager
-def workers(forward: ForwardModel, count: int | None = None) -> Iterator[Map]:
-    """Open workers whose tasks get a `Forward` as their first argument.
+def workers(forward: ForwardModel, problem: Any, count: int | None = None) -> Iterator[Map]:
+    """Open workers whose tasks get a `Forward` and what else they share as their first arguments.
 
     Parameters
     ----------
     forward : Forward
         Warmed up: its equilibria are the common start.
+    problem : object
     count : int, optional
         Processes; 1 runs everything here. Default: the cores this process may use.
 
     Yields
     ------
     callable
-        ``run(task, [(argument, ..), ..])`` yields ``task(forward, argument, ..)`` in order.
+        ``run(task, [(argument, ..), ..])`` yields ``task(forward, problem, argument, ..)`` in order.
     """
     # fork: effects that the user registered are known in the workers too
     able = "fork" in multiprocessing.get_all_start_methods()
     with local_workers((count or cores()) if able else 1, start="fork") as opened:
-        yield lambda task, jobs: in_order(opened, _run, [(task, *arguments) for arguments in jobs], shared=forward)
+        yield lambda task, jobs: in_order(
+            opened, _run, [(task, *arguments) for arguments in jobs], shared=(forward, problem)
+        )

@@ -39,7 +39,7 @@ def mirrored(setup: Setup) -> Setup:
 def mirrored_layout(layout: Layout) -> Layout:
     """Dynamic tests as a mirror shows them, thermometers where they sit."""
     tests = tuple(DynamicTest(t.load, math.pi - t.direction, t.speed, t.excitation, t.pads) for t in layout.dynamic)
-    return Layout(tests, temperature_position=1.0 - layout.temperature_position)
+    return Layout(tests, temperature_position=tuple(1.0 - place for place in layout.temperature_position))
 
 
 def _instruments(read: Instruments) -> Instruments:

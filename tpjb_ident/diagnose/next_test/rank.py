@@ -5,7 +5,7 @@ with both, and the expected separation
 
     d = | L^-1 (f_A(x) - f_B(x)) |
 
-is compared, L L^T being identification noise, fine tolerance and nuisances at x (Buzzi-Ferraris and Forzatti,
+is compared, L L^T being identification noise, model error and nuisances at x (Buzzi-Ferraris and Forzatti,
 Chem. Eng. Sci. 38 (1983) 225). The nearest rival counts. Beside tests on the rig there are checks of single parameters
 (`checks`). Where one test is not enough, the two that together separate the nearest rival furthest are suggested.
 """
@@ -22,11 +22,13 @@ from model.effects import Effect
 from model.setup import Setup
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.forward import NoEquilibriumError
-from tpjb_ident.diagnose.forward.nuisance import Certificates, nuisances, whitener
+from tpjb_ident.diagnose.forward.nuisance import at_baseline
+from tpjb_ident.diagnose.forward.tolerances import Tolerances
 from tpjb_ident.diagnose.next_test.checks import CHECKS, Check
 from tpjb_ident.diagnose.next_test.designs import Design, designs
 from tpjb_ident.diagnose.observations.layout import Layout
 from tpjb_ident.diagnose.observations.observe import Observations
+from tpjb_ident.diagnose.search.components import usual_factor
 
 #: Separation [standard deviations] from which a test tells at all, and from which one test is enough: with 5 the wrong
 #: explanation's chi-square exceeds the right one's by 9 in 95 of 100 cases.
@@ -65,7 +67,7 @@ def rank_designs(
     one: Sequence[Effect],
     rivals: Sequence[Sequence[Effect]],
     options: Sequence[Design | Check],
-    known: Certificates,
+    known: Tolerances,
 ) -> tuple[Separation, ...]:
     """Expected separation of an explanation from its rivals by every design, best first.
 
@@ -77,7 +79,7 @@ def rank_designs(
     rivals : sequence of sequence of Effect
         At least one.
     options : sequence of Design or Check
-    known : Certificates
+    known : Tolerances
     """
     out = []
     for design in options:
@@ -92,13 +94,13 @@ def rank_designs(
 
 
 def _each(
-    setup: Setup, design: Design, one: Sequence[Effect], rivals: Sequence[Sequence[Effect]], known: Certificates
+    setup: Setup, design: Design, one: Sequence[Effect], rivals: Sequence[Sequence[Effect]], known: Tolerances
 ) -> tuple[float, ...]:
     seen = design.planned(setup)
     forward = design.forward(setup, seen)
     acting = design.acting(one)
     mine = forward(acting)
-    columns = nuisances(forward, acting, mine, known).columns
+    columns = at_baseline(forward, acting, setup, known, mine)
     return tuple(apart(seen, columns, mine - forward(design.acting(other))) for other in rivals)
 
 
@@ -117,7 +119,7 @@ def apart(seen: Observations, columns: FloatArray, difference: FloatArray) -> fl
         Nuisances, per standard deviation.
     difference : (n,) ndarray
     """
-    return float(np.linalg.norm(np.linalg.solve(whitener(seen, columns), difference)))
+    return float(np.linalg.norm(np.linalg.solve(usual_factor(seen, columns), difference)))
 
 
 def chance(separation: float, margin: float = MARGIN) -> float:

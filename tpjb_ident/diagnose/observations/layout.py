@@ -54,12 +54,12 @@ class Layout:
     dry : tuple of DryTest
     push_load : float or None
         Of the clearance sweep [N]; None without one.
-    temperature_position : float
-        Fraction of the arc at which pads carry their sensors.
+    temperature_position : tuple of float
+        Fraction of the arc at which every pad carries its sensor; pads beyond the tuple have theirs at 0.75.
     """
 
     dynamic: tuple[DynamicTest, ...]
     locus: tuple[LocusTest, ...] = ()
     dry: tuple[DryTest, ...] = ()
     push_load: float | None = None
-    temperature_position: float = 0.75
+    temperature_position: tuple[float, ...] = ()

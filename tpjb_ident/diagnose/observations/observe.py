@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.locus import Locus
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.diagnose.observations.layout import DryTest, DynamicTest, Layout, LocusTest
@@ -24,8 +25,6 @@ from tpjb_ident.dynamic.corrections.mains import MAINS_CORRECTED, MAINS_ON_LINE
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.pivot.curve import PivotCurve
-
-FloatArray = NDArray[np.float64]
 
 ENTRY_NAMES = ("xx", "xy", "yx", "yy")
 #: Loads at which dry curves are compared, as shares of the range in which contact is complete.
@@ -77,9 +76,7 @@ class Observations:
     covariance : (n, n) ndarray
         Random part, from identification.
     sigma : (n,) ndarray
-        Stated model tolerance of every element (for the gap).
-    fine : (n,) ndarray
-        Tolerance of single elements for inference, smaller: what two programs differ by, point by point.
+        Stated model tolerance of every element.
     elements : tuple of Element
     """
 
@@ -87,7 +84,6 @@ class Observations:
     value: FloatArray
     covariance: FloatArray = field(repr=False)
     sigma: FloatArray = field(repr=False)
-    fine: FloatArray = field(repr=False)
     elements: tuple[Element, ...] = field(repr=False)
 
     def __len__(self) -> int:
@@ -113,7 +109,6 @@ class Observations:
 class _Builder:
     value: list[float] = field(default_factory=list)
     sigma: list[float] = field(default_factory=list)
-    fine: list[float] = field(default_factory=list)
     elements: list[Element] = field(default_factory=list)
     covariance: list[FloatArray] = field(default_factory=list)
 
@@ -122,14 +117,13 @@ class _Builder:
         elements: Sequence[Element],
         value: FloatArray,
         covariance: FloatArray,
-        tolerance: tuple[FloatArray | float, FloatArray | float],
+        tolerance: FloatArray | float,
     ) -> None:
         value = np.atleast_1d(value)
         keep = np.isfinite(value) & np.isfinite(np.diag(covariance))
-        sigma, fine = (np.broadcast_to(np.asarray(t, float), value.shape) for t in tolerance)
+        sigma = np.broadcast_to(np.asarray(tolerance, float), value.shape)
         self.value += list(value[keep])
         self.sigma += list(sigma[keep])
-        self.fine += list(fine[keep])
         self.elements += [e for e, k in zip(elements, keep, strict=True) if k]
         self.covariance.append(covariance[np.ix_(keep, keep)])
         self.kept = keep
@@ -162,7 +156,7 @@ def observe(
     layout = Layout(dynamic, locus_tests, tuple(d for d in dry), push)
     return Observations(
         layout, np.array(builder.value), block_diag(*builder.covariance), np.array(builder.sigma),
-        np.array(builder.fine), tuple(builder.elements),
+        tuple(builder.elements),
     )  # fmt: skip
 
 
@@ -185,7 +179,7 @@ def _add_dynamic(
         if temperature:
             noise = np.eye(len(names)) * TEMPERATURE_SE**2
             value = np.array(list(temperature.values()))
-            builder.add(names, value, noise, (tolerance.temperature, tolerance.fine_temperature))
+            builder.add(names, value, noise, tolerance.temperature)
         out.append(
             DynamicTest(load, direction, speed, tuple(points[i].point.excitation for i in members), tuple(temperature))
         )
@@ -213,7 +207,7 @@ def _add_stiffness(builder: _Builder, result, base: tuple, tolerance: Tolerance)
         elements,
         value,
         covariance,
-        (tolerance.stiffness * scale, tolerance.fine_stiffness * scale),
+        tolerance.stiffness * scale,
     )
 
 
@@ -229,8 +223,7 @@ def _add_locus(
     """Positions and load readings; a load that misses its set point moves both, so they share an error."""
     out = []
     spread = np.diag([tolerance.load_miss**2, tolerance.direction_miss**2])
-    unit = (tolerance.fine_position, tolerance.fine_position, 0.001, 0.001)
-    stated = (tolerance.position, tolerance.position, 0.003, 0.003)
+    stated = (tolerance.position, tolerance.position, tolerance.load, tolerance.load)
     for i, (p, give) in enumerate(zip(locus.points, moved_by_miss(locus, identification), strict=True)):
         where = (
             ("load", p.point.static_load), ("direction", p.point.static_load_direction), ("speed", p.point.shaft_speed),
@@ -242,7 +235,7 @@ def _add_locus(
         covariance[:2, :2] += p.covariance
         builder.add(
             [Element(family, name, f"locus {i % 5}", where) for family, name in names],
-            np.array([*p.position, p.load / p.point.static_load, turn]), covariance, (np.array(stated), np.array(unit)),
+            np.array([*p.position, p.load / p.point.static_load, turn]), covariance, np.array(stated),
         )  # fmt: skip
         out.append(LocusTest(p.point.static_load, p.point.static_load_direction, p.point.shaft_speed))
     return tuple(out)
@@ -258,7 +251,7 @@ def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryT
     elements = [Element("dry", "dry_compliance", "dry", (("pad", float(curve.pad)), ("load", float(w)))) for w in load]
     covariance = curve.relative_stiffness_covariance(load)
     covariance = covariance + np.diag(DRY_SHAPE**2 * np.diag(covariance))
-    builder.add(elements, value, covariance, (tolerance.dry, tolerance.fine_dry))
+    builder.add(elements, value, covariance, tolerance.dry)
     kept = load[builder.kept]
     return DryTest(curve.pad, tuple(float(w) for w in kept))
 
@@ -269,11 +262,9 @@ def _add_clearance(builder: _Builder, polygon: ClearancePolygon, tolerance: Tole
     elements = [Element("clearance", "clearance_pushed", "clearance", where) for where in places]
     builder.add(
         elements, polygon.clearance_pushed, np.diag(np.asarray(polygon.clearance_pushed_se) ** 2),
-        (tolerance.position, tolerance.fine_position),
+        tolerance.position,
     )  # fmt: skip
     elements = [Element("clearance", "side_angle", "clearance", where) for where in places]
     turn = np.array([math.remainder(t, 2 * math.pi) for t in polygon.fitted_angle - polygon.angles])
-    builder.add(
-        elements, turn, np.diag(np.asarray(polygon.fitted_angle_se) ** 2), (tolerance.angle, tolerance.fine_angle)
-    )
+    builder.add(elements, turn, np.diag(np.asarray(polygon.fitted_angle_se) ** 2), tolerance.angle)
     return float(polygon.push_load)

@@ -16,7 +16,7 @@ import numpy as np
 
 from model.setup import Setup
 from tpjb_ident.arrays import BoolArray, FloatArray
-from tpjb_ident.diagnose.forward.candidates import Candidate, candidates
+from tpjb_ident.diagnose.forward.candidates import Candidate, one_amplitude
 from tpjb_ident.diagnose.observations.layout import Layout
 from tpjb_ident.diagnose.observations.observe import Element
 from tpjb_ident.diagnose.plan.plan import CampaignPlan, Signatures, separated, signatures
@@ -77,7 +77,7 @@ def data_sets(setup: Setup, layout: Layout) -> tuple[DataSet, ...]:
         The baseline has none at some point of the layout, or at the second speed.
     """
     faster = tuple(replace(t, speed=FASTER * t.speed) for t in layout.dynamic)
-    chosen = candidates(setup.bearing)
+    chosen = one_amplitude(setup.bearing)
     seen = signatures(setup, replace(layout, dynamic=(*layout.dynamic, *faster)), chosen)
     planned = {t.speed for t in layout.dynamic}
     return tuple(

@@ -15,13 +15,14 @@ import numpy as np
 
 from model.setup import Setup
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.diagnose.forward.candidates import Candidate, candidates
-from tpjb_ident.diagnose.forward.forward import Forward
-from tpjb_ident.diagnose.forward.nuisance import Certificates, nuisances, whitener
+from tpjb_ident.diagnose.forward.candidates import Candidate, one_amplitude
+from tpjb_ident.diagnose.forward.forward import Forward, NoEquilibriumError
+from tpjb_ident.diagnose.forward.nuisance import at_baseline
+from tpjb_ident.diagnose.forward.tolerances import Tolerances
 from tpjb_ident.diagnose.observations.layout import Layout
 from tpjb_ident.diagnose.observations.observe import Observations
 from tpjb_ident.diagnose.plan.planned import planned_observations
-from tpjb_ident.diagnose.search.fit import slope
+from tpjb_ident.diagnose.search.components import usual_factor
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -122,7 +123,7 @@ def _finite(value: Any) -> Any:
 
 
 def plan(
-    setup: Setup, layout: Layout, known: Certificates | None = None, pool: Sequence[Candidate] | None = None
+    setup: Setup, layout: Layout, known: Tolerances | None = None, pool: Sequence[Candidate] | None = None
 ) -> CampaignPlan:
     """Work out what a layout of tests could tell.
 
@@ -131,7 +132,7 @@ def plan(
     NoEquilibriumError
         The baseline has none at some point of the layout.
     """
-    chosen = tuple(pool if pool is not None else candidates(setup.bearing))
+    chosen = tuple(pool if pool is not None else one_amplitude(setup.bearing))
     seen = signatures(setup, layout, chosen, known)
     return separated(chosen, np.asarray(np.linalg.solve(seen.factor(), seen.columns)))
 
@@ -156,11 +157,11 @@ class Signatures:
 
     def factor(self, free: bool = True) -> FloatArray:
         """Cholesky factor of the covariance, with or without nuisances."""
-        return whitener(self.observations, self.nuisances if free else self.nuisances[:, :0])
+        return usual_factor(self.observations, self.nuisances if free else self.nuisances[:, :0])
 
 
 def signatures(
-    setup: Setup, layout: Layout, chosen: Sequence[Candidate], known: Certificates | None = None
+    setup: Setup, layout: Layout, chosen: Sequence[Candidate], known: Tolerances | None = None
 ) -> Signatures:
     """Work out the signature of every candidate on a layout.
 
@@ -172,11 +173,24 @@ def signatures(
     observations = planned_observations(setup, layout)
     forward = Forward(setup, layout, observations.elements)
     base = forward()
-    free = nuisances(forward, (), base, known or Certificates()).columns
-    columns = [
-        slope(forward.fresh(), [c], np.array([c.neutral]), base, 0, 0.5 * c.step) * c.step for c in chosen
-    ]  # fmt: skip
+    free = at_baseline(forward, (), setup, known or Tolerances(), base)
+    columns = [_signature(forward, base, c) for c in chosen]
     return Signatures(observations, free, np.column_stack(columns))
+
+
+def _signature(forward: Forward, base: FloatArray, candidate: Candidate) -> FloatArray:
+    """Change by a typical size, from half of it; zero where the model has no equilibrium on either side."""
+    low, high = candidate.bounds
+    for share in (0.5, -0.5, 0.05, -0.05):
+        there = min(max(candidate.neutral + share * candidate.step, low), high)
+        if there == candidate.neutral:
+            continue
+        try:
+            moved = forward.fresh()((candidate.effect(there),)) - base
+        except NoEquilibriumError:
+            continue
+        return np.asarray(moved / (there - candidate.neutral) * candidate.step)
+    return np.zeros_like(base)
 
 
 def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:

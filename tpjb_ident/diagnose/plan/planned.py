@@ -12,8 +12,8 @@ from model.setup import Setup
 from tpjb_ident.diagnose.forward.forward import Forward
 from tpjb_ident.diagnose.observations.layout import DryTest, DynamicTest, Layout, LocusTest
 from tpjb_ident.diagnose.observations.observe import ENTRY_NAMES, Element, Observations
+from tpjb_ident.diagnose.observations.scale import direct_scale
 from tpjb_ident.diagnose.observations.tolerance import Tolerance
-from tpjb_ident.diagnose.search.directions import direct_scale
 
 
 @dataclass(frozen=True)
@@ -55,20 +55,20 @@ def planned_observations(
     elements = _elements(layout, [pad.pivot_angle for pad in setup.bearing.pads])
     value = Forward(setup, layout, elements)()
     scale = direct_scale(elements, value)
-    table: dict[str, tuple[np.ndarray | float, np.ndarray | float, np.ndarray | float]] = {
-        "h": (noise.stiffness * scale, tolerance.stiffness * scale, tolerance.fine_stiffness * scale),
-        "temperature": (noise.temperature, tolerance.temperature, tolerance.fine_temperature),
-        "locus": (noise.position, tolerance.position, tolerance.fine_position),
-        "load": (tolerance.load_miss, 0.003, 0.001),
-        "dry": (noise.dry, tolerance.dry, tolerance.fine_dry),
-        "clearance": (noise.position, tolerance.position, tolerance.fine_position),
-        "side": (noise.angle, tolerance.angle, tolerance.fine_angle),
+    table: dict[str, tuple[np.ndarray | float, np.ndarray | float]] = {
+        "h": (noise.stiffness * scale, tolerance.stiffness * scale),
+        "temperature": (noise.temperature, tolerance.temperature),
+        "locus": (noise.position, tolerance.position),
+        "load": (tolerance.load_miss, tolerance.load),
+        "dry": (noise.dry, tolerance.dry),
+        "clearance": (noise.position, tolerance.position),
+        "side": (noise.angle, tolerance.angle),
     }
-    columns = np.zeros((3, len(value)))
+    columns = np.zeros((2, len(value)))
     for i, e in enumerate(elements):
         row = table["side" if e.observable == "side_angle" else e.family]
         columns[:, i] = [float(np.broadcast_to(v, value.shape)[i]) for v in row]
-    return Observations(layout, value, np.diag(columns[0] ** 2), columns[1], columns[2], elements)
+    return Observations(layout, value, np.diag(columns[0] ** 2), columns[1], elements)
 
 
 def _elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:

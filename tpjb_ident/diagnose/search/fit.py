@@ -1,51 +1,58 @@
-"""Fit: amplitudes of one or several effects by nonlinear least squares on whitened training elements."""
+"""Fit: amplitudes of effects together with everything that may be off, by damped Gauss-Newton steps."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from model.effects import Effect
-from tpjb_ident.arrays import BoolArray, FloatArray
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.candidates import Candidate
 from tpjb_ident.diagnose.forward.forward import ForwardModel, NoEquilibriumError
+from tpjb_ident.diagnose.forward.nuisance import column_of, predict
+from tpjb_ident.diagnose.forward.workers import Map
+from tpjb_ident.diagnose.search.assessment import Assessment, Linear, assess
+from tpjb_ident.diagnose.search.problem import Problem
 
-MAX_STEPS = 12
+MAX_STEPS = 4
+#: Share of their tolerances that nuisances have at first.
+TIGHT = 0.2
 #: A fit is settled when a step would move every amplitude by less than this share of its standard error.
 SETTLED = 0.1
-#: Width of the prior of an amplitude, in typical sizes.
-PRIOR_WIDTH = 6.0
+#: How often a fit takes derivatives of its own.
+ROUNDS = 3
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Effects fitted together.
+    """Effects fitted together, nuisances beside them.
 
     Attributes
     ----------
     candidates : tuple of Candidate
-    amplitudes : (k,) ndarray
+    amplitudes : tuple of (k_i,) ndarray
         In the nearly linear forms.
+    nuisance : (m,) ndarray
+        Where the model was taken, in standard deviations.
     prediction : (n,) ndarray
-        Of all elements, held-out ones too.
+        There, readings included.
     jacobian : (n, k) ndarray
-    chi_square : float
-        Whitened misfit of the training elements plus the prior's.
-    covariance : (k, k) ndarray
-        Of the amplitudes.
-    at_bound : bool
-        Some amplitude has run into a physical bound.
+        Per unit of every amplitude.
+    columns : (n, m) ndarray
+        Per standard deviation of every nuisance.
+    assessment : Assessment
     """
 
     candidates: tuple[Candidate, ...]
-    amplitudes: FloatArray
+    amplitudes: tuple[FloatArray, ...]
+    nuisance: FloatArray = field(repr=False)
     prediction: FloatArray = field(repr=False)
     jacobian: FloatArray = field(repr=False)
-    chi_square: float
-    covariance: FloatArray = field(repr=False)
-    at_bound: bool = False
+    columns: FloatArray = field(repr=False)
+    assessment: Assessment = field(repr=False)
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -62,43 +69,48 @@ class Fit:
         """Names of the effects."""
         return frozenset(c.name for c in self.candidates)
 
+    @property
+    def evidence(self) -> float:
+        """Log evidence [nats]."""
+        return self.assessment.evidence
 
-def build(candidates: Sequence[Candidate], amplitudes: FloatArray) -> tuple[Effect, ...]:
+    @property
+    def slices(self) -> tuple[slice, ...]:
+        """Where every candidate's amplitudes stand among the free numbers."""
+        ends = np.cumsum([0, *(len(a) for a in self.amplitudes)])
+        return tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
+
+    @property
+    def errors(self) -> FloatArray:
+        """Standard errors of all amplitudes, (k,)."""
+        count = self.jacobian.shape[1]
+        return np.sqrt(np.maximum(np.diag(self.assessment.covariance)[:count], 0.0))
+
+    @property
+    def at_bound(self) -> bool:
+        """Whether some amplitude has run into a physical bound."""
+        for c, a in zip(self.candidates, self.amplitudes, strict=True):
+            low, high = c.limits
+            size = 1e-6 * np.maximum(np.abs(low), np.abs(high))
+            size = np.where(np.isfinite(size), size, 0.0)
+            if np.any((a <= low + size) | (a >= high - size)):
+                return True
+        return False
+
+    def at(self, free: FloatArray) -> FloatArray:
+        """Prediction at other free numbers (counted from their priors' means), to first order, (n,)."""
+        columns = np.column_stack([self.jacobian, self.columns])
+        return self.prediction + columns @ (free - _free(self.candidates, self.amplitudes, self.nuisance))
+
+
+def build(candidates: Sequence[Candidate], amplitudes: Sequence[FloatArray]) -> tuple[Effect, ...]:
     """Effects of candidates at amplitudes."""
-    return tuple(c.effect(float(a)) for c, a in zip(candidates, amplitudes, strict=True))
+    return tuple(c.effect(a) for c, a in zip(candidates, amplitudes, strict=True))
 
 
-@dataclass(frozen=True)
-class Misfit:
-    """Whitened residuals of the training elements.
-
-    Attributes
-    ----------
-    value : (n,) ndarray
-    covariance : (n, n) ndarray
-        For inference: identification, tolerance, nuisances.
-    train : (n,) ndarray of bool
-    """
-
-    value: FloatArray
-    covariance: FloatArray
-    train: BoolArray
-    factor: FloatArray = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        part = self.covariance[np.ix_(self.train, self.train)]
-        scale = np.sqrt(np.diag(part))
-        object.__setattr__(self, "factor", scale[:, None] * np.linalg.cholesky(part / np.outer(scale, scale)))
-
-    def whiten(self, vector: FloatArray) -> FloatArray:
-        """L^-1 of the training part of a vector or of columns."""
-        from scipy.linalg import solve_triangular
-
-        return np.asarray(solve_triangular(self.factor, vector[self.train], lower=True))
-
-    def chi_square(self, prediction: FloatArray) -> float:
-        """Whitened squared misfit of a prediction."""
-        return float(np.sum(self.whiten(self.value - prediction) ** 2))
+def _free(candidates: Sequence[Candidate], amplitudes: Sequence[FloatArray], nuisance: FloatArray) -> FloatArray:
+    moved = [a - c.origin for c, a in zip(candidates, amplitudes, strict=True)]
+    return np.concatenate([*moved, nuisance]) if moved else nuisance
 
 
 @dataclass(frozen=True)
@@ -107,146 +119,244 @@ class Start:
 
     Attributes
     ----------
-    amplitudes : (k,) ndarray
-    columns : (n, k) ndarray
+    candidates : tuple of Candidate
+    amplitudes : tuple of (k_i,) ndarray
+    jacobian : (n, k) ndarray
         Derivatives that are known from nearby; steps correct them.
+    nuisance : (m,) ndarray
+        Where nuisances stand while amplitudes move.
+    columns : (n, m) ndarray
     """
 
-    amplitudes: FloatArray
+    candidates: tuple[Candidate, ...]
+    amplitudes: tuple[FloatArray, ...]
+    jacobian: FloatArray = field(repr=False)
+    nuisance: FloatArray = field(repr=False)
     columns: FloatArray = field(repr=False)
+
+    def split(self, flat: FloatArray) -> tuple[FloatArray, ...]:
+        """Amplitudes by candidate, inside their bounds."""
+        out, at = [], 0
+        for c in self.candidates:
+            low, high = c.limits
+            out.append(np.clip(flat[at : at + len(low)], low, high))
+            at += len(low)
+        return tuple(out)
+
+
+def linear(problem: Problem, start: Start, prediction: FloatArray, slack: float = 1.0) -> Linear:
+    """Linear model about a prediction; `slack` scales the tolerances of all nuisances."""
+    columns = problem.scaled(np.column_stack([start.jacobian, start.columns]))
+    free = _free(start.candidates, start.amplitudes, start.nuisance)
+    width = np.concatenate([*(c.width for c in start.candidates), np.full(start.columns.shape[1], slack)])
+    residual = problem.scaled(problem.observations.value - prediction) + columns @ free
+    return Linear(residual, columns, width)
+
+
+def fitted(problem: Problem, start: Start, prediction: FloatArray, scales: FloatArray | None = None) -> Fit:
+    """A fit where a model stands, assessed."""
+    found = assess(problem.basis, linear(problem, start, prediction), scales)
+    return Fit(start.candidates, start.amplitudes, start.nuisance, prediction, start.jacobian, start.columns, found)
 
 
 @dataclass(frozen=True)
-class _Prior:
-    neutral: FloatArray
-    width: FloatArray
-    low: FloatArray
-    high: FloatArray
+class _Place:
+    """Where all free numbers stand, and what the model predicts there."""
 
-    def cost(self, now: FloatArray) -> float:
-        return float(np.sum(((now - self.neutral) / self.width) ** 2))
+    start: Start
+    prediction: FloatArray
+
+    def cost(self, problem: Problem, weight: FloatArray) -> float:
+        """Squared misfit under noise and model error, plus that of all priors."""
+        z = problem.scaled(problem.observations.value - self.prediction)
+        free = _free(self.start.candidates, self.start.amplitudes, self.start.nuisance)
+        width = np.concatenate([*(c.width for c in self.start.candidates), np.ones(len(self.start.nuisance))])
+        return float(z @ weight @ z + np.sum((free / width) ** 2))
 
 
-def fit(forward: ForwardModel, misfit: Misfit, chosen: Sequence[Candidate], start: Start) -> Fit | None:
-    """Fit amplitudes by Levenberg-Marquardt with bounds and a wide prior.
+def fit(forward: ForwardModel, problem: Problem, start: Start) -> Fit | None:
+    """Fit amplitudes; nuisances follow to first order.
 
-    The derivatives at hand are corrected along every step (Broyden, Math. Comp. 19 (1965) 577): a step costs one run
-    of the model however many effects there are.
+    First the effects alone have to do it: far from the answer nuisances, linear as they are here, would bend the way.
+    Then these are as free as stated, the model counting as wrong by what is stated and no more: where it may be wrong
+    by anything, nothing needs to move. Last by what the residual tells.
 
-    Parameters
-    ----------
-    forward : ForwardModel
-    misfit : Misfit
-    chosen : sequence of Candidate
-    start : Start
+    Derivatives are corrected along every step (Broyden, Math. Comp. 19 (1965) 577): a step costs one run of the model.
 
     Returns
     -------
     Fit or None
         None where the model has no equilibrium near the start.
     """
-    low, high = np.array([c.bounds for c in chosen]).reshape(-1, 2).T
-    prior = _Prior(
-        np.array([c.neutral for c in chosen]), np.array([c.step for c in chosen]) * PRIOR_WIDTH, low, high
-    )  # fmt: skip
-    now = np.clip(start.amplitudes, low, high)
-    y = attempt(forward, chosen, now)
+    y = attempt(forward, problem, start)
     if y is None:
         return None
-    cost = misfit.chi_square(y) + prior.cost(now)
-    damping = 1e-4
-    jacobian = start.columns.copy()
-    renewed = False
-    for _ in range(MAX_STEPS):
-        new = _proposed(misfit, prior, now, y, jacobian, damping)
-        spread = _spread(misfit, prior, jacobian)
-        if np.all(np.abs(new - now) < SETTLED * spread):
+    here = _descended(forward, problem, _Place(start, y), problem.basis.stated, TIGHT)
+    here = _descended(forward, problem, here, problem.basis.stated)
+    found = fitted(problem, here.start, here.prediction)
+    there = _descended(forward, problem, here, found.assessment.scales)
+    if there is here:
+        return found
+    other = fitted(problem, there.start, there.prediction, found.assessment.scales)
+    return other if other.evidence > found.evidence else found
+
+
+def _descended(forward: ForwardModel, problem: Problem, here: _Place, scales: FloatArray, slack: float = 1.0) -> _Place:
+    """Steps at fixed scales of the model's error until no amplitude moves."""
+    for _ in range(MAX_STEPS if here.start.jacobian.shape[1] else 0):
+        found = assess(problem.basis, linear(problem, here.start, here.prediction, slack), scales, fixed=True)
+        now = np.concatenate(here.start.amplitudes)
+        step = np.concatenate(here.start.split(_targets(here.start, found))) - now
+        errors = np.sqrt(np.maximum(np.diag(found.covariance)[: len(now)], 0.0))
+        if np.all(np.abs(step) < SETTLED * errors):
             break
-        trial = attempt(forward, chosen, new)
-        trial_cost = np.inf if trial is None else misfit.chi_square(trial) + prior.cost(new)
-        if trial is not None:
-            jacobian = _corrected(jacobian, trial - y, new - now, prior.width)
-        if trial is None or trial_cost > cost:
-            damping = max(10 * damping, 0.1)
-            if damping > 1e3:
-                if renewed:
-                    break
-                # the corrected derivatives have led nowhere: take real ones, once
-                jacobian, damping, renewed = derivatives(forward, chosen, now, y), 1e-4, True
+        moved = _improved(forward, problem, here, step, found, slack)
+        if moved is None:
+            break
+        here = moved
+    return here
+
+
+def _improved(
+    forward: ForwardModel, problem: Problem, here: _Place, step: FloatArray, found: Assessment, slack: float
+) -> _Place | None:
+    """The place after a step, or after a part of it, that is better; None if none is."""
+    now = np.concatenate(here.start.amplitudes)
+    for share in (1.0, 0.4, 0.1):
+        trial = replace(here.start, amplitudes=here.start.split(now + share * step))
+        y = attempt(forward, problem, trial)
+        if y is None:
             continue
-        damping = max(0.1 * damping, 1e-6)
-        now, y, cost = new, trial, trial_cost
-    return _result(misfit, prior, chosen, now, y, jacobian, cost)
+        taken = np.concatenate(trial.amplitudes) - now
+        trial = replace(trial, jacobian=_corrected(here.start, y - here.prediction, taken))
+        told = assess(problem.basis, linear(problem, trial, y, slack), found.scales, fixed=True)
+        if told.evidence > found.evidence:
+            return _Place(trial, y)
+    return None
 
 
-def settle(forward: ForwardModel, misfit: Misfit, found: Fit) -> Fit:
-    """Give a fit real derivatives at its place, for intervals and further searches."""
-    jacobian = derivatives(forward, found.candidates, found.amplitudes, found.prediction)
-    better = fit(forward, misfit, found.candidates, Start(found.amplitudes, jacobian))
-    return better if better is not None and better.chi_square <= found.chi_square + 0.1 else found
+def _targets(start: Start, found: Assessment) -> FloatArray:
+    count = start.jacobian.shape[1]
+    return np.concatenate([c.origin for c in start.candidates]) + found.free[:count]
 
 
-def _result(  # type: ignore[no-untyped-def]
-    misfit: Misfit, prior: _Prior, chosen: Sequence[Candidate], now: FloatArray, y: FloatArray, jacobian, cost: float
-) -> Fit:
-    white = misfit.whiten(jacobian)
-    covariance = np.linalg.inv(white.T @ white + np.diag(1.0 / prior.width**2))
-    inside = (now > prior.low + 1e-9 * np.abs(prior.low)) & (now < prior.high - 1e-9 * np.abs(prior.high))
-    return Fit(tuple(chosen), now, y, jacobian, cost, np.asarray(covariance), not bool(np.all(inside)))
-
-
-def _proposed(  # type: ignore[no-untyped-def]
-    misfit: Misfit, prior: _Prior, now: FloatArray, y: FloatArray, jacobian: FloatArray, damping: float
-):
-    white = misfit.whiten(jacobian)
-    normal = white.T @ white + np.diag(1.0 / prior.width**2)
-    gradient = white.T @ misfit.whiten(misfit.value - y) - (now - prior.neutral) / prior.width**2
-    step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
-    return np.clip(now + step, prior.low, prior.high)
-
-
-def _spread(misfit: Misfit, prior: _Prior, jacobian: FloatArray) -> FloatArray:
-    white = misfit.whiten(jacobian)
-    return np.asarray(1.0 / np.sqrt(np.sum(white**2, axis=0) + 1.0 / prior.width**2))
-
-
-def _corrected(jacobian: FloatArray, change: FloatArray, step: FloatArray, width: FloatArray) -> FloatArray:
+def _corrected(start: Start, change: FloatArray, step: FloatArray) -> FloatArray:
     """Broyden's update, amplitudes measured in their prior widths."""
+    width = np.concatenate([c.width for c in start.candidates])
     scaled = step / width
     length = float(scaled @ scaled)
     if length < 1e-20:
-        return jacobian
-    return np.asarray(jacobian + np.outer(change - jacobian @ step, scaled / length) / width)
+        return start.jacobian
+    return np.asarray(start.jacobian + np.outer(change - start.jacobian @ step, scaled / length) / width)
 
 
-def attempt(forward: ForwardModel, chosen: Sequence[Candidate], amplitudes: FloatArray) -> FloatArray | None:
+def settle(run: Map, problem: Problem, found: Fit, rounds: int = ROUNDS) -> Fit:
+    """Give a fit derivatives of its own, those of the nuisances too, and move all of them together.
+
+    Parameters
+    ----------
+    run : Map
+        See `workers`.
+    problem : Problem
+    found : Fit
+    rounds : int
+        How often derivatives are taken.
+    """
+    start = Start(found.candidates, found.amplitudes, found.jacobian, found.nuisance, found.columns)
+    here = _Place(start, found.prediction)
+    scales = found.assessment.scales
+    for number in range(rounds):
+        if number:
+            here = replace(here, start=_renewed(run, problem, here.start, here.prediction))
+            found = fitted(problem, here.start, here.prediction, scales)
+            scales = found.assessment.scales
+        here, moved = _stepped(run, problem, here, found)
+        found = fitted(problem, here.start, here.prediction, scales)
+        if number and not moved:
+            break
+    return found
+
+
+def _stepped(run: Map, problem: Problem, here: _Place, found: Fit) -> tuple[_Place, bool]:
+    """Take the step that a linear model proposes, or a part of it; whether it was one worth taking."""
+    weight: FloatArray = np.asarray(np.linalg.inv(problem.basis.covariance(found.assessment.scales)), float)
+    free = found.assessment.free
+    now = _free(here.start.candidates, here.start.amplitudes, here.start.nuisance)
+    errors = np.sqrt(np.maximum(np.diag(found.assessment.covariance), 1e-300))
+    if np.all(np.abs(free - now) < SETTLED * errors):
+        return here, False
+    cost = here.cost(problem, weight)
+    for share in (1.0, 0.4, 0.1):
+        start = _moved(here.start, now + share * (free - now))
+        (y,) = tuple(run(_attempt, [(start,)]))
+        if y is not None:
+            there = _Place(start, y)
+            if there.cost(problem, weight) < cost:
+                return there, True
+    return here, False
+
+
+def _moved(start: Start, free: FloatArray) -> Start:
+    count = start.jacobian.shape[1]
+    origin = np.concatenate([c.origin for c in start.candidates]) if start.candidates else np.zeros(0)
+    return replace(start, amplitudes=start.split(origin + free[:count]), nuisance=free[count:])
+
+
+def _renewed(run: Map, problem: Problem, start: Start, y: FloatArray) -> Start:
+    count = start.jacobian.shape[1]
+    jobs = [(start, y, i) for i in range(count + len(problem.nuisances))]
+    columns = list(run(_column, jobs))
+    nothing = np.zeros((len(y), 0))
+    jacobian = np.column_stack(columns[:count]) if count else nothing
+    return replace(start, jacobian=jacobian, columns=np.column_stack([nothing, *columns[count:]]))
+
+
+def _column(forward: ForwardModel, problem: Problem, start: Start, y: FloatArray, index: int) -> FloatArray:
+    count = start.jacobian.shape[1]
+    if index < count:
+        return slope(forward, problem, start, y, index, 0.1)
+    effects = build(start.candidates, start.amplitudes)
+    try:
+        return column_of(forward, effects, problem.nuisances, start.nuisance, y, index - count)
+    except NoEquilibriumError:
+        return np.asarray(start.columns[:, index - count])
+
+
+def _attempt(forward: ForwardModel, problem: Problem, start: Start) -> FloatArray | None:
+    return attempt(forward, problem, start)
+
+
+def attempt(forward: ForwardModel, problem: Problem, start: Start) -> FloatArray | None:
     """Predict; None where the model has no equilibrium."""
     try:
-        return forward(build(chosen, amplitudes))
+        return predict(forward, build(start.candidates, start.amplitudes), problem.nuisances, start.nuisance)
     except NoEquilibriumError:
         return None
 
 
-def derivatives(forward: ForwardModel, chosen: Sequence[Candidate], now: FloatArray, y: FloatArray) -> FloatArray:
-    """Change of the prediction per unit of every amplitude, (n, k)."""
-    columns = [slope(forward, chosen, now, y, i, 0.1 * c.step) for i, c in enumerate(chosen)]
-    return np.column_stack(columns) if columns else np.zeros((len(y), 0))
-
-
-def slope(
-    forward: ForwardModel, chosen: Sequence[Candidate], now: FloatArray, y: FloatArray, index: int, size: float
-) -> FloatArray:
+def slope(forward: ForwardModel, problem: Problem, start: Start, y: FloatArray, index: int, share: float) -> FloatArray:
     """Change of the prediction per unit of one amplitude, by a one-sided difference that stays inside the bounds.
 
-    A zero column where the model has no equilibrium on either side.
+    Parameters
+    ----------
+    share : float
+        Step, in typical sizes.
+
+    Returns
+    -------
+    (n,) ndarray
+        Zero where the model has no equilibrium on either side.
     """
-    low, high = chosen[index].bounds
+    flat = np.concatenate(start.amplitudes)
+    size = share * np.concatenate([c.steps for c in start.candidates])[index]
     for signed in (size, -size, 0.1 * size, -0.1 * size):
-        moved = now.copy()
-        moved[index] = min(max(now[index] + signed, low), high)
-        if moved[index] == now[index]:
+        moved = flat.copy()
+        moved[index] += signed
+        trial = replace(start, amplitudes=start.split(moved))
+        taken = np.concatenate(trial.amplitudes)[index] - flat[index]
+        if taken == 0.0:
             continue
-        other = attempt(forward, chosen, moved)
+        other = attempt(forward, problem, trial)
         if other is not None:
-            return (other - y) / (moved[index] - now[index])
+            return np.asarray((other - y) / taken)
     return np.zeros_like(y)

@@ -1,4 +1,4 @@
-"""Problem: all that a search needs, whether the model behind it is the real one or a surrogate."""
+"""Problem: all that a search needs, whether the model behind it is the real one or a stand-in."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnose.forward.candidates import Candidate
-from tpjb_ident.diagnose.forward.nuisance import Nuisances
+from tpjb_ident.diagnose.forward.nuisance import Nuisance
+from tpjb_ident.diagnose.observations.folds import Fold, folds, held_out
 from tpjb_ident.diagnose.observations.observe import Observations
-from tpjb_ident.diagnose.observations.split import held_out
 from tpjb_ident.diagnose.observations.tolerance import Tolerance
-from tpjb_ident.diagnose.search.directions import Direction, directions
-from tpjb_ident.diagnose.search.fit import Fit, Misfit
+from tpjb_ident.diagnose.search.assessment import Basis
+from tpjb_ident.diagnose.search.components import components
 
 #: Share of the static load below which a pad hardly carries: its attitude, and so its temperature, is not unique.
 HARDLY = 0.10
@@ -29,50 +29,48 @@ class Problem:
     observations : Observations
     base : (n,) ndarray
         Prediction of the baseline.
-    nuisances : Nuisances
+    nuisances : tuple of Nuisance
+    columns : (n, m) ndarray
+        What they do at the baseline, per standard deviation.
     pool : tuple of Candidate
         What may be added.
-    shape : float
-        Relative tolerance of what an effect does.
     """
 
     observations: Observations
     base: FloatArray = field(repr=False)
-    nuisances: Nuisances = field(repr=False)
+    nuisances: tuple[Nuisance, ...] = field(repr=False)
+    columns: FloatArray = field(repr=False)
     pool: tuple[Candidate, ...] = field(repr=False)
-    shape: float = Tolerance.shape
+
+    @functools.cached_property
+    def sigma(self) -> FloatArray:
+        """Measurement and stated model tolerance together: the unit of everything in a search, (n,)."""
+        return self.observations.total_sigma
+
+    @functools.cached_property
+    def basis(self) -> Basis:
+        """What every assessment shares."""
+        noise = self.observations.covariance / np.outer(self.sigma, self.sigma)
+        return Basis(noise, components(self.observations), self.folds)
+
+    @functools.cached_property
+    def folds(self) -> tuple[Fold, ...]:
+        """Blocks that are left out in turn."""
+        return folds(self.observations)
 
     @functools.cached_property
     def held(self) -> BoolArray:
-        """Elements that no fit may see."""
+        """Elements to which a model must extrapolate."""
         return held_out(self.observations)
 
-    @functools.cached_property
-    def covariance(self) -> FloatArray:
-        """For inference: identification, fine tolerance, nuisances; (n, n)."""
-        columns = self.nuisances.columns
-        return self.observations.covariance + np.diag(self.observations.fine**2) + columns @ columns.T
+    def scaled(self, vector: FloatArray) -> FloatArray:
+        """A vector (n,) or columns (n, k) in units of `sigma`."""
+        return np.asarray(vector / (self.sigma if vector.ndim == 1 else self.sigma[:, None]))
 
-    @functools.cached_property
-    def misfit(self) -> Misfit:
-        """Whitened residuals of the training elements."""
-        return Misfit(self.observations.value, self.covariance, ~self.held)
-
-    @functools.cached_property
-    def groups(self) -> tuple[Direction, ...]:
-        """Patterns that a residual is tested for."""
-        return directions(self.observations.elements, self.base)
-
-    @functools.cached_property
-    def empty(self) -> Fit:
-        """The baseline as a fit of nothing."""
-        n = len(self.base)
-        chi_square = self.misfit.chi_square(self.base)
-        return Fit((), np.zeros(0), self.base, np.zeros((n, 0)), chi_square, np.zeros((0, 0)))
-
-    def tolerant(self, fitted: Fit) -> FloatArray:
-        """Covariance with the tolerance of what the fitted effects do, (n, n)."""
-        return np.asarray(self.covariance + np.diag((self.shape * (fitted.prediction - self.base)) ** 2))
+    def twins(self, candidate: Candidate) -> list[int]:
+        """Nuisances that do what a candidate does."""
+        names = {candidate.name, candidate.label}
+        return [i for i, one in enumerate(self.nuisances) if names & one.twins]
 
 
 def loosened(observations: Observations, shares: FloatArray, tolerance: Tolerance) -> Observations:
@@ -86,6 +84,5 @@ def loosened(observations: Observations, shares: FloatArray, tolerance: Toleranc
     tolerance : Tolerance
     """
     idle = np.nan_to_num(shares, nan=1.0) < HARDLY
-    fine = np.where(idle, np.maximum(observations.fine, tolerance.idle_temperature), observations.fine)
-    sigma = np.where(idle, np.maximum(observations.sigma, tolerance.idle_temperature), observations.sigma)
-    return replace(observations, fine=fine, sigma=sigma)
+    noise = np.where(idle, tolerance.idle_temperature, 0.0)
+    return replace(observations, covariance=observations.covariance + np.diag(noise**2))

@@ -1,9 +1,10 @@
-"""Screen: the score test of every candidate at the present model: one model run each, no fit."""
+"""Screen: what every candidate could do to the residual, to first order; the best are worth a fit."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,89 +12,127 @@ from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.candidates import Candidate
 from tpjb_ident.diagnose.forward.forward import ForwardModel
 from tpjb_ident.diagnose.forward.workers import Map
-from tpjb_ident.diagnose.search.fit import Fit, Misfit, slope
+from tpjb_ident.diagnose.search.assessment import Linear, assess
+from tpjb_ident.diagnose.search.fit import Fit, Start, slope
+from tpjb_ident.diagnose.search.problem import Problem
+
+#: Shares of a model's own error scales at which candidates are scored: with the right effect added they fall.
+SHARES = (1.0, 0.1, 0.01, 0.001)
 
 
 @dataclass(frozen=True)
 class Score:
-    """What one candidate could do to the residual, to first order.
+    """What some candidates could do to a model's residual.
 
     Attributes
     ----------
-    candidate : Candidate
+    candidates : tuple of Candidate
+        One, or two at once.
     gain : float
-        Drop of chi-square it promises, other fitted amplitudes free to follow, inside its bounds.
-    amplitude : float
-        At which it promises that (nearly linear form).
-    column : (n,) ndarray
-        Change of the prediction per unit of amplitude.
-    detectable : float
-        Whitened size of its typical step: what this campaign sees of it.
+        Rise of the log evidence that they promise.
+    amplitudes : tuple of (k,) ndarray
+        At which they promise it.
     """
 
-    candidate: Candidate
+    candidates: tuple[Candidate, ...]
     gain: float
-    amplitude: float
-    column: FloatArray = field(repr=False)
-    detectable: float
+    amplitudes: tuple[FloatArray, ...]
 
 
-def screen(
-    run: Map, misfit: Misfit, model: Fit, pool: Sequence[Candidate],
-    known: Mapping[Candidate, FloatArray] | None = None, renewed: int = 0,
+Columns = Mapping[Candidate, FloatArray]
+
+
+def columns(run: Map, model: Fit, pool: Sequence[Candidate]) -> dict[Candidate, FloatArray]:
+    """Change of the prediction per unit of every amplitude of every candidate, at a model; (n, k) each."""
+    slim = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
+    jobs = [(slim, model.prediction, c, i) for c in pool for i in range(len(c.steps))]
+    found = iter(run(_column, jobs))
+    return {c: np.column_stack([next(found) for _ in c.steps]) for c in pool}
+
+
+def _column(
+    forward: ForwardModel, problem: Problem, model: Start, y: FloatArray, candidate: Candidate, index: int
+) -> FloatArray:
+    start = replace(model, candidates=(*model.candidates, candidate), amplitudes=(*model.amplitudes, candidate.origin))
+    at = sum(len(a) for a in model.amplitudes) + index
+    # a step of the size one would expect: some effects act late, or by their square
+    return slope(forward, problem, start, y, at, 0.5)
+
+
+def scores(
+    problem: Problem, model: Fit, table: Columns, pairs: bool = False
 ) -> list[Score]:  # fmt: skip
-    """Score every candidate of a pool against a fitted model, best first.
+    """Score candidates, or all pairs of them, beside a model; best first.
 
     Parameters
     ----------
-    run : Map
-        See `workers`.
-    misfit : Misfit
+    problem : Problem
     model : Fit
-    pool : sequence of Candidate
-    known : mapping of Candidate to (n,) ndarray, optional
-        Columns found at another model; they serve for a first ranking here.
-    renewed : int
-        Of the candidates that rank best by known columns so many get new ones.
+    table : mapping of Candidate to (n, k) ndarray
+    pairs : bool
     """
-    if known is None:
-        columns = run(_column, [(model, candidate) for candidate in pool])
-        return _ranked(misfit, model, dict(zip(pool, columns, strict=True)))
-    table = {c: known[c] for c in pool}
-    first = [s.candidate for s in _ranked(misfit, model, table)[:renewed]]
-    table |= dict(zip(first, run(_column, [(model, c) for c in first]), strict=True))
-    return _ranked(misfit, model, table)
+    levels = [_Level(problem, model, table, share) for share in SHARES]
+    pool = list(table)
+    chosen: list[tuple[Candidate, ...]] = [(c,) for c in pool]
+    if pairs:
+        chosen = [(a, b) for i, a in enumerate(pool) for b in pool[i + 1 :]]
+    found = [max((level.score(one) for level in levels), key=lambda s: s.gain) for one in chosen]
+    return sorted(found, key=lambda s: -s.gain)
 
 
-def _ranked(misfit: Misfit, model: Fit, columns: Mapping[Candidate, FloatArray]) -> list[Score]:
-    residual = misfit.whiten(misfit.value - model.prediction)
-    project = _projector(misfit.whiten(model.jacobian))
-    scores = []
-    for candidate, column in columns.items():
-        seen = project(misfit.whiten(column))
-        scores.append(_score(candidate, column, seen, float(seen @ seen), residual))
-    return sorted(scores, key=lambda s: -s.gain)
+class _Level:
+    """Scores at one level of the error scales."""
+
+    def __init__(self, problem: Problem, model: Fit, table: Columns, share: float) -> None:
+        scales = model.assessment.scales * share
+        found = assess(problem.basis, model.assessment.linear, np.maximum(scales, 1e-5), fixed=True)
+        self.offset = found.evidence - model.evidence
+        residual = model.assessment.linear.residual
+        self.at: dict[Candidate, slice] = {}
+        parts, width, count = [], [], 0
+        for c, column in table.items():
+            parts.append(problem.scaled(column) * c.width)
+            width.append(c.width)
+            self.at[c] = slice(count, count + column.shape[1])
+            count += column.shape[1]
+        unit = np.column_stack(parts)
+        weighted = found.inverse @ unit
+        self.gram, self.toward = unit.T @ weighted, weighted.T @ residual
+        self.width = np.concatenate(width)
+
+    def score(self, chosen: tuple[Candidate, ...]) -> Score:
+        rows = np.concatenate([np.arange(self.at[c].start, self.at[c].stop) for c in chosen])
+        inner = self.gram[np.ix_(rows, rows)] + np.eye(len(rows))
+        moved = np.linalg.solve(inner, self.toward[rows])
+        origin = np.concatenate([c.origin for c in chosen])
+        low, high = (np.concatenate(v) for v in zip(*(c.limits for c in chosen), strict=True))
+        inside = np.clip(origin + moved * self.width[rows], low, high)
+        shift = (inside - origin) / self.width[rows]
+        # careful: no further out than the prior's width, beyond which the first-order step means little
+        shift = np.clip(shift, -1.0, 1.0)
+        gain = float(shift @ self.toward[rows] - 0.5 * shift @ inner @ shift)
+        gain -= 0.5 * float(np.linalg.slogdet(inner)[1])
+        flat, amplitudes, at = origin + shift * self.width[rows], [], 0
+        for c in chosen:
+            amplitudes.append(flat[at : at + len(c.steps)])
+            at += len(c.steps)
+        return Score(chosen, gain + self.offset, tuple(amplitudes))
 
 
-def _column(forward: ForwardModel, model: Fit, candidate: Candidate) -> FloatArray:
-    chosen = (*model.candidates, candidate)
-    now = np.append(model.amplitudes, candidate.neutral)
-    # a step of the size one would expect: some effects act late, or by their square
-    return slope(forward, chosen, now, model.prediction, len(chosen) - 1, 0.5 * candidate.step)
+def with_model(model: Fit, score: Score, table: Columns) -> Start:
+    """Start of a fit of a model with what was scored."""
+    jacobian = np.column_stack([model.jacobian, *(table[c] for c in score.candidates)])
+    return Start((*model.candidates, *score.candidates), (*model.amplitudes, *score.amplitudes), jacobian,
+                 model.nuisance, model.columns)  # fmt: skip
 
 
-def _score(candidate: Candidate, column: FloatArray, seen: FloatArray, power: float, residual: FloatArray) -> Score:
-    if power <= 1e-12:
-        return Score(candidate, 0.0, candidate.neutral, column, 0.0)
-    low, high = candidate.bounds
-    amplitude = float(seen @ residual) / power
-    moved = min(max(candidate.neutral + amplitude, low), high) - candidate.neutral
-    gain = float(2 * moved * (seen @ residual) - moved**2 * power)
-    return Score(candidate, gain, candidate.neutral + moved, column, float(np.sqrt(power)) * candidate.step)
+def visible(problem: Problem, model: Fit, candidate: Candidate, column: FloatArray) -> float:
+    """Size of a typical step of a candidate beside a model, in standard deviations of everything else."""
+    one = problem.scaled(column) @ candidate.steps
+    return math.sqrt(max(float(one @ model.assessment.inverse @ one), 0.0))
 
 
-def _projector(basis: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    if basis.shape[1] == 0:
-        return lambda v: v
-    q, _ = np.linalg.qr(basis)
-    return lambda v: v - q @ (q.T @ v)
+def without_twins(problem: Problem, model: Fit, candidate: Candidate) -> Linear:
+    """A model's linear form without the nuisances that do what a candidate does."""
+    count = model.jacobian.shape[1]
+    return model.assessment.linear.without([count + i for i in problem.twins(candidate)])

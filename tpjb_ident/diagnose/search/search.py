@@ -1,25 +1,46 @@
-"""Search: forward selection of effects by nonlinear fits, a backward check, and the rivals of every effect."""
+"""Search: effects are added and dropped as unseen points want it; rivals of every effect that stays."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.diagnose.forward.candidates import Candidate
+from tpjb_ident.diagnose.forward.candidates import TERMS, Candidate
 from tpjb_ident.diagnose.forward.workers import Map
-from tpjb_ident.diagnose.search.examine import Examination, examine
-from tpjb_ident.diagnose.search.fit import Fit, Start, fit, settle
-from tpjb_ident.diagnose.search.pairs import best_pairs
+from tpjb_ident.diagnose.search.assessment import assess
+from tpjb_ident.diagnose.search.fit import Fit, Start, fit, fitted, settle
 from tpjb_ident.diagnose.search.problem import Problem
-from tpjb_ident.diagnose.search.screen import Score, screen
+from tpjb_ident.diagnose.search.screen import Columns, Score, columns, scores, with_model, without_twins
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 
 Progress = Callable[[str, float], None]
 #: How often another explanation may take the place of one effect of the model.
 SWAPS = 2
+#: How often a model takes derivatives of its own while the search goes on.
+ROUNDS_ON_THE_WAY = 2
+#: Pairs of candidates that are fitted from the baseline: forward selection can begin with a compromise.
+PAIRS = 2
+#: Candidates that are fitted in the place of every effect of the model.
+RIVALS = 3
+
+
+@dataclass(frozen=True)
+class Worth:
+    """What an effect is worth in a model.
+
+    Attributes
+    ----------
+    unseen : float
+        Rise of the log score of folds that are left out in turn, nuisances that do the same set aside [nats].
+    beside : float
+        Rise of the log evidence beside all stated tolerances [nats].
+    """
+
+    unseen: float
+    beside: float
 
 
 @dataclass(frozen=True)
@@ -31,24 +52,79 @@ class Search:
     baseline : Fit
         The model with nothing added.
     model : Fit
-        The model with the effects that were found; `baseline` if none.
-    before, after : Examination
-        What `baseline` and `model` leave.
-    first_scores : tuple of Score
-        Of every candidate, at the baseline.
+        The model with all that unseen points want; `baseline` if nothing.
+    effects : Fit
+        The model without generic terms, fitted again; `model` if it has none.
+    worth : tuple of Worth
+        Of every candidate of `model`.
+    less : tuple of Fit or None
+        `effects` without each of its own.
+    first : dict of Candidate to (n, k) ndarray
+        Derivatives of every candidate at the baseline.
     singles : tuple of Fit
         Fits of one candidate each, best first.
     rivals : tuple of tuple of Fit
-        Per effect of `model`: fits in which another candidate takes its place, best first.
+        Per candidate of `model`: fits in which another one takes its place, best first.
     """
 
     baseline: Fit
     model: Fit
-    before: Examination = field(repr=False)
-    after: Examination = field(repr=False)
-    first_scores: tuple[Score, ...] = field(repr=False)
+    effects: Fit
+    worth: tuple[Worth, ...]
+    less: tuple[Fit | None, ...] = field(repr=False)
+    first: Columns = field(repr=False)
     singles: tuple[Fit, ...] = field(repr=False)
     rivals: tuple[tuple[Fit, ...], ...] = field(repr=False)
+
+
+def worth(problem: Problem, model: Fit, less: Fit, candidate: Candidate) -> Worth:
+    """What a candidate is worth in a model, beside the same model without it."""
+    unseen = []
+    for one in (model, less):
+        told = one.assessment
+        if problem.twins(candidate):
+            told = assess(problem.basis, without_twins(problem, one, candidate), told.scales)
+        unseen.append(float(np.sum(told.scores())))
+    return Worth(unseen[0] - unseen[1], model.evidence - less.evidence)
+
+
+def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Progress | None = None) -> Search:
+    """Look for the effects and terms that unseen points want.
+
+    Parameters
+    ----------
+    run : Map
+        See `workers`.
+    problem : Problem
+    settings : DiagnoseSettings
+    progress : callable, optional
+    """
+    say = progress or (lambda what, share: None)
+    baseline = baseline_fit(problem)
+    say("every effect of the library", 0.1)
+    first = columns(run, baseline, problem.pool)
+    hunt = _Hunt(run, problem, settings, baseline, first)
+    model, singles = hunt.forward(say)
+    say("rivals", 0.8)
+    rivals: tuple[tuple[Fit, ...], ...] = ()
+    for _ in range(SWAPS):
+        rivals = hunt.rivals(model, singles)
+        better = max((r for row in rivals for r in row), key=lambda f: f.evidence, default=model)
+        if better.evidence <= model.evidence + 1.0:
+            break
+        model = hunt.backward(hunt.refined(better))
+    if model.candidates:
+        model = settle(run, problem, model)
+    values = tuple(hunt.worth_in(model, i) for i in range(len(model.candidates)))
+    effects = hunt.named(model)
+    less = tuple(hunt.without(effects, i) for i in range(len(effects.candidates)))
+    return Search(baseline, model, effects, values, less, first, singles, rivals)
+
+
+def baseline_fit(problem: Problem) -> Fit:
+    """The model with nothing added, nuisances to first order."""
+    n, m = problem.columns.shape
+    return fitted(problem, Start((), (), np.zeros((n, 0)), np.zeros(m), problem.columns), problem.base)
 
 
 @dataclass(frozen=True)
@@ -58,133 +134,155 @@ class _Hunt:
     run: Map
     problem: Problem
     settings: DiagnoseSettings
-    columns: dict[Candidate, FloatArray]
+    baseline: Fit
+    first: Columns
 
-    def screened(self, model: Fit) -> list[Score]:
-        """Candidates at a model; those that promise most with new derivatives."""
-        others = [c for c in self.problem.pool if c not in model.candidates]
-        return screen(self.run, self.problem.misfit, model, others, self.columns, self.settings.tried)
+    def forward(self, say: Progress) -> tuple[Fit, tuple[Fit, ...]]:
+        """Add what unseen points want, one at a time or two at once; drop what they do not want any more."""
+        model, table = self.baseline, self.first
+        singles: tuple[Fit, ...] = ()
+        for count in range(self.settings.most_effects):
+            say(f"fits, effect {count + 1}", 0.2 + 0.2 * count)
+            tried = self.extended(model, table)
+            singles = singles or tuple(tried)
+            if count == 1:
+                tried += self.pairs(singles)
+            chosen = self.chosen(model, tried)
+            if chosen is None:
+                break
+            model = self.backward(self.refined(chosen))
+            if len(model.candidates) <= count:
+                break
+            table = self.renewed(model)
+        return model, singles
 
-    def extended(self, model: Fit, scores: Sequence[Score]) -> list[Fit]:
-        """Fits of a model with one candidate more, best first."""
-        starts = [
-            ((*model.candidates, s.candidate),
-             Start(np.append(model.amplitudes, _careful(s)), np.column_stack([model.jacobian, s.column])))
-            for s in scores
-        ]  # fmt: skip
-        return self.fitted(starts)
+    def chosen(self, model: Fit, tried: Sequence[Fit]) -> Fit | None:
+        """The best that unseen points want; an effect of the library before a generic term that does no better."""
+        wanted = [f for f in tried if self.all_wanted(f, model)]
+        if not wanted:
+            return None
+        best = max(wanted, key=lambda f: f.evidence)
+        if best.names & set(TERMS):
+            near = [f for f in wanted if f.evidence > best.evidence - self.settings.alike]
+            named = [f for f in near if not f.names & set(TERMS)]
+            best = max(named, key=lambda f: f.evidence, default=best)
+        return best
 
-    def fitted(self, starts: Sequence[tuple[tuple[Candidate, ...], Start]]) -> list[Fit]:
-        """Fits from their starts, best first."""
-        found = self.run(fit, [(self.problem.misfit, chosen, start) for chosen, start in starts])
-        return sorted((f for f in found if f is not None), key=lambda f: f.chi_square)
+    def all_wanted(self, found: Fit, model: Fit) -> bool:
+        """Whether unseen points want every candidate that is new in a fit."""
+        new = [c for c in found.candidates if c not in model.candidates]
+        if len(new) == 1 and set(found.candidates) - set(new) == set(model.candidates):
+            return self.enough(worth(self.problem, found, model, new[0]))
+        return all(self.enough(self.worth_in(found, i)) for i in range(len(found.candidates)))
 
-    def settled(self, model: Fit) -> Fit:
-        """The same fit with derivatives of its own."""
-        (one,) = tuple(self.run(settle, [(self.problem.misfit, model)]))
-        return one
+    def enough(self, value: Worth) -> bool:
+        """Whether an effect is worth its place."""
+        return value.unseen > self.settings.wanted and value.beside > self.settings.exceeds
 
-    def examined(self, model: Fit) -> Examination:
-        """What a model leaves."""
-        return examine(self.problem, model, self.columns)
+    def worth_in(self, model: Fit, index: int) -> Worth:
+        """What one candidate of a model is worth: the others are fitted again without it."""
+        less = self.without(model, index)
+        return worth(self.problem, model, less, model.candidates[index]) if less is not None else Worth(np.inf, np.inf)
 
+    def without(self, model: Fit, index: int) -> Fit | None:
+        """A model without one of its candidates, the others fitted again."""
+        if len(model.candidates) == 1:
+            return self.baseline
+        keep = [i for i in range(len(model.candidates)) if i != index]
+        start = Start(
+            tuple(model.candidates[i] for i in keep), tuple(model.amplitudes[i] for i in keep),
+            np.column_stack([model.jacobian[:, model.slices[i]] for i in keep]), model.nuisance, model.columns,
+        )  # fmt: skip
+        return next(iter(self.run(fit, [(start,)])))
 
-def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Progress | None = None) -> Search:
-    """Look for the effects that close the gap on the training elements."""
-    say = progress or (lambda what, share: None)
-    empty = problem.empty
-    say("every effect of the library", 0.1)
-    first = screen(run, problem.misfit, empty, problem.pool)
-    hunt = _Hunt(run, problem, settings, {s.candidate: s.column for s in first})
-    before = hunt.examined(empty)
-    if before.structure.p >= settings.alarm:
-        return Search(empty, empty, before, before, tuple(first), (), ())
-    model, after, singles = _forward(hunt, empty, before, first, say)
-    model = _backward(hunt, model, after.scale)
-    say("rivals", 0.9)
-    rivals: tuple[tuple[Fit, ...], ...] = ()
-    for _ in range(SWAPS + 1):
-        rivals = _rivals(hunt, model, singles)
-        better = min((r for row in rivals for r in row), key=lambda f: f.chi_square, default=model)
-        if better.chi_square >= model.chi_square - 0.5:
-            break
-        model = hunt.settled(better)
-    if model.candidates:
-        after = hunt.examined(model)
-    return Search(empty, model, before, after, tuple(first), tuple(singles), rivals)
-
-
-def _forward(
-    hunt: _Hunt, empty: Fit, before: Examination, first: Sequence[Score], say: Progress
-) -> tuple[Fit, Examination, list[Fit]]:
-    """Add effects until what is left has no structure, or nothing helps any more."""
-    model, after, scores = empty, before, list(first)
-    singles: list[Fit] = []
-    for count in range(hunt.settings.most_effects):
-        say(f"fits, effect {count + 1}", 0.2 + 0.2 * count)
-        fits = hunt.extended(model, _most_promising(scores, hunt.settings))
-        if count == 1:
-            pairs = best_pairs(hunt.problem.misfit, empty, singles, hunt.columns)
-            fits = sorted([*fits, *hunt.fitted(pairs)], key=lambda f: f.chi_square)
-        least = after.scale * (hunt.settings.further if count else hunt.settings.detect)
-        if not fits or model.chi_square - fits[0].chi_square < least:
-            break
-        singles = singles or fits
-        model = hunt.settled(fits[0])
-        after = hunt.examined(model)
-        if after.structure.p >= hunt.settings.adequate:
-            break
-        scores = hunt.screened(model)
-    return model, after, singles
-
-
-def _most_promising(scores: Sequence[Score], settings: DiagnoseSettings) -> list[Score]:
-    """Best by score, and the best of every effect that promises a fair share: a first step can mislead."""
-    chosen = [s for s in scores[: settings.tried] if s.gain > 0.25 * settings.detect]
-    names = {s.candidate.name for s in chosen}
-    for s in scores[settings.tried :]:
-        if s.gain > 0.1 * scores[0].gain and s.candidate.name not in names:
-            chosen.append(s)
-            names.add(s.candidate.name)
-    return chosen
-
-
-def _careful(score: Score) -> float:
-    """Start no further out than three typical sizes: beyond, the first-order step means little."""
-    c = score.candidate
-    return c.neutral + float(np.clip(score.amplitude - c.neutral, -3 * c.step, 3 * c.step))
-
-
-def _without(model: Fit, index: int) -> tuple[tuple[Candidate, ...], Start]:
-    return (
-        tuple(c for i, c in enumerate(model.candidates) if i != index),
-        Start(np.delete(model.amplitudes, index), np.delete(model.jacobian, index, axis=1)),
-    )
-
-
-def _backward(hunt: _Hunt, model: Fit, scale: float) -> Fit:
-    """Drop effects whose removal costs next to nothing once the others are there."""
-    while len(model.candidates) > 1:
-        reduced = hunt.fitted([_without(model, i) for i in range(len(model.candidates))])
-        if not reduced or reduced[0].chi_square - model.chi_square >= hunt.settings.further * scale:
+    def named(self, model: Fit) -> Fit:
+        """A model without its generic terms."""
+        terms = [i for i, c in enumerate(model.candidates) if c.name in TERMS]
+        if not terms:
             return model
-        model = hunt.settled(reduced[0])
-    return model
+        if len(terms) == len(model.candidates):
+            return self.baseline
+        for i in reversed(terms):
+            model = self.without(model, i) or model
+        return settle(self.run, self.problem, model)
 
+    def backward(self, model: Fit) -> Fit:
+        """Drop what unseen points do not want once the others are there."""
+        while len(model.candidates) > 1:
+            values = [self.worth_in(model, i) for i in range(len(model.candidates))]
+            weak = [i for i, v in enumerate(values) if not self.enough(v)]
+            if not weak:
+                return model
+            less = self.without(model, min(weak, key=lambda i: values[i].unseen))
+            if less is None:
+                return model
+            model = settle(self.run, self.problem, less)
+        return model
 
-def _rivals(hunt: _Hunt, model: Fit, singles: Sequence[Fit]) -> tuple[tuple[Fit, ...], ...]:
-    """For every effect, fits in which another candidate takes its place."""
-    if not model.candidates:
-        return ()
-    if len(model.candidates) == 1:
-        return (tuple(f for f in singles if f.candidates != model.candidates),)
-    out: list[tuple[Fit, ...]] = []
-    for index, gone in enumerate(model.candidates):
-        (rest, *_) = [*hunt.fitted([_without(model, index)]), None]
-        if rest is None:
-            out.append(())
-            continue
-        lost = rest.chi_square - model.chi_square
-        scores = [s for s in hunt.screened(rest) if s.gain > 0.5 * lost and s.candidate != gone]
-        out.append(tuple(hunt.extended(rest, scores[:4])))
-    return tuple(out)
+    def extended(self, model: Fit, table: Columns) -> list[Fit]:
+        """Fits of a model with one candidate more, best first."""
+        free = {c: v for c, v in table.items() if c.label not in {o.label for o in model.candidates}}
+        ranked = self.promising(scores(self.problem, model, free))
+        return self.fits([with_model(model, s, free) for s in ranked])
+
+    def promising(self, ranked: Sequence[Score]) -> list[Score]:
+        """The best, and the best of every other effect that promises a fair share: a first step can mislead."""
+        chosen = list(ranked[: self.settings.tried])
+        names = {s.candidates[0].name for s in chosen}
+        for s in ranked[self.settings.tried :]:
+            if s.gain > 0.3 * ranked[0].gain and s.candidates[0].name not in names:
+                chosen.append(s)
+                names.add(s.candidates[0].name)
+        return [s for s in chosen if s.gain > self.settings.exceeds]
+
+    def pairs(self, singles: Sequence[Fit]) -> list[Fit]:
+        """Fits of two candidates at once from the baseline: what a compromise between two would hide."""
+        table = dict(self.first)
+        for f in singles:  # the secant of a fit tells more than the derivative at the baseline
+            (c,), (a,) = f.candidates, f.amplitudes
+            if len(a) == 1 and abs(a[0] - c.neutral) > 1e-3 * c.step:
+                table[c] = (f.prediction - self.problem.base)[:, None] / (a[0] - c.neutral)
+        ranked = scores(self.problem, self.baseline, table, pairs=True)[:PAIRS]
+        return self.fits([with_model(self.baseline, s, table) for s in ranked])
+
+    def fits(self, starts: Sequence[Start]) -> list[Fit]:
+        """Fits from their starts, best first."""
+        found = self.run(fit, [(start,) for start in starts])
+        return sorted((f for f in found if f is not None), key=lambda f: -f.evidence)
+
+    def refined(self, model: Fit) -> Fit:
+        """The same model with directions off their grid and derivatives of its own."""
+        swapped = tuple(c.refined() for c in model.candidates)
+        if swapped != model.candidates:
+            parts, amplitudes = [], []
+            for old, new, a, at in zip(model.candidates, swapped, model.amplitudes, model.slices, strict=True):
+                more = len(new.free) - len(old.free) if not new.form else 0
+                parts.append(np.column_stack([model.jacobian[:, at], np.zeros((len(model.prediction), more))]))
+                amplitudes.append(np.append(a, [new.about["direction"]] * more))
+            model = replace(model, candidates=swapped, amplitudes=tuple(amplitudes), jacobian=np.column_stack(parts))
+            start = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
+            model = fitted(self.problem, start, model.prediction, model.assessment.scales)
+        return settle(self.run, self.problem, model, ROUNDS_ON_THE_WAY)
+
+    def renewed(self, model: Fit) -> dict[Candidate, FloatArray]:
+        """Derivatives at a model: new ones for the candidates that rank best by those of the baseline."""
+        labels = {c.label for c in model.candidates}
+        table = {c: v for c, v in self.first.items() if c.label not in labels}
+        best = [s.candidates[0] for s in scores(self.problem, model, table)[: 2 * self.settings.tried]]
+        return table | columns(self.run, model, best)
+
+    def rivals(self, model: Fit, singles: Sequence[Fit]) -> tuple[tuple[Fit, ...], ...]:
+        """For every candidate of a model, fits in which another one takes its place."""
+        if len(model.candidates) == 1:
+            return (tuple(f for f in singles if f.label != model.label),)
+        out: list[tuple[Fit, ...]] = []
+        for index, gone in enumerate(model.candidates):
+            rest = self.without(model, index)
+            if rest is None:
+                out.append(())
+                continue
+            used = {gone.label, *(o.label for o in rest.candidates)}
+            table = {c: v for c, v in self.first.items() if c.label not in used}
+            best = [s for s in scores(self.problem, rest, table) if s.gain > 0.0][:RIVALS]
+            out.append(tuple(self.fits([with_model(rest, s, table) for s in best])))
+        return tuple(out)

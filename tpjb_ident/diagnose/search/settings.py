@@ -1,58 +1,60 @@
-"""Settings of a diagnosis: thresholds with what they mean, in one place."""
+"""Settings of a diagnosis: every constant of the decision path, with what set it, in one place."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from tpjb_ident.diagnose.forward.nuisance import Certificates
+from tpjb_ident.diagnose.forward.tolerances import Tolerances
 from tpjb_ident.diagnose.observations.tolerance import Tolerance
 
 
 @dataclass(frozen=True)
 class DiagnoseSettings:
-    """How a diagnosis decides.
+    """How a diagnosis decides; studies in `tests/studies/diagnosis`, tables in `docs/diagnosis.md`.
 
     Attributes
     ----------
     tolerance : Tolerance
-    certificates : Certificates
+        What the model is trusted to, per kind of observable.
+    tolerances : Tolerances
+        What may be off in drawing, data sheet and instruments.
+    wanted : float
+        Held-out log score (nats, summed over the folds) that an effect must be worth to unseen points.
+    exceeds : float
+        Log evidence that it must be worth beside the stated tolerances: for an effect that is itself a tolerance, 1.6
+        is two and a half standard deviations of it.
+    alike : float
+        Log evidence below which another explanation counts as one that these data cannot tell apart: 3 is odds of 20.
+    most : float
+        Share of the squared gap on unseen points that effects must close to be named at all.
+    part : float
+        Share of it that every one of them must close.
     alarm : float
-        p-value of the baseline's residual, all tests considered, below which something is the matter.
-    adequate : float
-        p-value below which what a model leaves is still structured.
-    cancelling : float
-        Whitened size of one effect, in units of what all together do, above which effects merely cancel each other.
-    held : float
-        p-value below which held-out points contradict a model.
-    detect, further : float
-        Drop of chi-square, in units of the residual's own variance, which the first effect and every one after it
-        must bring: combinations imitate far more than single effects do.
-    rivals : float
-        Difference of chi-square, in the same units, below which two explanations count as alike.
-    closed : float
-        Share of the squared gap that a model may leave however structured: it closes all that matters.
+        p-value, all patterns considered, below which a residual is more than noise and stated tolerances.
     tried : int
-        Candidates that are fitted per round, the best by score.
+        Candidates that are fitted per round, the best to first order.
     most_effects : int
     visible : float
-        Whitened size of a typical effect below which a campaign could not have seen it.
+        Size of a typical effect, in standard deviations of everything else, below which a campaign cannot see it.
     skip : frozenset of str
         Effects to leave out of the library.
     workers : int or None
     """
 
     tolerance: Tolerance = field(default_factory=Tolerance)
-    certificates: Certificates = field(default_factory=Certificates)
-    alarm: float = 0.01
-    adequate: float = 0.005
-    cancelling: float = 2.5
-    held: float = 0.001
-    detect: float = 12.0
-    further: float = 25.0
-    rivals: float = 9.0
-    closed: float = 0.01
-    tried: int = 8
+    tolerances: Tolerances = field(default_factory=Tolerances)
+    wanted: float = 5.0
+    exceeds: float = 1.6
+    alike: float = 3.0
+    most: float = 0.8
+    part: float = 0.02
+    alarm: float = 0.005
+    tried: int = 5
     most_effects: int = 3
     visible: float = 3.0
     skip: frozenset[str] = frozenset()
     workers: int | None = None
+
+    def with_tolerances(self, stated: Tolerances) -> DiagnoseSettings:
+        """Return a copy with other stated tolerances; the model's own among them."""
+        return replace(self, tolerances=stated, tolerance=replace(self.tolerance, stiffness=stated["model"]))

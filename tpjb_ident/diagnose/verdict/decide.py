@@ -1,25 +1,68 @@
-"""Decide: from fits to a verdict: consistent, named, ambiguous, or unexplained."""
+"""Decide: what is named, what is left, and what the rest behaves like."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray
-from tpjb_ident.diagnose.forward.candidates import Candidate
+from model.effects import kind_of
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.diagnose.forward.candidates import TERMS
 from tpjb_ident.diagnose.observations.gap import gap, gap_by_observable, noise_floor
-from tpjb_ident.diagnose.observations.observe import Observations
 from tpjb_ident.diagnose.search.fit import Fit
 from tpjb_ident.diagnose.search.problem import Problem
+from tpjb_ident.diagnose.search.screen import visible
 from tpjb_ident.diagnose.search.search import Search
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+from tpjb_ident.diagnose.verdict.behaviour import behaviours
+from tpjb_ident.diagnose.verdict.closure import Closure, closure, effects_unseen, unseen
+from tpjb_ident.diagnose.verdict.drift import Drift, drifts
 from tpjb_ident.diagnose.verdict.localise import localise
-from tpjb_ident.diagnose.verdict.verdict import FoundEffect, FoundParameter, RankedCandidate, Verdict, VerdictName
+from tpjb_ident.diagnose.verdict.plausibility import plausible
+from tpjb_ident.diagnose.verdict.remainder import Excess, excess
+from tpjb_ident.diagnose.verdict.verdict import (
+    Assumption,
+    FoundEffect,
+    FoundParameter,
+    RankedCandidate,
+    Remainder,
+    Verdict,
+    VerdictName,
+)
 
 
-def decide(problem: Problem, found: Search, settings: DiagnoseSettings) -> Verdict:
-    """Turn a search into a verdict.
+@dataclass(frozen=True)
+class Judged:
+    """What the evidence says before it is put in words.
+
+    Attributes
+    ----------
+    name : str
+        The verdict.
+    named : Fit
+        The model with exactly the effects that are named; the baseline if none.
+    closed : Closure
+        By the effects of the search, generic terms left out.
+    left : Excess
+        What `named` leaves beyond the stated tolerances.
+    alike : tuple of tuple of str
+        Per effect that has rivals: its label, then theirs.
+    reasons : tuple of str
+    """
+
+    name: VerdictName
+    named: Fit = field(repr=False)
+    closed: Closure
+    left: Excess
+    alike: tuple[tuple[str, ...], ...]
+    reasons: tuple[str, ...]
+
+
+def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Judged:
+    """Weigh a search: the dominant causes first, then what they leave.
 
     Parameters
     ----------
@@ -27,177 +70,222 @@ def decide(problem: Problem, found: Search, settings: DiagnoseSettings) -> Verdi
     found : Search
     settings : DiagnoseSettings
     """
-    observations, held = problem.observations, problem.held
-    scale = found.after.scale
-    groups, spelt = _groups(found, scale, settings), _alternatives(found, scale, settings)
-    name, reasons = _judge(problem, found, spelt, settings)
-    model = found.model if name in {"named", "ambiguous"} else found.baseline
-    shown = found.model if found.model.candidates else found.baseline
-    return Verdict(
-        verdict=name,
-        effects=_effects(found, scale) if model.candidates else (),
-        indistinguishable=groups if name == "ambiguous" else (),
-        alternatives=spelt if name == "ambiguous" else (),
-        below_floor=_below_floor(found, settings),
-        next_test="",
-        candidates=_ranked(found, observations, held, int(problem.misfit.train.sum())),
-        disagreement=localise(observations, found.baseline.prediction),
-        gap_by_observable=gap_by_observable(observations, found.baseline.prediction, shown.prediction, held),
-        gap={
-            "before": gap(observations, found.baseline.prediction),
-            "after": gap(observations, shown.prediction),
-            "heldout_before": gap(observations, found.baseline.prediction, held),
-            "heldout_after": gap(observations, shown.prediction, held),
-            "noise_floor": noise_floor(observations),
-        },
-        reasons=reasons,
-    )
-
-
-def _judge(
-    problem: Problem, found: Search, alike: tuple[tuple[str, ...], ...], settings: DiagnoseSettings
-) -> tuple[VerdictName, tuple[str, ...]]:
-    model, before, after = found.model, found.before, found.after
-    if not model.candidates:
-        if before.structure.p >= settings.alarm:
-            return "consistent", (f"no disagreement above noise and tolerance (p = {before.structure.p:.2g})",)
-        where = before.structure.words
-        return "unexplained", (
-            f"something is the matter (p = {before.structure.p:.1g}, most in {where}), and no effect of the library "
-            "reduces it enough",
+    baseline, effects = found.baseline, found.effects
+    before = excess(problem, baseline)
+    closed = closure(problem, baseline, effects, found.less)
+    if not found.model.candidates:
+        if before.p >= settings.alarm:
+            told = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"
+            return Judged("consistent", baseline, closed, before, (), (told,))
+        told = (
+            f"something is the matter (p = {before.p:.1g}, most in {before.where}), and unseen points want no effect "
+            "of the library"
         )
-    reasons = _refusals(problem, found, settings)
+        return Judged("unexplained", baseline, closed, before, (), (told,))
+    reasons = _refusals(found, closed, settings)
+    if reasons and before.p >= settings.alarm:
+        told = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"
+        return Judged("consistent", baseline, closed, before, (), (told,))
     if reasons:
-        return "unexplained", reasons
-    gaps = [gap(problem.observations, f.prediction, problem.held) for f in (found.baseline, model)]
-    text = f"held-out gap {gaps[0]:.2f} -> {gaps[1]:.2f}; what is left has no structure (p = {after.structure.p:.2g})"
-    if after.structure.p < settings.adequate:
-        text = (
-            f"held-out gap {gaps[0]:.2f} -> {gaps[1]:.2f}; what is left is small but structured, most in "
-            f"{after.structure.words}"
+        return Judged("unexplained", baseline, closed, before, (), reasons)
+    left = excess(problem, effects)
+    alike = _alike(found, settings)
+    share = f"{100 * closed.closed:.0f} % of the squared gap on unseen points is closed"
+    if left.p < settings.alarm or found.model.candidates != effects.candidates:
+        told = (
+            f"{share}; what is left is more than noise and stated tolerances (p = {left.p:.1g}), most in {left.where}"
         )
-    if alike:
-        return "ambiguous", (*(f"{' or '.join(group)}: these data cannot tell" for group in alike), text)
-    return "named", (text,)
+        return Judged("partly-explained", effects, closed, left, alike, (told,))
+    told = f"{share}; what is left is within noise and stated tolerances (p = {left.p:.2g})"
+    return Judged("ambiguous" if alike else "named", effects, closed, left, alike, (told,))
 
 
-def _alike(found: Search, rival: Fit, scale: float, settings: DiagnoseSettings) -> bool:
-    return (rival.chi_square - found.model.chi_square) / scale < settings.rivals and not rival.at_bound
-
-
-def _refusals(problem: Problem, found: Search, settings: DiagnoseSettings) -> tuple[str, ...]:
-    """Why the best model is not believed; empty if it is."""
-    model, after = found.model, found.after
-    reasons = []
-    if model.at_bound:
-        reasons.append(f"the best fit ({model.label}) runs into a physical bound")
-    if len(model.candidates) > 1 and _cancelling(problem, model) > settings.cancelling:
-        reasons.append(f"the effects of the best fit ({model.label}) mostly cancel each other")
-    left = share_left(problem, found)
-    if after.structure.p < settings.adequate and left > settings.closed:
-        reasons.append(
-            f"the best fit ({model.label}) leaves {100 * left:.0f} % of the squared gap, and that has structure "
-            f"(p = {after.structure.p:.1g}), most in {after.structure.words}"
-        )
-    if after.held_p < settings.held and left > settings.closed:
-        reasons.append(f"points that the best fit ({model.label}) has not seen contradict it (p = {after.held_p:.1g})")
-    return tuple(reasons)
-
-
-def _cancelling(problem: Problem, model: Fit) -> float:
-    """Whitened size of the largest effect over that of all together."""
-    moved = model.amplitudes - np.array([c.neutral for c in model.candidates])
-    alone = np.linalg.norm(problem.misfit.whiten(model.jacobian * moved), axis=0)
-    together = np.linalg.norm(problem.misfit.whiten(model.prediction - problem.base))
-    return float(alone.max() / together)
-
-
-def share_left(problem: Problem, found: Search) -> float:
-    """Share of the baseline's squared gap that the model leaves, noise deducted from both."""
-    floor = noise_floor(problem.observations) ** 2
-    before, after = (gap(problem.observations, f.prediction) ** 2 for f in (found.baseline, found.model))
-    return max(after - floor, 0.0) / max(before - floor, 1e-12) if before > floor else 1.0
-
-
-def _others(found: Search, index: int, scale: float, settings: DiagnoseSettings) -> tuple[Candidate, ...]:
-    """Candidates that could stand in the place of one effect of the model as well, best first."""
-    ordered = sorted(found.rivals[index], key=lambda f: f.chi_square)
-    alike = (r for r in ordered if _alike(found, r, scale, settings))
-    return tuple(dict.fromkeys(c for r in alike for c in r.candidates if c not in found.model.candidates))
-
-
-def _groups(found: Search, scale: float, settings: DiagnoseSettings) -> tuple[tuple[str, ...], ...]:
-    """Per effect that has rivals, the names of all of them, its own first.
-
-    Another pad or direction of the same effect is a rival too; it is spelt out, since its name is the effect's own.
-    """
+def _refusals(found: Search, closed: Closure, settings: DiagnoseSettings) -> tuple[str, ...]:
+    """Why the effects of a search are not named; empty if they are."""
+    effects = found.effects
+    if not effects.candidates:
+        return ("unseen points want a term that no effect of the library stands for",)
     out = []
-    for i, candidate in enumerate(found.model.candidates):
-        others = _others(found, i, scale, settings)
-        if others:
-            rest = {c.label if c.name == candidate.name else c.name for c in others}
-            out.append((candidate.name, *sorted(rest)))
+    if effects.at_bound:
+        out.append(f"the best fit ({effects.label}) runs into a physical bound")
+    if not closed.closed >= settings.most:
+        out.append(
+            f"the best fit ({effects.label}) closes {100 * closed.closed:.0f} % of the squared gap on unseen points, "
+            f"less than the {100 * settings.most:.0f} % that a name takes"
+        )
     return tuple(out)
 
 
-def _alternatives(found: Search, scale: float, settings: DiagnoseSettings) -> tuple[tuple[str, ...], ...]:
-    """`_groups` with every pad and direction spelt out, likeliest first."""
-    rows = [
-        (candidate, _others(found, i, scale, settings)) for i, candidate in enumerate(found.model.candidates)
-    ]  # fmt: skip
-    return tuple((one.label, *(c.label for c in others)) for one, others in rows if others)
+def _alike(found: Search, settings: DiagnoseSettings) -> tuple[tuple[str, ...], ...]:
+    """Per effect, the others that could stand in its place as well, its own label first."""
+    out = []
+    for candidate, row in zip(found.model.candidates, found.rivals, strict=False):
+        if candidate.name in TERMS:
+            continue
+        near = [r for r in row if r.evidence > found.model.evidence - settings.alike and not r.at_bound]
+        used = {c.label for c in found.model.candidates}
+        others = [c for r in near for c in r.candidates if c.label not in used and c.name not in TERMS]
+        names = tuple(dict.fromkeys(c.label if c.name == candidate.name else c.name for c in others))
+        if names:
+            out.append((candidate.name, *names))
+    return tuple(out)
 
 
-def close_rivals(found: Search, settings: DiagnoseSettings) -> tuple[Fit, ...]:
-    """Return the explanations that the data cannot tell from the model, the closest first.
+def decide(
+    problem: Problem, found: Search, settings: DiagnoseSettings, exact: FloatArray | None = None
+) -> Verdict:  # fmt: skip
+    """Turn a search into a verdict.
 
     Parameters
     ----------
+    problem : Problem
     found : Search
     settings : DiagnoseSettings
+    exact : (n,) ndarray, optional
+        What the model predicts with the effects of the search and nothing else; by default to first order.
     """
-    alike = [r for row in found.rivals for r in row if _alike(found, r, found.after.scale, settings)]
-    return tuple(sorted(alike, key=lambda f: f.chi_square))
+    observations, held = problem.observations, problem.held
+    judged = judge(problem, found, settings)
+    named = judged.named
+    if exact is None:
+        exact = found.effects.prediction - found.effects.columns @ found.effects.nuisance
+    after = exact if named.candidates else problem.base
+    unseen_after = effects_unseen(problem, named, after) if named.candidates else problem.base
+    worst = localise(observations, unseen(problem, named))
+    return Verdict(
+        verdict=judged.name,
+        effects=_effects(problem, found, judged),
+        indistinguishable=judged.alike if judged.name in {"ambiguous", "partly-explained"} else (),
+        below_floor=_below_floor(problem, found, settings),
+        next_test="",
+        candidates=_ranked(problem, found),
+        disagreement=localise(observations, problem.base),
+        gap_by_observable=gap_by_observable(observations, problem.base, unseen_after, held),
+        gap={
+            "before": gap(observations, problem.base),
+            "after": gap(observations, after),
+            "heldout_before": gap(observations, problem.base, held),
+            "heldout_after": gap(observations, unseen_after, held),
+            "within_tolerances": judged.closed.after if named.candidates else judged.closed.before,
+            "closed": judged.closed.closed if named.candidates else math.nan,
+            "noise_floor": noise_floor(observations),
+        },
+        remainder=_remainder(problem, judged, worst[0].observable + " at " + worst[0].where if worst else ""),
+        behaves_like=behaviours(problem, found),
+        drift=_drifts(problem, found, judged),
+        assumptions=_assumptions(problem, found, settings),
+        reasons=judged.reasons,
+    )
 
 
-def _effects(found: Search, scale: float) -> tuple[FoundEffect, ...]:
-    model = found.model
-    out = []
-    for i, candidate in enumerate(model.candidates):
-        rivals = found.rivals[i] if i < len(found.rivals) else ()
-        odds = [math.exp(-0.5 * min((r.chi_square - model.chi_square) / scale, 700.0)) for r in rivals]
-        parameters = {
-            k: FoundParameter(v, v, v, "rad" if k == "direction" else "1") for k, v in candidate.fixed.items()
-        }
-        parameters[candidate.parameter.name] = _parameter(candidate, model, i, scale)
-        out.append((_importance(model, i), FoundEffect(candidate.name, 1.0 / (1.0 + sum(odds)), parameters)))
-    return tuple(e for _, e in sorted(out, key=lambda pair: -pair[0]))
+def _remainder(problem: Problem, judged: Judged, where: str) -> Remainder:
+    """What is left on unseen points once everything that may be off is at its likeliest."""
+    left = judged.closed.after if judged.named.candidates else judged.closed.before
+    floor, before = noise_floor(problem.observations) ** 2, gap(problem.observations, problem.base) ** 2
+    share = max(left**2 - floor, 0.0) / (before - floor) if before > floor else 0.0
+    return Remainder(left, min(share, 1.0), judged.left.where if judged.left.p < 0.005 else where, judged.left.p)
 
 
-def _importance(model: Fit, i: int) -> float:
-    moved = model.amplitudes[i] - model.candidates[i].neutral
-    return abs(moved) / math.sqrt(model.covariance[i, i])
+def _drifts(problem: Problem, found: Search, judged: Judged) -> tuple[Drift, ...]:
+    if judged.name == "consistent":
+        return ()
+    if judged.named.candidates:
+        return drifts(problem, found.model)
+    return drifts(problem, found.singles[0]) if found.singles else ()
 
 
-def _parameter(candidate: Candidate, model: Fit, i: int, scale: float) -> FoundParameter:
-    """Value and 95 % interval, transformed from the nearly linear form."""
-    parameter = candidate.parameter
-    value, se = float(model.amplitudes[i]), math.sqrt(float(model.covariance[i, i]) * scale)
-    low, high = candidate.bounds
-    ends = [parameter.from_linear(min(max(value + s * 1.96 * se, low), high)) for s in (-1, 1)]
-    return FoundParameter(parameter.from_linear(value), min(ends), max(ends), parameter.unit)
+def _effects(problem: Problem, found: Search, judged: Judged) -> tuple[FoundEffect, ...]:
+    if not judged.named.candidates:
+        return ()
+    rows = []
+    for index, candidate in enumerate(found.model.candidates):
+        if candidate.name in TERMS:
+            continue
+        parameters = parameters_of(found.model, index)
+        order = found.worth[index].unseen
+        rows.append((order, FoundEffect(candidate.name, parameters, _stands_in(problem, candidate.name, parameters))))
+    return tuple(e for _, e in sorted(rows, key=lambda row: -row[0]))
 
 
-def _below_floor(found: Search, settings: DiagnoseSettings) -> tuple[str, ...]:
+def _stands_in(problem: Problem, name: str, parameters: dict[str, FoundParameter]) -> str:
+    pads = sum(n.name == "clearance_scatter" for n in problem.nuisances)
+    words = []
+    for key, value in parameters.items():
+        known = plausible(name, key, pads) if value.lo < value.hi else None
+        if known is not None:
+            words.append(known.words(f"{name} {key}", value.value, value.lo, value.hi))
+    return "; ".join(w for w in words if w)
+
+
+def parameters_of(fitted: Fit, index: int) -> dict[str, FoundParameter]:
+    """Parameters of one candidate of a fit with their 95 % intervals.
+
+    Parameters
+    ----------
+    fitted : Fit
+    index : int
+        Of the candidate.
+    """
+    candidate, amplitudes = fitted.candidates[index], fitted.amplitudes[index]
+    errors = fitted.errors[fitted.slices[index]]
+    value = candidate.values(amplitudes)
+    if candidate.basis:
+        spread = np.sqrt((np.asarray(candidate.basis).T ** 2) @ errors**2)
+        units = {p.name: p.unit for p in candidate.free}
+        return {p.name: FoundParameter(value[p.name], value[p.name] - 1.96 * s, value[p.name] + 1.96 * s, units[p.name])
+                for p, s in zip(candidate.free, spread, strict=True)}  # fmt: skip
+    out = {}
+    for k, parameter in enumerate(candidate.free):
+        step = np.zeros(len(amplitudes))
+        step[k] = 1.96 * errors[k]
+        ends = [candidate.values(amplitudes + s * step)[parameter.name] for s in (-1.0, 1.0)]
+        out[parameter.name] = FoundParameter(value[parameter.name], min(ends), max(ends), parameter.unit)
+    for name, fixed in candidate.fixed.items():
+        unit = next((p.unit for p in kind_of(candidate.name).parameters if p.name == name), "1")
+        out[name] = FoundParameter(fixed, fixed, fixed, "1" if unit == "pad" else unit)
+    return out
+
+
+def _below_floor(problem: Problem, found: Search, settings: DiagnoseSettings) -> tuple[str, ...]:
     seen: dict[str, float] = {}
-    for score in found.first_scores:
-        seen[score.candidate.name] = max(seen.get(score.candidate.name, 0.0), score.detectable)
-    named = {c.name for c in found.model.candidates}
-    return tuple(sorted(n for n, d in seen.items() if d < settings.visible and n not in named))
+    for candidate, column in found.first.items():
+        if candidate.name not in TERMS:
+            size = visible(problem, found.model, candidate, column)
+            seen[candidate.name] = max(seen.get(candidate.name, 0.0), size)
+    return tuple(sorted(n for n, d in seen.items() if d < settings.visible and n not in found.model.names))
 
 
-def _ranked(found: Search, observations: Observations, held: BoolArray, size: int) -> tuple[RankedCandidate, ...]:
-    fits = {f.label: f for f in (found.model, *found.singles, *(r for rivals in found.rivals for r in rivals))}
-    fits.pop("baseline", None)
-    ordered = sorted(fits.values(), key=lambda f: f.chi_square)
-    return tuple(RankedCandidate(f.label, -f.chi_square / size, gap(observations, f.prediction, held)) for f in ordered)
+def _ranked(problem: Problem, found: Search) -> tuple[RankedCandidate, ...]:
+    fits: Sequence[Fit] = (found.model, found.effects, *found.singles, *(r for row in found.rivals for r in row))
+    table: dict[str, Fit] = {}
+    for f in fits:
+        if f.candidates:
+            table.setdefault(f.label, f)
+    out = []
+    for f in sorted(table.values(), key=lambda f: -f.evidence):
+        told = {c.label: {k: vars(p) for k, p in parameters_of(f, i).items()} for i, c in enumerate(f.candidates)}
+        held = gap(problem.observations, unseen(problem, f), problem.held)
+        out.append(RankedCandidate(f.label, f.evidence - found.baseline.evidence, held, told))
+    return tuple(out)
+
+
+def _assumptions(problem: Problem, found: Search, settings: DiagnoseSettings) -> tuple[Assumption, ...]:
+    """Every tolerance that took part, with what the fit made of it."""
+    count = found.model.jacobian.shape[1]
+    free = found.model.assessment.free[count:]
+    fitted: dict[str, list[float]] = {}
+    units: dict[str, tuple[float, str]] = {}
+    for one, size in zip(problem.nuisances, free, strict=True):
+        fitted.setdefault(one.name, []).append(float(size * one.sigma))
+        units[one.name] = one.sigma, one.unit
+    stated = settings.tolerances.stated
+    out = []
+    for name, values in fitted.items():
+        sigma, unit = units[name]
+        source = stated[name].source if name in stated else settings.tolerances.cell_gain.source
+        out.append(Assumption(name, sigma, values if len(values) > 1 else values[0], unit, source))
+    scales = dict(zip((c.name for c in problem.basis.components), found.model.assessment.scales, strict=True))
+    if "h" in scales:
+        learnt = settings.tolerance.stiffness * math.sqrt(scales["h"] + scales["beyond"])
+        out.append(Assumption("model", settings.tolerance.stiffness, learnt, "1", stated["model"].source))
+    return tuple(out)

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from model.effects import Effect, kind_of
+from tpjb_ident.diagnose.verdict.behaviour import Behaviour
+from tpjb_ident.diagnose.verdict.drift import Drift
 
-VerdictName = Literal["consistent", "named", "ambiguous", "unexplained"]
+VerdictName = Literal["consistent", "named", "ambiguous", "partly-explained", "unexplained"]
 
 
 @dataclass(frozen=True)
@@ -29,19 +31,14 @@ class FoundEffect:
     Attributes
     ----------
     name : str
-    probability : float
-        Among the explanations that were fitted.
     parameters : dict of str to FoundParameter
+    stands_in : str
+        What to say where an amplitude is beyond what its source allows; empty otherwise.
     """
 
     name: str
-    probability: float
     parameters: dict[str, FoundParameter]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data, as in the contract."""
-        parameters = {k: vars(p) for k, p in self.parameters.items()}
-        return {"name": self.name, "probability": self.probability, "parameters": parameters}
+    stands_in: str = ""
 
     @property
     def label(self) -> str:
@@ -53,14 +50,31 @@ class FoundEffect:
         """The effect itself."""
         return Effect(self.name, **{k: p.value for k, p in self.parameters.items()})
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, as in the contract."""
+        parameters = {k: vars(p) for k, p in self.parameters.items()}
+        return {"name": self.name, "parameters": parameters, "stands_in": self.stands_in}
+
 
 @dataclass(frozen=True)
 class RankedCandidate:
-    """An explanation that was fitted: effects, chi-square per element, held-out gap."""
+    """An explanation that was fitted.
+
+    Attributes
+    ----------
+    name : str
+    score : float
+        Log evidence above the baseline's [nats].
+    heldout_gap : float
+        On points to which a model must extrapolate, tolerances used [sigma].
+    parameters : dict
+        By effect, with intervals.
+    """
 
     name: str
     score: float
     heldout_gap: float
+    parameters: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -83,11 +97,53 @@ class Disagreement:
 
 
 @dataclass(frozen=True)
+class Remainder:
+    """What is left on unseen points.
+
+    Attributes
+    ----------
+    sigma : float
+        Root mean square, everything that may be off at its likeliest.
+    share : float
+        Of the squared gap of the baseline.
+    where : str
+    p : float
+        Of the most telling part, against noise and stated tolerances.
+    """
+
+    sigma: float
+    share: float
+    where: str
+    p: float
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """A tolerance or nuisance that took part.
+
+    Attributes
+    ----------
+    name : str
+    stated : float
+        One standard deviation.
+    fitted : float or list of float
+        What the fit made of it, pad by pad where there are several.
+    unit, source : str
+    """
+
+    name: str
+    stated: float
+    fitted: float | list[float]
+    unit: str
+    source: str
+
+
+@dataclass(frozen=True)
 class Verdict:
     """Result of `diagnose`; `to_json` is ``diagnosis.json`` of `outputs.md`.
 
     `indistinguishable` holds names of effects; where another pad or direction of the same effect would do, that is
-    spelt out there. `alternatives` holds the same groups with every pad and direction spelt out, likeliest first.
+    spelt out there.
     """
 
     verdict: VerdictName
@@ -99,32 +155,31 @@ class Verdict:
     disagreement: tuple[Disagreement, ...]
     gap_by_observable: dict[str, dict[str, float]]
     gap: dict[str, float]
+    remainder: Remainder
+    behaves_like: tuple[Behaviour, ...] = ()
+    drift: tuple[Drift, ...] = ()
+    assumptions: tuple[Assumption, ...] = ()
     reasons: tuple[str, ...] = ()
-    alternatives: tuple[tuple[str, ...], ...] = ()
     notes: dict[str, Any] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, in the order of the contract."""
         return {
-            "schema": "tpjb-diagnosis/1",
+            "schema": "tpjb-diagnosis/2",
             "verdict": self.verdict,
-            "effects": [
-                {
-                    "name": e.name,
-                    "probability": e.probability,
-                    "parameters": {k: vars(p) for k, p in e.parameters.items()},
-                }
-                for e in self.effects
-            ],
+            "effects": [e.to_dict() for e in self.effects],
             "indistinguishable": [list(group) for group in self.indistinguishable],
             "below_floor": list(self.below_floor),
             "next_test": self.next_test,
             "candidates": [vars(c) for c in self.candidates],
             "disagreement": [vars(d) for d in self.disagreement],
             "gap_by_observable": self.gap_by_observable,
+            "remainder": vars(self.remainder),
+            "behaves_like": [vars(b) for b in self.behaves_like],
+            "drift": [d.to_dict() for d in self.drift],
+            "assumptions": [vars(a) for a in self.assumptions],
             "gap": self.gap,
             "reasons": list(self.reasons),
-            "alternatives": [list(group) for group in self.alternatives],
             **self.notes,
         }
 
@@ -149,7 +204,21 @@ class Verdict:
             lines += ["[[effects]]", f'name = "{e.name}"']
             lines += [f"{k} = {p.value!r}  # 95 %: {p.lo:.6g} to {p.hi:.6g} {p.unit}" for k, p in e.parameters.items()]
             lines += [f"# prior: {p.name} {p.low:g} to {p.high:g} {p.unit}" for p in kind.parameters]
-            lines += [f"# {kind.source}", ""]
+            lines += [f"# {kind.source}", *([f"# {e.stands_in}"] if e.stands_in else []), ""]
+        return "\n".join(lines)
+
+    def terms_toml(self, before: tuple[Effect, ...] = ()) -> str:
+        """Serialise the effects with what the rest behaves like, in the same form.
+
+        Parameters
+        ----------
+        before : tuple of Effect
+            As of `effects_toml`.
+        """
+        lines = [self.effects_toml(before)]
+        for b in self.behaves_like:
+            values = [f"{k} = {v!r}" for k, v in b.parameters.items()]
+            lines += ["[[effects]]", f'name = "{b.effect}"', *values, f"# {b.words}", ""]
         return "\n".join(lines)
 
 

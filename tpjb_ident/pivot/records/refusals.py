@@ -13,6 +13,7 @@ from tpjb_ident.pivot.records.dry_record import DryRecord, axial_channels, refus
 from tpjb_ident.pivot.records.pickup import mistakes
 from tpjb_ident.pivot.records.projection import PadDirection, displacement_direction, load_direction
 from tpjb_ident.pivot.records.settings import PivotSettings
+from tpjb_ident.pivot.records.structure import Structure, structure_behind
 from tpjb_ident.slow_records.noise import NoiseModel
 
 ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
@@ -22,7 +23,11 @@ CURE = "Check the run's pad number, the channels' axes, polarities and order, an
 
 
 def check_directions(
-    record: DryRecord, noise: NoiseModel, settings: PivotSettings, pad_angles: FloatArray
+    record: DryRecord,
+    noise: NoiseModel,
+    settings: PivotSettings,
+    pad_angles: FloatArray,
+    structure: Structure | None = None,
 ) -> tuple[PadDirection, PadDirection]:
     """Directions of load and displacement, or a refusal.
 
@@ -36,6 +41,8 @@ def check_directions(
         Limits of both angles.
     pad_angles : (n_pads,) ndarray
         Of all pads [rad]: the error says which of them a record fits better.
+    structure : Structure, optional
+        What explains displacements that point elsewhere, see `structure_of`.
 
     Returns
     -------
@@ -53,10 +60,33 @@ def check_directions(
         ("force", load, settings.load_angle_limit),
         ("displacement", displacement, settings.displacement_angle_limit),
     ):
+        if quantity == "displacement" and structure is not None:
+            continue
         if abs(found.angle) > limit:
             guess = _suspect(record, load, displacement, settings, pad_angles)
             raise _elsewhere(record, quantity, found, limit, guess)
     return load, displacement
+
+
+def structure_of(records: Sequence[DryRecord], noise: NoiseModel, settings: PivotSettings) -> Structure | None:
+    """One compliance that explains displacements beyond their limit; None where none is beyond, or none explains them.
+
+    Parameters
+    ----------
+    records : sequence of DryRecord
+        One campaign.
+    noise : NoiseModel
+        Of the displacement channels.
+    settings : PivotSettings
+    """
+    moved = [displacement_direction(r.projection, r.blocks, noise) for r in records]
+    loads = [load_direction(r.projection, r.blocks) for r in records]
+    if any(abs(d.angle) > settings.load_angle_limit for d in loads):
+        return None
+    if not any(abs(d.angle) > settings.displacement_angle_limit for d in moved):
+        return None
+    slopes = [float(np.polyfit(r.projection.load, r.projection.deflection, 1)[0]) for r in records]
+    return structure_behind([r.angle for r in records], slopes, moved, settings.displacement_angle_limit)
 
 
 def _elsewhere(record: DryRecord, quantity: str, direction: PadDirection, limit: float, guess: str) -> RigDataError:

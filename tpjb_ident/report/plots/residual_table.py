@@ -53,8 +53,8 @@ def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
     from tpjb_ident.diagnose.observations.gap import residuals
 
     rows = []
-    for model, fit in (("before", diagnosis.found.baseline), ("after", diagnosis.found.model)):
-        z = residuals(diagnosis.observations, fit.prediction)
+    for model, prediction in (("before", diagnosis.problem.base), ("after", diagnosis.after)):
+        z = residuals(diagnosis.observations, prediction)
         for element, value in zip(diagnosis.observations.elements, z, strict=True):
             if element.family == "h":
                 frequency = element.place("excitation") / (2 * np.pi)

@@ -1,0 +1,107 @@
+"""Stated tolerances: how well the drawing, the data sheet and the instruments are known, one standard deviation each.
+
+They come from the bearing file's ``[tolerances]``, from ``--tolerance NAME=VALUE``, or from the defaults of
+`rig-export.md`, which are what a good workshop and an ISO oil grade hold.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from model.bearing import Bearing
+from model.units import UnitError, parse_quantity
+from tpjb_ident.errors import BadInputError
+
+
+@dataclass(frozen=True)
+class Stated:
+    """One stated tolerance: one standard deviation in SI, its unit, and where it comes from."""
+
+    value: float
+    unit: str
+    source: str = "default"
+
+
+#: Defaults of `rig-export.md`: value, unit, and the dimension in which a text states another one.
+DEFAULTS: dict[str, tuple[float, str, str]] = {
+    "viscosity": (0.05, "1", "ratio"),
+    "viscosity_exponent": (0.03, "1", "ratio"),
+    "supply_temperature": (0.5, "K", "temperature difference"),
+    "assembled_clearance": (2e-6, "m", "length"),
+    "pad_clearance": (3e-6, "m", "length"),
+    "clearance_scatter": (2e-6, "m", "length"),
+    "pivot_stiffness_scatter": (0.05, "1", "ratio"),
+    "film_heat": (0.07, "1", "ratio"),
+    "thermometer": (0.5, "K", "temperature difference"),
+    "probe_gain": (0.005, "1", "ratio"),
+    "model": (0.015, "1", "ratio"),
+}
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Everything that may be off without being a finding.
+
+    Attributes
+    ----------
+    stated : mapping of str to Stated
+        By the names of `DEFAULTS`.
+    probe_axes : tuple of float
+        Directions of the two probes [rad].
+    cell_gain : float
+        Relative, per load cell; the manifest's uncertainty where it states one.
+    centre : float
+        How far the polygon's centre may lie from the bearing's [m]: it is a choice where pads stand unequal. Without
+        a polygon, that of the probes' zero.
+    """
+
+    stated: Mapping[str, Stated] = field(default_factory=lambda: dict(_defaults()))
+    probe_axes: tuple[float, float] = (math.pi / 4, 3 * math.pi / 4)
+    cell_gain: Stated = Stated(0.002, "1")
+    centre: float = 10e-6
+
+    def __getitem__(self, name: str) -> float:
+        """One standard deviation, SI."""
+        return self.stated[name].value
+
+    def states(self, values: Mapping[str, str | float], source: str) -> Tolerances:
+        """Return a copy with other values: texts with units or SI numbers.
+
+        Parameters
+        ----------
+        values : mapping of str to str or float
+        source : str
+            ``"bearing file"``, ``"command line"``, ``"manifest"``.
+
+        Raises
+        ------
+        BadInputError
+            A name that is not known, or a value that is no such quantity.
+        """
+        table = dict(self.stated)
+        for name, value in values.items():
+            if name not in DEFAULTS:
+                near = difflib.get_close_matches(name, DEFAULTS, n=1)
+                hint = f"Did you mean {near[0]!r}?" if near else f"Known: {', '.join(DEFAULTS)}."
+                raise BadInputError(f"tolerance {name!r} ({source}): not known. {hint}")
+            _, unit, dimension = DEFAULTS[name]
+            try:
+                number = parse_quantity(value, dimension, name) if isinstance(value, str) else float(value)
+            except (UnitError, ValueError) as error:
+                raise BadInputError(f"tolerance {name} ({source}): {error}") from error
+            if not 0.0 <= number < math.inf:
+                raise BadInputError(f"tolerance {name} ({source}): must be zero or more, got {value!r}.")
+            table[name] = Stated(number, unit, source)
+        return Tolerances(table, self.probe_axes, self.cell_gain, self.centre)
+
+    def layered(self, bearing: Bearing) -> Tolerances:
+        """Return a copy with what a bearing file states where the command line states nothing."""
+        typed = {k: v.value for k, v in self.stated.items() if v.source == "command line"}
+        return self.states(dict(bearing.tolerances), "bearing file").states(typed, "command line")
+
+
+def _defaults() -> dict[str, Stated]:
+    return {name: Stated(value, unit) for name, (value, unit, _) in DEFAULTS.items()}

@@ -1,0 +1,217 @@
+"""Assessment: what a model is worth to the data, seen and unseen, with everything that may be off left free.
+
+At a fitted model the observation vector is linear in amplitudes a and nuisances n,
+
+    y = f + J (a - a0) + N n + e,   a ~ N(a00, A), n ~ N(0, 1), e ~ N(0, S + sum_k t_k D_k),
+
+S from identification, D_k the components of the stated model tolerance. The scales t_k maximise the evidence p(y)
+with a half-Cauchy prior on sqrt(t_k) whose scale is the stated tolerance (Gelman, Bayesian Analysis 1 (2006) 515).
+Every fold is then predicted from all others, in closed form.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.diagnose.observations.folds import Fold
+from tpjb_ident.diagnose.search.components import Component
+
+STEPS = 12
+#: Change of the log scales at which they count as found.
+FOUND = 0.05
+
+
+@dataclass(frozen=True)
+class Basis:
+    """What every assessment of a campaign shares; all in units of `total_sigma`.
+
+    Attributes
+    ----------
+    noise : (n, n) ndarray
+        Covariance of identification.
+    components : tuple of Component
+    folds : tuple of Fold
+    """
+
+    noise: FloatArray = field(repr=False)
+    components: tuple[Component, ...] = field(repr=False)
+    folds: tuple[Fold, ...] = field(repr=False)
+
+    @property
+    def stated(self) -> FloatArray:
+        """Scales of a model that is as wrong as stated and no more, (c,)."""
+        return np.array([1e-5 if one.name in {"scatter", "beyond"} else 1.0 for one in self.components])
+
+    def covariance(self, scales: FloatArray) -> FloatArray:
+        """Noise and model error at scales t_k, (n, n)."""
+        total = self.noise.copy()
+        for one, t in zip(self.components, scales, strict=True):
+            total[np.ix_(one.rows, one.rows)] += t * one.matrix
+        return total
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A model, linear about where it was fitted; all in units of `total_sigma`.
+
+    Attributes
+    ----------
+    residual : (n,) ndarray
+        y - f + J (a0 - a00) + N n0: what amplitudes and nuisances, counted from their priors' means, must explain.
+    columns : (n, k) ndarray
+        J and N side by side.
+    width : (k,) ndarray
+        Standard deviations of their priors.
+    """
+
+    residual: FloatArray = field(repr=False)
+    columns: FloatArray = field(repr=False)
+    width: FloatArray = field(repr=False)
+
+    @property
+    def spread(self) -> FloatArray:
+        """Covariance that the free numbers add, (n, n)."""
+        scaled = self.columns * self.width
+        return np.asarray(scaled @ scaled.T)
+
+    def without(self, gone: Sequence[int]) -> Linear:
+        """Return the same without some columns."""
+        kept = np.setdiff1d(np.arange(self.columns.shape[1]), np.asarray(gone, int))
+        return Linear(self.residual, self.columns[:, kept], self.width[kept])
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """What a model is worth.
+
+    Attributes
+    ----------
+    scales : (c,) ndarray
+        t_k.
+    evidence : float
+        log p(y) at these scales, their prior included [nats].
+    inverse : (n, n) ndarray
+        Of the whole covariance.
+    """
+
+    scales: FloatArray
+    evidence: float
+    inverse: FloatArray = field(repr=False)
+    linear: Linear = field(repr=False)
+    folds: tuple[Fold, ...] = field(repr=False)
+
+    @property
+    def free(self) -> FloatArray:
+        """Posterior mean of the free numbers, from their priors' means, (k,)."""
+        return self._from(self.inverse @ self.linear.residual)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Posterior covariance of the free numbers, (k, k)."""
+        scaled = self.linear.columns * self.linear.width
+        inner = np.eye(scaled.shape[1]) - scaled.T @ self.inverse @ scaled
+        return np.asarray(inner * np.outer(self.linear.width, self.linear.width))
+
+    def scores(self) -> FloatArray:
+        """Log density of every fold given all others, (folds,) [nats]."""
+        weighted = self.inverse @ self.linear.residual
+        return np.array([self._score(f.members, weighted) for f in self.folds])
+
+    def _score(self, rows: NDArray[np.intp], weighted: FloatArray) -> float:
+        block = self.inverse[np.ix_(rows, rows)]
+        error = np.linalg.solve(block, weighted[rows])
+        log_det = float(np.linalg.slogdet(block)[1])
+        return 0.5 * (log_det - float(error @ weighted[rows]) - len(rows) * math.log(2 * math.pi))
+
+    def unseen(self, fold: Fold) -> FloatArray:
+        """Free numbers as all elements but a fold's tell them, (k,)."""
+        weighted = self.inverse @ self.linear.residual
+        rows = fold.members
+        error = np.linalg.solve(self.inverse[np.ix_(rows, rows)], weighted[rows])
+        return self._from(weighted - self.inverse[:, rows] @ error)
+
+    def _from(self, weighted: FloatArray) -> FloatArray:
+        return np.asarray(self.linear.width**2 * (self.linear.columns.T @ weighted))
+
+
+def assess(basis: Basis, linear: Linear, start: FloatArray | None = None, fixed: bool = False) -> Assessment:
+    """Assess a model; scales by Fisher scoring on their logarithms, damped where a step does not help.
+
+    Parameters
+    ----------
+    basis : Basis
+    linear : Linear
+    start : (c,) ndarray, optional
+        Scales to begin with.
+    fixed : bool
+        Leave the scales as they are.
+    """
+    logs = np.log(start) if start is not None else np.full(len(basis.components), math.log(0.1))
+    # scatter beyond what is stated is rare
+    if start is None:
+        logs[0] = math.log(1e-2)
+    spread = linear.spread
+    value, inverse = _evidence(basis, linear, spread, logs)
+    damping = 1e-3
+    lowest, highest = np.array([(one.lowest, one.highest) for one in basis.components]).T
+    for _ in range(0 if fixed else STEPS):
+        gradient, fisher = _slopes(basis, linear, inverse, logs)
+        moved = np.linalg.solve(fisher + damping * np.diag(np.diag(fisher)) + 1e-9 * np.eye(len(logs)), gradient)
+        new = np.clip(logs + np.clip(moved, -3.0, 3.0), lowest, highest)
+        trial, other = _evidence(basis, linear, spread, new)
+        if trial < value:
+            damping = max(10.0 * damping, 0.1)
+            if damping > 1e4:
+                break
+            continue
+        done = np.max(np.abs(new - logs)) < FOUND or trial - value < 0.01
+        logs, value, inverse, damping = new, trial, other, 0.1 * damping
+        if done:
+            break
+    return Assessment(np.exp(logs), value, inverse, linear, basis.folds)
+
+
+def _evidence(basis: Basis, linear: Linear, spread: FloatArray, logs: FloatArray) -> tuple[float, FloatArray]:
+    total = basis.covariance(np.exp(logs)) + spread
+    factor, failed = lapack.dpotrf(total, lower=1, clean=1)
+    if failed:
+        return -math.inf, total
+    inverse = lapack.dpotri(factor, lower=1)[0]
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    quadratic = float(linear.residual @ inverse @ linear.residual)
+    log_det = 2.0 * float(np.sum(np.log(np.diag(factor))))
+    value = -0.5 * (quadratic + log_det + len(total) * math.log(2 * math.pi))
+    return value + _prior(logs), inverse
+
+
+def _prior(logs: FloatArray) -> float:
+    """Log density of log t when sqrt(t) is half-Cauchy about the stated tolerance."""
+    return float(np.sum(0.5 * logs - np.log1p(np.exp(logs)) - math.log(math.pi)))
+
+
+def _slopes(
+    basis: Basis, linear: Linear, inverse: FloatArray, logs: FloatArray
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    scales = np.exp(logs)
+    weighted = inverse @ linear.residual
+    products = [inverse[:, one.rows] @ one.matrix for one in basis.components]
+    trace = np.array([np.trace(p[one.rows]) for p, one in zip(products, basis.components, strict=True)])
+    square = np.array([weighted[one.rows] @ one.matrix @ weighted[one.rows] for one in basis.components])
+    share = scales / (1.0 + scales)
+    gradient = 0.5 * scales * (square - trace) + 0.5 - share
+    count = len(scales)
+    fisher = np.zeros((count, count))
+    for i, one in enumerate(basis.components):
+        for j in range(i, count):
+            other = basis.components[j]
+            # tr(Q Di Q Dj) over the rows that each acts on
+            value = float(np.sum(products[i][other.rows] * products[j][one.rows].T))
+            fisher[i, j] = fisher[j, i] = 0.5 * scales[i] * scales[j] * value
+    return gradient, fisher + np.diag(share * (1.0 - share))
