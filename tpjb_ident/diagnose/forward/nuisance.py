@@ -142,7 +142,7 @@ def _readings(elements: Sequence[Element], known: Tolerances) -> list[Nuisance]:
         for axis, letter in enumerate("xy") if np.any(shifts[:, axis])
     ]  # fmt: skip
     pads = np.array([e.place("pad") for e in elements])
-    warm = np.array([e.observable == "pad_temperature" for e in elements])
+    warm = np.array([e.observable == "pad_temperature" for e in elements], dtype=bool)
     for pad in sorted(set(pads[warm])):
         column = np.where(warm & (pads == pad), known["thermometer"], 0.0)
         out.append(Nuisance("thermometer", known["thermometer"], "K", f"pad {pad:.0f}", column=column))

@@ -114,7 +114,8 @@ def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Pro
             break
         model = hunt.backward(hunt.refined(better))
     if model.candidates:
-        model = settle(run, problem, model)
+        model = hunt.kept(settle(run, problem, model))
+    rivals = rivals if model.candidates else ()
     values = tuple(hunt.worth_in(model, i) for i in range(len(model.candidates)))
     effects = hunt.named(model)
     less = tuple(hunt.without(effects, i) for i in range(len(effects.candidates)))
@@ -194,6 +195,13 @@ class _Hunt:
             np.column_stack([model.jacobian[:, model.slices[i]] for i in keep]), model.nuisance, model.columns,
         )  # fmt: skip
         return next(iter(self.run(fit, [(start,)])))
+
+    def kept(self, model: Fit) -> Fit:
+        """The model itself, or less of it where its last derivatives take an effect's worth away."""
+        model = self.backward(model)
+        if len(model.candidates) == 1 and not self.enough(self.worth_in(model, 0)):
+            return self.baseline
+        return model
 
     def named(self, model: Fit) -> Fit:
         """A model without its generic terms."""
