@@ -21,6 +21,8 @@ Progress = Callable[[str, float], None]
 SWAPS = 2
 #: How often a model takes derivatives of its own while the search goes on.
 ROUNDS_ON_THE_WAY = 2
+#: First effects that are compared with derivatives of their own.
+FIRST = 3
 #: Pairs of candidates that are fitted from the baseline: forward selection can begin with a compromise.
 PAIRS = 2
 #: Candidates that are fitted in the place of every effect of the model.
@@ -147,7 +149,10 @@ class _Hunt:
             tried = self.extended(model, table)
             singles = singles or tuple(tried)
             if count == 1:
-                tried += self.pairs(singles)
+                tried = sorted([*tried, *self.pairs(singles)], key=lambda f: -f.evidence)
+            # what may be off acts otherwise beside a large effect: the likeliest are told with derivatives of their own
+            near = FIRST if not count else 1
+            tried = [settle(self.run, self.problem, f, ROUNDS_ON_THE_WAY) for f in tried[:near]] + tried[near:]
             chosen = self.chosen(model, tried)
             if chosen is None:
                 break
