@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
+from rigdata.keyphasor import speed_from_pulses
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import RunReader
@@ -218,7 +219,7 @@ class Run:
         return tuple(Temperature(c.name, c.pad, c.position) for c in found)
 
     def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
-        """Read the shaft speed [rad/s]; None where no channel measures it.
+        """Read the shaft speed [rad/s], from pulses if need be; None where no channel measures it.
 
         Parameters
         ----------
@@ -230,4 +231,8 @@ class Run:
         for channel in self.channels.values():
             if channel.quantity == "speed":
                 return self.record(channel.name, start, stop)
+        for channel in self.channels.values():
+            if channel.quantity == "keyphasor":
+                pulses = self.record(channel.name, start, stop)
+                return replace(pulses, quantity="speed", values=speed_from_pulses(pulses.values, pulses.time))
         return None

@@ -48,6 +48,8 @@ ERRORS = {
     "cells-and-accelerometers-out-of-phase": "Between the load cells and the housing on them there is a lag: a device "
     "that records late, or a filter. Damping is wrong by stiffness times that lag. State delay or filter in the "
     "manifest, or filter all channels alike.",
+    "baseline-missing": "The campaign measured the rig without its bearing, but not at this frequency: the rig's own "
+    "stiffness is still inside. Measure it there too.",
     "film-not-linear": "The film was shaken so hard that it answers at twice the excitation frequency: K and C of "
     "small motion cannot be had from this. Excite less.",
     "runs-disagree": "The runs of the point do not belong to one dynamic stiffness: what it leaves of their forces is "

@@ -24,7 +24,7 @@ from tpjb_ident.dynamic.runs.run_jobs import all_runs as shelved_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
 from tpjb_ident.runtime.executors import local_workers
 
-TABLES = ("coefficients", "estimators", "windows", "frequency_fits")
+TABLES = ("coefficients", "estimators", "windows", "frequency_fits", "budget")
 
 
 POINTS = [(2500.0, 25.0), (5000.0, 25.0)]

@@ -16,7 +16,7 @@ import pytest
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")]
 ROOT = Path(__file__).parents[2]
-TABLES = ("coefficients", "estimators", "windows", "frequency_fits")
+TABLES = ("coefficients", "estimators", "windows", "frequency_fits", "budget")
 
 
 def command(*words, **options):

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 from rigdata.campaign import Campaign
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.corrections.baseline import measured_baseline
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change, gain_draws
 from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
 from tpjb_ident.dynamic.corrections.mains import MAINS_ON_LINE, force_pickup, force_pickup_spread
@@ -138,6 +139,8 @@ def assemble(campaign: Campaign, shelf: RunShelf, settings: IdentifySettings, te
     """Estimate all points from runs already turned to phasors, one point's windows in memory at a time."""
     digests = shelf.digests
     findings, sources = look_at_instruments(point_sources(shelf), delays_stated(campaign))
+    baseline = measured_baseline(campaign, settings.phasors, _own_method(settings.method))
+    sources = [replace(source, baseline=baseline) for source in sources]
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
     tell("estimating", 0, len(sources))
     first = [_first_estimate(source.load(), settings) for source in sources]
@@ -191,13 +194,13 @@ class _Points:
         changes = {"calibration": apparent_change(data, best, self.draws), **self.sources.changes(data, best)}
         bent, amplitude_part = amplitude_findings(source, best)
         systematic = {name: np.cov(change.T, bias=True) for name, change in changes.items()}
-        systematic |= self.findings.spreads(data, best) | amplitude_part
+        systematic |= self.findings.spreads(data, best) | source.baseline.spread(data) | amplitude_part
         if source.found(MAINS_ON_LINE) and self.mains_force.any():
             systematic["mains on the cells"] = force_pickup_spread(data, self.mains_force)
         if not settings.keep_weights:
             by_method = {name: _counted_only(est) for name, est in by_method.items()}
         with_both = {name: with_systematic(est, systematic) for name, est in by_method.items()}
-        told = (used.conditions, self.findings.conditions(data), bent)
+        told = (used.conditions, self.findings.conditions(data), source.baseline.missing(data), bent)
         finished = replace(
             point,
             stiffness=with_both[settings.method],
@@ -225,9 +228,13 @@ def cell_zero_uncertainty(campaign: Campaign) -> float:
 
 def _first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffness:
     """Estimate before any correction, for how H changes with load and how runs scatter; its weights are not needed."""
-    method = "mm-eiv" if settings.method == "iv" else settings.method.partition(":")[0]
-    found = estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, method)
+    found = estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, _own_method(settings.method))
     return replace(found, weights=np.empty((0, 2)))
+
+
+def _own_method(method: str) -> str:
+    """A method that needs no instruments, the one asked for if it is such."""
+    return "mm-eiv" if method == "iv" else method.partition(":")[0]
 
 
 def _counted_only(est: DynamicStiffness) -> DynamicStiffness:

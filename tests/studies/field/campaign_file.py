@@ -47,9 +47,11 @@ def manifest_text(rig: Rig, plans: Sequence[Plan], extra: Mapping[str, Mapping[s
             lines += ['uncertainty = "0 %"']
         lines += more(name)
     for plan in plans:
-        lines += ["[[runs]]", f'id = "{plan.id}"', 'kind = "dynamic"', f'shaft_speed = "{rig.shaft} Hz"']
-        lines += [f'static_load = "{plan.load} N"', 'static_load_direction = "-90 deg"']
+        kind, speed = ("baseline", 0.0) if plan.dry else ("dynamic", rig.shaft)
+        lines += ["[[runs]]", f'id = "{plan.id}"', f'kind = "{kind}"', f'shaft_speed = "{speed} Hz"']
         lines += [f'excitation_frequency = "{plan.frequency} Hz"', f'excitation_direction = "{plan.direction} deg"']
+        if not plan.dry:
+            lines += [f'static_load = "{plan.load} N"', 'static_load_direction = "-90 deg"']
     return "\n".join(lines) + "\n"
 
 

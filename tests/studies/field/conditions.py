@@ -225,6 +225,11 @@ def _loads() -> list[Row]:
         Row("amplitude 40 % of clearance", replace(base, bearing=film, amplitude=2.0), plans_of(loads=(5000.0,)),
             wish="told"),
         Row("three amplitudes up to 8 %", replace(base, bearing=film, amplitude=0.35), amplitudes),
+        Row("a stiffness beside the film, dry test in the campaign", replace(base, baseline=(2e7, 3e7)),
+            [*plans_of(), *(replace(p, id=f"b-{p.id}", load=500.0, dry=True) for p in plans_of(loads=(500.0,)))]),
+        Row("a stiffness beside the film, dry test at 40 Hz only", replace(base, baseline=(2e7, 3e7)),
+            [*plans_of(), *(replace(p, id=f"b-{p.id}", load=500.0, frequency=40.0, dry=True)
+                            for p in plans_of(loads=(500.0,)))], wish="told"),
         Row("runs differ by 20 %", replace(base, gain_by_run=0.2), wish="told"),
     ]  # fmt: skip
 

@@ -81,13 +81,14 @@ class Rig:
 
 @dataclass(frozen=True)
 class Plan:
-    """One run: set points and where the excitation goes [deg]."""
+    """One run: set points and where the excitation goes [deg]; `dry` without oil and rotation."""
 
     id: str
     load: float
     frequency: float
     direction: float
     scale: float = 1.0
+    dry: bool = False
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ def record(rig: Rig, plan: Plan, rng: np.random.Generator) -> dict[str, np.ndarr
             for tone in tones:
                 response = 1.0 if device.response is None else device.response(tone.frequency)
                 value += np.real(response * (tone.phasors[quantity] @ u) * np.exp(2j * np.pi * tone.frequency * t))
-            value += shaft.seen(quantity, u, t)
+            value += 0.0 if plan.dry else shaft.seen(quantity, u, t)
             pickup = rig.pickup.get(quantity, 0.0)
             value += pickup * np.cos(2 * np.pi * rig.mains * t + angle[quantity] + axis)
             value *= device.gain * gain[quantity]
@@ -176,6 +177,8 @@ def _tones(rig: Rig, plan: Plan, load: float, aside: float, rng: np.random.Gener
     start = 0.0 if rig.locked else rng.uniform(0, 2 * np.pi)
     force = size * (along + 1j * rig.elliptic * across) * np.exp(1j * start)
     omega = 2 * np.pi * f
+    if plan.dry:
+        return [_tone(rig, f, np.zeros(2, complex), force / np.array(rig.baseline))]
     h = rig.bearing.h(omega, load, aside)
     d = np.linalg.solve(h, force)
     share = float(np.linalg.norm(d)) / rig.bearing.clearance
@@ -185,7 +188,8 @@ def _tones(rig: Rig, plan: Plan, load: float, aside: float, rng: np.random.Gener
     tones = [_tone(rig, f, force, d)]
     second = rig.drive_harmonic * size * along * np.exp(2j * start + 0.5j)
     h2 = rig.bearing.h(2 * omega, load, aside)
-    film2 = 0.5 * rig.bearing.second * share * float(np.linalg.norm(h @ d)) * along * np.exp(2j * start)
+    stiff = 0.5 * rig.bearing.second / rig.bearing.clearance * np.abs(np.diag(h))
+    film2 = stiff * np.array([0.5 * d[0] ** 2 + 1.2 * d[0] * d[1], d[1] ** 2 + 0.4 * d[0] ** 2])
     tones.append(_tone(rig, 2 * f, second, np.linalg.solve(h2, second - film2)))
     if rig.bearing.third:
         h3 = rig.bearing.h(3 * omega, load, aside)

@@ -6,7 +6,9 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
 
     from rigdata.campaign import Campaign
     from tpjb_ident.arrays import FloatArray
+    from tpjb_ident.dynamic.plain import PlainSettings
     from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.runs.run_store import RunStore
@@ -43,6 +46,11 @@ if TYPE_CHECKING:
 WORTH_PROCESSES = 100 * 2**20
 #: Share of the mean direct coefficient from which a cross-coupled one is shown.
 CROSS_MATTERS = 0.1
+PlainWay = Annotated[
+    bool, typer.Option("--plain", help="Also write plain.csv: Eq. (15) by statsmodels' RLM, nothing corrected.")
+]
+KeepR = Annotated[bool, typer.Option("--keep-r", help="Write the R matrices of Eq. (15) too: r_matrices.h5.")]
+Window = Annotated[str, typer.Option("--window", metavar="TIME", help="Window length of --plain and --keep-r.")]
 #: Folder in the output folder in which finished runs wait for the others.
 KEPT = ".tpjb-finished-runs"
 #: What worker processes need, imported once for all of them.
@@ -58,6 +66,9 @@ def identify(
     delay: Delays = None,
     workers: WorkerCount = None,
     scheduler: Scheduler = None,
+    plain: PlainWay = False,
+    keep_r: KeepR = False,
+    window: Window = "0.5 s",
     out: Out = None,
 ) -> None:
     """Identify stiffness and damping with 95 % intervals.
@@ -82,6 +93,8 @@ def identify(
         ):
             result = run_identification(source, settings, show, team, store)
         write_identification(folder, result)
+        if plain or keep_r:
+            write_plain(folder, source, plain_settings(window, norm), keep_r)
         options = {"campaign": campaign, "method": method, "norm": norm, "lines": lines, "delay": delay}
         write_record(folder, target, "identify", options, source.fingerprint(), result.remarks())
     show_summary(result)
@@ -245,6 +258,36 @@ def show_summary(result: Identification) -> None:
     trusted = "all to be trusted" if not bad else f"{bad} NOT to be trusted"
     more = f", {flagged} with flags" if flagged else ""
     print_line(f"{result.campaign}: {len(result.points)} operating points, {trusted}{more}.")
+
+
+def plain_settings(window: str, norm: str | None) -> PlainSettings:
+    """Build `PlainSettings` from ``--window`` and ``--norm``.
+
+    Raises
+    ------
+    BadInputError
+        Not a time above zero.
+    """
+    from rigdata.units import UnitError, parse_quantity
+    from tpjb_ident.dynamic.plain import PlainSettings
+
+    try:
+        length = parse_quantity(window, "time")
+    except UnitError as error:
+        raise BadInputError(f"--window {window!r}: {error}. Write, for instance, --window '0.5 s'.") from error
+    if not length > 0:
+        raise BadInputError(f"--window {window!r}: must be above zero.")
+    return PlainSettings(length, norm or "huber")
+
+
+def write_plain(folder: Path, campaign: Campaign, settings: PlainSettings, keep_r: bool) -> None:
+    """Write ``plain`` (Eq. (15) by statsmodels' RLM, nothing else) and, if asked for, the R matrices behind it."""
+    from tpjb_ident.dynamic.plain import plain_frame, plain_points, write_r_matrices
+
+    points = plain_points(campaign, settings)
+    write_table(folder, "plain", plain_frame(points, settings))
+    if keep_r:
+        write_r_matrices(folder / "r_matrices.h5", points)
 
 
 def show_coefficients(result: Identification) -> None:

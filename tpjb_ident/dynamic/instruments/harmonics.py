@@ -15,13 +15,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
+from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.records.line_means import LineMean
 
 #: Change of h per squared second harmonic.
 CHANGE = 2.7
+#: From so many runs on the harmonic is held against the squares of the motion,
+MIN_RUNS = 5
+#: and what goes with them must be this many times what does not, per degree of freedom.
+DISTINCT = 6.0
 #: Changes below this share are not worth telling [share of h].
 NOTHING = 2e-4
 #: From here on no interval can be answered for.
@@ -48,16 +52,37 @@ def film_change(harmonics: Sequence[tuple[LineMean, LineMean]], est: DynamicStif
     if not np.isfinite(est.h).all():
         return 0.0
     doubled = est.h.real + 2j * est.h.imag
-    shares = []
-    for first, second in harmonics:
-        size = float(np.linalg.norm(first.force))
-        if not size > 0:
-            continue
-        bent = float(np.linalg.norm(second.force - doubled @ second.displacement))
-        noise = float(np.hypot(second.force_error, np.abs(doubled).max() * second.displacement_error))
-        shares.append(max(bent**2 - (2 * noise) ** 2, 0.0) / size**2)
-    change = CHANGE * float(np.median(shares)) if shares else 0.0
+    kept = [(a, b) for a, b in harmonics if np.isfinite(b.force).all() and np.linalg.norm(a.force) > 0]
+    if len(kept) >= MIN_RUNS:
+        change = CHANGE * _quadratic_share(kept, doubled)
+    else:
+        shares = [_share(first, second, doubled) for first, second in kept if not second.shared]
+        change = CHANGE * float(np.median(shares)) if shares else 0.0
     return change if change > NOTHING else 0.0
+
+
+def _share(first: LineMean, second: LineMean, doubled: ComplexArray) -> float:
+    """Squared second harmonic over squared fundamental of one run, less its noise."""
+    bent = float(np.linalg.norm(second.force - doubled @ second.displacement))
+    noise = float(np.hypot(second.force_error, np.abs(doubled).max() * second.displacement_error))
+    return max(bent**2 - (2 * noise) ** 2, 0.0) / float(np.linalg.norm(first.force)) ** 2
+
+
+def _quadratic_share(kept: Sequence[tuple[LineMean, LineMean]], doubled: ComplexArray) -> float:
+    """The same of all runs together: only what goes with the squares of the motion, size and phase, is the film's.
+
+    Mains on the line, and noise, have any phase; they stay in the residual.
+    """
+    size = np.array([np.linalg.norm(first.force) for first, _ in kept])[:, None]
+    d = np.array([first.displacement for first, _ in kept])
+    bent = np.array([second.force - doubled @ second.displacement for _, second in kept]) / size
+    squares = np.stack([d[:, 0] ** 2, d[:, 0] * d[:, 1], d[:, 1] ** 2], axis=1) / size
+    fitted = squares @ np.linalg.lstsq(squares, bent, rcond=None)[0]
+    explained = float(np.sum(np.abs(fitted) ** 2)) / 3
+    left = float(np.sum(np.abs(bent - fitted) ** 2)) / (len(kept) - 3)
+    if explained < DISTINCT * left:
+        return 0.0
+    return 3 * (explained - left) / len(kept)
 
 
 def change_spread(change: float, est: DynamicStiffness) -> FloatArray:

@@ -2,14 +2,14 @@
 
 The cells are the housing's springs, so its acceleration is a = -omega^2 K^-1 F_cell with K symmetric, positive
 definite and real. Swapped or inverted accelerometers, a device that is late, a filter before the cells: each breaks
-one of these, whatever the bearing does. What is left of phase between the two, below the limit, enters the intervals:
-the cells may be late by that.
+one of these, whatever the bearing does. A small phase as of late cells enters the intervals; one as of damping in the
+cells' mounts does not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,8 @@ MAX_CROSS = 0.5
 HARMLESS = 2e-3
 #: The ratio must stand this many standard errors above nothing to be judged.
 CLEAR = 8.0
+#: A lag of the cells counts from so many standard errors on.
+CLEAR_LAG = 2.5
 MIN_RUNS = 3
 
 
@@ -56,12 +58,15 @@ class Balance:
     Attributes
     ----------
     phase : float
-        By which the accelerometers are ahead of the cells [rad], beyond its own error.
+        By which the accelerometers are ahead of the cells [rad]; zero where it is not clear of its error.
     conditions : tuple of Condition
+    doubt : float
+        Standard error of the phase that this frequency alone shows [rad].
     """
 
     phase: float = 0.0
     conditions: tuple[Condition, ...] = ()
+    doubt: float = np.inf
 
     def spread(self, est: DynamicStiffness) -> FloatArray:
         """Covariance (8, 8) of H if the cells are late by that phase: one standard deviation [N^2/m^2]."""
@@ -99,7 +104,21 @@ def balances(runs: Sequence[BalanceRun]) -> dict[float, Balance]:
     groups: dict[float, list[BalanceRun]] = {}
     for run in runs:
         groups.setdefault(frequency_key(run.frequency), []).append(run)
-    return {frequency: _judge(group) for frequency, group in groups.items() if len(group) >= MIN_RUNS}
+    found = {frequency: _judge(group) for frequency, group in groups.items() if len(group) >= MIN_RUNS}
+    lag = _shared_lag([(2 * np.pi * f, verdict) for f, verdict in found.items()])
+    return {f: replace(verdict, phase=2 * np.pi * f * lag) for f, verdict in found.items()}
+
+
+def _shared_lag(verdicts: Sequence[tuple[float, Balance]]) -> float:
+    """Lag of the cells that all frequencies share [s]; zero where it is not clear of its error."""
+    told = [(v.phase / omega, v.doubt / omega) for omega, v in verdicts if np.isfinite(v.doubt) and not v.conditions]
+    if not told:
+        return 0.0
+    lags, errors = np.array(told).T
+    weight = 1 / np.maximum(errors, 1e-12) ** 2
+    lag, error = float(np.sum(weight * lags) / weight.sum()), float(1 / np.sqrt(weight.sum()))
+    # cells that come late make it positive; what damping the housing's supports have makes it negative
+    return lag if lag > CLEAR_LAG * error else 0.0
 
 
 def frequency_key(frequency: float) -> float:
@@ -132,8 +151,8 @@ def _judge(group: Sequence[BalanceRun]) -> Balance:
     worst = int(np.argmax(np.abs(phases) - 3 * doubt))
     if abs(phases[worst]) > MAX_PHASE + 3 * doubt[worst]:
         return Balance(0.0, (_out_of_phase(group, float(phases[worst])),))
-    left = np.sqrt(np.maximum(np.mean(phases**2 - doubt**2), 0.0))
-    return Balance(float(left))
+    weight = 1 / np.maximum(doubt, 1e-12) ** 2
+    return Balance(float(np.sum(weight * phases) / weight.sum()), (), float(1 / np.sqrt(weight.sum())))
 
 
 def _ratio(cells: ComplexArray, accelerations: ComplexArray) -> tuple[ComplexArray, float] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,12 +20,15 @@ class LineMean:
         Medians over the windows [m], oil force [N].
     displacement_error, force_error : float
         Standard errors of their components.
+    shared : bool
+        Whether mains stand on the line too.
     """
 
     displacement: ComplexArray
     force: ComplexArray
     displacement_error: float
     force_error: float
+    shared: bool = False
 
 
 def second_harmonics(run: RunPhasors) -> tuple[tuple[LineMean, LineMean] | None, ...]:
@@ -36,7 +39,8 @@ def second_harmonics(run: RunPhasors) -> tuple[tuple[LineMean, LineMean] | None,
         own = [k for k, line in enumerate(lines) if abs(line.frequency - 2 * driven.frequency) < 1e-3]
         # mains on it adds little; what turns with the shaft does not count as the film's
         named = own and not lines[own[0]].name.endswith("X")
-        pair = (_mean(run, i), _mean(run, own[0])) if named else None
+        mains = bool(named) and lines[own[0]].name.startswith("mains")
+        pair = (_mean(run, i), replace(_mean(run, own[0]), shared=mains)) if named else None
         found.append(pair if pair is not None and np.isfinite(pair[0].force).all() else None)
     return tuple(found)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from rigdata.problem import Problem, RigDataError
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.records.compensation import compensated
 from tpjb_ident.dynamic.records.extra_lines import unexpected_lines
@@ -40,6 +41,11 @@ def run_phasors(run: MeasuredRun, housing_mass: float, settings: PhasorSettings 
         The file cannot give what the manifest promises.
     """
     settings = settings or PhasorSettings()
+    kind = getattr(run, "excitation_kind", "sine")
+    if kind != "sine":
+        what = f"is excited by {kind}; coefficients come from sines, one frequency per run"
+        cure = "Excite with sines, or leave the run out"
+        raise RigDataError(Problem("error", getattr(run, "file", ""), "excitation", what, cure, run.id))
     slower, told = look_at_readings(run)
     result = compensated(_fitted(run, housing_mass, settings), run, slower)
     return replace(result, conditions=merged(result.conditions, told)) if told else result

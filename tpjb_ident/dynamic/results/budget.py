@@ -16,7 +16,7 @@ from tpjb_ident.arrays import FloatArray
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES, DynamicStiffness
 
 #: Sources that scatter from run to run; all others are common to the runs.
-RANDOM = ("random", "load miss", "mains", "baseline")
+RANDOM = ("random", "load miss", "mains")
 BUDGET_COLUMNS = ("coefficient", "unit", "source", "kind", "standard_uncertainty", "share", "dof")
 
 

@@ -68,7 +68,7 @@ def estimate_row(p: PointResult, est: DynamicStiffness, group: LoadFits | None) 
         chi_square=est.chi_square,
         attenuation=float(est.attenuation[0]),
         inertia_corrected=p.inertia_corrected,
-        baseline_subtracted=False,  # the rig without its bearing is not part of a campaign
+        baseline_subtracted="baseline" in p.budget,
         **_model_columns(group),
         x_m=p.position[0],
         y_m=p.position[1],

@@ -8,6 +8,7 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arrays import FloatArray
+from tpjb_ident.dynamic.corrections.baseline import Baseline
 from tpjb_ident.dynamic.instruments.clock_rates import ClockRates
 from tpjb_ident.dynamic.runs.point_data import PointData, group, point_data
 from tpjb_ident.dynamic.runs.run_shelf import RunDigest, RunShelf
@@ -26,6 +27,8 @@ class PointSource:
     shelf : RunShelf
     clocks : ClockRates
         By which the channels' clocks differ, once that is known.
+    baseline : Baseline
+        Of the rig without its bearing, where the campaign measured it.
     """
 
     point: OperatingPoint
@@ -33,10 +36,12 @@ class PointSource:
     digests: tuple[RunDigest, ...]
     shelf: RunShelf = field(repr=False)
     clocks: ClockRates = field(default_factory=ClockRates)
+    baseline: Baseline = field(default_factory=Baseline)
 
     def load(self) -> PointData:
-        """All windows of the point, as if one clock had recorded them."""
-        return self.clocks.apply(point_data(self.point, [(self.shelf.take(k), i) for k, i in self.members]))
+        """All windows of the point, as if one clock had recorded them, and without the rig's own stiffness."""
+        recorded = point_data(self.point, [(self.shelf.take(k), i) for k, i in self.members])
+        return self.baseline.taken_off(self.clocks.apply(recorded))
 
     @property
     def mean_loads(self) -> FloatArray:
