@@ -5,7 +5,7 @@ is off by with its square. For a force law x / (1 - x/c)^n the two are tied by t
 
     change of h / h = 3/4 a3 (A/c)^2,   q2 = second harmonic / fundamental = a2 / 2 (A/c),   a3 = 0.9 a2^2
 
-so that the change is about 2.7 q2^2. The second harmonic of the actuators is no part of it: what H explains of the
+so that the change is about 2.7 q2^2; 4.5 is taken, because a film is no spring along one line. The second harmonic of the actuators is no part of it: what H explains of the
 harmonic force by the harmonic displacement is taken off.
 """
 
@@ -21,7 +21,7 @@ from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.records.line_means import LineMean
 
 #: Change of h per squared second harmonic.
-CHANGE = 2.7
+CHANGE = 4.5
 #: From so many runs on the harmonic is held against the squares of the motion,
 MIN_RUNS = 5
 #: and what goes with them must be this many times what does not, per degree of freedom.

@@ -27,7 +27,7 @@ HARMLESS = 2e-3
 #: The ratio must stand this many standard errors above nothing to be judged.
 CLEAR = 8.0
 #: A lag of the cells counts from so many standard errors on.
-CLEAR_LAG = 2.5
+CLEAR_LAG = 2.0
 MIN_RUNS = 3
 
 
