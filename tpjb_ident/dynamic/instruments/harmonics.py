@@ -5,8 +5,8 @@ is off by with its square. For a force law x / (1 - x/c)^n the two are tied by t
 
     change of h / h = 3/4 a3 (A/c)^2,   q2 = second harmonic / fundamental = a2 / 2 (A/c),   a3 = 0.9 a2^2
 
-so that the change is about 2.7 q2^2; 4.5 is taken, because a film is no spring along one line. The second harmonic of the actuators is no part of it: what H explains of the
-harmonic force by the harmonic displacement is taken off.
+so that the change is about 2.7 q2^2; 4.5 is taken, because a film is no spring along one line. The second harmonic of
+the actuators is no part of it: what H explains of the harmonic force by the harmonic displacement is taken off.
 """
 
 from __future__ import annotations

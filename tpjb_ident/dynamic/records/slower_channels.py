@@ -100,8 +100,8 @@ def _rhythm(bent: FloatArray, export_rate: float, held: bool) -> float | None:
     while peak + 1 < len(spectrum) and spectrum[peak + 1] > spectrum[peak]:
         peak += 1
     ratio = 1 / (peak * step / export_rate)
-    # between two samples of the export a corner bends the line at both
-    each = 1 if held or abs(ratio - round(ratio)) * n / ratio**2 < 0.5 else 2
+    # a corner between two samples of the export bends the line at both
+    each = 1 if held or bent.mean() < 1.5 / ratio else 2
     expected = each / ratio
     strict = abs(bent.mean() / expected - 1) < COUNT_OFF and spectrum[peak] > RHYTHM * np.sinc(expected) * bent.sum()
     return _sharpened(bent, peak * step, export_rate) if strict and expected < 1 - STRAIGHT else None

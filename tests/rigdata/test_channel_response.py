@@ -1,0 +1,110 @@
+"""Filters, delays and measured responses of channels, and what a manifest may say of them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rigdata.channel_response import ChannelResponse, parse_filter, parse_response_table
+from rigdata.keyphasor import speed_from_pulses
+from rigdata.manifest import parse_manifest
+from rigdata.problem import RigDataError
+from rigdata.units import UnitError
+
+MANIFEST = """schema = "tpjb-rig/1"
+id = "a"
+bearing = "b.toml"
+[housing]
+mass = "30 kg"
+mass_uncertainty = "0.5 kg"
+[acquisition]
+mains = "60 Hz"
+[channels.F]
+quantity = "force"
+axis = "0 deg"
+unit = "N"
+axis_uncertainty = "0.5 deg"
+delay = "0.2 ms"
+delay_uncertainty = "20 us"
+filter = "butterworth 2 low 400 Hz"
+clock = "B"
+zero_uncertainty = "50 N"
+[channels.CMD]
+quantity = "command"
+axis = "0 deg"
+[channels.KEY]
+quantity = "keyphasor"
+[[runs]]
+id = "r"
+kind = "dynamic"
+shaft_speed = "22 Hz"
+static_load = "5 kN"
+static_load_direction = "-90 deg"
+excitation = "random"
+excitation_band = "5..120 Hz"
+[[runs]]
+id = "b"
+kind = "baseline"
+excitation_frequency = "25 Hz"
+"""
+
+
+@pytest.mark.parametrize("family", ["bessel", "butterworth"])
+def test_a_corner_is_where_the_amplitude_has_fallen_by_3_db(family):
+    low = parse_filter(f"{family} 4 low 800 Hz").at(np.array([800.0, 1e-3]))
+    assert np.abs(low) == pytest.approx([math.sqrt(0.5), 1.0], rel=1e-6)
+    assert np.abs(parse_filter(f"{family} 2 high 5 Hz").at(np.array([5.0]))) == pytest.approx(math.sqrt(0.5))
+
+
+@pytest.mark.parametrize("text", ["", "bessel", "chebyshev 4 low 8 Hz", "bessel 0 low 8 Hz", "bessel 4 low 8 kg"])
+def test_what_is_no_filter_is_refused(text):
+    with pytest.raises(UnitError):
+        parse_filter(text)
+
+
+def test_a_measured_response_is_linear_between_its_lines():
+    table = parse_response_table("frequency_Hz, gain, phase_deg\n10, 1.0, -10\n30, 0.8, -30\n")
+    assert table.at(np.array([20.0]))[0] == pytest.approx(0.9 * np.exp(-1j * math.radians(20)))
+    assert np.isnan(table.at(np.array([40.0]))[0])
+    with pytest.raises(UnitError, match="rise"):
+        parse_response_table("10, 1, 0\n10, 1, 0\n")
+
+
+def test_a_delay_turns_the_phase_back():
+    assert ChannelResponse((), 1e-3).at(np.array([25.0]))[0] == pytest.approx(np.exp(-2j * math.pi * 0.025))
+
+
+def test_a_manifest_states_what_is_known_of_channels():
+    manifest = parse_manifest(MANIFEST)
+    force = manifest.channels["F"]
+    assert (manifest.mains, manifest.mass_uncertainty) == (60.0, 0.5)
+    assert (force.axis_uncertainty, force.delay_uncertainty) == pytest.approx((math.radians(0.5), 2e-5))
+    assert (force.clock, force.zero_uncertainty, force.response.delay) == ("B", 50.0, 2e-4)
+    assert force.response.filters[0].corner == 400.0
+    assert manifest.runs[0].band == (5.0, 120.0)
+    assert [run.kind for run in manifest.runs] == ["dynamic", "baseline"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('"60 Hz"', '"55 Hz"', "mains"),
+        ("butterworth 2 low", "butterworth two low", "whole number"),
+        ('"5..120 Hz"', '"120..5 Hz"', "excitation_band"),
+        ('"5..120 Hz"', '"5 Hz"', "excitation_band"),
+        ('"20 us"', '"-20 us"', "delay_uncertainty"),
+        ('filter = "butterworth 2 low 400 Hz"', 'filter_table = "x.csv"', "filter_table"),
+    ],
+)
+def test_what_is_stated_wrongly_is_named(old, new, told):
+    with pytest.raises(RigDataError, match=told):
+        parse_manifest(MANIFEST.replace(old, new))
+
+
+def test_pulses_tell_the_speed():
+    time = np.arange(4000) / 2000
+    turns = 20.0 * time + 0.5 * time**2
+    readings = np.where(turns % 1.0 < 0.08, 5.0, 0.0) + 0.01 * np.sin(300 * time)
+    speed = speed_from_pulses(readings, time) / (2 * math.pi)
+    np.testing.assert_allclose(speed[200:-200], (20.0 + time)[200:-200], rtol=0.01)
+    assert np.isnan(speed_from_pulses(readings[:20], time[:20])).all()
