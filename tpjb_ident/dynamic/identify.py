@@ -38,6 +38,7 @@ from tpjb_ident.dynamic.results.quality import (
     rejected_windows,
 )
 from tpjb_ident.dynamic.results.run_gains import Pairs, channel_pairs, with_gain_doubts
+from tpjb_ident.dynamic.results.swept_probes import swept_probes
 from tpjb_ident.dynamic.runs.left_out import named_runs
 from tpjb_ident.dynamic.runs.nominal_drive import nominal_drive
 from tpjb_ident.dynamic.runs.point_data import PointData
@@ -142,6 +143,7 @@ def assemble(campaign: Campaign, shelf: RunShelf, settings: IdentifySettings, te
     baseline = measured_baseline(campaign, settings.phasors, _own_method(settings.method))
     sources = [replace(source, baseline=baseline) for source in sources]
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
+    sweeps = swept_probes(campaign)
     tell("estimating", 0, len(sources))
     first = [_first_estimate(source.load(), settings) for source in sources]
     mains = [digest.mains for digest in digests]
@@ -151,7 +153,7 @@ def assemble(campaign: Campaign, shelf: RunShelf, settings: IdentifySettings, te
         findings,
         {digest.run: digest.temperatures for digest in digests},
         directions_differ(first),
-        channel_pairs(campaign),
+        channel_pairs(campaign, sweeps),
         gain_draws(campaign.channels, settings.n_calibration, settings.seed),
         systematic_sources(campaign, settings.n_calibration, settings.seed + 1),
         force_pickup(digest.mains_force for digest in digests),
@@ -165,7 +167,7 @@ def assemble(campaign: Campaign, shelf: RunShelf, settings: IdentifySettings, te
     joint = np.concatenate(changes, axis=1)
     left, several = shelf.left_out, bool(settings.phasors.excitation_lines)
     told = named_runs(left, len(digests) + len(left)) + lost_points(points, left, several)
-    named = with_probe_doubts(campaign, named_at_points(points, left, several), settings.clearance)
+    named = with_probe_doubts(sweeps, named_at_points(points, left, several), settings.clearance)
     return Identification(campaign.id, settings.method, named, joint, _campaign_conditions(work.draws) + told)
 
 

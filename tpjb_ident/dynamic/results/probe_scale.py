@@ -15,10 +15,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigdata.campaign import Campaign
-from rigdata.problem import RigDataError
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.dynamic.results.swept_probes import SweptProbe
 
 #: Half of a probe's travel in a sweep over the clearance, least and most: a polygon reaches up to twice its clearance.
 TRAVEL = (0.5, 2.5)
@@ -29,21 +28,21 @@ LEAST_STIFF = 0.5
 
 
 def with_probe_doubts(
-    campaign: Campaign, points: Sequence[PointResult], clearance: float | None
+    sweeps: Sequence[SweptProbe], points: Sequence[PointResult], clearance: float | None
 ) -> tuple[PointResult, ...]:
     """The points, each with the doubt that the probes' readings are no lengths in this bearing, where there is one.
 
     Parameters
     ----------
-    campaign : Campaign
-        Its clearance sweeps are looked at.
+    sweeps : sequence of SweptProbe
+        The campaign's probes in its clearance sweeps.
     points : sequence of PointResult
     clearance : float or None
         Assembled clearance of the drawing [m]; None says nothing.
     """
     if clearance is None or not clearance > 0:
         return tuple(points)
-    said = [*_sweeps(campaign, clearance), *_positions(points, clearance), *_stiffness(points, clearance)]
+    said = [*_sweeps(sweeps, clearance), *_positions(points, clearance), *_stiffness(points, clearance)]
     if not said:
         return tuple(points)
     cure = "is the probes' sensitivity right in the manifest?"
@@ -51,23 +50,12 @@ def with_probe_doubts(
     return tuple(replace(point, quality=merged(point.quality, (doubt,))) for point in points)
 
 
-def _sweeps(campaign: Campaign, clearance: float) -> list[str]:
+def _sweeps(sweeps: Sequence[SweptProbe], clearance: float) -> list[str]:
     said: dict[str, str] = {}
-    for run in campaign.of_kind("clearance"):
-        for name, channel in run.channels.items():
-            if channel.quantity != "displacement":
-                continue
-            try:
-                values = run.record(name).values
-            except RigDataError:  # a damaged sweep is no matter of the dynamic runs
-                continue
-            known = values[np.isfinite(values)]
-            if len(known) < 100:
-                continue
-            low, high = np.quantile(known, [0.01, 0.99])
-            travel = 0.5 * float(high - low)
-            if not TRAVEL[0] * clearance < travel < TRAVEL[1] * clearance:
-                said[name] = f"{name} travels {1e6 * travel:.3g} um to either side in the sweep {run.id}"
+    for probe in sweeps:
+        if probe.half_travel <= TRAVEL[0] * clearance or probe.half_travel >= TRAVEL[1] * clearance:
+            um = 1e6 * probe.half_travel
+            said[probe.name] = f"{probe.name} travels {um:.3g} um to either side in the sweep {probe.run}"
     return list(said.values())
 
 

@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigdata.campaign import Campaign
-from rigdata.problem import RigDataError
 from rigdata.vector import inverse_directions
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.gain_evidence import PointReadings
 from tpjb_ident.check.one_gain import wrong_gains
-from tpjb_ident.check.run_gains import gain_in_words, swept_centre
+from tpjb_ident.check.run_gains import gain_in_words
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.dynamic.results.swept_probes import SweptProbe
 from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: Name of the condition.
@@ -45,8 +45,15 @@ class Pairs:
     centre: tuple[float | None, float | None]
 
 
-def channel_pairs(campaign: Campaign) -> Pairs | None:
-    """Probes and cells of a campaign; None where it has not two of each in different directions."""
+def channel_pairs(campaign: Campaign, sweeps: Sequence[SweptProbe] = ()) -> Pairs | None:
+    """Probes and cells of a campaign; None where it has not two of each in different directions.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    sweeps : sequence of SweptProbe
+        Its probes in the clearance sweeps.
+    """
     of = {q: [c for c in campaign.channels.values() if c.quantity == q] for q in ("displacement", "force")}
     if any(len(channels) != 2 for channels in of.values()):
         return None
@@ -56,20 +63,12 @@ def channel_pairs(campaign: Campaign) -> Pairs | None:
     if not np.isfinite(probe_plane).all() or not np.isfinite(cell_plane).all():
         return None
     names = tuple(c.name for channels in of.values() for c in channels)
-    first, second = (_centre(campaign, name, names[2:], cell_plane) for name in names[:2])
+    first, second = (_centre(sweeps, name) for name in names[:2])
     return Pairs(names, probe_plane, cell_plane, (first, second))
 
 
-def _centre(campaign: Campaign, probe: str, cells: Sequence[str], plane: FloatArray) -> float | None:
-    found = []
-    for run in campaign.of_kind("clearance"):
-        try:
-            readings = [run.record(name).values for name in (probe, *cells)]
-        except RigDataError:  # a damaged sweep is no matter of the dynamic runs
-            continue
-        if len({len(values) for values in readings}) == 1:
-            found.append(swept_centre(np.stack(readings[1:], axis=1) @ plane.T, readings[0]))
-    known = [centre for centre in found if centre is not None]
+def _centre(sweeps: Sequence[SweptProbe], probe: str) -> float | None:
+    known = [sweep.centre for sweep in sweeps if sweep.name == probe and sweep.centre is not None]
     return float(np.median(known)) if known else None
 
 
