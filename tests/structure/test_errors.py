@@ -19,7 +19,9 @@ ROOT = Path(__file__).parents[2]
 NO_REFUSALS = {"UnknownConditionError", "NotTrustedError"}
 
 
-@pytest.mark.parametrize(("package", "base"), [("rigdata", "RigError"), ("tpjb_ident", "TpjbError")])
+@pytest.mark.parametrize(
+    ("package", "base"), [("rigdata", "RigError"), ("model", "ModelError"), ("tpjb_ident", "TpjbError")]
+)
 def test_every_error_class_of_a_package_has_its_one_base(package, base):
     bases = {}
     for path in (ROOT / package).rglob("*.py"):

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.plots.clearance_and_locus import clearance_and_locus
 
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
 
-FloatArray = NDArray[np.float64]
 GROUP = "Clearance and shaft centre locus"
 
 

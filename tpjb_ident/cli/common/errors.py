@@ -74,11 +74,8 @@ def bad_input_message(error: Exception) -> str | None:
 
 def _is_refusal(error: Exception) -> bool:
     """Whether it says so itself: of each of the three packages the command line knows one base of all refusals."""
-    if isinstance(error, (TpjbError, RigError)):
-        return True
     model = sys.modules.get("model.errors")  # not loaded: then it is none of the model's
-    base = ValueError if model is None else model.ModelError
-    return isinstance(error, base) and type(error).__module__.startswith("model.")
+    return isinstance(error, (TpjbError, RigError, *((model.ModelError,) if model else ())))
 
 
 def _show_warning(
