@@ -1,4 +1,4 @@
-"""From the phasors of all runs to a campaign's coefficients: a campaign on a shelf of its own, made by hand."""
+"""From the phasors of all runs to a campaign's coefficients: a campaign made by hand."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from tests.dynamic.test_load_direction import OMEGA, WINDOWS, law
 from tests.dynamic.test_load_direction import run as run_at
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.identify import IdentifySettings, assemble
+from tpjb_ident.dynamic.runs.finished_runs import digest
 from tpjb_ident.dynamic.runs.left_out import LeftOut
 from tpjb_ident.dynamic.runs.run_result import RunResult
-from tpjb_ident.dynamic.runs.run_shelf import digest
 
 LOADS = (3000.0, 8000.0)
 CHANNELS = [
@@ -28,8 +28,10 @@ CHANNELS = [
 ]
 
 
-class Shelf:
+class Kept:
     """Finished runs, all in memory."""
+
+    all_in_memory = True
 
     def __init__(self, runs, left_out=()):
         self._runs, self.left_out = runs, left_out
@@ -54,7 +56,7 @@ def runs():
 def found(runs, left_out=(), channels=CHANNELS, progress=None, **settings):
     campaign = SimpleNamespace(id="c", channels={c.name: c for c in channels}, of_kind=lambda kind: [])
     chosen = IdentifySettings(**{"methods": ("ols",), "n_calibration": 200} | settings)
-    return assemble(campaign, Shelf(runs, left_out), chosen, progress or (lambda text, done, total: None))
+    return assemble(campaign, Kept(runs, left_out), chosen, progress or (lambda text, done, total: None))
 
 
 @pytest.fixture(scope="module")

@@ -302,7 +302,7 @@ def test_typical_scatter_of_runs_is_that_of_their_means():
 
 
 def source(data, ratios):
-    """A point on a shelf, with the mean loads of its runs as multiples of the set point."""
+    """A point, with the mean loads of its runs as multiples of the set point."""
     force = data.point.static_load * np.exp(1j * data.point.static_load_direction) * np.asarray(ratios)
     found = data.runs[0].conditions
     return SimpleNamespace(

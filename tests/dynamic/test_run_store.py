@@ -19,7 +19,7 @@ from tests.dynamic.test_identify import rig
 from tests.good_campaigns import directions, written
 from tpjb_ident.cli.commands.identify import KEPT
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
-from tpjb_ident.dynamic.runs import run_jobs, run_shelf
+from tpjb_ident.dynamic.runs import finished_runs, run_jobs
 from tpjb_ident.dynamic.runs.run_jobs import all_runs as shelved_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
 from tpjb_ident.runtime.executors import local_workers
@@ -58,9 +58,9 @@ def counted(monkeypatch):
 
 
 def all_runs(*arguments, **named):
-    """What the shelf gives back of every run: its digest and the phasors of its excitation lines."""
-    with shelved_runs(*arguments, **named) as shelf:
-        return [(shelf.take(i), digest) for i, digest in enumerate(shelf.digests)]
+    """What `FinishedRuns` gives back of every run: its digest and the phasors of its excitation lines."""
+    with shelved_runs(*arguments, **named) as finished:
+        return [(finished.take(i), digest) for i, digest in enumerate(finished.digests)]
 
 
 def silent(text, done, total):
@@ -109,14 +109,14 @@ def test_finished_runs_are_not_repeated_and_come_back_bit_for_bit(path, whole, t
 
 def test_what_waits_on_disk_comes_back_bit_for_bit(path, whole, tmp_path, monkeypatch, counted):
     campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
-    monkeypatch.setattr(run_shelf, "ROOM", 0)  # as if the campaign were large
+    monkeypatch.setattr(finished_runs, "ROOM", 0)  # as if the campaign were large
     counted.clear()
     assert same(all_runs(campaign, settings, silent), whole)  # in a temporary folder
     assert same(all_runs(campaign, settings, silent, store=store), whole)  # in the store
     assert len(counted) == 12  # all six twice
-    with shelved_runs(campaign, settings, silent, store=store) as shelf:
+    with shelved_runs(campaign, settings, silent, store=store) as finished:
         store.clear()  # another command has ended
-        assert np.array_equal(shelf.take(3).displacement.phasors, whole[3][0].displacement.phasors)
+        assert np.array_equal(finished.take(3).displacement.phasors, whole[3][0].displacement.phasors)
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from tpjb_ident.dynamic.corrections.baseline import measured_baseline
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change, gain_draws
 from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
 from tpjb_ident.dynamic.corrections.mains import MAINS_ON_LINE, force_pickup, force_pickup_spread
+from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.corrections.systematic_sources import SystematicSources, systematic_sources
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table
 from tpjb_ident.dynamic.estimators.methods import TABLED
@@ -23,11 +24,11 @@ from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.findings import InstrumentFindings, amplitude_findings, look_at_instruments
 from tpjb_ident.dynamic.records.mains_frequency import mains_frequency
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
-from tpjb_ident.dynamic.results.amplitude import amplitude_slope
+from tpjb_ident.dynamic.results.amplitude import AmplitudeSlope, amplitude_slope
 from tpjb_ident.dynamic.results.budget import with_systematic
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.left_out_runs import lost_points, named_at_points
-from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.dynamic.results.point_result import PointResult, WindowVerdict
 from tpjb_ident.dynamic.results.probe_scale import with_probe_doubts
 from tpjb_ident.dynamic.results.quality import (
     amplitude,
@@ -37,14 +38,14 @@ from tpjb_ident.dynamic.results.quality import (
     flags,
     rejected_windows,
 )
-from tpjb_ident.dynamic.results.run_gains import Pairs, channel_pairs, with_gain_doubts
+from tpjb_ident.dynamic.results.run_gains import Pairs, channel_pairs, gain_doubts
 from tpjb_ident.dynamic.results.swept_probes import swept_probes
+from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 from tpjb_ident.dynamic.runs.left_out import named_runs
 from tpjb_ident.dynamic.runs.nominal_drive import nominal_drive
 from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.dynamic.runs.point_source import PointSource, point_sources
 from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
-from tpjb_ident.dynamic.runs.run_shelf import RunShelf
 from tpjb_ident.dynamic.runs.run_store import RunStore
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.executors import Workers
@@ -124,8 +125,8 @@ def identify(
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     tell = progress or (lambda text, done, total: None)
     settings = _with_mains(settings, campaign)
-    with all_runs(campaign, settings.phasors, tell, workers, store) as shelf:
-        return assemble(campaign, shelf, settings, tell)
+    with all_runs(campaign, settings.phasors, tell, workers, store) as finished:
+        return assemble(campaign, finished, settings, tell)
 
 
 def _with_mains(settings: IdentifySettings, campaign: Campaign) -> IdentifySettings:
@@ -136,10 +137,19 @@ def _with_mains(settings: IdentifySettings, campaign: Campaign) -> IdentifySetti
     return replace(settings, phasors=replace(settings.phasors, lines=replace(lines, mains=mains)))
 
 
-def assemble(campaign: Campaign, shelf: RunShelf, settings: IdentifySettings, tell: Progress) -> Identification:
-    """Estimate all points from runs already turned to phasors, one point's windows in memory at a time."""
-    digests = shelf.digests
-    findings, sources = look_at_instruments(point_sources(shelf), delays_stated(campaign))
+def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySettings, tell: Progress) -> Identification:
+    """Estimate all points from runs already turned to phasors, one point's windows in memory at a time.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    finished : FinishedRuns
+    settings : IdentifySettings
+    tell : callable
+        Called as tell(text, done, total).
+    """
+    digests = finished.digests
+    findings, sources = look_at_instruments(point_sources(finished), delays_stated(campaign))
     baseline = measured_baseline(campaign, settings.phasors, _own_method(settings.method))
     sources = [replace(source, baseline=baseline) for source in sources]
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
@@ -165,7 +175,7 @@ def assemble(campaign: Campaign, shelf: RunShelf, settings: IdentifySettings, te
         changes.append(change)
         tell("estimating", len(points), len(sources))
     joint = np.concatenate(changes, axis=1)
-    left, several = shelf.left_out, bool(settings.phasors.excitation_lines)
+    left, several = finished.left_out, bool(settings.phasors.excitation_lines)
     told = named_runs(left, len(digests) + len(left)) + lost_points(points, left, several)
     named = with_probe_doubts(sweeps, named_at_points(points, left, several), settings.clearance)
     return Identification(campaign.id, settings.method, named, joint, _campaign_conditions(work.draws) + told)
@@ -188,10 +198,10 @@ class _Points:
         """One point with all its uncertainties, and what the draws of the systematic ones do to it."""
         settings, data = self.settings, source.load()
         used = correction if settings.correct else correction.measured_only()
-        point = identify_point(used.apply(data), self.temperatures, settings, self.differ)
-        point = with_gain_doubts(point, data, self.pairs)
-        before = point.by_method[settings.method]
-        by_method = {name: used.widened(est) for name, est in point.by_method.items()}
+        corrected = used.apply(data)
+        figures = _figures(corrected, settings, self.differ)
+        before = figures.by_method[settings.method]
+        by_method = {name: used.widened(est) for name, est in figures.by_method.items()}
         best = by_method[settings.method]
         changes = {"calibration": apparent_change(data, best, self.draws), **self.sources.changes(data, best)}
         bent, amplitude_part = amplitude_findings(source, best)
@@ -202,20 +212,20 @@ class _Points:
         if not settings.keep_weights:
             by_method = {name: _counted_only(est) for name, est in by_method.items()}
         with_both = {name: with_systematic(est, systematic) for name, est in by_method.items()}
-        told = (used.conditions, self.findings.conditions(data), source.baseline.missing(data), bent)
-        finished = replace(
-            point,
-            stiffness=with_both[settings.method],
-            by_method=with_both,
-            load_miss=used.miss,
-            quality=merged(point.quality, *told),
-            budget={**used.budget(before), **systematic},
-        )
+        found = (used.conditions, self.findings.conditions(data), source.baseline.missing(data), bent)
+        doubts = (gain_doubts(data, self.pairs), *found)
+        completion = _Completion(with_both, merged(*doubts), used.miss, {**used.budget(before), **systematic})
+        finished = _point_result(corrected, figures, completion, self.temperatures, settings)
         return finished, np.sum(list(changes.values()), axis=0)
 
 
 def delays_stated(campaign: Campaign) -> bool:
-    """Whether the manifest says how late channels are, or how well that is known."""
+    """Whether the manifest says how late channels are, or how well that is known.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    """
     return any(
         getattr(c, "delay_uncertainty", 0.0) > 0 or getattr(getattr(c, "response", None), "delay", 0.0) != 0.0
         for c in campaign.channels.values()
@@ -223,7 +233,12 @@ def delays_stated(campaign: Campaign) -> bool:
 
 
 def cell_zero_uncertainty(campaign: Campaign) -> float:
-    """Standard uncertainty of the cells' zero by the manifest [N]; 0 where it says nothing."""
+    """Standard uncertainty of the cells' zero by the manifest [N]; 0 where it says nothing.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    """
     cells = [c for c in campaign.channels.values() if c.quantity == "force"]
     return float(max((getattr(c, "zero_uncertainty", 0.0) for c in cells), default=0.0))
 
@@ -249,6 +264,11 @@ def directions_differ(first: list[DynamicStiffness]) -> bool:
 
     Few runs per point tell little about it; the cause (set points that are missed a little) is the same
     at all points. Beyond doubt means: the summed chi-square has a probability below 1e-4.
+
+    Parameters
+    ----------
+    first : list of DynamicStiffness
+        One per point.
     """
     known = [est for est in first if np.isfinite(est.chi_square) and est.spare_equations > 0]
     dof = sum(est.spare_equations for est in known)
@@ -284,6 +304,34 @@ def identify_point(
     differ : bool
         Whether runs are known to differ by more than their windows do.
     """
+    figures = _figures(data, settings, differ)
+    return _point_result(data, figures, _Completion(figures.by_method), temperatures, settings)
+
+
+@dataclass(frozen=True)
+class _Figures:
+    """What the windows of a point say before its uncertainties are known."""
+
+    by_method: dict[str, DynamicStiffness]
+    outlier_fraction: float
+    coherence: float
+    amplitude: float
+    linearity: AmplitudeSlope | None
+    conditions: tuple[Condition, ...]
+    rejected: tuple[WindowVerdict, ...]
+
+
+@dataclass(frozen=True)
+class _Completion:
+    """What corrections and systematic sources add: the estimates with their uncertainty, and what to say of them."""
+
+    by_method: dict[str, DynamicStiffness]
+    conditions: tuple[Condition, ...] = ()
+    load_miss: LoadMiss | None = None
+    budget: dict[str, FloatArray] = field(default_factory=dict)
+
+
+def _figures(data: PointData, settings: IdentifySettings, differ: bool) -> _Figures:
     by_method = _all_methods(data, settings, differ)
     best = by_method[settings.method]
     weights = best.weights.min(axis=1)
@@ -299,26 +347,43 @@ def identify_point(
         () if linearity is None else linearity.condition(),
         disagreement(by_method, settings.method),
     )
-    loads, positions = data.mean_loads, data.mean_positions
+    rejected = rejected_windows(data, best.h, weights)
+    share = float((weights < REJECTED_WEIGHT).mean())
+    return _Figures(by_method, share, figure, size, linearity, conditions, rejected)
+
+
+def _point_result(
+    data: PointData,
+    figures: _Figures,
+    completion: _Completion,
+    temperatures: dict[str, dict[int, float]],
+    settings: IdentifySettings,
+) -> PointResult:
+    """The point, made once, with everything that is known of it."""
+    positions = data.mean_positions
     return PointResult(
-        data.point,
-        best,
-        by_method,
-        float(np.linalg.norm(loads.mean(axis=0))),
-        positions.mean(axis=0),
-        positions.std(axis=0, ddof=1) / np.sqrt(len(positions)) if len(positions) > 1 else np.full(2, np.nan),
-        _pad_means([temperatures.get(run.run, {}) for run in data.runs]),
-        len(data.runs),
-        len(data.D),
-        float((weights < REJECTED_WEIGHT).mean()),
-        figure,
-        size,
-        conditions,
-        rejected_windows(data, best.h, weights),
-        tuple(run.run for run in data.runs),
-        linearity=linearity,
+        point=data.point,
+        stiffness=completion.by_method[settings.method],
+        by_method=completion.by_method,
+        static_load_measured=float(np.linalg.norm(data.mean_loads.mean(axis=0))),
+        position=positions.mean(axis=0),
+        position_se=positions.std(axis=0, ddof=1) / np.sqrt(len(positions))
+        if len(positions) > 1
+        else np.full(2, np.nan),
+        temperatures=_pad_means([temperatures.get(run.run, {}) for run in data.runs]),
+        n_records=len(data.runs),
+        n_windows=len(data.D),
+        outlier_fraction=figures.outlier_fraction,
+        coherence=figures.coherence,
+        amplitude=figures.amplitude,
+        quality=merged(figures.conditions, completion.conditions),
+        rejected=figures.rejected,
+        runs=tuple(run.run for run in data.runs),
+        load_miss=completion.load_miss,
+        linearity=figures.linearity,
         inertia_corrected=data.runs[0].acceleration is not None,
         clearance=settings.clearance,
+        budget=completion.budget,
     )
 
 
@@ -336,7 +401,14 @@ def _all_methods(data: PointData, settings: IdentifySettings, differ: bool) -> d
 
 
 def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[Condition, ...]:
-    """Say which methods differ from the default beyond both intervals."""
+    """Say which methods differ from the default beyond both intervals.
+
+    Parameters
+    ----------
+    by_method : dict of str to DynamicStiffness
+    default : str
+        Method that the others are held against.
+    """
     best = by_method[default]
     found = []
     for name, other in by_method.items():

@@ -71,6 +71,12 @@ def apparent_change(data: PointData, stiffness: DynamicStiffness, draws: GainDra
 
     The inertia force is a small part of F; its share of H is found by regression of the housing
     acceleration on the displacements, so each draw takes a few 2x2 products instead of a new fit.
+
+    Parameters
+    ----------
+    data : PointData
+    stiffness : DynamicStiffness
+    draws : GainDraws
     """
     h = stiffness.h
     if not np.isfinite(h).all():

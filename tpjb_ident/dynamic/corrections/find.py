@@ -59,12 +59,22 @@ class Correction:
     conditions: tuple[Condition, ...]
 
     def apply(self, data: PointData) -> PointData:
-        """The point's windows as they would be at the set point and without mains."""
+        """The point's windows as they would be at the set point and without mains.
+
+        Parameters
+        ----------
+        data : PointData
+        """
         cleaned = data if self.mains is None else without_mains(data, self.mains)
         return _at_set_point(cleaned, self.miss, self.slope, self.turn)
 
     def widened(self, est: DynamicStiffness) -> DynamicStiffness:
-        """The estimate with what the corrections leave uncertain."""
+        """The estimate with what the corrections leave uncertain.
+
+        Parameters
+        ----------
+        est : DynamicStiffness
+        """
         wide = self._load_known(est)
         return wide if self.mains is None else with_mains_uncertainty(wide, self.mains)
 
@@ -73,7 +83,12 @@ class Correction:
         return wide if self.turn is None else replace(wide, covariance=wide.covariance + self.turn.left)
 
     def budget(self, est: DynamicStiffness) -> dict[str, FloatArray]:
-        """Random covariance (8, 8) of `widened` by source, from the estimate before it [N^2/m^2]."""
+        """Random covariance (8, 8) of `widened` by source, from the estimate before it [N^2/m^2].
+
+        Parameters
+        ----------
+        est : DynamicStiffness
+        """
         loaded = self._load_known(est).covariance
         parts = {"random": est.covariance, "load miss": loaded - est.covariance}
         if self.mains is not None:

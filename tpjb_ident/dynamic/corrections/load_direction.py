@@ -211,7 +211,14 @@ def _turn(ratio: RunRatios, basis: ComplexArray, fits: list[tuple[FloatArray, Fl
 
 
 def turned_back(data: PointData, miss: LoadMiss, turn: Turn | None) -> ComplexArray:
-    """Force (n, 2) that a point's windows have because their loads point aside [N]."""
+    """Force (n, 2) that a point's windows have because their loads point aside [N].
+
+    Parameters
+    ----------
+    data : PointData
+    miss : LoadMiss
+    turn : Turn or None
+    """
     if turn is None:
         return np.zeros_like(data.F)
     return np.asarray(miss.sideways[data.run_index][:, None] * (data.D @ turn.slope.T))

@@ -164,12 +164,24 @@ def _direction_means(data: PointData) -> tuple[ComplexArray, ComplexArray] | Non
 
 
 def without_mains(data: PointData, fit: MainsFit) -> PointData:
-    """The point's windows with the pick-up taken out of the displacements."""
+    """The point's windows with the pick-up taken out of the displacements.
+
+    Parameters
+    ----------
+    data : PointData
+    fit : MainsFit
+    """
     return replace(data, D=data.D - fit.pickup[data.run_index])
 
 
 def with_mains_uncertainty(est: DynamicStiffness, fit: MainsFit) -> DynamicStiffness:
-    """Move an estimate to the mean over the possible angles, and add what they leave uncertain."""
+    """Move an estimate to the mean over the possible angles, and add what they leave uncertain.
+
+    Parameters
+    ----------
+    est : DynamicStiffness
+    fit : MainsFit
+    """
     if not np.isfinite(est.h).all():
         return est
     total = est.covariance + fit.covariance
@@ -178,7 +190,13 @@ def with_mains_uncertainty(est: DynamicStiffness, fit: MainsFit) -> DynamicStiff
 
 
 def corrected_condition(pickup: Pickup, fit: MainsFit) -> Condition:
-    """What was done about it."""
+    """What was done about it.
+
+    Parameters
+    ----------
+    pickup : Pickup
+    fit : MainsFit
+    """
     size = ", ".join(f"{1e6 * s:.3g} um" for s in pickup.size)
     return Condition(
         MAINS_CORRECTED,
@@ -188,7 +206,14 @@ def corrected_condition(pickup: Pickup, fit: MainsFit) -> Condition:
 
 
 def relative_scatter(points: Iterable[PointData], first: list[DynamicStiffness]) -> float:
-    """Typical force residual of a run's mean, relative to its force, where no mains disturbs."""
+    """Typical force residual of a run's mean, relative to its force, where no mains disturbs.
+
+    Parameters
+    ----------
+    points : iterable of PointData
+    first : list of DynamicStiffness
+        Estimates of the same points.
+    """
     sizes = []
     for data, est in zip(points, first):
         struck = any(MAINS_ON_LINE in run.conditions for run in data.runs)
@@ -204,7 +229,13 @@ def relative_scatter(points: Iterable[PointData], first: list[DynamicStiffness])
 
 
 def force_pickup(lines: Iterable[ComplexArray | None]) -> FloatArray:
-    """Usual size of the mains line in the oil force, X and Y (2,) [N], from runs where nothing else sits on it."""
+    """Usual size of the mains line in the oil force, X and Y (2,) [N], from runs where nothing else sits on it.
+
+    Parameters
+    ----------
+    lines : iterable of (2,) complex ndarray or None
+        Oil force at every run's mains line [N]; None where something else sits on it.
+    """
     seen = [np.abs(line) for line in lines if line is not None]
     return np.median(seen, axis=0) if seen else np.zeros(2)
 

@@ -62,24 +62,54 @@ class MainsEquations:
         return float(np.linalg.norm(self.F) / np.linalg.norm(self.D))
 
     def h(self, x: FloatArray) -> ComplexArray:
-        """H of the unknowns, (2, 2) [N/m]."""
+        """H of the unknowns, (2, 2) [N/m].
+
+        Parameters
+        ----------
+        x : (8 + g m,) ndarray
+            Entries of H over `scale`, then the angles [rad].
+        """
         return np.asarray((x[:4] + 1j * x[4:8]).reshape(2, 2) * self.scale, dtype=complex)
 
     def entries(self, x: FloatArray) -> FloatArray:
-        """The eight real entries of H [N/m]."""
+        """The eight real entries of H [N/m].
+
+        Parameters
+        ----------
+        x : (8 + g m,) ndarray
+            Entries of H over `scale`, then the angles [rad].
+        """
         return x[:8] * self.scale
 
     def vectors(self, x: FloatArray) -> ComplexArray:
-        """Disturbance of every run in X, Y, (g, 2) [m]."""
+        """Disturbance of every run in X, Y, (g, 2) [m].
+
+        Parameters
+        ----------
+        x : (8 + g m,) ndarray
+            Entries of H over `scale`, then the angles [rad].
+        """
         return np.asarray(np.exp(1j * x[8:].reshape(len(self.D), -1)) @ self.patterns)
 
     def residual(self, x: FloatArray) -> FloatArray:
-        """Weighted residuals, (4 g,)."""
+        """Weighted residuals, (4 g,).
+
+        Parameters
+        ----------
+        x : (8 + g m,) ndarray
+            Entries of H over `scale`, then the angles [rad].
+        """
         r = (self.F - (self.D - self.vectors(x)) @ self.h(x).T) / self.sigma[:, None]
         return np.sqrt(2.0) * np.concatenate([r.real.ravel(), r.imag.ravel()])
 
     def jacobian(self, x: FloatArray) -> FloatArray:
-        """D residual / d x, (4 g, 8 + g m)."""
+        """D residual / d x, (4 g, 8 + g m).
+
+        Parameters
+        ----------
+        x : (8 + g m,) ndarray
+            Entries of H over `scale`, then the angles [rad].
+        """
         g, m = len(self.D), len(self.patterns)
         h, clean = self.h(x), self.D - self.vectors(x)
         slope = np.zeros((g, 2, 8 + g * m), dtype=complex)
@@ -97,7 +127,13 @@ class MainsEquations:
         return np.sqrt(2.0) * np.concatenate([flat.real, flat.imag])
 
     def start(self, h: ComplexArray) -> FloatArray:
-        """Unknowns for a given H: the angles are those of what H leaves of the displacements."""
+        """Unknowns for a given H: the angles are those of what H leaves of the displacements.
+
+        Parameters
+        ----------
+        h : (2, 2) complex ndarray
+            [N/m]
+        """
         scaled = h.ravel() / self.scale
         return np.concatenate([scaled.real, scaled.imag, self._angles(h).ravel()])
 

@@ -68,7 +68,14 @@ class Loaded(Protocol):
 
 
 def load_ratio(data: Loaded, zero: complex = 0.0) -> ComplexArray:
-    """Measured mean load (less the cells' zero) over set point for every run: size and direction, complex."""
+    """Measured mean load (less the cells' zero) over set point for every run: size and direction, complex.
+
+    Parameters
+    ----------
+    data : Loaded
+    zero : complex, optional
+        What the cells show without load, X + i Y [N].
+    """
     loads = data.mean_loads
     set_point = _set_point(data)
     if data.point.static_load <= 0:
@@ -100,6 +107,12 @@ def load_misses(points: Sequence[Loaded], zero: complex = 0.0) -> tuple[list[Loa
 
     The ratio is the mean over the runs without outliers; what it is uncertain by, all misses are. Cells that show
     no static force have no ratio: it is zero then.
+
+    Parameters
+    ----------
+    points : sequence of Loaded
+    zero : complex, optional
+        What the cells show without load, X + i Y [N].
     """
     ratios = [load_ratio(data, zero) for data in points]
     known = np.concatenate(ratios)
@@ -126,6 +139,12 @@ def load_slopes(points: Sequence[Loaded], first: list[DynamicStiffness]) -> list
 
     Stiffness and damping slopes are found at the excitation that was run at several loads and
     carried over to the others at the same load, direction and speed.
+
+    Parameters
+    ----------
+    points : sequence of Loaded
+    first : list of DynamicStiffness
+        Estimates without corrections, one per point.
     """
     families: dict[tuple[float, ...], list[int]] = {}
     for i, data in enumerate(points):
@@ -187,7 +206,15 @@ def _borrowed(i: int, points: Sequence[Loaded], slopes: list[ComplexArray | None
 
 
 def to_set_point(data: PointData, miss: LoadMiss, slope: ComplexArray | None) -> PointData:
-    """The point's windows with forces as they would be at the set point."""
+    """The point's windows with forces as they would be at the set point.
+
+    Parameters
+    ----------
+    data : PointData
+    miss : LoadMiss
+    slope : (2, 2) complex ndarray or None
+        dH/d(ln W) [N/m]; None where not known.
+    """
     if slope is None or np.abs(miss.size).max(initial=0.0) > MAX_MISS:
         return data
     change = miss.size[data.run_index][:, None] * (data.D @ slope.T)
@@ -195,7 +222,15 @@ def to_set_point(data: PointData, miss: LoadMiss, slope: ComplexArray | None) ->
 
 
 def widened(est: DynamicStiffness, miss: LoadMiss, slope: ComplexArray | None) -> DynamicStiffness:
-    """Add what is not known of the miss, or what a known one may have done where the slope is not known."""
+    """Add what is not known of the miss, or what a known one may have done where the slope is not known.
+
+    Parameters
+    ----------
+    est : DynamicStiffness
+    miss : LoadMiss
+    slope : (2, 2) complex ndarray or None
+        dH/d(ln W) [N/m]; None where not known.
+    """
     if not np.isfinite(est.h).all():
         return est
     if slope is None:
@@ -206,7 +241,14 @@ def widened(est: DynamicStiffness, miss: LoadMiss, slope: ComplexArray | None) -
 
 
 def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
-    """Point out loads that are off by more than scatter."""
+    """Point out loads that are off by more than scatter.
+
+    Parameters
+    ----------
+    miss : LoadMiss
+    common : complex
+        The campaign's own ratio of measured to set load.
+    """
     found = []
     worst = float(np.abs(miss.size).max(initial=0.0))
     if worst > MAX_MISS:

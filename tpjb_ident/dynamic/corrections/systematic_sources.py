@@ -39,7 +39,13 @@ class SystematicSources:
     mass: FloatArray
 
     def changes(self, data: PointData, stiffness: DynamicStiffness) -> dict[str, FloatArray]:
-        """Change of the eight entries of H in every draw [N/m], (n, 8), by source."""
+        """Change of the eight entries of H in every draw [N/m], (n, 8), by source.
+
+        Parameters
+        ----------
+        data : PointData
+        stiffness : DynamicStiffness
+        """
         found = {}
         if self.turns:
             found["axis"] = apparent_change(data, stiffness, self._draws(self._turned))

@@ -47,7 +47,12 @@ class Regression:
         self.metric += METRIC_FLOOR * float(np.trace(self.metric).real) / self.q * np.eye(self.q)
 
     def fit(self, weights: FloatArray) -> ComplexArray:
-        """Weighted least squares, (..., n) -> (..., q, 2), by Cramer's rule; a singular system gives large numbers."""
+        """Weighted least squares, (..., n) -> (..., q, 2), by Cramer's rule; a singular system gives large numbers.
+
+        Parameters
+        ----------
+        weights : (..., n) ndarray
+        """
         sums = weights @ self._terms
         a, d = sums[..., 0], sums[..., 1]
         b = sums[..., 2] + 1j * sums[..., 3]
@@ -62,11 +67,23 @@ class Regression:
         return B
 
     def residual(self, B: ComplexArray) -> ComplexArray:
-        """Y - X B', (n, q)."""
+        """Y - X B', (n, q).
+
+        Parameters
+        ----------
+        B : (q, 2) complex ndarray
+            Coefficients.
+        """
         return np.asarray(self.Y - self.X @ B.T)
 
     def terms(self, B: ComplexArray) -> FloatArray:
-        """`products` of the residual, (..., q^2, n)."""
+        """`products` of the residual, (..., q^2, n).
+
+        Parameters
+        ----------
+        B : (..., q, 2) complex ndarray
+            Coefficients.
+        """
         return products(self._y - B @ self._x)
 
 
@@ -77,7 +94,13 @@ def _pairs(q: int) -> tuple[IntArray, IntArray]:
 
 
 def products(rows: ComplexArray) -> FloatArray:
-    """Terms of r r^H as reals, (..., q, n) -> (..., q^2, n): |r_a|^2, then Re and Im of conj(r_a) r_b for a < b."""
+    """Terms of r r^H as reals, (..., q, n) -> (..., q^2, n): |r_a|^2, then Re and Im of conj(r_a) r_b for a < b.
+
+    Parameters
+    ----------
+    rows : (..., q, n) complex ndarray
+        Residuals.
+    """
     q = rows.shape[-2]
     first, second = _pairs(q)
     pairs = rows[..., first, :].conj() * rows[..., second, :]
@@ -90,7 +113,16 @@ def products(rows: ComplexArray) -> FloatArray:
 
 
 def scatter(terms: FloatArray, weights: FloatArray, q: int) -> ComplexArray:
-    """Weighted mean of r r^H, (..., q, q), from `products`."""
+    """Weighted mean of r r^H, (..., q, q), from `products`.
+
+    Parameters
+    ----------
+    terms : (..., q^2, n) ndarray
+        Of `products`.
+    weights : (..., n) ndarray
+    q : int
+        Components of a residual.
+    """
     sums = (terms @ weights[..., None])[..., 0] / weights.sum(axis=-1)[..., None]
     first, second = _pairs(q)
     result = np.zeros((*sums.shape[:-1], q, q), dtype=complex)
@@ -102,7 +134,15 @@ def scatter(terms: FloatArray, weights: FloatArray, q: int) -> ComplexArray:
 
 
 def distance2(terms: FloatArray, inner: ComplexArray) -> FloatArray:
-    """2 r^H S^-1 r of every window, (..., n), from `products` and the scatter S."""
+    """2 r^H S^-1 r of every window, (..., n), from `products` and the scatter S.
+
+    Parameters
+    ----------
+    terms : (..., q^2, n) ndarray
+        Of `products`.
+    inner : (..., q, q) complex ndarray
+        Scatter S.
+    """
     inverse = np.linalg.inv(inner)
     q = inner.shape[-1]
     first, second = _pairs(q)
@@ -162,7 +202,15 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Star
 
 
 def evenly_chosen(direction: IntArray, most: int) -> IntArray:
-    """Indices of at most about `most` windows, the same share of every direction, spread over its time."""
+    """Indices of at most about `most` windows, the same share of every direction, spread over its time.
+
+    Parameters
+    ----------
+    direction : (n,) ndarray of int
+        Label of every window.
+    most : int
+        Windows.
+    """
     n = len(direction)
     if n <= most:
         return np.arange(n)

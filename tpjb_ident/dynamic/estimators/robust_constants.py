@@ -16,19 +16,43 @@ from tpjb_ident.arrays import FloatArray
 
 
 def bisquare_weight(u: FloatArray, c: float) -> FloatArray:
-    """Tukey's weight psi(u) / u."""
+    """Tukey's weight psi(u) / u.
+
+    Parameters
+    ----------
+    u : (n,) ndarray
+        Residuals over their scale.
+    c : float
+        Residual from which the weight is zero.
+    """
     return np.asarray(np.maximum(1 - (u / c) ** 2, 0.0) ** 2)
 
 
 def half_shrinkage(dimension: int, share: float) -> float:
-    """Variance of the innermost `share` of a chi(dimension) population, relative to all of it."""
+    """Variance of the innermost `share` of a chi(dimension) population, relative to all of it.
+
+    Parameters
+    ----------
+    dimension : int
+        Real dimensions.
+    share : float
+        0 to 1.
+    """
     limit = chi2.ppf(share, dimension)
     return float(chi2.cdf(limit, dimension + 2) / share)
 
 
 @functools.cache
 def efficiency_constant(dimension: int, efficiency: float = 0.95) -> float:
-    """Constant c at which the bisquare location/regression estimate has this Gaussian efficiency."""
+    """Constant c at which the bisquare location/regression estimate has this Gaussian efficiency.
+
+    Parameters
+    ----------
+    dimension : int
+        Real dimensions.
+    efficiency : float, optional
+        0 to 1.
+    """
 
     def shortfall(c: float) -> float:
         def psi2(u: float) -> float:
@@ -50,6 +74,15 @@ def efficiency_constant(dimension: int, efficiency: float = 0.95) -> float:
 def trimming_limits(dimension: int, begin: float = 0.99, end: float = 0.9999) -> tuple[float, float, float]:
     """Squared distances where a window starts to lose weight and where it has none.
 
+    Parameters
+    ----------
+    dimension : int
+        Real dimensions.
+    begin : float, optional
+        Probability beyond which weight is lost.
+    end : float, optional
+        Probability beyond which none is left.
+
     Returns
     -------
     lower, upper : float
@@ -68,6 +101,16 @@ def trimming_limits(dimension: int, begin: float = 0.99, end: float = 0.9999) ->
 
 
 def trimming_weight(u2: FloatArray, lower: float, upper: float) -> FloatArray:
-    """One up to `lower`, falling smoothly to zero at `upper` (no window tips the answer by a hair)."""
+    """One up to `lower`, falling smoothly to zero at `upper` (no window tips the answer by a hair).
+
+    Parameters
+    ----------
+    u2 : (n,) ndarray
+        Squared distances.
+    lower : float
+        Where weight begins to fall.
+    upper : float
+        Where none is left.
+    """
     v = np.clip((u2 - lower) / (upper - lower), 0.0, 1.0)
     return np.asarray((1 - v) ** 2 * (1 + 2 * v))

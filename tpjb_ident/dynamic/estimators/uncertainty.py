@@ -119,7 +119,16 @@ def direction_effect(residual: ComplexArray, means: DirectionMeans, noise: Compl
 
 
 def direction_covariances(means: DirectionMeans, noise: ComplexArray, T: ComplexArray) -> ComplexArray:
-    """V_g = noise / count_g + T |D_g|^2, shape (g, 2, 2)."""
+    """V_g = noise / count_g + T |D_g|^2, shape (g, 2, 2).
+
+    Parameters
+    ----------
+    means : DirectionMeans
+    noise : (2, 2) complex ndarray
+        Covariance of one window's residual.
+    T : (2, 2) complex ndarray
+        By which directions differ, over |D|^2.
+    """
     power = np.einsum("ga,ga->g", means.D, means.D.conj()).real
     return noise / means.count[:, None, None] + T * power[:, None, None]
 

@@ -53,7 +53,12 @@ class ClockRates:
     error: float = 0.0
 
     def apply(self, data: PointData) -> PointData:
-        """The point's windows as if all channels had been recorded by one clock that was started with all others."""
+        """The point's windows as if all channels had been recorded by one clock that was started with all others.
+
+        Parameters
+        ----------
+        data : PointData
+        """
         if not (self.force or self.acceleration):
             return data
         omega = 2 * np.pi * np.array([r.lines.excitation[i].frequency for r, i in zip(data.runs, data.lines)])
@@ -79,7 +84,12 @@ class ClockRates:
 
 
 def rate_samples(data: PointData) -> RateSamples:
-    """What the runs of one point show of the clocks."""
+    """What the runs of one point show of the clocks.
+
+    Parameters
+    ----------
+    data : PointData
+    """
     mass = data.runs[0].housing_mass if data.runs[0].acceleration is not None else 0.0
     cells = data.F - mass * data.A
     found: dict[str, list[FloatArray]] = {"force": [], "acceleration": []}
@@ -115,7 +125,12 @@ def _drift(z: ComplexArray, d: ComplexArray, start: FloatArray) -> tuple[float, 
 
 
 def clock_rates(samples: Iterable[RateSamples]) -> ClockRates:
-    """Differences that the runs of a campaign share; zero where none is clear."""
+    """Differences that the runs of a campaign share; zero where none is clear.
+
+    Parameters
+    ----------
+    samples : iterable of RateSamples
+    """
     every = list(samples)
     force = np.concatenate([s.force for s in every] or [np.empty((0, 3))])
     acceleration = np.concatenate([s.acceleration for s in every] or [np.empty((0, 3))])

@@ -37,11 +37,22 @@ class InstrumentFindings:
     start: float = 0.0
 
     def conditions(self, data: PointData) -> tuple[Condition, ...]:
-        """What to say of one point."""
+        """What to say of one point.
+
+        Parameters
+        ----------
+        data : PointData
+        """
         return (*self.clocks.conditions(), *self._balance(data).conditions)
 
     def spreads(self, data: PointData, est: DynamicStiffness) -> dict[str, FloatArray]:
-        """Covariance (8, 8) by source that the findings add to one point [N^2/m^2]; only what is not zero."""
+        """Covariance (8, 8) by source that the findings add to one point [N^2/m^2]; only what is not zero.
+
+        Parameters
+        ----------
+        data : PointData
+        est : DynamicStiffness
+        """
         found = {}
         balance = self._balance(data)
         if balance.phase:
@@ -78,7 +89,13 @@ def look_at_instruments(
 def amplitude_findings(
     source: PointSource, est: DynamicStiffness
 ) -> tuple[tuple[Condition, ...], dict[str, FloatArray]]:
-    """Conditions and covariance that the film's own harmonics give rise to at one point."""
+    """Conditions and covariance that the film's own harmonics give rise to at one point.
+
+    Parameters
+    ----------
+    source : PointSource
+    est : DynamicStiffness
+    """
     pairs = [digest.harmonics[line] for digest, (_, line) in zip(source.digests, source.members) if digest.harmonics]
     change = film_change([pair for pair in pairs if pair is not None], est)
     return change_conditions(change), {"amplitude": change_spread(change, est)} if change else {}

@@ -86,13 +86,26 @@ def _quadratic_share(kept: Sequence[tuple[LineMean, LineMean]], doubled: Complex
 
 
 def change_spread(change: float, est: DynamicStiffness) -> FloatArray:
-    """Covariance (8, 8) of H when its entries may be off by a common share."""
+    """Covariance (8, 8) of H when its entries may be off by a common share.
+
+    Parameters
+    ----------
+    change : float
+        Share of H by which its entries may be off.
+    est : DynamicStiffness
+    """
     shift = AS_DEVIATION * change * np.abs(est.vector)
     return np.diag(shift**2)
 
 
 def change_conditions(change: float) -> tuple[Condition, ...]:
-    """What to say of a point."""
+    """What to say of a point.
+
+    Parameters
+    ----------
+    change : float
+        Share of H by which its entries may be off.
+    """
     if change <= REFUSED:
         return ()
     return (

@@ -69,14 +69,24 @@ class Balance:
     doubt: float = np.inf
 
     def spread(self, est: DynamicStiffness) -> FloatArray:
-        """Covariance (8, 8) of H if the cells are late by that phase: one standard deviation [N^2/m^2]."""
+        """Covariance (8, 8) of H if the cells are late by that phase: one standard deviation [N^2/m^2].
+
+        Parameters
+        ----------
+        est : DynamicStiffness
+        """
         moved = 1j * self.phase * est.h
         shift = np.concatenate([moved.real.ravel(), moved.imag.ravel()])
         return np.outer(shift, shift)
 
 
 def balance_runs(data: PointData) -> list[BalanceRun]:
-    """Means of a point's runs; empty where the rig has no accelerometers."""
+    """Means of a point's runs; empty where the rig has no accelerometers.
+
+    Parameters
+    ----------
+    data : PointData
+    """
     if data.runs[0].acceleration is None:
         return []
     found = []
@@ -100,7 +110,13 @@ def _middle(z: ComplexArray, d: ComplexArray) -> ComplexArray:
 
 
 def balances(runs: Sequence[BalanceRun]) -> dict[float, Balance]:
-    """A verdict for every excitation frequency, rounded to 0.01 Hz, that enough runs were excited at."""
+    """A verdict for every excitation frequency, rounded to 0.01 Hz, that enough runs were excited at.
+
+    Parameters
+    ----------
+    runs : sequence of int
+        Places.
+    """
     groups: dict[float, list[BalanceRun]] = {}
     for run in runs:
         groups.setdefault(frequency_key(run.frequency), []).append(run)
@@ -122,7 +138,13 @@ def _shared_lag(verdicts: Sequence[tuple[float, Balance]]) -> float:
 
 
 def frequency_key(frequency: float) -> float:
-    """Under which a frequency is found again."""
+    """Under which a frequency is found again.
+
+    Parameters
+    ----------
+    frequency : float
+        [rad/s]
+    """
     return round(frequency, 2)
 
 

@@ -32,7 +32,12 @@ class LineMean:
 
 
 def second_harmonics(run: RunPhasors) -> tuple[tuple[LineMean, LineMean] | None, ...]:
-    """Every excitation line of a run with its second harmonic; None where it is not fitted, or the shaft's."""
+    """Every excitation line of a run with its second harmonic; None where it is not fitted, or the shaft's.
+
+    Parameters
+    ----------
+    run : RunPhasors
+    """
     lines = (run.lines.excitation + run.lines.nuisance)[: run.displacement.phasors.shape[1]]
     found: list[tuple[LineMean, LineMean] | None] = []
     for i, driven in enumerate(run.lines.excitation):

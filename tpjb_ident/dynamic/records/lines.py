@@ -63,7 +63,13 @@ class LineSet:
         return np.array([line.frequency for line in self.excitation + self.nuisance])
 
     def at_speed(self, speed: float) -> LineSet:
-        """The same lines with 1X, 2X.. at another shaft speed [Hz]."""
+        """The same lines with 1X, 2X.. at another shaft speed [Hz].
+
+        Parameters
+        ----------
+        speed : float
+            [Hz]
+        """
         moved = tuple(
             replace(line, frequency=speed * int(line.name[:-1])) if re.fullmatch(r"\d+X", line.name) else line
             for line in self.nuisance

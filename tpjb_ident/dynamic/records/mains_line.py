@@ -9,13 +9,23 @@ from tpjb_ident.dynamic.records.run_data import RunPhasors
 
 
 def mains_line(run: RunPhasors) -> ComplexArray | None:
-    """Typical displacement phasor (2,) at a run's mains line [m]; None where something else sits on it."""
+    """Typical displacement phasor (2,) at a run's mains line [m]; None where something else sits on it.
+
+    Parameters
+    ----------
+    run : RunPhasors
+    """
     place = _place(run)
     return None if place is None else _typical(run.displacement.phasors[:, place])
 
 
 def mains_force(run: RunPhasors) -> ComplexArray | None:
-    """The same of the oil force [N]."""
+    """The same of the oil force [N].
+
+    Parameters
+    ----------
+    run : RunPhasors
+    """
     place = _place(run)
     return None if place is None else _typical(run.oil_force(place))
 
@@ -39,5 +49,10 @@ def _shared(run: RunPhasors, index: int) -> bool:
 
 
 def complex_median(z: ComplexArray) -> ComplexArray:
-    """Median of real and imaginary parts over the first axis."""
+    """Median of real and imaginary parts over the first axis.
+
+    Parameters
+    ----------
+    z : (n, ...) complex ndarray
+    """
     return np.asarray(np.median(z.real, axis=0) + 1j * np.median(z.imag, axis=0))

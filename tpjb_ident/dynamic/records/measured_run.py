@@ -40,13 +40,37 @@ class MeasuredRun(Protocol):
         """Nominal sample rate [Hz]."""
 
     def vector(self, quantity: str, start: int | None = None, stop: int | None = None) -> VectorRecord:
-        """X and Y of a quantity, SI."""
+        """X and Y of a quantity, SI.
+
+        Parameters
+        ----------
+        quantity : str
+            ``"displacement"``, ``"force"`` or ``"acceleration"``.
+        start : int or None, optional
+            First sample.
+        stop : int or None, optional
+            Sample after the last.
+        """
 
     def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
-        """Shaft speed by the tachometer [rad/s]; None where there is none."""
+        """Shaft speed by the tachometer [rad/s]; None where there is none.
+
+        Parameters
+        ----------
+        start : int or None, optional
+            First sample; default the first of all.
+        stop : int or None, optional
+            Sample after the last; default the end.
+        """
 
     def row_reader(self, quantities: Sequence[str]) -> RowReader:
-        """Reader of several quantities at once."""
+        """Reader of several quantities at once.
+
+        Parameters
+        ----------
+        quantities : sequence of str
+            With X and Y.
+        """
 
     def kept_open(self) -> AbstractContextManager[None]:
         """Keep the file open while the block runs."""

@@ -169,7 +169,13 @@ def _by_window(values: FloatArray) -> FloatArray:
 
 
 def usual_scale(scale: FloatArray) -> FloatArray:
-    """Median over the windows with a scale, X and Y; infinite where none has."""
+    """Median over the windows with a scale, X and Y; infinite where none has.
+
+    Parameters
+    ----------
+    scale : (n_windows, 2) ndarray
+        SI.
+    """
     known = scale[np.isfinite(scale).all(axis=1)]
     return np.median(known, axis=0) if len(known) else np.full(2, np.inf)
 

@@ -75,6 +75,12 @@ class RunPhasors:
     conditions: tuple[Condition, ...] = ()
 
     def oil_force(self, line: int = 0) -> ComplexArray:
-        """Oil-force phasors at one line, shape (n, 2) [N]."""
+        """Oil-force phasors at one line, shape (n, 2) [N].
+
+        Parameters
+        ----------
+        line : int, optional
+            Place among the excitation lines.
+        """
         a = None if self.acceleration is None else self.acceleration.phasors[:, line]
         return oil_force(self.cell_force.phasors[:, line], a, 0.0 if a is None else self.housing_mass)

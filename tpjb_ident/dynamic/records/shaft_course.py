@@ -25,5 +25,11 @@ class ShaftCourse:
     speed: FloatArray
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Speed at `time` (m,) [s], [Hz]."""
+        """Speed at `time` (m,) [s], [Hz].
+
+        Parameters
+        ----------
+        time : (n,) ndarray
+            [s]
+        """
         return np.interp(time, self.time, self.speed)

@@ -15,7 +15,12 @@ MAX_DEPARTURE = 0.05
 
 
 def shaft_speed(run: MeasuredRun) -> tuple[float, tuple[Condition, ...]]:
-    """Shaft speed of a run [Hz]: the tachometer's, or the set point where it gives nothing usable."""
+    """Shaft speed of a run [Hz]: the tachometer's, or the set point where it gives nothing usable.
+
+    Parameters
+    ----------
+    run : MeasuredRun
+    """
     nominal = run.point.shaft_speed_hz
     record = run.speed(0, FIRST_LOOK)
     if record is None:

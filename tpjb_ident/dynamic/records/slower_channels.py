@@ -47,6 +47,11 @@ class SlowerChannel:
         """What the filling does to a sine of `frequency` (n,) [Hz]: sinc^2 for lines, sinc and half a step for steps.
 
         Where the rates divide evenly the sums over the samples of a period take the place of the integrals.
+
+        Parameters
+        ----------
+        frequency : float
+            [rad/s]
         """
         f = np.asarray(frequency, dtype=float)
         ratio = self.export_rate / self.rate

@@ -43,7 +43,12 @@ class WaveBlocks:
         self._place, self._slope = (starts - half) / half, 1 / half
 
     def project(self, rows: FloatArray) -> FloatArray:
-        """Inner products with every column, (k, length) -> (k, 2 m + 2)."""
+        """Inner products with every column, (k, length) -> (k, 2 m + 2).
+
+        Parameters
+        ----------
+        rows : (k, length) ndarray
+        """
         parts = np.empty((len(rows), len(self._turn), self._waves.shape[1]))
         main = rows[:, : self.full * BLOCK].reshape(len(rows), self.full, BLOCK)
         np.matmul(main, self._waves, out=parts[:, : self.full])
@@ -57,7 +62,15 @@ class WaveBlocks:
         return sums
 
     def subtract(self, rows: FloatArray, coefficients: FloatArray) -> None:
-        """Take the sum of all columns, times their (k, 2 m + 2) coefficients, off (k, length) rows in place."""
+        """Take the sum of all columns, times their (k, 2 m + 2) coefficients, off (k, length) rows in place.
+
+        Parameters
+        ----------
+        rows : (k, length) ndarray
+            Changed in place.
+        coefficients : (k, 2 m + 2) ndarray
+            As of `line_design`.
+        """
         lines = (coefficients[:, 0:-2:2] + 1j * coefficients[:, 1:-2:2])[:, None, :] * self._turn
         local = np.empty((len(rows), len(self._turn), self._waves.shape[1]))
         local[:, :, 0:-2:2], local[:, :, 1:-2:2] = lines.real, lines.imag

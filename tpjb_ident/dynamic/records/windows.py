@@ -118,7 +118,15 @@ def variance_inflation(frequencies: FloatArray, n_driven: int, length: float, ra
 
 
 def shortest_window(lines: LineSet, rate: float, settings: WindowSettings) -> float:
-    """Shortest window [s] that keeps the excitation lines within the accepted inflation."""
+    """Shortest window [s] that keeps the excitation lines within the accepted inflation.
+
+    Parameters
+    ----------
+    lines : LineSet
+    rate : float
+        [Hz]
+    settings : WindowSettings
+    """
     frequencies = lines.frequencies
     n_driven = len(lines.excitation)
     start = settings.min_cycles / min(line.frequency for line in lines.excitation)
@@ -136,6 +144,14 @@ def shortest_window(lines: LineSet, rate: float, settings: WindowSettings) -> fl
 
 def plan_windows(n_samples: int, rate: float, lines: LineSet, settings: WindowSettings) -> tuple[int, int]:
     """Choose window length and count for one run.
+
+    Parameters
+    ----------
+    n_samples : int
+    rate : float
+        [Hz]
+    lines : LineSet
+    settings : WindowSettings
 
     Returns
     -------

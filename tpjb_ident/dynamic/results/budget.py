@@ -21,7 +21,14 @@ BUDGET_COLUMNS = ("coefficient", "unit", "source", "kind", "standard_uncertainty
 
 
 def with_systematic(est: DynamicStiffness, parts: Mapping[str, FloatArray]) -> DynamicStiffness:
-    """The estimate with the sum of some systematic covariances (8, 8)."""
+    """The estimate with the sum of some systematic covariances (8, 8).
+
+    Parameters
+    ----------
+    est : DynamicStiffness
+    parts : mapping of str to (8, 8) ndarray
+        By source [N^2/m^2].
+    """
     return replace(est, systematic=np.sum(list(parts.values()), axis=0) if parts else np.zeros((8, 8)))
 
 

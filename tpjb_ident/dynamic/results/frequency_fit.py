@@ -76,7 +76,13 @@ class FrequencyFit:
         return np.sqrt(np.diag(self.covariance) * inflation)
 
     def h(self, omega: float) -> np.ndarray:
-        """Dynamic stiffness of the model at `omega` [rad/s], (2, 2) complex."""
+        """Dynamic stiffness of the model at `omega` [rad/s], (2, 2) complex.
+
+        Parameters
+        ----------
+        omega : float
+            [rad/s]
+        """
         return np.asarray(self.K - omega**2 * self.M + 1j * omega * self.C)
 
 
@@ -196,6 +202,10 @@ def fits_per_load(points: tuple[PointResult, ...]) -> list[LoadFits]:
     """Fit every load that was run at two excitation frequencies or more.
 
     Points with mains on the excitation line take part: their intervals say what they are worth.
+
+    Parameters
+    ----------
+    points : tuple of PointResult
     """
     groups: dict[tuple[float, ...], list[PointResult]] = {}
     for p in points:

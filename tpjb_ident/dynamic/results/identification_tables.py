@@ -29,7 +29,12 @@ WINDOW_COLUMNS = ("run", "time_s", "excitation_direction_deg", "weight", "reason
 
 
 def point_columns(p: PointResult) -> dict[str, float]:
-    """Key of a point."""
+    """Key of a point.
+
+    Parameters
+    ----------
+    p : PointResult
+    """
     point = p.point
     values = (point.static_load, point.static_load_direction_deg, point.shaft_speed_hz, point.excitation_hz)
     return dict(zip(POINT_COLUMNS, values))
@@ -90,7 +95,13 @@ def _model_columns(group: LoadFits | None) -> dict[str, Any]:
 
 
 def fit_row(group: LoadFits, fit: FrequencyFit) -> dict[str, Any]:
-    """One model over frequency of one load."""
+    """One model over frequency of one load.
+
+    Parameters
+    ----------
+    group : LoadFits
+    fit : FrequencyFit
+    """
     row: dict[str, Any] = {name: point_columns(group.points[0])[name] for name in STATIC_COLUMNS}
     row.update(
         model=fit.model,
@@ -112,6 +123,10 @@ def fit_row(group: LoadFits, fit: FrequencyFit) -> dict[str, Any]:
 
 def coefficient_columns(est: DynamicStiffness) -> dict[str, float]:
     """K and C with their intervals under the names of ``coefficients.csv``.
+
+    Parameters
+    ----------
+    est : DynamicStiffness
 
     Returns
     -------

@@ -26,7 +26,15 @@ def named_at_points(
 
 
 def lost_points(points: Sequence[PointResult], left: Sequence[LeftOut], any_excitation: bool) -> tuple[Condition, ...]:
-    """Name the operating points that have no run left."""
+    """Name the operating points that have no run left.
+
+    Parameters
+    ----------
+    points : sequence of PointResult
+    left : sequence of LeftOut
+    any_excitation : bool
+        Whether a record holds several excitation lines.
+    """
     lost = [one for one in left if not any(_same(one, point, any_excitation) for point in points)]
     places = dict.fromkeys(f"{one.point.static_load / 1e3:g} kN, {one.point.excitation_hz:g} Hz" for one in lost)
     if not places:

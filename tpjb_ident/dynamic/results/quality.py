@@ -43,7 +43,14 @@ def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatA
 
 
 def amplitude(data: PointData, weights: FloatArray) -> float:
-    """Largest displacement amplitude (major half-axis of the orbit) of any run's mean phasor [m]."""
+    """Largest displacement amplitude (major half-axis of the orbit) of any run's mean phasor [m].
+
+    Parameters
+    ----------
+    data : PointData
+    weights : (n,) ndarray
+        Of the windows.
+    """
     largest = 0.0
     for i in range(len(data.runs)):
         mine = (data.run_index == i) & (weights > 0) & np.isfinite(data.D).all(axis=1)
@@ -55,7 +62,16 @@ def amplitude(data: PointData, weights: FloatArray) -> float:
 
 
 def rejected_windows(data: PointData, h: ComplexArray, weights: FloatArray) -> tuple[WindowVerdict, ...]:
-    """Windows without weight, each with the reason that shows in its own numbers."""
+    """Windows without weight, each with the reason that shows in its own numbers.
+
+    Parameters
+    ----------
+    data : PointData
+    h : (2, 2) complex ndarray
+        Dynamic stiffness [N/m].
+    weights : (n,) ndarray
+        Of the windows.
+    """
     found = []
     answered = bool(np.isfinite(h).all())
     for i in np.flatnonzero(weights < REJECTED_WEIGHT):
@@ -159,6 +175,12 @@ def directional_pattern(data: PointData, weights: FloatArray) -> Condition | Non
 
     A binomial test per run: more rejected windows than chance gives once in a thousand, in a run
     with at least three of them.
+
+    Parameters
+    ----------
+    data : PointData
+    weights : (n,) ndarray
+        Of the windows.
     """
     from scipy.stats import binom
 

@@ -6,7 +6,7 @@ The search is that of `tpjb check`, `tpjb_ident.check.one_gain`; here it works o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,8 +16,7 @@ from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.gain_evidence import PointReadings
 from tpjb_ident.check.one_gain import wrong_gains
 from tpjb_ident.check.run_gains import gain_in_words
-from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.results.swept_probes import SweptProbe
 from tpjb_ident.dynamic.runs.point_data import PointData
 
@@ -72,31 +71,28 @@ def _centre(sweeps: Sequence[SweptProbe], probe: str) -> float | None:
     return float(np.median(known)) if known else None
 
 
-def with_gain_doubts(result: PointResult, data: PointData, pairs: Pairs | None) -> PointResult:
-    """The point, with a condition that names runs in which one channel has a gain of its own.
+def gain_doubts(data: PointData, pairs: Pairs | None) -> tuple[Condition, ...]:
+    """A condition that names the runs of a point in which one channel has a gain of its own; none where there is none.
 
     Parameters
     ----------
-    result : PointResult
     data : PointData
         Its windows as measured, nothing corrected.
     pairs : Pairs or None
         None says nothing.
     """
     if pairs is None:
-        return result
+        return ()
     medians = [_medians(data, k) for k in range(len(data.runs))]
     kept = [k for k, values in enumerate(medians) if all(np.isfinite(v).all() for v in values)]
     if not kept:
-        return result
+        return ()
     found = wrong_gains(_readings(data, [medians[k] for k in kept], kept, pairs))
     doubts = []
     for one in sorted(found, key=lambda f: f.run):
         names = [pairs.names[i] for i in one.channels]
         doubts.append(f"{data.runs[kept[one.run]].run}: {names[0]} {gain_in_words(one, names)}")
-    if not doubts:
-        return result
-    return replace(result, quality=merged(result.quality, (Condition(RUN_GAIN_OFF, "; ".join(doubts)),)))
+    return (Condition(RUN_GAIN_OFF, "; ".join(doubts)),) if doubts else ()
 
 
 def _medians(data: PointData, k: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

@@ -42,7 +42,14 @@ class LeftOut:
 
 
 def named_runs(left: Sequence[LeftOut], of: int) -> tuple[Condition, ...]:
-    """What the campaign has to say: which of its `of` dynamic runs take no part, and why."""
+    """What the campaign has to say: which of its `of` dynamic runs take no part, and why.
+
+    Parameters
+    ----------
+    left : sequence of LeftOut
+    of : int
+        Dynamic runs of the campaign.
+    """
     if not left:
         return ()
     listed = "; ".join(f"{one.run} ({one.reason})" for one in left[:LISTED])

@@ -55,13 +55,23 @@ class PointData:
 
 
 def finite_mean(rows: FloatArray) -> FloatArray:
-    """Mean of the complete rows, (2,); NaN where there is none."""
+    """Mean of the complete rows, (2,); NaN where there is none.
+
+    Parameters
+    ----------
+    rows : (n, 2) ndarray
+    """
     good = rows[np.isfinite(rows).all(axis=1)]
     return good.mean(axis=0) if len(good) else np.full(2, np.nan)
 
 
 def gather(runs: list[RunPhasors]) -> list[PointData]:
-    """Group runs by operating point; a record with several excitation lines feeds several points."""
+    """Group runs by operating point; a record with several excitation lines feeds several points.
+
+    Parameters
+    ----------
+    runs : list of RunPhasors
+    """
     lines = [(run.point, tuple(line.frequency for line in run.lines.excitation)) for run in runs]
     return [point_data(point, [(runs[k], i) for k, i in members]) for point, members in group(lines)]
 
@@ -98,7 +108,14 @@ def _point_of(stated: OperatingPoint, frequency: float) -> OperatingPoint:
 
 
 def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> PointData:
-    """Windows of a point's runs, each with the line that is meant."""
+    """Windows of a point's runs, each with the line that is meant.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+    members : list of (RunPhasors, int)
+        Runs, and the line of each that is meant.
+    """
     runs = tuple(run for run, _ in members)
     lines = tuple(i for _, i in members)
     D = [run.displacement.phasors[:, i] for run, i in zip(runs, lines)]

@@ -1,4 +1,4 @@
-"""The operating points of a campaign whose phasors are on a shelf: one point's windows in memory at a time."""
+"""The operating points of a campaign whose phasors are kept: one point's windows in memory at a time."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.dynamic.corrections.baseline import Baseline
 from tpjb_ident.dynamic.instruments.clock_rates import ClockRates
+from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns, RunDigest
 from tpjb_ident.dynamic.runs.point_data import PointData, group, point_data
-from tpjb_ident.dynamic.runs.run_shelf import RunDigest, RunShelf
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class PointSource:
     ----------
     point : OperatingPoint
     members : tuple of (int, int)
-        Place on the shelf, and line, of every run.
+        Place among the finished runs, and line, of every run.
     digests : tuple of RunDigest
-    shelf : RunShelf
+    finished : FinishedRuns
     clocks : ClockRates
         By which the channels' clocks differ, once that is known.
     baseline : Baseline
@@ -34,14 +34,23 @@ class PointSource:
     point: OperatingPoint
     members: tuple[tuple[int, int], ...]
     digests: tuple[RunDigest, ...]
-    shelf: RunShelf = field(repr=False)
+    finished: FinishedRuns = field(repr=False)
     clocks: ClockRates = field(default_factory=ClockRates)
     baseline: Baseline = field(default_factory=Baseline)
+    _loaded: list[PointData] = field(init=False, default_factory=list, repr=False, compare=False)
 
     def load(self) -> PointData:
-        """All windows of the point, as if one clock had recorded them, and without the rig's own stiffness."""
-        recorded = point_data(self.point, [(self.shelf.take(k), i) for k, i in self.members])
-        return self.baseline.taken_off(self.clocks.apply(recorded))
+        """All windows of the point, as if one clock had recorded them, and without the rig's own stiffness.
+
+        They are kept where the runs themselves are in memory.
+        """
+        if self._loaded:
+            return self._loaded[0]
+        recorded = point_data(self.point, [(self.finished.take(k), i) for k, i in self.members])
+        data = self.baseline.taken_off(self.clocks.apply(recorded))
+        if self.finished.all_in_memory:
+            self._loaded.append(data)
+        return data
 
     @property
     def mean_loads(self) -> FloatArray:
@@ -49,14 +58,25 @@ class PointSource:
         return np.array([digest.mean_load for digest in self.digests])
 
     def found(self, condition: str) -> bool:
-        """Whether one of the runs carries a condition of this name."""
+        """Whether one of the runs carries a condition of this name.
+
+        Parameters
+        ----------
+        condition : str
+            Its name.
+        """
         return any(condition in digest.conditions for digest in self.digests)
 
 
-def point_sources(shelf: RunShelf) -> list[PointSource]:
-    """Operating points of all runs on a shelf."""
-    digests, places = shelf.digests, shelf.places
+def point_sources(finished: FinishedRuns) -> list[PointSource]:
+    """Operating points of all runs kept.
+
+    Parameters
+    ----------
+    finished : FinishedRuns
+    """
+    digests, places = finished.digests, finished.places
     return [
-        PointSource(point, tuple((places[k], i) for k, i in members), tuple(digests[k] for k, _ in members), shelf)
+        PointSource(point, tuple((places[k], i) for k, i in members), tuple(digests[k] for k, _ in members), finished)
         for point, members in group([(digest.point, digest.excitations) for digest in digests])
     ]

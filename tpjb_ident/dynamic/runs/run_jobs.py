@@ -19,9 +19,9 @@ from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.dynamic.records.windows import RecordTooShortError
 from tpjb_ident.dynamic.runs.dead_channels import dead_accelerometers
+from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 from tpjb_ident.dynamic.runs.left_out import LeftOut
 from tpjb_ident.dynamic.runs.run_result import RunResult
-from tpjb_ident.dynamic.runs.run_shelf import RunShelf
 from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
 from tpjb_ident.runtime.executors import InProcessWorkers, Workers, each_finished
 
@@ -36,10 +36,10 @@ def all_runs(
     progress: Progress,
     workers: Workers | None = None,
     store: RunStore | None = None,
-) -> RunShelf:
-    """Phasors and temperatures of every dynamic run, put away on a shelf that the caller closes.
+) -> FinishedRuns:
+    """Phasors and temperatures of every dynamic run, put away kept that the caller closes.
 
-    A run that cannot be used is left out, and the shelf names it.
+    A run that cannot be used is left out, and `FinishedRuns` names it.
 
     Parameters
     ----------
@@ -62,31 +62,31 @@ def all_runs(
     runs = campaign.of_kind("dynamic")
     mass = campaign.housing_mass
     progress(runs[0].id if runs else "", 0, len(runs))
-    shelf = RunShelf(runs, mass, lambda run: one_run(run, mass, settings), store)
+    kept = FinishedRuns(runs, mass, lambda run: one_run(run, mass, settings), store)
     done = 0
 
     def finished(index: int, answer: tuple[str, RunResult | LeftOut | None]) -> None:
         nonlocal done
         mark, result = answer
         if isinstance(result, LeftOut):
-            shelf.leave_out(index, result)
+            kept.leave_out(index, result)
         else:
             if store is not None and result is not None and mark:
                 store.keep(mark, result)
-            shelf.put(index, result, mark)
+            kept.put(index, result, mark)
         done += 1
         progress(runs[index].id, done, len(runs))
 
     jobs = ((_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs)
     try:
         each_finished(workers or InProcessWorkers(), unless_known, list(jobs), finished)
-        shelf.leave_out_dead_accelerometers()
-        if runs and not shelf.places:
-            raise shelf.left_out[0].error
+        kept.leave_out_dead_accelerometers()
+        if runs and not kept.places:
+            raise kept.left_out[0].error
     except BaseException:
-        shelf.close()
+        kept.close()
         raise
-    return shelf
+    return kept
 
 
 def unless_known(
@@ -96,6 +96,15 @@ def unless_known(
 
     The fingerprint is "" where the record changed while it was read: such a result must not be kept. Where nothing
     is kept anywhere (`known` is None) it is not asked for.
+
+    Parameters
+    ----------
+    run : Run
+    housing_mass : float
+        [kg]
+    settings : PhasorSettings
+    known : str or None
+        Fingerprint of a kept result; None where nothing is kept.
     """
     try:
         return _unless_known(run, housing_mass, settings, known)
@@ -136,7 +145,15 @@ def _anywhere(run: Run) -> Any:
 
 
 def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResult:
-    """Phasors and temperatures of one run."""
+    """Phasors and temperatures of one run.
+
+    Parameters
+    ----------
+    run : Run
+    housing_mass : float
+        [kg]
+    settings : PhasorSettings
+    """
     with run.kept_open():
         try:
             phasors = run_phasors(run, housing_mass, settings)
@@ -154,7 +171,12 @@ def _mended(run: Run) -> tuple[Condition, ...]:
 
 
 def mean_temperatures(run: Run) -> dict[int, float]:
-    """Mean temperature per pad over a run [K]; pads with several sensors give their mean."""
+    """Mean temperature per pad over a run [K]; pads with several sensors give their mean.
+
+    Parameters
+    ----------
+    run : Run
+    """
     found: dict[int, list[float]] = {}
     for sensor in run.temperatures():
         if sensor.pad is None:

@@ -73,7 +73,12 @@ class RunStore:
         return self.folder / f"{hashlib.sha256(run_id.encode()).hexdigest()[:32]}.npz"
 
     def known(self, run_id: str) -> str:
-        """Fingerprint under which a run is kept, "" if it is not."""
+        """Fingerprint under which a run is kept, "" if it is not.
+
+        Parameters
+        ----------
+        run_id : str
+        """
         found = self._read(run_id)
         return "" if found is None else str(found[0]["fingerprint"])
 
@@ -88,7 +93,14 @@ class RunStore:
         return (meta, arrays) if isinstance(meta, dict) and meta.get("run") == run_id else None
 
     def keep(self, mark: str, result: RunResult) -> None:
-        """Keep a finished run under its fingerprint `mark`."""
+        """Keep a finished run under its fingerprint `mark`.
+
+        Parameters
+        ----------
+        mark : str
+            Fingerprint.
+        result : RunResult
+        """
         phasors = result.phasors
         arrays: dict[str, Any] = {"start": phasors.start, "speeds": phasors.speeds}
         for name in _BLOCKS:

@@ -71,7 +71,14 @@ class RunDigest:
 
 
 def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:
-    """Sum up a finished run that was recorded at `sample_rate` [Hz]."""
+    """Sum up a finished run that was recorded at `sample_rate` [Hz].
+
+    Parameters
+    ----------
+    result : RunResult
+    sample_rate : float, optional
+        [Hz]
+    """
     phasors = result.phasors
     return RunDigest(
         phasors.run,
@@ -88,7 +95,12 @@ def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:
 
 
 def slim(phasors: RunPhasors) -> RunPhasors:
-    """The run without the phasors of nuisance lines: estimates need those of the excitation alone."""
+    """The run without the phasors of nuisance lines: estimates need those of the excitation alone.
+
+    Parameters
+    ----------
+    phasors : RunPhasors
+    """
     n = len(phasors.lines.excitation)
 
     def cut(block: PhasorBlock) -> PhasorBlock:
@@ -109,7 +121,7 @@ def _bytes(phasors: RunPhasors) -> int:
     return sum(a.nbytes for a in (*arrays, phasors.start, phasors.speeds))
 
 
-class RunShelf:
+class FinishedRuns:
     """Puts finished runs away and gives them back.
 
     Parameters
@@ -141,7 +153,7 @@ class RunShelf:
         self._marks: dict[int, str] = {}
         self._folder: tempfile.TemporaryDirectory[str] | None = None
 
-    def __enter__(self) -> RunShelf:
+    def __enter__(self) -> FinishedRuns:
         return self
 
     def __exit__(
@@ -167,12 +179,24 @@ class RunShelf:
         return [self._digests[i] for i in self.places]
 
     @property
+    def all_in_memory(self) -> bool:
+        """Whether no run waits on disk: what is made of them may stay in memory too."""
+        return len(self._memory) == len(self._digests)
+
+    @property
     def left_out(self) -> tuple[LeftOut, ...]:
         """Runs that take no part, in the campaign's order."""
         return tuple(self._left[i] for i in sorted(self._left))
 
     def leave_out(self, index: int, why: LeftOut) -> None:
-        """Note that a run takes no part."""
+        """Note that a run takes no part.
+
+        Parameters
+        ----------
+        index : int
+            Place of the run.
+        why : LeftOut
+        """
         self._left[index] = why
         self._digests.pop(index, None)
         self._memory.pop(index, None)
@@ -217,7 +241,13 @@ class RunShelf:
             self._own().keep(_OWN, replace(result, phasors=phasors))
 
     def take(self, index: int) -> RunPhasors:
-        """Phasors of a run's excitation lines."""
+        """Phasors of a run's excitation lines.
+
+        Parameters
+        ----------
+        index : int
+            Place of the run.
+        """
         if index in self._memory:
             return self._memory[index]
         run, mark = self._runs[index], self._marks.get(index, "")
