@@ -14,7 +14,7 @@ import numpy as np
 from tpjb_ident.arrays import ComplexArray, FloatArray
 
 #: Samples that are looked at.
-LOOK = 2**14
+LOOK = 2**13
 #: Share of the samples that must be straight (or flat), at least.
 STRAIGHT = 0.15
 #: A bend is none below this share of the usual one.
@@ -78,11 +78,9 @@ def slower_channel(readings: FloatArray, export_rate: float) -> SlowerChannel | 
     if len(values) < 200 or not np.isfinite(values).all():
         return None
     for held, changes in ((True, np.abs(np.diff(values))), (False, np.abs(np.diff(values, 2)))):
-        usual = float(np.quantile(changes, 0.95))
+        usual = 2 * float(changes.mean())
         bent = changes > NO_BEND * usual
         if not usual > 0 or bent.mean() > 1 - STRAIGHT:
-            continue
-        if not held and float(np.quantile(changes, STRAIGHT)) > 1e-9 * float(np.abs(values).max()) + NO_BEND * usual:
             continue
         rate = _rhythm(bent.astype(float), export_rate, held)
         if rate is not None:
