@@ -1,0 +1,90 @@
+"""Tables fit the terminal: numbers stay whole, words wrap, what has no room stands below its row."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tpjb_ident.cli.commands.identify import cross_coupling_matters, with_half
+from tpjb_ident.cli.common.table_layout import cell_len, table_lines, wrapped
+
+COLUMNS = ["load kN", "dir. deg", "speed Hz", "exc. Hz", "kxx MN/m", "kyy MN/m", "quality"]
+FLAGS = "large-amplitude; mains-on-excitation-line; methods-disagree"
+ROW = ["8.75", "-90", "22", "25", "1234.5 ±67.8", "1234.5 ±67.8", FLAGS]
+
+
+@pytest.mark.parametrize("width", [60, 72, 80, 100, 140])
+def test_no_line_is_wider_than_the_terminal(width):
+    lines = table_lines(COLUMNS, [ROW, ROW], {6}, width)
+    assert max(cell_len(line) for line in lines) <= width
+    assert sum("1234.5 ±67.8  1234.5 ±67.8" in line for line in lines) == 2
+
+
+def test_no_word_is_broken_into_letters():
+    text = "\n".join(table_lines(COLUMNS, [ROW], {6}, 80))
+    for word in ("large-amplitude", "mains-on-excitation-line", "methods-disagree"):
+        assert word in text
+
+
+def test_words_without_room_stand_below_their_row():
+    lines = table_lines(["a" * 30, "b" * 30, "note"], [["1", "2", "some words"]], {2}, 66)
+    assert lines[-1] == "    note: some words"
+
+
+def test_numbers_alone_are_never_cut():
+    assert "1" * 100 in "\n".join(table_lines(["n"], [["1" * 100]], (), 40))
+
+
+def test_wide_letters_count_twice():
+    lines = table_lines(["name", "n"], [["温度", "1"], ["temp", "2"]], {0}, 40)
+    assert cell_len(lines[-1]) == cell_len(lines[-2]) == cell_len("温度  1")
+
+
+def test_sentences_break_at_spaces_and_paths_stay_whole():
+    path = "/a/" + "b" * 90
+    lines = wrapped(f"Results are in {path} and nowhere else", 60)
+    assert any(path in line for line in lines)
+    assert wrapped("", 60) == [""]
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "says"),
+    [
+        (32.31, 0.28, "32.3 ±0.3"),
+        (1315.2, 11.4, "1315 ±11"),
+        (math.nan, math.nan, "no answer"),
+        (5.0, math.nan, "5 ±?"),
+    ],
+)
+def test_a_point_without_an_answer_says_so(value, half, says):
+    assert with_half(value, half) == says
+
+
+def test_cross_coupling_is_shown_when_it_is_beyond_doubt():
+    values = np.array([100.0, 20.0, -1.0, 90.0, 500.0, 0.0, 0.0, 500.0])
+    assert cross_coupling_matters(values, np.full(8, 5.0))
+    assert not cross_coupling_matters(values, np.full(8, 15.0))
+    assert not cross_coupling_matters(values * np.nan, np.full(8, 5.0))
+
+
+def test_notes_of_one_sort_are_counted():
+    from rigdata.problem import Problem
+    from tpjb_ident.cli.commands.check import gathered
+
+    alike = [Problem("note", f"run{i}.csv", "time", f"the clock has {i} steps", "none", f"r{i}") for i in range(39)]
+    error = [Problem("error", f"run{i}.csv", "time", "is empty", "mend it", f"r{i}") for i in range(5)]
+    sentences = gathered([*error, *alike])
+    assert len(sentences) == 6
+    assert "the like 38 more times" in sentences[-1]
+
+
+def test_a_verdict_leads_to_a_command():
+    from tpjb_ident.report.diagnosis_words import next_command
+
+    named = SimpleNamespace(effects=("x",), verdict="named")
+    consistent = SimpleNamespace(effects=(), verdict="consistent")
+    assert next_command("k.h5", "", named, "o") == "tpjb compare k.h5 --effects o/updated.effects.toml"
+    assert next_command("k.h5", "b.toml", consistent, "o") == "tpjb export o --to ross"
