@@ -66,7 +66,7 @@ def coherence_spectrum(
     axes.axhline(chance, color=LIGHT["ink"], linestyle=(0, (4, 2)), linewidth=0.9, label="by chance, 95 %")
     if drive:
         axes.axvline(drive, color=LIGHT["grey"], linewidth=0.9)
-        axes.text(drive, 0.03, f" {drive:g} Hz", color=LIGHT["grey"], fontsize=FONT_SIZE - 1, va="bottom")
+        axes.text(drive, 0.03, f" {drive:g} Hz", color=LIGHT["ink"], fontsize=FONT_SIZE - 1, va="bottom")
     axes.set_xlim(0.0, top)
     axes.set_ylim(0.0, 1.02)
     add_legend(axes)
