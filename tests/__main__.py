@@ -1,4 +1,7 @@
-"""``python3 tests [--quick] [pytest arguments]``: set up .venv and run the test suite there, or its quick part."""
+"""``python3 tests [--quick] [--changed [REV]] [pytest arguments]``: set up .venv and run the test suite there.
+
+--quick leaves out what is marked slow; --changed runs what lies above the files that differ from REV (default: HEAD).
+"""
 
 # The lines before the version check must parse on any Python, so that an old one gets a sentence, not a traceback.
 import os
@@ -22,13 +25,14 @@ if __name__ == "__main__":
     # two workers, each with one thread: what the reference machine has
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # both workers, and every command they start, import the same thousand modules: who wants no bytecode beside the
-    # sources gets it kept in .venv
-    if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
-        os.environ.setdefault("PYTHONPYCACHEPREFIX", os.path.join(root, ".venv", "bytecode"))
     arguments = sys.argv[1:]
     if "--quick" in arguments:
         arguments = ["-m", "not slow"] + [a for a in arguments if a != "--quick"]
+    if "--changed" in arguments:
+        sys.path.insert(0, root)
+        from tests.changed import chosen
+
+        arguments = chosen(arguments)
     if not any(a.startswith(("-n", "--numprocesses")) for a in arguments):
         arguments = ["-n", "2", "--dist", "loadfile"] + arguments  # noqa: RUF005 (parses on old Pythons)
     bootstrap.run("pytest", arguments)

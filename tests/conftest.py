@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +17,12 @@ hypothesis.settings.register_profile(
 )
 hypothesis.settings.load_profile("shared machine")
 ROOT = Path(__file__).resolve().parent.parent
+# every worker, and every command that tests start, imports the same thousand modules, and pytest rewrites the
+# assertions of each test file: who wants no bytecode beside the sources gets it kept in .venv
+if sys.dont_write_bytecode and sys.pycache_prefix is None and (ROOT / ".venv").is_dir():
+    sys.dont_write_bytecode, sys.pycache_prefix = False, str(ROOT / ".venv" / "bytecode")
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
 
 
 @pytest.hookimpl(wrapper=True)
@@ -26,6 +34,7 @@ def pytest_collection() -> Iterator[None]:
     finally:
         gc.freeze()
         gc.enable()
+        gc.set_threshold(50_000)  # tests leave little behind; the default walks it every 700 objects
 
 
 @pytest.fixture(scope="session")
@@ -41,12 +50,19 @@ def rocker_file() -> Path:
 
 
 @pytest.fixture(scope="session")
-def small_campaign(tmp_path_factory) -> Path:
+def session_folder(tmp_path_factory) -> Path:
+    """Folder that all workers of a session share: what they need alike is written there by the first that asks."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+
+@pytest.fixture(scope="session")
+def small_campaign(session_folder) -> Path:
     """HDF5 campaign of a linear bearing: two loads, three directions, three locus runs, one sweep, no dry tests."""
     from dataclasses import replace
 
     from rigdata.virtual_rig import ClearanceSweep, operating_points
-    from tests.good_campaigns import SMALL_PLAN, rocker_rig, written
+    from tests.good_campaigns import SMALL_PLAN, once, rocker_rig, written
 
     plan = replace(
         SMALL_PLAN,
@@ -56,4 +72,4 @@ def small_campaign(tmp_path_factory) -> Path:
     )
     text = '=HYPERLINK("http://example.invalid")<script>alert(1)</script>'
     rig = rocker_rig(3, plan=plan, campaign="small <b>&", description=text)
-    return written(tmp_path_factory.mktemp("campaign") / "small.h5", rig)
+    return once(session_folder / "small.h5", lambda path: written(path, rig))

@@ -7,6 +7,9 @@ commands (the rocker bearing file, three temperatures). Everything random hangs 
 from __future__ import annotations
 
 import math
+import os
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -79,4 +82,21 @@ def rocker_rig(seed: int, *faults: Fault, plan: RigPlan = SMALL_PLAN, **names: s
 def written(path: Path, rig: VirtualRig, layout: str = "hdf5") -> Path:
     """Write a rig's campaign; its path."""
     write_campaign(path, rig, layout)
+    return path
+
+
+def once(path: Path, write: Callable[[Path], object], patience: float = 120.0) -> Path:
+    """Let one of several workers write `path`, the others wait for it; after `patience` [s] one that waits writes."""
+    lock = path.with_name(f"{path.name}.lock")
+    began = time.monotonic()
+    while not path.exists():
+        try:
+            os.close(os.open(lock, os.O_CREAT | os.O_EXCL))
+        except FileExistsError:
+            if time.monotonic() - began < patience:
+                time.sleep(0.05)
+                continue
+        made = path.with_name(f"{os.getpid()}-{path.name}")
+        write(made)
+        made.replace(path)
     return path

@@ -34,6 +34,7 @@ def disturbed(tmp_path_factory):
     return result, folder / "out"
 
 
+@pytest.mark.slow
 def test_rejected_windows_and_what_they_mean_are_told(disturbed):
     result, out = disturbed
     windows = pd.read_csv(out / "windows.csv")
@@ -45,6 +46,7 @@ def test_rejected_windows_and_what_they_mean_are_told(disturbed):
     assert f"{DISTURBED} at 30 deg" in result.stdout
 
 
+@pytest.mark.slow
 def test_methods_that_disagree_are_named_on_screen_in_the_table_and_in_the_record(disturbed):
     result, out = disturbed
     quality = pd.read_csv(out / "coefficients.csv").set_index("excitation_Hz")["quality"]
@@ -56,6 +58,7 @@ def test_methods_that_disagree_are_named_on_screen_in_the_table_and_in_the_recor
     assert "times the interval) away from mm-eiv" in remark
 
 
+@pytest.mark.slow
 def test_every_figure_of_the_best_rigs_is_a_column(disturbed):
     frame = pd.read_csv(disturbed[1] / "coefficients.csv")
     for name in ("kxx_N_per_m_random95", "cyy_Ns_per_m_systematic95", "n_windows", "n_windows_rejected", "coherence",
@@ -68,6 +71,7 @@ def test_every_figure_of_the_best_rigs_is_a_column(disturbed):
     assert set(frame["frequency_model"]) == {"K-C"}  # which it is
 
 
+@pytest.mark.slow
 def test_models_over_frequency_are_written_and_shown(disturbed):
     result, out = disturbed
     fits = pd.read_csv(out / "frequency_fits.csv")

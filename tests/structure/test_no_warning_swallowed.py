@@ -8,6 +8,9 @@ import pytest
 
 from tests.structure.sources import SOURCES, imports_and_calls, relative
 
+#: A source without any of them need not be parsed.
+WORDS = ("filter", "seterr", "errstate")
+
 
 def _name(call: ast.Call) -> str:
     return call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
@@ -28,7 +31,8 @@ def offenders(text: str) -> list[str]:
 
 
 def test_no_source_swallows_one():
-    told = {relative(path): offenders(path.read_text(encoding="utf-8")) for path in SOURCES}
+    texts = {relative(path): path.read_text(encoding="utf-8") for path in SOURCES}
+    told = {name: offenders(text) for name, text in texts.items() if any(word in text for word in WORDS)}
     assert {name: found for name, found in told.items() if found} == {}
 
 
