@@ -117,10 +117,8 @@ class ImportGraph:
 
     def _targets(self, path: str, source: Source, text: str) -> Iterator[str]:
         if path.endswith("/__init__.py"):  # names given on first use are their users' affair
-            given = {source.gives[n] for n in source.gives}
-            eager = {u for u in source.uses if u not in given} | {
-                u for u in source.uses if self._is_eager(path, u, text)
-            }
+            given = set(source.gives.values())
+            eager = {u for u in source.uses if u not in given or self._is_eager(u, text)}
             uses = {u for u in eager if not u.endswith(".*") or not source.gives}
         else:
             uses = set(source.uses)

@@ -1,0 +1,243 @@
+"""The house as it is laid out: no circles, rooms that know only what they may, files and functions that fit a screen.
+
+Exceptions are named, and a name that no longer needs to stand on its list fails: the lists may only shrink.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import re
+import tomllib
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import PurePosixPath
+
+import pytest
+
+from tests.structure.sources import ROOT, SOURCES, relative
+
+FILES_A_FOLDER, LINES_A_FILE, LINES_A_FUNCTION, PARAMETERS = 20, 400, 60, 6
+#: A catalogue: one file per effect.
+CATALOGUES = ("model/effects",)
+LONG_FILES = {"model/pivots.py"}
+#: The model's front door: every argument a name of the field; its body is what each of them becomes.
+LONG_FUNCTIONS = {"model/predict.py:predict"}
+MANY_PARAMETERS = {
+    "model/pad/bending.py:bending_step",
+    "model/predict.py:predict",
+    "rigdata/campaign.py:_finish",
+    "tpjb_ident/clearance/sweep.py:_blocks",
+    "tpjb_ident/diagnose/search/fit.py:_result",
+    "tpjb_ident/dynamic/estimators/estimate.py:estimate_dynamic_stiffness",
+    "tpjb_ident/pivot/laws/law_fit.py:_descend",
+    "tpjb_ident/report/plots/fig17_coefficient.py:_line",
+}
+#: Public functions with arguments whose docstring has no section Parameters: may only fall.
+WITHOUT_PARAMETERS = 700
+
+#: What each room of `tpjb_ident` may import of the others; single files (errors, arrays, ...) are free to all.
+MAY_IMPORT = {
+    "runtime": set(),
+    "slow_records": {"rigdata"},
+    "check": {"rigdata", "dynamic"},
+    "pivot": {"rigdata", "slow_records"},
+    "clearance": {"rigdata", "slow_records", "pivot"},
+    "dynamic": {"rigdata", "runtime", "check"},
+    "export": {"runtime"},
+    "compare": {"rigdata", "model", "dynamic", "pivot", "clearance"},
+    "diagnose": {"model", "dynamic", "pivot", "clearance", "compare", "runtime"},
+    "report": {"rigdata", "dynamic", "pivot", "clearance", "compare", "diagnose", "runtime"},
+    "view": {"rigdata", "runtime"},
+    "cli": {"rigdata", "model", "check", "dynamic", "pivot", "clearance", "compare", "diagnose", "report", "export",
+            "view", "runtime"},
+}  # fmt: skip
+#: The one way back: the set points are checked with the oil force that identification uses.
+ONE_WAY_BACK = {("check", "tpjb_ident/dynamic/records/oil_force.py")}
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+@functools.cache
+def trees() -> dict[str, ast.Module]:
+    """Every source of the three packages, parsed, by its path."""
+    return {relative(p): ast.parse(p.read_text(encoding="utf-8")) for p in SOURCES}
+
+
+def is_for_types_only(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
+
+
+def imported_files(tree: ast.AST, files: dict[str, str]) -> set[str]:
+    """Files (values of `files`, by dotted name) that a tree imports at any depth, types apart."""
+    found, waiting = set(), [tree]
+    while waiting:
+        node = waiting.pop()
+        if is_for_types_only(node):
+            continue
+        if isinstance(node, ast.ImportFrom):
+            names = [n for a in node.names for n in (f"{node.module}.{a.name}", str(node.module)) if n in files]
+            found.update(files[n] for n in names)
+        elif isinstance(node, ast.Import):
+            found.update(files[a.name] for a in node.names if a.name in files)
+        waiting += ast.iter_child_nodes(node)
+    return found
+
+
+@functools.cache
+def imports() -> dict[str, set[str]]:
+    """Which files each file imports; a package's own file only where it is meant itself."""
+    dotted = {p.removesuffix(".py").removesuffix("/__init__").replace("/", "."): p for p in trees()}
+    found = {path: imported_files(tree, dotted) - {path} for path, tree in trees().items()}
+    # "from package import module" runs the package's file too, but does not ask it for anything
+    return {path: {f for f in to if not f.endswith("/__init__.py") or asks(path, f)} for path, to in found.items()}
+
+
+def asks(path: str, package_file: str) -> bool:
+    """Tell whether `path` takes a name from a package's own file, not one of its modules."""
+    package = package_file.removesuffix("/__init__.py")
+    taken = [n for n in ast.walk(trees()[path]) if isinstance(n, ast.ImportFrom)]
+    names = [a.name for n in taken if n.module == package.replace("/", ".") for a in n.names]
+    return any(f"{package}/{n}.py" not in trees() and f"{package}/{n}/__init__.py" not in trees() for n in names)
+
+
+def a_circle(edges: dict[str, set[str]]) -> list[str]:
+    """One circle of a graph, or none."""
+    done: set[str] = set()
+
+    def walk(node: str, path: list[str]) -> list[str]:
+        if node in path:
+            return [*path[path.index(node) :], node]
+        if node not in done:
+            for other in sorted(edges.get(node, ())):
+                if circle := walk(other, [*path, node]):
+                    return circle
+            done.add(node)
+        return []
+
+    return next((circle for node in sorted(edges) if (circle := walk(node, []))), [])
+
+
+def room(path: str) -> str:
+    """Room of a file: what a wall stands around."""
+    parts = path.split("/")
+    return parts[0] if parts[0] != "tpjb_ident" else parts[1]
+
+
+def test_a_circle_is_seen():
+    assert a_circle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
+    assert a_circle({"a": {"b", "c"}, "b": {"c"}}) == []
+
+
+def test_no_files_import_each_other_in_a_circle():
+    assert a_circle(imports()) == []
+
+
+def test_no_folders_import_each_other_in_a_circle():
+    edges: dict[str, set[str]] = {}
+    for path, to in imports().items():
+        here = str(PurePosixPath(path).parent)
+        if here.count("/"):
+            edges.setdefault(here, set()).update({str(PurePosixPath(t).parent) for t in to} - {here})
+    assert a_circle(edges) == []
+
+
+def test_rooms_know_only_what_they_may():
+    free = {room(p) for p in trees() if p.count("/") == 1}
+    found = []
+    for path, to in imports().items():
+        here = room(path)
+        if not path.startswith("tpjb_ident/") or here in free:
+            continue
+        assert here in MAY_IMPORT, f"{here}: a new room; say in {__name__} what it may import"
+        found += [f"{path} imports {t}" for t in to if room(t) not in {here, *free, *MAY_IMPORT[here]}]
+        if here == "check":
+            found += [f"{path} imports {t}" for t in to if room(t) == "dynamic" and (here, t) not in ONE_WAY_BACK]
+    assert found == []
+
+
+def test_rooms_that_may_import_each_other_make_no_circle_but_the_named_one():
+    allowed = {here: set(to) for here, to in MAY_IMPORT.items()}
+    for here, path in ONE_WAY_BACK:
+        allowed[here].discard(room(path))
+    assert a_circle(allowed) == []
+
+
+def test_tests_and_studies_stay_out_of_the_wheel_and_of_the_product():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"] == ["rigdata", "model", "tpjb_ident"]
+    for path, tree in trees().items():
+        for node in ast.walk(tree):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
+            assert not [n for n in names if n.split(".")[0] == "tests"], path
+
+
+def kept_to(found: Iterable[str], named: set[str]) -> None:
+    """Assert that just the named exceptions were found."""
+    found = set(found)
+    assert found <= named, f"over the limit: {sorted(found - named)}"
+    assert named <= found, f"no longer over the limit, take off the list: {sorted(named - found)}"
+
+
+def test_a_folder_shows_at_most_twenty_files():
+    files = [p.relative_to(ROOT) for top in ("rigdata", "model", "tpjb_ident") for p in (ROOT / top).rglob("*.py")]
+    count = Counter(f.parent.as_posix() for f in files if f.name != "__init__.py")
+    kept_to([folder for folder, n in count.items() if n > FILES_A_FOLDER], set(CATALOGUES))
+
+
+def test_files_are_short_enough_to_be_read():
+    lines = {relative(p): len(p.read_text(encoding="utf-8").splitlines()) for p in SOURCES}
+    kept_to([path for path, n in lines.items() if n > LINES_A_FILE], LONG_FILES)
+
+
+def functions() -> Iterator[tuple[str, Function]]:
+    for path, tree in trees().items():
+        for node in ast.walk(tree):
+            if isinstance(node, Function):
+                yield path, node
+
+
+def is_compiled(node: Function) -> bool:
+    """Tell whether numba compiles it: a kernel takes arrays, not objects, and stands whole where its loops are."""
+    return any("compiled" in ast.unparse(d) or "njit" in ast.unparse(d) for d in node.decorator_list)
+
+
+def parameters(node: Function) -> list[str]:
+    a = node.args
+    return [p.arg for p in (*a.posonlyargs, *a.args, *a.kwonlyargs) if p.arg not in ("self", "cls")]
+
+
+def test_functions_fit_a_screen():
+    long = [f"{path}:{f.name}" for path, f in functions()
+            if (f.end_lineno or 0) - f.lineno >= LINES_A_FUNCTION and not is_compiled(f)]  # fmt: skip
+    kept_to(long, LONG_FUNCTIONS)
+
+
+def test_functions_take_at_most_six_parameters():
+    many = [
+        f"{path}:{f.name}"
+        for path, f in functions()
+        if len(parameters(f)) > PARAMETERS and not is_compiled(f) and not path.startswith("tpjb_ident/cli/")
+    ]
+    kept_to(many, MANY_PARAMETERS)
+
+
+def public(body: list[ast.stmt]) -> Iterator[Function]:
+    """Public functions of a module or class, those of public classes too."""
+    for node in body:
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            yield from public(node.body)
+        elif isinstance(node, Function) and not node.name.startswith("_"):
+            yield node
+
+
+def test_public_functions_with_arguments_tell_their_parameters():
+    without = [f"{path}:{f.name}" for path, tree in trees().items() for f in public(tree.body) if parameters(f)
+               and not re.search(r"^Parameters\n-{10}$", ast.get_docstring(f) or "", re.MULTILINE)]  # fmt: skip
+    assert len(without) <= WITHOUT_PARAMETERS, "\n".join(without)
+
+
+@pytest.mark.parametrize(("source", "long"), [("def f(a, b):\n    pass", 2), ("def f(self, *, a):\n    pass", 1)])
+def test_parameters_are_counted(source, long):
+    assert len(parameters(ast.parse(source).body[0])) == long
