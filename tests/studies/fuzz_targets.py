@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import hashlib
 import io
 import math
+import re
 import shlex
 import sys
 from collections.abc import Callable
@@ -408,10 +410,10 @@ _READER_SOURCES = {
     "bearing": ("model/bearing*.py", "model/toml_text.py", "model/units.py"),
     "pivots": ("model/pivots.py", "model/toml_text.py"),
     "effects": ("model/effects/*.py", "model/toml_text.py", "model/bearing.py"),
-    "csv": ("rigdata/readers/csv*.py", "rigdata/readers/text/dialect.py", "rigdata/readers/text/byte_stream.py"),
-    "hdf5": ("rigdata/readers/hdf5*.py", "rigdata/campaign.py", "rigdata/run.py", "rigdata/manifest*.py"),
-    "cli": ("tpjb_ident/cli/*.py",),
-    "mat": ("rigdata/readers/mat*.py",),
+    "csv": ("rigdata/readers/text/csv*.py", "rigdata/readers/text/dialect.py", "rigdata/readers/text/byte_stream.py"),
+    "hdf5": ("rigdata/readers/hdf5/*.py", "rigdata/campaign.py", "rigdata/run.py", "rigdata/manifest*.py"),
+    "cli": ("tpjb_ident/cli/**/*.py",),
+    "mat": ("rigdata/readers/formats/mat*.py",),
     "mat73": ("rigdata/readers/formats/mat.py",),
     "parquet": ("rigdata/readers/formats/parquet.py",),
     "tdms": ("rigdata/readers/formats/tdms.py",),
@@ -421,15 +423,31 @@ _READER_SOURCES = {
 }
 
 
-def source_hash(name: str) -> str:
-    """SHA-256 of the source of a target's reader: cases count for as long as it stays the same."""
-    patterns = _READER_SOURCES[name]
-    if name in FOREIGN:
-        patterns = (*patterns, "rigdata/readers/formats/foreign.py")
-    digest = hashlib.sha256()
-    for path in sorted(p for pattern in patterns for p in ROOT.glob(pattern)):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
+class _Running(ast.NodeTransformer):
+    """Takes off what may change without changing what runs: docstrings, annotations, where names are imported from."""
+
+    def visit(self, node: ast.AST) -> ast.AST | None:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            return None
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            return None
+        for name in ("annotation", "returns"):
+            if getattr(node, name, None) is not None:
+                setattr(node, name, ast.Constant(None) if isinstance(node, ast.AnnAssign) else None)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and re.fullmatch(r"[\w.]+", node.value):
+            node.value = re.sub(r"\b(formats|text|hdf5)\.", "", node.value)  # the folder of a module's name
+        return self.generic_visit(node)
+
+
+def source_hash(name: str, root: Path = ROOT, patterns: tuple[str, ...] = ()) -> str:
+    """SHA-256 of what runs in a reader, wherever its files stand: cases count for as long as it stays the same."""
+    if not patterns:
+        foreign = ("rigdata/readers/formats/foreign.py",) if name in FOREIGN else ()
+        patterns = (*_READER_SOURCES[name], *foreign)
+    files = {p for pattern in patterns for p in root.glob(pattern) if p.name != "__init__.py"}
+    assert files, f"no source of {name}"
+    codes = (ast.dump(_Running().visit(ast.parse(p.read_text(encoding="utf-8")))) for p in files)
+    return hashlib.sha256("".join(sorted(hashlib.sha256(c.encode()).hexdigest() for c in codes)).encode()).hexdigest()
 
 
 def make_target(name: str, folder: Path) -> Target:
