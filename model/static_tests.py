@@ -9,10 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from model.arrays import FloatArray
 from model.bearing import BearingError
@@ -232,83 +230,3 @@ def locus(setup: Setup, load: float, directions: FloatArray, speed: float) -> Fl
     """
     points = [(load, float(d), speed, np.array([speed])) for d in directions]
     return np.array([p.position if p.converged else (math.nan, math.nan) for p in sweep(setup, points)])
-
-
-def load_sweep(
-    setup: Setup, loads: FloatArray, direction: float, speed: float, excitation: FloatArray
-) -> list[Prediction]:
-    """Predict over static loads [N] at one direction [rad], speed and excitation frequencies [rad/s].
-
-    Parameters
-    ----------
-    setup : Setup
-    loads : (n,) ndarray
-        [N]
-    direction : float
-        [rad]
-    speed : float
-        [rad/s]
-    excitation : (n,) ndarray
-        [rad/s]
-
-    Returns
-    -------
-    list of Prediction
-    """
-    return sweep(setup, [(float(load), direction, speed, excitation) for load in loads])
-
-
-def speed_sweep(
-    setup: Setup, load: float, direction: float, speeds: FloatArray, ratio: float = 1.0
-) -> list[Prediction]:
-    """Predict over shaft speeds [rad/s], each excited at `ratio` times its speed (1: synchronous).
-
-    Parameters
-    ----------
-    setup : Setup
-    load : float
-        [N]
-    direction : float
-        [rad]
-    speeds : (n,) ndarray
-        [rad/s]
-    ratio : float
-        Excitation over speed.
-
-    Returns
-    -------
-    list of Prediction
-    """
-    return sweep(setup, [(load, direction, float(w), np.array([ratio * w])) for w in speeds])
-
-
-#: Columns of `sweep_table`: one number per point.
-SWEEP_COLUMNS = (
-    "load", "load_direction", "speed", "min_film", "max_pressure", "max_temperature", "power_loss",
-)  # fmt: skip
-
-
-def sweep_table(predictions: Sequence[Prediction]) -> dict[str, NDArray[Any]]:
-    """What a sweep found, as columns (SI, degC): NaN where a point has no equilibrium.
-
-    Parameters
-    ----------
-    predictions : sequence of Prediction
-
-    Returns
-    -------
-    dict of ndarray
-        `SWEEP_COLUMNS` (n,), ``x``, ``y`` as read (n,), ``pad_load`` (n, n_pads), ``status`` (n,) of text.
-    """
-    out: dict[str, NDArray[Any]] = {}
-    for name in SWEEP_COLUMNS:
-        known = name in {"load", "load_direction", "speed"}
-        out[name] = np.array([getattr(p, name) if known or p.converged else math.nan for p in predictions])
-    pads = len(predictions[0].pad_load) if predictions else 0
-    nothing = (math.nan, math.nan)
-    position = np.array([p.position if p.converged else nothing for p in predictions]).reshape(len(predictions), 2)
-    out["x"], out["y"] = position[:, 0], position[:, 1]
-    rows = [p.pad_load if p.converged else np.full(pads, math.nan) for p in predictions]
-    out["pad_load"] = np.array(rows).reshape(len(predictions), pads)
-    out["status"] = np.array(["; ".join(p.status) for p in predictions])
-    return out

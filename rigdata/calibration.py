@@ -122,16 +122,6 @@ class Channel:
         values += self.zero
         return values
 
-    def to_reading(self, values: FloatArray) -> FloatArray:
-        """Turn SI values into readings (the inverse of `to_si`).
-
-        Parameters
-        ----------
-        values : (n,) ndarray
-            SI.
-        """
-        return (np.asarray(values, dtype=np.float64) - self.zero) / self.slope
-
 
 def reading_gain(
     quantity: str, unit: str, sensitivity: object, full_scale: object = None, excitation: object = None

@@ -13,13 +13,10 @@ from rigdata.calibration import Channel
 from rigdata.keyphasor import speed_from_pulses
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import RunReader
+from rigdata.readers.base import LEAST_RATE, MOST_RATE, RunReader
 from rigdata.record import Record, VectorRecord
 from rigdata.rows import FileRows, RowReader
 from rigdata.vector import COLLINEAR_SINE, solve_vector
-
-#: Sample rates beyond these are none [Hz]: times counted from them overflow.
-LEAST_RATE, MOST_RATE = 1e-6, 1e12
 
 
 @dataclass(frozen=True)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from rigdata.near_names import nearest_name
 from rigdata.problem import Problem
 
 #: A channel longer than this is refused: slices of it would be asked for by mistake [samples].
 MAX_SAMPLES = 2**31
 #: One request for more samples of one channel than this is refused (it would be 4 GB) [samples].
 MAX_REQUEST = 2**29
+#: Sample rates beyond these are none [Hz]: times counted from them overflow.
+LEAST_RATE, MOST_RATE = 1e-6, 1e12
 
 
 class RunReader(Protocol):
@@ -49,6 +52,24 @@ def undescribed(names: Sequence[str], what: str, file: str, run: str) -> tuple[P
     listed = ", ".join(ascii(n)[1:-1][:40] for n in names[:6]) + (", ..." if len(names) > 6 else "")
     cure = "Nothing, or describe them in the manifest"
     return (Problem("note", file, what, f"{len(names)} {what} are not described: {listed}", cure, run),)
+
+
+def missing_channel(name: str, known: Iterable[str], held: str) -> tuple[str, str, str]:
+    """Place, what is wrong and what to do where a file lacks a channel: the nearest it has, or all of them.
+
+    Parameters
+    ----------
+    name : str
+        As the manifest states it.
+    known : iterable of str
+        Names in the file.
+    held : str
+        How the list of them begins.
+    """
+    names = list(known)
+    close = nearest_name(name, names)
+    cure = f"Did you mean {close!r}?" if close else f"{held}: {', '.join(names)[:200]}"
+    return f"channel {name}", "is missing in the file", cure
 
 
 def rate_of_time(time: FloatArray) -> float:

@@ -39,11 +39,6 @@ class Export:
         rates = [s.rate for s in self.series if s.rate > 0]
         return max(rates, default=float("nan"))
 
-    @property
-    def knows_times(self) -> bool:
-        """Whether a time column or a rate stands in the file."""
-        return self.rate > 0
-
 
 def record_files(folder: Path) -> list[Path]:
     """List files below `folder` that may be records, by suffix, in order of name.

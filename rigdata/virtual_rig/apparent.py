@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray
 from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.running import answer
 from rigdata.virtual_rig.sensing import felt_direction
@@ -32,20 +32,6 @@ def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instrumen
         seen[quantity] = reading_map(instruments, quantity, frequency) @ phasors
     oil_force = seen["force"] + instruments.housing_mass * seen["acceleration"]
     return oil_force @ np.linalg.inv(seen["displacement"])
-
-
-def apparent_vector(vector: FloatArray, quantity: str, instruments: Instruments) -> FloatArray:
-    """Mean vector (2,) of a quantity that the readings show; the sensors' offsets are left out.
-
-    Parameters
-    ----------
-    vector : (2,) ndarray
-        True X and Y, SI.
-    quantity : str
-        ``"displacement"``, ``"force"`` or ``"acceleration"``.
-    instruments : Instruments
-    """
-    return (reading_map(instruments, quantity, 0.0) @ vector).real
 
 
 def reading_map(instruments: Instruments, quantity: str, frequency: float) -> ComplexArray:

@@ -19,7 +19,7 @@ from rigdata.virtual_rig import (
     locus_points,
     operating_points,
 )
-from rigdata.virtual_rig.apparent import apparent_stiffness, apparent_vector
+from rigdata.virtual_rig.apparent import apparent_stiffness
 from rigdata.virtual_rig.ledger import campaign_truth
 
 K = np.array([[2.0e8, 1.3e7], [-1.1e7, 4.0e8]])
@@ -96,11 +96,6 @@ def test_housing_mass_error_takes_its_inertia_out_of_the_force():
     instruments = Instruments.like_paper().with_errors(mass_error=12.0)
     share = 12.0 * OMEGA**2 / (np.array([4e8, 6e8]) - 42.0 * OMEGA**2)
     np.testing.assert_allclose(apparent_stiffness(H, OMEGA, instruments), (1 + share)[:, None] * H, rtol=1e-10)
-
-
-def test_probe_rotation_turns_the_mean_position():
-    seen = apparent_vector(np.array([0.0, -50e-6]), "displacement", RIGID.with_errors(probe_rotation=0.02))
-    np.testing.assert_allclose(seen, 50e-6 * np.array([-math.sin(0.02), -math.cos(0.02)]), atol=1e-12)
 
 
 def test_cell_gain_shows_in_the_mean_force_and_probe_gain_in_the_position():

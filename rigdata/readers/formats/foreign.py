@@ -14,9 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import rate_of_time, undescribed
+from rigdata.readers.base import missing_channel, rate_of_time, undescribed
 from rigdata.readers.series import Columns, Series, on_one_clock
 
 #: Suffix -> module of this package, extra that brings its library.
@@ -155,9 +154,7 @@ class ForeignReader:
         values = self._columns().values
         for name in names:
             if name not in values:
-                close = nearest_name(name, values)
-                cure = f"Did you mean {close!r}?" if close else f"It holds: {', '.join(values)[:200]}"
-                raise self._error(f"channel {name}", "is missing in the file", cure)
+                raise self._error(*missing_channel(name, values, "It holds"))
         return [np.asarray(values[name][start:stop], dtype=float) for name in names]
 
     def time(self, start: int, stop: int) -> FloatArray:

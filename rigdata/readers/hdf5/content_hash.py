@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 _PIECE = 2**20
-#: HDF5's classes of types: integers, floats, texts.
-_PLAIN, _STRING = (0, 1, 3), 3
+#: HDF5's class of texts (H5T_STRING), and the classes of what stands in its own place: integers, floats, texts.
+TEXT = 3
+_PLAIN = (0, 1, TEXT)
 
 
 def group_hash(path: Path, group: Any, names: tuple[str, ...]) -> str:
@@ -54,7 +55,7 @@ def is_plain(attribute: Any, most: int) -> bool:
     library makes room before it looks.
     """
     kind = attribute.get_type()
-    within = kind.get_class() in _PLAIN and not (kind.get_class() == _STRING and kind.is_variable_str())
+    within = kind.get_class() in _PLAIN and not (kind.get_class() == TEXT and kind.is_variable_str())
     return within and attribute.get_storage_size() <= most
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, rate_of_time, undescribed
-from rigdata.readers.hdf5.content_hash import group_hash, is_plain
+from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, rate_of_time, undescribed
+from rigdata.readers.hdf5.content_hash import TEXT, group_hash, is_plain
 from rigdata.readers.hdf5.heaps import broken_heap, too_long_text
 from rigdata.readers.hdf5.links import has_link, resolve
 
@@ -23,8 +23,8 @@ from rigdata.readers.hdf5.links import has_link, resolve
 _FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}
 _MAX_CHUNK = 256 * 2**20
 _MAX_TEXT = 8 * 2**20
-#: Class of texts in HDF5's types (H5T_STRING), and bytes of an attribute that is one number.
-_STRING, _MOST_NUMBER = 3, 64
+#: Bytes of an attribute that is one number.
+_MOST_NUMBER = 64
 #: Members of a group that are looked at, and faults that are listed.
 _MAX_MEMBERS, _LISTED = 4096, 20
 #: Attribute of a run's group.
@@ -126,7 +126,7 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
 def _text_attribute(handle: Any, name: str, file: str) -> str:
     place = f"root attribute {name}"
     stored = handle.attrs.get_id(name)
-    if stored.get_storage_size() > _MAX_TEXT or stored.get_type().get_class() != _STRING:
+    if stored.get_storage_size() > _MAX_TEXT or stored.get_type().get_class() != TEXT:
         raise _refuse(file, place, "is not a text, or far too long", "Store it as one UTF-8 string")
     value = handle.attrs[name]
     value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
@@ -320,7 +320,7 @@ class Hdf5Reader:
             rate = float(np.asarray(attributes[_RATE]).reshape(()))
         except (ValueError, TypeError) as error:
             raise self._error(place, "is not a number", cure) from error
-        if not 0.0 < rate < 1e12:
+        if not 0.0 < rate < MOST_RATE:
             raise self._error(place, f"is {rate}", cure)
         return rate
 

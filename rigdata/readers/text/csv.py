@@ -13,9 +13,8 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.manifest import CsvSpec
-from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import rate_of_time, undescribed
+from rigdata.readers.base import missing_channel, rate_of_time, undescribed
 from rigdata.readers.text.csv_table import Source, Table, read_table
 from rigdata.readers.text.dialect import Dialect, DialectFinder
 
@@ -150,10 +149,7 @@ class CsvReader:
         table = self._table(names)
         for name in names:
             if name not in table.columns:
-                known = [n for n in self.names() if n]
-                close = nearest_name(name, known)
-                cure = f"Did you mean {close!r}?" if close else f"The columns are: {', '.join(known)[:200]}"
-                raise self._error(f"channel {name}", "is missing in the file", cure)
+                raise self._error(*missing_channel(name, (n for n in self.names() if n), "The columns are"))
         return [table.columns[n][start:stop] for n in names]
 
     def _clock_name(self) -> str:
