@@ -157,7 +157,8 @@ def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySetti
     tell("estimating", 0, len(sources))
     first = [_first_estimate(source.load(), settings) for source in sources]
     mains = [digest.mains for digest in digests]
-    corrections = find_corrections(sources, mains, axes, first, cell_zero_uncertainty(campaign))
+    in_cells = [digest.mains_force for digest in digests]
+    corrections = find_corrections(sources, mains, axes, first, cell_zero_uncertainty(campaign), in_cells)
     work = _Points(
         settings,
         findings,
@@ -166,7 +167,7 @@ def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySetti
         channel_pairs(campaign, sweeps),
         gain_draws(campaign.channels, settings.n_calibration, settings.seed),
         systematic_sources(campaign, settings.n_calibration, settings.seed + 1),
-        force_pickup(digest.mains_force for digest in digests),
+        force_pickup(in_cells),
     )
     points, changes = [], []
     for source, correction in zip(sources, corrections):

@@ -17,6 +17,7 @@ from tpjb_ident.dynamic.corrections.mains import (
     Pickup,
     corrected_condition,
     fit_mains,
+    force_pickup,
     mains_pickup,
     relative_scatter,
     with_mains_uncertainty,
@@ -107,6 +108,7 @@ def find_corrections(
     probe_axes: FloatArray,
     first: list[DynamicStiffness],
     zero_uncertainty: float = 0.0,
+    mains_forces: Sequence[ComplexArray | None] = (),
 ) -> list[Correction]:
     """Work out the corrections of all points of a campaign.
 
@@ -121,11 +123,14 @@ def find_corrections(
         Estimates without corrections, one per point.
     zero_uncertainty : float
         Of the cells' zero by the manifest [N]; 0 where it says nothing.
+    mains_forces : sequence
+        Oil force at the mains line of every dynamic run, as of `mains_force`.
     """
     zero = campaign_zero(points, zero_uncertainty)
     misses, common = load_misses(points, zero.force)
     slopes = load_slopes(points, first)
     turns = _turns(points, first, misses, slopes)
+    in_cells = force_pickup(mains_forces)
     struck = [source.found(MAINS_ON_LINE) for source in points]
     pickup = mains_pickup(mains_lines, probe_axes) if any(struck) else None
     at_set_point = (
@@ -137,10 +142,18 @@ def find_corrections(
     for source, miss, slope, turn, hit in zip(points, misses, slopes, turns, struck, strict=True):
         mains = None
         if hit and pickup is not None:
-            mains = fit_mains(_at_set_point(source.load(), miss, slope, turn), pickup, scatter)
+            data = _at_set_point(source.load(), miss, slope, turn)
+            mains = fit_mains(data, pickup, _with_force_pickup(scatter, data, in_cells))
         conditions = load_conditions(miss, common) + zero.conditions() + _mains_conditions(pickup, mains)
         result.append(Correction(miss, slope, turn, mains, conditions))
     return result
+
+
+def _with_force_pickup(scatter: float, data: PointData, force: FloatArray) -> float:
+    """The runs' relative scatter, with mains in the cells where those are more than that."""
+    usual = float(np.nanmedian(np.linalg.norm(data.F, axis=1)))
+    share = float(np.linalg.norm(force)) / usual / np.sqrt(2) if usual > 0 else 0.0
+    return float(np.hypot(scatter, share)) if share > scatter else scatter
 
 
 def _turns(
