@@ -14,7 +14,8 @@ import numpy as np
 
 from model.arrays import FloatArray
 from model.bearing import BearingError
-from model.predict import Prediction, predict_setup
+from model.predict import predict_setup
+from model.prediction import Prediction
 from model.setup import Setup
 from model.statics.equilibrium import Equilibrium
 from model.statics.warm_start import extrapolated_state

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rigdata.calibration import Channel
-from rigdata.manifest import MAX_MANIFEST, Manifest, parse_manifest
-from rigdata.manifest_runs import RunEntry
+from rigdata.manifest.manifest import MAX_MANIFEST, Manifest, parse_manifest
+from rigdata.manifest.runs import RunEntry
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import RunReader

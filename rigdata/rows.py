@@ -7,18 +7,16 @@ quicker than a product per sample). Where that does not apply (missing values, t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from rigdata.calibration import Channel
 from rigdata.record import Record, VectorRecord
 from rigdata.vector import COLLINEAR_SINE, inverse_directions
-
-if TYPE_CHECKING:
-    from rigdata.run import Run
 
 #: Readings of this size are written for an overflow (see `rigdata.calibration.Channel.to_si`).
 OVERFLOW = 1e30
@@ -62,6 +60,16 @@ class _HasVectors(Protocol):
     def vector(self, quantity: str, start: int | None = None, stop: int | None = None) -> VectorRecord: ...
 
     def speed(self, start: int | None = None, stop: int | None = None) -> Record | None: ...
+
+
+class _FileRun(_HasVectors, Protocol):
+    """What a run that is read from its file has besides: `rigdata.run.Run`."""
+
+    @property
+    def channels(self) -> Mapping[str, Channel]: ...
+
+    @property
+    def reader(self) -> Any: ...
 
 
 class VectorRows:
@@ -109,12 +117,12 @@ class FileRows:
 
     Parameters
     ----------
-    run : Run
+    run : rigdata.run.Run
     quantities : sequence of str
         With X and Y.
     """
 
-    def __init__(self, run: Run, quantities: Sequence[str]) -> None:
+    def __init__(self, run: _FileRun, quantities: Sequence[str]) -> None:
         self._run, self._reader = run, run.reader
         self._plans = {q: _plan(run, q) for q in quantities}
         self._tach = [c for c in run.channels.values() if c.quantity == "speed"][:1]
@@ -147,7 +155,7 @@ def _turned(values: FloatArray) -> FloatArray:
     return np.ascontiguousarray(values.T)
 
 
-def _plan(run: Run, quantity: str) -> _Plan | None:
+def _plan(run: _FileRun, quantity: str) -> _Plan | None:
     """Calibration and axes of two channels in one matrix; None where `Run.vector` has more to do, or to refuse."""
     chosen = [c for c in run.channels.values() if c.quantity == quantity and c.axis is not None]
     if len(chosen) != 2:

@@ -48,7 +48,7 @@ _HOMES = {
     "EffectError": "model.effects",
     "load_effects": "model.effects",
     "load_pivots": "model.pivots",
-    "Prediction": "model.predict",
+    "Prediction": "model.prediction",
     "predict": "model.predict",
     "CompareSettings": "tpjb_ident.compare",
     "compare_campaign": "tpjb_ident.compare",

@@ -35,6 +35,7 @@ Parameters = Mapping[str, Found]
 UNITS = {
     "m": ("µm", 1e-6),
     "N/m": ("MN/m", 1e6),
+    "m/N": ("µm/kN", 1e-9),
     "N s/m": ("kN s/m", 1e3),
     "N m/rad": ("kN m/rad", 1e3),
     "s": ("ms", 1e-3),
@@ -60,6 +61,11 @@ def amount(found: Found, size: bool = False) -> str:
     if size and value < 0:
         value, low, high = -value, -high, -low
     return f"{with_interval(value, low, high, scale)} {unit}".replace(" °", "°")
+
+
+def _entries(p: Parameters) -> str:
+    """Entries of a 2x2 term with their directions."""
+    return ", ".join(f"{entry} {amount(found)}" for entry, found in p.items())
 
 
 def _away(found: Found, more: str, less: str) -> str:
@@ -203,6 +209,26 @@ WORDS: dict[str, EffectWords] = {
         "among them.",
         "The clearance polygon is irregular; coefficients part where the load turns.",
         "the clearance sweep, pad by pad",
+    ),
+    "series_compliance": EffectWords(
+        lambda p: "something between film and probes gives way, differently in every direction: " + _entries(p),
+        "A generic term: a spring in series with the whole bearing, for what no named effect describes.",
+        "Stiffness is short, most where it is high; dry tests and shaft positions show it too.",
+        "the joints, caps and brackets between the pivots and the probes",
+    ),
+    "parallel_stiffness": EffectWords(
+        lambda p: "something beside the film adds a stiffness: " + _entries(p),
+        "A generic term: a constant stiffness that the records hold besides the film's, for what no named effect "
+        "describes.",
+        "The same amount is off at every load and frequency; shaft positions do not show it.",
+        "hoses, seals and leaf springs across the film; shake the rig dry",
+    ),
+    "parallel_damping": EffectWords(
+        lambda p: "something beside the film adds a damping: " + _entries(p),
+        "A generic term: a constant damping that the records hold besides the film's, for what no named effect "
+        "describes.",
+        "The same damping is off at every load; stiffness agrees.",
+        "hoses, seals and dampers across the film; shake the rig dry",
     ),
     "structure_compliance": EffectWords(
         lambda p: (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import importlib
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -72,3 +73,16 @@ def in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
                 name.rpartition("_")[0].replace("_", " ") + f", {name.rpartition('_')[2]}" if "_" in name else name
             ] = frame[name]
     return pd.DataFrame(shown)
+
+
+def shown_by(module: str, function: str) -> Any:
+    """A function of a room above the result's own, looked up when it is asked for: no file imports upwards.
+
+    Parameters
+    ----------
+    module : str
+        Below `tpjb_ident`, e.g. ``"report.plots"``.
+    function : str
+        Of that module.
+    """
+    return getattr(importlib.import_module(f"tpjb_ident.{module}"), function)

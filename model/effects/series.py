@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from model.pivots import MeasuredPivot, PivotLaw, ScaledPivot
+from model.measured_pivot import MeasuredPivot
+from model.pivots import PivotLaw, ScaledPivot
 from model.setup import Setup
 
 

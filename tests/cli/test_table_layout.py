@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tpjb_ident.cli.commands.identify import cross_coupling_matters, with_half
+from tpjb_ident.cli.common.identification_display import cross_coupling_matters, with_half
 from tpjb_ident.cli.common.table_layout import cell_len, table_lines, wrapped
 
 COLUMNS = ["load kN", "dir. deg", "speed Hz", "exc. Hz", "kxx MN/m", "kyy MN/m", "quality"]

@@ -14,10 +14,11 @@ from rigdata.operating_point import OperatingPoint
 from tests.dynamic.test_load_direction import OMEGA, WINDOWS, law
 from tests.dynamic.test_load_direction import run as run_at
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
-from tpjb_ident.dynamic.identify import IdentifySettings, assemble
+from tpjb_ident.dynamic.identify import assemble
 from tpjb_ident.dynamic.runs.finished_runs import digest
 from tpjb_ident.dynamic.runs.left_out import LeftOut
 from tpjb_ident.dynamic.runs.run_result import RunResult
+from tpjb_ident.dynamic.settings import IdentifySettings
 
 LOADS = (3000.0, 8000.0)
 CHANNELS = [

@@ -12,7 +12,8 @@ from scipy.stats import binom, chi2
 from tests.dynamic.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.identify import IdentifySettings, directions_differ, disagreement, identify_point
+from tpjb_ident.dynamic.identify import directions_differ
+from tpjb_ident.dynamic.identify_point import disagreement, identify_point
 from tpjb_ident.dynamic.results.quality import (
     MAX_AMPLITUDE,
     amplitude,
@@ -22,6 +23,7 @@ from tpjb_ident.dynamic.results.quality import (
     rejected_windows,
 )
 from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.dynamic.settings import IdentifySettings
 
 
 def run(name, direction=0.5, n=4, lost=None, acceleration="yes"):

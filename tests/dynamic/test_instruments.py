@@ -12,10 +12,11 @@ from tests.studies.field.judge import judge
 from tests.studies.field.rig import Device, Rig
 from tpjb_ident.dynamic.corrections.cell_zero import cell_zero, without_static_part
 from tpjb_ident.dynamic.estimators.uncertainty import DirectionMeans, pooled_effect
-from tpjb_ident.dynamic.identify import IdentifySettings, identify
+from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.plain import PlainSettings, plain_frame, plain_points, write_r_matrices
 from tpjb_ident.dynamic.records.slower_channels import SlowerChannel, slower_channel
 from tpjb_ident.dynamic.results.frequency_fit import chance_of
+from tpjb_ident.dynamic.settings import IdentifySettings
 
 ONE_LOAD = plans_of(loads=(5000.0,))
 QUICK = replace(Rig(), seconds=2.0, rate=1000.0)

@@ -102,7 +102,7 @@ def test_the_bits_do_not_depend_on_the_number_of_workers(small_campaign, tmp_pat
         for w in (1, 3)
     ]
     assert marks[0] == marks[1]
-    assert len(marks[0]) == 8
+    assert len(marks[0]) == 10
 
 
 def test_a_file_that_vanishes_costs_its_run_and_no_other(tmp_path):

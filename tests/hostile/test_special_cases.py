@@ -15,7 +15,7 @@ from model.bearing_file import load_bearing, parse_bearing
 from model.effects import EffectError, load_effects
 from model.pivots import load_pivots
 from model.units import UnitError
-from rigdata.manifest import parse_manifest
+from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
 from rigdata.readers.formats.foreign import FORMATS, read_foreign
 

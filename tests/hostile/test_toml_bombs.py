@@ -12,7 +12,7 @@ from model.effects import EffectError, load_effects
 from model.pivots import load_pivots
 from model.toml_text import MAX_DEPTH, parse_toml
 from model.units import UnitError, parse_quantity
-from rigdata.manifest import parse_manifest
+from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
 from tpjb_ident.cli.common.quantities import parse_values
 from tpjb_ident.errors import BadInputError

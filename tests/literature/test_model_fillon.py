@@ -15,7 +15,8 @@ from model.bearing import Bearing, Oil, Pad, Pivot
 from model.effects import Effect
 from model.growth import Growth
 from model.options import Options
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 
 #: rpm: measured, their TEHD [degC]
 PEAK = {1000: (49.5, 43.7), 2000: (59.5, 53.4), 3000: (67.5, 63.2), 4000: (76.5, 72.9)}

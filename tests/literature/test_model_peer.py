@@ -17,7 +17,8 @@ import pytest
 
 from model.bearing import Bearing
 from model.bearing_file import load_bearing
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 REFERENCE = SHARED / "references" / "peer_predictions.csv"

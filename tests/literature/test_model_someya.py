@@ -21,7 +21,8 @@ import pytest
 from model.bearing import Bearing, Oil, Pad, Pivot
 from model.film.mesh import film_grid, film_work
 from model.film.reynolds import solve_film
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 
 CLEARANCE, DIAMETER, REVS = 1e-4, 0.1, 20.0
 OIL = Oil(0.03, 0.0, 860.0, 0.0, 2000.0, 0.13, 40.0)

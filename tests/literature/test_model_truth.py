@@ -16,7 +16,8 @@ import pytest
 
 from model.bearing_file import load_bearing
 from model.pivots import ScaledPivot, pivot_laws
-from model.predict import Mesh, Prediction, predict
+from model.predict import Mesh, predict
+from model.prediction import Prediction
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 TRUTH = SHARED / "samples" / "truth"

@@ -12,7 +12,8 @@ from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.pivots import pivot_laws
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 from model.setup import Setup
 from model.statics.conditions import overloaded_pads, unsupported
 

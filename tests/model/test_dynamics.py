@@ -12,7 +12,8 @@ from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.dynamics.reduction import bearing_impedance, mass_centre_offset, pad_matrices, reduce_pads
 from model.effects import Effect
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 from model.setup import Setup
 
 SPEED = 2 * math.pi * 22.0

@@ -14,7 +14,8 @@ import pytest
 from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.pivots import ConstantPivot
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 from model.statics.carrying import EDGE
 
 SPEED = 2 * math.pi * 22.0

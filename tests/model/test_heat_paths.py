@@ -14,7 +14,8 @@ from model.effects import Effect
 from model.film.energy import dissipation, solve_energy
 from model.growth import Growth, grown
 from model.options import Options
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 from model.statics.heat_paths import minimal_residual
 from model.statics.pad_flow import outlet_temperature, through_flow
 

@@ -13,7 +13,8 @@ from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.options import Options
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 
 SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
 COARSE = (24, 4)

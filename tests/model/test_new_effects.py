@@ -13,9 +13,11 @@ from model.bearing_file import load_bearing
 from model.dynamics.pivot_friction import describing, friction_impedance
 from model.dynamics.reduction import bearing_impedance
 from model.effects import Effect, EffectError, apply_effects, known_effects
+from model.measured_pivot import MeasuredPivot
 from model.options import Options
-from model.pivots import MeasuredPivot, pivot_laws
-from model.predict import Prediction, predict, predict_setup
+from model.pivots import pivot_laws
+from model.predict import predict, predict_setup
+from model.prediction import Prediction
 from model.setup import Setup
 from model.static_tests import corner_positions, dry_curve, polygon_sides
 from model.statics.tilt_hold import friction_limits, rolling_radius, tilt_hold

@@ -9,9 +9,9 @@ import pytest
 
 from model.bearing import Bearing, BearingError, Pivot
 from model.bearing_file import load_bearing
+from model.measured_pivot import MeasuredPivot
 from model.pivots import (
     ConstantPivot,
-    MeasuredPivot,
     RigidPivot,
     RockerPivot,
     ScaledPivot,

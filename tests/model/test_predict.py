@@ -10,7 +10,8 @@ import pytest
 from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.pivots import pivot_laws
-from model.predict import Prediction, predict, predict_setup
+from model.predict import predict, predict_setup
+from model.prediction import Prediction
 from model.setup import Mesh, Setup
 from model.static_tests import sweep
 

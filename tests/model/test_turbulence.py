@@ -18,7 +18,8 @@ from model.film.reynolds import solve_film
 from model.film.turbulence import ACROSS, ALONG, SHEAR, excess, solve_turbulent_film
 from model.options import Options
 from model.pivots import pivot_laws
-from model.predict import Prediction, predict, predict_setup
+from model.predict import predict, predict_setup
+from model.prediction import Prediction
 from model.setup import Mesh, Setup
 
 DOWN, FAST = -math.pi / 2, 2 * math.pi * 150.0

@@ -16,7 +16,8 @@ import pytest
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
 from tpjb_ident.dynamic.corrections.mains_angles import MainsEquations
-from tpjb_ident.dynamic.identify import IdentifySettings, identify
+from tpjb_ident.dynamic.identify import identify
+from tpjb_ident.dynamic.settings import IdentifySettings
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 DIRECT = [0, 3, 4, 7]

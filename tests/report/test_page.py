@@ -7,9 +7,9 @@ import re
 
 import pytest
 
+from tpjb_ident.report.drawing.picture import add_legend, new_picture
 from tpjb_ident.report.figure import panel, save_panels, svg_text
 from tpjb_ident.report.page import Page, Section, Table, render_page
-from tpjb_ident.report.plots.picture import add_legend, new_picture
 
 HOSTILE = "<script>alert(1)</script>\"'& <img src=x onerror=alert(2)> $\\frac{a}{b}$ \x1b[31m\u202e"
 

@@ -27,7 +27,7 @@ from tests.report.plot_cases import (
     polygon,
 )
 from tpjb_ident.report import plots
-from tpjb_ident.report.plots.colours import LIGHT
+from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.plots.residual_table import residual_frame
 
 #: Root mean square difference of grey levels, out of 255, that another freetype or anti-aliasing may make.

@@ -7,7 +7,7 @@ import pytest
 
 from rigdata.channel_response import ChannelResponse, parse_filter, parse_response_table
 from rigdata.keyphasor import speed_from_pulses
-from rigdata.manifest import parse_manifest
+from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
 from rigdata.units import UnitError
 

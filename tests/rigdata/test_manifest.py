@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigdata.manifest import MAX_MANIFEST, parse_manifest
+from rigdata.manifest.manifest import MAX_MANIFEST, parse_manifest
 from rigdata.problem import Problem, RigDataError
 
 GOOD = """\

@@ -76,7 +76,7 @@ def test_toml_is_toml(language, text):
 
 def test_the_described_campaign_and_effects_are_understood():
     from model.effects import load_effects
-    from rigdata.manifest import parse_manifest
+    from rigdata.manifest.manifest import parse_manifest
 
     text = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
     assert parse_manifest(re.search(r"```toml\n(.*?)```", text, flags=re.S)[1]).runs

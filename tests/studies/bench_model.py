@@ -28,7 +28,8 @@ from numba import njit
 
 from model.bearing_file import load_bearing
 from model.pivots import pivot_laws
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 from model.setup import Mesh, Setup
 from model.static_tests import locus, sweep
 

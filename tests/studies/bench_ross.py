@@ -23,7 +23,8 @@ from typing import Any
 
 from model.bearing import Bearing
 from model.bearing_file import load_bearing
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 from model.setup import Mesh
 
 FILE = Path(__file__).resolve().parents[2] / "model" / "bearings" / "rocker.toml"

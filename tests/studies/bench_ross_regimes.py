@@ -17,7 +17,8 @@ from typing import Any
 
 from model.effects import Effect
 from model.options import Options
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 from tests.studies.bench_ross import NAMES, VISCOSITY, bearing, peer_case, run_peer
 
 LOAD, DOWN = 5000.0, -math.pi / 2

@@ -193,7 +193,8 @@ def judge(path: Path, struck: str | None) -> Outcome:
 
 def identified(path: Path) -> tuple[float, frozenset[str]]:
     """Largest error of the direct terms at the struck point; names of what identification says."""
-    from tpjb_ident.dynamic.identify import IdentifySettings, identify
+    from tpjb_ident.dynamic.identify import identify
+    from tpjb_ident.dynamic.settings import IdentifySettings
 
     try:
         result = identify(rigdata.load_campaign(path), IdentifySettings(methods=(), clearance=CLEARANCE))

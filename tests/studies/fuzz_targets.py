@@ -70,8 +70,8 @@ def _text(data: bytes) -> str:
 
 
 def manifest_target(folder: Path) -> Target:
-    """`rigdata.manifest.parse_manifest`."""
-    from rigdata.manifest import parse_manifest
+    """`rigdata.manifest.manifest.parse_manifest`."""
+    from rigdata.manifest.manifest import parse_manifest
     from rigdata.problem import RigDataError
 
     seeds = (CSV_MANIFEST.encode(), _shortened(_demo_manifest()))
@@ -151,7 +151,7 @@ def effects_target(folder: Path) -> Target:
 
 def csv_target(folder: Path) -> Target:
     """One CSV record: dialect, numbers, times."""
-    from rigdata.manifest import parse_manifest
+    from rigdata.manifest.manifest import parse_manifest
     from rigdata.problem import RigDataError
     from rigdata.readers.text.csv import CsvReader
 
@@ -406,7 +406,11 @@ def command_target(folder: Path) -> Target:
 
 #: Files and folders (below the root) that make up each reader, for the record of what was fuzzed.
 _READER_SOURCES = {
-    "manifest": ("rigdata/manifest*.py", "rigdata/toml_lines.py", "rigdata/units.py", "rigdata/calibration.py"),
+    "manifest": (
+        "rigdata/manifest/*.py",
+        "rigdata/units.py",
+        "rigdata/calibration.py",
+    ),
     "bearing": ("model/bearing*.py", "model/toml_text.py", "model/units.py"),
     "pivots": ("model/pivots.py", "model/toml_text.py"),
     "effects": ("model/effects/*.py", "model/toml_text.py", "model/bearing.py"),

@@ -24,7 +24,8 @@ from model.bearing import Bearing, Oil, Pad, Pivot
 from model.film.energy import solve_energy
 from model.film.mesh import film_work
 from model.film.reynolds import solve_film
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 from model.statics.pad_film import PadFilm
 
 #: name: (low, high, logarithmic). Preload from 0.1: with less, a pad behind whose middle the pivot stands takes up

@@ -48,7 +48,8 @@ def one_round(path: Path) -> str:
     from rigdata import load_campaign
     from tpjb_ident.check.campaign import check_campaign
     from tpjb_ident.compare.static_tests import measure_static
-    from tpjb_ident.dynamic.identify import IdentifySettings, identify
+    from tpjb_ident.dynamic.identify import identify
+    from tpjb_ident.dynamic.settings import IdentifySettings
 
     campaign = load_campaign(path)
     bearing = parse_bearing(campaign.bearing_text, "bearing")
@@ -132,7 +133,8 @@ def load(gigabytes: float, workers: int) -> dict[str, float]:
 
 def _identify(path: Path, workers: int, answer: Path) -> int:
     from rigdata import load_campaign
-    from tpjb_ident.dynamic.identify import IdentifySettings, identify
+    from tpjb_ident.dynamic.identify import identify
+    from tpjb_ident.dynamic.settings import IdentifySettings
     from tpjb_ident.runtime.workers import open_workers
 
     began, cpu = time.time(), time.process_time()

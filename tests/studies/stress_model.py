@@ -31,7 +31,8 @@ from model.bearing_file import load_bearing
 from model.effects import Effect, known_effects
 from model.growth import Growth
 from model.options import CAVITATION, Options
-from model.predict import Prediction, predict
+from model.predict import predict
+from model.prediction import Prediction
 
 ROOT = Path(__file__).resolve().parents[2]
 BEARINGS = sorted((ROOT / "model" / "bearings").glob("*.toml"))

@@ -10,10 +10,11 @@ from rigdata.campaign import Campaign
 from tpjb_ident.compare.measured_pivots import measured_laws
 from tpjb_ident.compare.predictions import ModelSettings, PointPrediction, Progress, predict_points
 from tpjb_ident.compare.static_tests import measure_static
-from tpjb_ident.dynamic.identify import IdentifySettings, identify
+from tpjb_ident.dynamic.identify import identify
+from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.model_guard import check_model
-from tpjb_ident.presentation import Presented
+from tpjb_ident.presentation import Presented, shown_by
 
 check_model()
 
@@ -117,15 +118,12 @@ class Comparison(Presented):
 
     def to_dataframe(self) -> pd.DataFrame:
         """``comparison.csv``."""
-        from tpjb_ident.compare.tables import comparison_frame
-
-        return comparison_frame(self)
+        frame: pd.DataFrame = shown_by("compare.tables", "comparison_frame")(self)
+        return frame
 
     def summary(self) -> str:
         """What to conclude, and what it rests on."""
-        from tpjb_ident.compare.summary import summary_sentences
-
-        return "\n".join(summary_sentences(self))
+        return "\n".join(shown_by("compare.summary", "summary_sentences")(self))
 
     def plot(self, **options: Any) -> Any:
         """Draw kxx over load, measured and predicted; see `tpjb_ident.report.plots.coefficient`.
@@ -135,9 +133,7 @@ class Comparison(Presented):
         **options
             ``name``, ``over``, ``title``.
         """
-        from tpjb_ident.report.plots import coefficient
-
-        return coefficient(self, **{"name": "kxx", **options})
+        return shown_by("report.plots", "coefficient")(self, **{"name": "kxx", **options})
 
     def __str__(self) -> str:
         names = ", ".join(v.name for v in self.variants)

@@ -18,7 +18,8 @@ check_model()
 from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
 from model.effects import Effect  # noqa: E402
 from model.options import Options  # noqa: E402
-from model.predict import Prediction, predict  # noqa: E402
+from model.predict import predict  # noqa: E402
+from model.prediction import Prediction  # noqa: E402
 
 if TYPE_CHECKING:
     import pandas as pd

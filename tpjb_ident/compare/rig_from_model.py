@@ -23,7 +23,8 @@ from model.bearing import Bearing  # noqa: E402  (only once it is known to be ou
 from model.dynamics.reduction import bearing_impedance  # noqa: E402
 from model.effects import Effect, apply_effects  # noqa: E402
 from model.pivots import pivot_laws  # noqa: E402
-from model.predict import Prediction, predict_setup  # noqa: E402
+from model.predict import predict_setup  # noqa: E402
+from model.prediction import Prediction  # noqa: E402
 from model.setup import Setup  # noqa: E402
 
 FloatArray = NDArray[np.float64]

@@ -16,9 +16,10 @@ from tpjb_ident.diagnose.observations.from_table import observe_table
 from tpjb_ident.diagnose.observations.housing import with_housing
 from tpjb_ident.diagnose.observations.observe import observe
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
-from tpjb_ident.dynamic.identify import IdentifySettings, identify
+from tpjb_ident.dynamic.identify import identify
+from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.presentation import Presented
+from tpjb_ident.presentation import Presented, shown_by
 
 from model.effects import Effect, apply_effects  # isort: skip
 from model.pivots import pivot_laws  # isort: skip
@@ -68,15 +69,14 @@ class CampaignDiagnosis(Presented):
 
     def to_dataframe(self) -> pd.DataFrame:
         """K and C measured, predicted before, and predicted with the effects found: columns as comparison.csv."""
-        from tpjb_ident.report.diagnosis_coefficients import before_and_after
-
-        return before_and_after(self.diagnosis, self.identification)
+        both = shown_by("report.diagnosis_coefficients", "before_and_after")
+        frame: pd.DataFrame = both(self.diagnosis, self.identification)
+        return frame
 
     def summary(self) -> str:
         """What was found, and what it rests on."""
-        from tpjb_ident.report.diagnosis_coefficients import median_deviations
-        from tpjb_ident.report.diagnosis_words import verdict_sentences
-
+        median_deviations = shown_by("report.diagnosis_coefficients", "median_deviations")
+        verdict_sentences = shown_by("report.diagnosis_words", "verdict_sentences")
         name = self.identification.campaign if self.identification is not None else "table"
         off = median_deviations(self.to_dataframe())
         return "\n".join(verdict_sentences(name, self.diagnosis.verdict, off))
@@ -89,9 +89,7 @@ class CampaignDiagnosis(Presented):
         **options
             ``logarithmic``, ``title``.
         """
-        from tpjb_ident.report.plots import gap
-
-        return gap(self.diagnosis, **options)
+        return shown_by("report.plots", "gap")(self.diagnosis, **options)
 
 
 @dataclass(frozen=True)

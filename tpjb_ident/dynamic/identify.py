@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -10,80 +10,31 @@ from scipy.stats import chi2
 from rigdata.campaign import Campaign
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.corrections.baseline import measured_baseline
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change, gain_draws
 from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
 from tpjb_ident.dynamic.corrections.mains import MAINS_ON_LINE, force_pickup, force_pickup_spread
-from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.corrections.systematic_sources import SystematicSources, systematic_sources
-from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table
-from tpjb_ident.dynamic.estimators.methods import TABLED
-from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
-from tpjb_ident.dynamic.estimators.rlm import RlmSettings
+from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.identify_point import Completion, first_estimate, own_method, point_figures, point_result
 from tpjb_ident.dynamic.instruments.findings import InstrumentFindings, amplitude_findings, look_at_instruments
-from tpjb_ident.dynamic.records.mains_frequency import mains_frequency
-from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
-from tpjb_ident.dynamic.results.amplitude import AmplitudeSlope, amplitude_slope
 from tpjb_ident.dynamic.results.budget import with_systematic
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.left_out_runs import lost_points, named_at_points
-from tpjb_ident.dynamic.results.point_result import PointResult, WindowVerdict
+from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.results.probe_scale import with_probe_doubts
-from tpjb_ident.dynamic.results.quality import (
-    amplitude,
-    coherence,
-    directional_pattern,
-    disagreeing_runs,
-    flags,
-    rejected_windows,
-)
 from tpjb_ident.dynamic.results.run_gains import Pairs, channel_pairs, gain_doubts
 from tpjb_ident.dynamic.results.swept_probes import swept_probes
+from tpjb_ident.dynamic.runs.baseline import measured_baseline
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 from tpjb_ident.dynamic.runs.left_out import named_runs
-from tpjb_ident.dynamic.runs.nominal_drive import nominal_drive
-from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.dynamic.runs.point_source import PointSource, point_sources
 from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore
+from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.dynamic.spectral_lines.mains_frequency import mains_frequency
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.executors import Workers
-
-
-@dataclass(frozen=True)
-class IdentifySettings:
-    """Choices of a campaign's identification.
-
-    Attributes
-    ----------
-    method : str
-        Default method, the one in ``coefficients.csv``.
-    methods : tuple of str
-        All that are run; ``"rlm:tukey"`` names a norm. ``"iv"`` takes the excitation directions of the manifest
-        for instruments and is left out where they cannot serve.
-    phasors : PhasorSettings
-    clearance : float or None
-        Assembled clearance [m], for the amplitude check; None leaves it out.
-    correct : bool
-        Bring every run to its set-point load (measured miss, slope over the campaign's loads) and take
-        mains off the excitation line where its size is known.
-    n_calibration : int
-        Monte-Carlo draws over the calibration uncertainties.
-    seed : int
-        Of those draws.
-    keep_weights : bool
-        Keep the weight of every window and method; without, only whether the window counted (nearly no memory).
-    """
-
-    method: str = "mm-eiv"
-    methods: tuple[str, ...] = TABLED
-    phasors: PhasorSettings = field(default_factory=PhasorSettings)
-    clearance: float | None = None
-    correct: bool = True
-    n_calibration: int = 400
-    seed: int = 20190722
-    keep_weights: bool = True
 
 
 def identify(
@@ -150,12 +101,12 @@ def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySetti
     """
     digests = finished.digests
     findings, sources = look_at_instruments(point_sources(finished), delays_stated(campaign))
-    baseline = measured_baseline(campaign, settings.phasors, _own_method(settings.method))
+    baseline = measured_baseline(campaign, settings.phasors, own_method(settings.method))
     sources = [replace(source, baseline=baseline) for source in sources]
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
     sweeps = swept_probes(campaign)
     tell("estimating", 0, len(sources))
-    first = [_first_estimate(source.load(), settings) for source in sources]
+    first = [first_estimate(source.load(), settings) for source in sources]
     mains = [digest.mains for digest in digests]
     in_cells = [digest.mains_force for digest in digests]
     corrections = find_corrections(sources, mains, axes, first, cell_zero_uncertainty(campaign), in_cells)
@@ -200,7 +151,7 @@ class _Points:
         settings, data = self.settings, source.load()
         used = correction if settings.correct else correction.measured_only()
         corrected = used.apply(data)
-        figures = _figures(corrected, settings, self.differ)
+        figures = point_figures(corrected, settings, self.differ)
         before = figures.by_method[settings.method]
         by_method = {name: used.widened(est) for name, est in figures.by_method.items()}
         best = by_method[settings.method]
@@ -215,8 +166,8 @@ class _Points:
         with_both = {name: with_systematic(est, systematic) for name, est in by_method.items()}
         found = (used.conditions, self.findings.conditions(data), source.baseline.missing(data), bent)
         doubts = (gain_doubts(data, self.pairs), *found)
-        completion = _Completion(with_both, merged(*doubts), used.miss, {**used.budget(before), **systematic})
-        finished = _point_result(corrected, figures, completion, self.temperatures, settings)
+        completion = Completion(with_both, merged(*doubts), used.miss, {**used.budget(before), **systematic})
+        finished = point_result(corrected, figures, completion, self.temperatures, settings)
         return finished, np.sum(list(changes.values()), axis=0)
 
 
@@ -242,17 +193,6 @@ def cell_zero_uncertainty(campaign: Campaign) -> float:
     """
     cells = [c for c in campaign.channels.values() if c.quantity == "force"]
     return float(max((getattr(c, "zero_uncertainty", 0.0) for c in cells), default=0.0))
-
-
-def _first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffness:
-    """Estimate before any correction, for how H changes with load and how runs scatter; its weights are not needed."""
-    found = estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, _own_method(settings.method))
-    return replace(found, weights=np.empty((0, 2)))
-
-
-def _own_method(method: str) -> str:
-    """A method that needs no instruments, the one asked for if it is such."""
-    return "mm-eiv" if method == "iv" else method.partition(":")[0]
 
 
 def _counted_only(est: DynamicStiffness) -> DynamicStiffness:
@@ -286,145 +226,3 @@ def _campaign_conditions(draws: GainDraws) -> tuple[Condition, ...]:
             f"no uncertainty in the manifest for {', '.join(draws.unstated)}: their systematic part is left out",
         ),
     )
-
-
-def identify_point(
-    data: PointData,
-    temperatures: dict[str, dict[int, float]],
-    settings: IdentifySettings,
-    differ: bool = False,
-) -> PointResult:
-    """All methods on one operating point, and the figures that go with it.
-
-    Parameters
-    ----------
-    data : PointData
-    temperatures : dict
-        Mean temperature per run and pad [K].
-    settings : IdentifySettings
-    differ : bool
-        Whether runs are known to differ by more than their windows do.
-    """
-    figures = _figures(data, settings, differ)
-    return _point_result(data, figures, _Completion(figures.by_method), temperatures, settings)
-
-
-@dataclass(frozen=True)
-class _Figures:
-    """What the windows of a point say before its uncertainties are known."""
-
-    by_method: dict[str, DynamicStiffness]
-    outlier_fraction: float
-    coherence: float
-    amplitude: float
-    linearity: AmplitudeSlope | None
-    conditions: tuple[Condition, ...]
-    rejected: tuple[WindowVerdict, ...]
-
-
-@dataclass(frozen=True)
-class _Completion:
-    """What corrections and systematic sources add: the estimates with their uncertainty, and what to say of them."""
-
-    by_method: dict[str, DynamicStiffness]
-    conditions: tuple[Condition, ...] = ()
-    load_miss: LoadMiss | None = None
-    budget: dict[str, FloatArray] = field(default_factory=dict)
-
-
-def _figures(data: PointData, settings: IdentifySettings, differ: bool) -> _Figures:
-    by_method = _all_methods(data, settings, differ)
-    best = by_method[settings.method]
-    weights = best.weights.min(axis=1)
-    figure = coherence(data.D, data.F, best.h, weights)
-    size = amplitude(data, weights)
-    linearity = amplitude_slope(data, best.h, weights)
-    patterns = (directional_pattern(data, weights), disagreeing_runs(data, best.h, weights))
-    conditions = merged(
-        *(run.conditions for run in data.runs),
-        best.status,
-        flags(data, best, figure, size, settings.clearance),
-        tuple(pattern for pattern in patterns if pattern is not None),
-        () if linearity is None else linearity.condition(),
-        disagreement(by_method, settings.method),
-    )
-    rejected = rejected_windows(data, best.h, weights)
-    share = float((weights < REJECTED_WEIGHT).mean())
-    return _Figures(by_method, share, figure, size, linearity, conditions, rejected)
-
-
-def _point_result(
-    data: PointData,
-    figures: _Figures,
-    completion: _Completion,
-    temperatures: dict[str, dict[int, float]],
-    settings: IdentifySettings,
-) -> PointResult:
-    """The point, made once, with everything that is known of it."""
-    positions = data.mean_positions
-    return PointResult(
-        point=data.point,
-        stiffness=completion.by_method[settings.method],
-        by_method=completion.by_method,
-        static_load_measured=float(np.linalg.norm(data.mean_loads.mean(axis=0))),
-        position=positions.mean(axis=0),
-        position_se=positions.std(axis=0, ddof=1) / np.sqrt(len(positions))
-        if len(positions) > 1
-        else np.full(2, np.nan),
-        temperatures=_pad_means([temperatures.get(run.run, {}) for run in data.runs]),
-        n_records=len(data.runs),
-        n_windows=len(data.D),
-        outlier_fraction=figures.outlier_fraction,
-        coherence=figures.coherence,
-        amplitude=figures.amplitude,
-        quality=merged(figures.conditions, completion.conditions),
-        rejected=figures.rejected,
-        runs=tuple(run.run for run in data.runs),
-        load_miss=completion.load_miss,
-        linearity=figures.linearity,
-        inertia_corrected=data.runs[0].acceleration is not None,
-        clearance=settings.clearance,
-        budget=completion.budget,
-    )
-
-
-def _all_methods(data: PointData, settings: IdentifySettings, differ: bool) -> dict[str, DynamicStiffness]:
-    """Every method that was asked for and applies, the default one in any case."""
-    drive = nominal_drive(data)
-    table = phasor_table(data.D, data.F, data.run_index, drive)
-    table = replace(table, directions_differ=differ)
-    found: dict[str, DynamicStiffness] = {}
-    for name in dict.fromkeys((*settings.methods, settings.method)):
-        method, _, norm = name.partition(":")
-        if method != "iv" or drive is not None or settings.method == "iv":
-            found[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"))
-    return found
-
-
-def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[Condition, ...]:
-    """Say which methods differ from the default beyond both intervals.
-
-    Parameters
-    ----------
-    by_method : dict of str to DynamicStiffness
-    default : str
-        Method that the others are held against.
-    """
-    best = by_method[default]
-    found = []
-    for name, other in by_method.items():
-        if name == default or not (np.isfinite(other.h).all() and np.isfinite(best.h).all()):
-            continue
-        gap = np.abs(other.vector - best.vector)
-        room = np.hypot(other.half_width(systematic=False), best.half_width(systematic=False))
-        if (gap > room).any():
-            worst = int(np.argmax(gap / room))
-            found.append(f"{name} ({gap[worst] / room[worst]:.1f} times the interval)")
-    if not found:
-        return ()
-    return (Condition("methods-disagree", f"{', '.join(found)} away from {default}"),)
-
-
-def _pad_means(runs: list[dict[int, float]]) -> dict[int, float]:
-    pads = sorted({pad for run in runs for pad in run})
-    return {pad: float(np.mean([run[pad] for run in runs if pad in run])) for pad in pads}

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigdata.near_names import nearest_name
-from tpjb_ident.errors import TpjbError
+from tpjb_ident.export.errors import ExportError
 
 if TYPE_CHECKING:
     from tpjb_ident.export.points import StaticPoint
@@ -60,10 +60,6 @@ FORMATS: dict[str, Format] = {
     "dyrobes": Format("rotor_programs", "write_dyrobes", holds_intervals=False, note=_BY_SPEED),
     "ansys": Format("rotor_programs", "write_ansys", holds_intervals=False, note=_BY_SPEED),
 }
-
-
-class ExportError(TpjbError):
-    """What was given cannot be exported; says which format, column or point, and what to do."""
 
 
 def export_format(name: str) -> Format:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tpjb_ident.arrays import BoolArray, FloatArray
-from tpjb_ident.export.formats import ExportError
+from tpjb_ident.export.errors import ExportError
 from tpjb_ident.export.trust import doubts
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, STATIC_COLUMNS
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tpjb_ident.export.formats import ExportError
+from tpjb_ident.export.errors import ExportError
 from tpjb_ident.export.points import COLUMNS, StaticPoint
 from tpjb_ident.runtime.tables import printable, safe_for_spreadsheets, write_atomic
 

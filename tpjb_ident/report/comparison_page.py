@@ -21,11 +21,11 @@ from tpjb_ident.report.comparison_tables import (
     pivot_points_table,
     predicted_table,
 )
+from tpjb_ident.report.drawing.colours import VARIANT_LABEL
 from tpjb_ident.report.figure import Panel, save_panels
 from tpjb_ident.report.laboratory_sections import budget_table, evidence_section, set_up_section
 from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.report.pivot_panels import pivot_panels
-from tpjb_ident.report.plots.colours import VARIANT_LABEL
 from tpjb_ident.report.position_panels import position_panels
 from tpjb_ident.rounding import percent
 from tpjb_ident.runtime.tables import write_text

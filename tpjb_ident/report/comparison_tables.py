@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from tpjb_ident.report.drawing.colours import VARIANT_LABEL
 from tpjb_ident.report.page import Table
-from tpjb_ident.report.plots.colours import VARIANT_LABEL
 from tpjb_ident.rounding import fixed, percent, signed, with_interval
 from tpjb_ident.schema import DAMPING, ENTRIES, KINDS, STIFFNESS, coefficient_column
 

@@ -16,8 +16,8 @@ from pathlib import Path
 import matplotlib
 from matplotlib.figure import Figure
 
+from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.hover import mark_lines, with_titles
-from tpjb_ident.report.plots.colours import LIGHT
 from tpjb_ident.runtime.tables import write_atomic, write_text
 
 PNG_DPI = 160

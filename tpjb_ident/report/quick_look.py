@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.picture import FONT_SIZE
 from tpjb_ident.report.figure import Panel, save_panels
-from tpjb_ident.report.plots.colours import LIGHT
-from tpjb_ident.report.plots.picture import FONT_SIZE
 from tpjb_ident.runtime.tables import printable
 
 if TYPE_CHECKING:

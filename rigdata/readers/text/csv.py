@@ -12,7 +12,7 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
-from rigdata.manifest import CsvSpec
+from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import missing_channel, rate_of_time, undescribed
 from rigdata.readers.text.csv_table import Source, Table, read_table

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rigdata.manifest import CsvSpec
+from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.numbers import is_missing, is_number, looks_like
 from rigdata.readers.text.byte_stream import HEAD, codec_of_bytes, head_lines, text_encoding

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.colours import LIGHT
-from tpjb_ident.report.plots.picture import LINE, add_legend, label, new_pictures
+from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.picture import LINE, add_legend, label, new_pictures
 
 if TYPE_CHECKING:
     import pandas as pd

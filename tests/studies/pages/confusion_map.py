@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from tpjb_ident.report.plots.colours import LIGHT, SEQUENTIAL
-from tpjb_ident.report.plots.picture import CHARACTER, FONT_SIZE, WIDTH, label, new_pictures, shrink
+from tpjb_ident.report.drawing.colours import LIGHT, SEQUENTIAL
+from tpjb_ident.report.drawing.picture import CHARACTER, FONT_SIZE, WIDTH, label, new_pictures, shrink
 
 if TYPE_CHECKING:
     import pandas as pd

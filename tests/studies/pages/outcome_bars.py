@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.colours import LIGHT
-from tpjb_ident.report.plots.picture import CHARACTER, FONT_SIZE, LEFT, add_legend, new_picture, shrink
+from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.picture import CHARACTER, FONT_SIZE, LEFT, add_legend, new_picture, shrink
 
 #: Colour and hatch of every outcome: right, shy, wrong.
 STYLE: dict[str, tuple[str, str | None]] = {

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.colours import LIGHT
-from tpjb_ident.report.plots.picture import add_legend, new_picture
+from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.picture import add_legend, new_picture
 
 #: Kolmogorov's 95 % quantile (Annals of Mathematical Statistics 12 (1941) 461).
 KOLMOGOROV = 1.358

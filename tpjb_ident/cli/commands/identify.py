@@ -11,6 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tpjb_ident.cli.common.errors import guarded
+from tpjb_ident.cli.common.identification_display import (
+    show_coefficients,
+    show_frequency_fits,
+    show_remarks,
+    show_summary,
+)
 from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
 from tpjb_ident.cli.common.options import (
     CampaignPath,
@@ -26,7 +32,7 @@ from tpjb_ident.cli.common.options import (
 )
 from tpjb_ident.cli.common.quantities import parse_values
 from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import command_line, note_line, print_line, progress, table
+from tpjb_ident.cli.common.terminal import command_line, note_line, print_line, progress
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
@@ -36,7 +42,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rigdata.campaign import Campaign
-    from tpjb_ident.arrays import FloatArray
     from tpjb_ident.dynamic.plain import PlainSettings
     from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
     from tpjb_ident.dynamic.results.identification import Identification
@@ -44,8 +49,6 @@ if TYPE_CHECKING:
 
 #: Records [bytes] above which several processes are quicker than one.
 WORTH_PROCESSES = 100 * 2**20
-#: Share of the mean direct coefficient from which a cross-coupled one is shown.
-CROSS_MATTERS = 0.1
 PlainWay = Annotated[
     bool, typer.Option("--plain", help="Also write plain.csv: Eq. (15) by statsmodels' RLM, nothing corrected.")
 ]
@@ -203,7 +206,7 @@ def identify_settings(campaign: Campaign, method: str, norm: str | None) -> Any:
         Unknown method or norm, or a campaign without dynamic runs.
     """
     from tpjb_ident.dynamic.estimators.estimate import METHODS, NORMS
-    from tpjb_ident.dynamic.identify import IdentifySettings
+    from tpjb_ident.dynamic.settings import IdentifySettings
 
     refuse_unknown(method, METHODS, "--method")
     if norm is not None:
@@ -246,20 +249,6 @@ def write_identification(folder: Path, result: Identification) -> None:
     write_table(folder, "budget", result.budget_frame())
 
 
-def show_summary(result: Identification) -> None:
-    """Print how many points have an answer, and how many of those are to be trusted.
-
-    Parameters
-    ----------
-    result : Identification
-    """
-    bad = sum(bool(untrusted(p.quality)) or not math.isfinite(float(p.stiffness.k[0, 0])) for p in result.points)
-    flagged = sum(bool(p.quality) for p in result.points) - bad
-    trusted = "all to be trusted" if not bad else f"{bad} NOT to be trusted"
-    more = f", {flagged} with flags" if flagged else ""
-    print_line(f"{result.campaign}: {len(result.points)} operating points, {trusted}{more}.")
-
-
 def plain_settings(window: str, norm: str | None) -> PlainSettings:
     """Build `PlainSettings` from ``--window`` and ``--norm``.
 
@@ -288,123 +277,6 @@ def write_plain(folder: Path, campaign: Campaign, settings: PlainSettings, keep_
     write_table(folder, "plain", plain_frame(points, settings))
     if keep_r:
         write_r_matrices(folder / "r_matrices.h5", points)
-
-
-def show_coefficients(result: Identification) -> None:
-    """Print K and C of every point with half the width of their intervals; what is flagged stands below in full.
-
-    Parameters
-    ----------
-    result : Identification
-    """
-    import numpy as np
-
-    letters = flag_letters(result)
-    rows, cross = [], []
-    for p in result.points:
-        half, omega = p.stiffness.half_width(), p.stiffness.omega
-        values = np.concatenate([p.stiffness.k.ravel() / 1e6, p.stiffness.c.ravel() / 1e3])
-        halves = half / np.repeat([1e6, 1e3 * omega], 4)
-        cells = [with_half(v, h) for v, h in zip(values, halves, strict=True)]
-        place = [f"{p.point.static_load / 1e3:g}", f"{p.point.static_load_direction_deg:g}",
-                 f"{p.point.shaft_speed_hz:g}", f"{p.point.excitation_hz:g}"]  # fmt: skip
-        flags = "".join(letters[str(q)] for q in p.quality)
-        rows.append([*place, cells[0], cells[3], cells[4], cells[7], f"{100 * p.outlier_fraction:.0f}", flags])
-        if cross_coupling_matters(values, halves):
-            cross.append([*place, *(cells[i] for i in (1, 2, 5, 6))])
-    point = ["load kN", "dir. deg", "speed Hz", "exc. Hz"]
-    direct = ["kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m"]
-    title = f"{result.campaign}: {result.method}, 95 % intervals"
-    table(title, [*point, *direct, "out %", "flags"], rows, words=(9,), whole="coefficients.csv")
-    if cross:
-        coupled = ["kxy MN/m", "kyx MN/m", "cxy kNs/m", "cyx kNs/m"]
-        heading = "cross-coupled, where they are more than a tenth of the direct ones"
-        table(heading, [*point, *coupled], cross, words=(), whole="coefficients.csv")
-
-
-def flag_letters(result: Identification) -> dict[str, str]:
-    """A letter for every condition that a point has, in the order of their appearance.
-
-    Parameters
-    ----------
-    result : Identification
-    """
-    names = dict.fromkeys(str(q) for p in result.points for q in p.quality)
-    return dict(zip(names, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ", strict=False))
-
-
-def show_remarks(result: Identification) -> None:
-    """Print every condition once, under the letter by which the table marks its points.
-
-    Parameters
-    ----------
-    result : Identification
-    """
-    letters = flag_letters(result)
-    for remark in result.remarks():
-        name = next((n for n in letters if remark.startswith(f"{n} at ")), "")
-        print_line(f"{letters[name]}: {remark}" if name else f"note: {remark}")
-
-
-def with_half(value: float, half: float) -> str:
-    """A number with half its interval, or that there is none.
-
-    Parameters
-    ----------
-    value, half : float
-        In the units of the table.
-    """
-    if not math.isfinite(value):
-        return "no answer"
-    if not math.isfinite(half) or half <= 0:
-        return f"{value:.4g} ±?"
-    digits = max(0, -math.floor(math.log10(half))) if half < 10 else 0
-    return f"{value:.{min(digits, 3)}f} ±{half:.{min(digits, 3)}f}"
-
-
-def cross_coupling_matters(values: FloatArray, halves: FloatArray) -> bool:
-    """Whether a cross-coupled term is beyond doubt more than a tenth of the direct ones.
-
-    Parameters
-    ----------
-    values, halves : (8,) ndarray
-        K and C, row by row, and half their intervals.
-    """
-    import numpy as np
-
-    for part in (slice(0, 4), slice(4, 8)):
-        value, half = values[part], halves[part]
-        direct = 0.5 * (abs(value[0]) + abs(value[3]))
-        if np.isfinite(value).all() and (np.abs(value[1:3]) - half[1:3] > CROSS_MATTERS * direct).any():
-            return True
-    return False
-
-
-def show_frequency_fits(result: Identification) -> None:
-    """Print which model over frequency the data of every load support.
-
-    Parameters
-    ----------
-    result : Identification
-    """
-    rows = []
-    for group in result.frequency_fits():
-        point = group.points[0].point
-        for name, fit in group.fits.items():
-            misfit = f"{100 * fit.misfit:.1f}"
-            verdict = "supported" if name == group.supported else "refused" if fit.refused else "not needed"
-            figures = [f"{fit.chi_square:.1f}", str(fit.dof), f"{fit.probability:.2g}", misfit]
-            rows.append([f"{point.static_load / 1e3:g}", name, *figures, verdict])
-    if rows:
-        columns = ["load kN", "model", "chi-square", "dof", "probability", "misfit %", "verdict"]
-        table("over frequency", columns, rows, words=(1, 6), whole="frequency_fits.csv")
-    refusing = [g.points[0].point.static_load for g in result.frequency_fits() if g.supported not in g.fits]
-    if refusing:
-        loads = ", ".join(f"{load / 1e3:g}" for load in refusing[:6]) + " kN"
-        more = f" and {len(refusing) - 6} more loads" if len(refusing) > 6 else ""
-        print_line(
-            f"note: at {loads}{more} the data refuse K-C and K-C-M; use the coefficients of each excitation frequency"
-        )
 
 
 def refuse_untrusted(result: Identification) -> None:

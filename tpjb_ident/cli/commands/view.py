@@ -69,7 +69,8 @@ def _session(source: Path, bearing: Path | None) -> Session:
     campaign = open_campaign(source)
     session = Session(name=campaign.id, campaign=campaign)
     if campaign.of_kind("dynamic"):
-        from tpjb_ident.dynamic.identify import IdentifySettings, identify
+        from tpjb_ident.dynamic.identify import identify
+        from tpjb_ident.dynamic.settings import IdentifySettings
 
         session.identify = lambda: identify(campaign, IdentifySettings())
         if bearing is not None or campaign.bearing_text:

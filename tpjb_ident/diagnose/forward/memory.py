@@ -13,7 +13,8 @@ import numpy as np
 
 from model.dynamics.reduction import with_structure
 from model.instruments import Instruments
-from model.predict import Prediction, predict_setup
+from model.predict import predict_setup
+from model.prediction import Prediction
 from model.setup import Setup
 from model.statics.equilibrium import Equilibrium
 from tpjb_ident.arrays import ComplexArray, FloatArray

@@ -14,7 +14,7 @@ import numpy as np
 
 from model.setup import Setup
 from tpjb_ident.dynamic.records.run_phasors import run_phasors
-from tpjb_ident.dynamic.records.windows import RecordTooShortError
+from tpjb_ident.dynamic.spectral_lines.windows import RecordTooShortError
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign

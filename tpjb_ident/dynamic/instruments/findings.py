@@ -9,9 +9,9 @@ import numpy as np
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.instruments.clock_rates import ClockRates, clock_rates, rate_samples
 from tpjb_ident.dynamic.instruments.harmonics import change_conditions, change_spread, film_change
 from tpjb_ident.dynamic.instruments.housing_balance import Balance, balance_runs, balances, frequency_key
+from tpjb_ident.dynamic.runs.clock_rates import ClockRates, clock_rates, rate_samples
 from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.dynamic.runs.point_source import PointSource
 

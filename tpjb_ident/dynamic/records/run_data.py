@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.lines import LineSet, LineSettings
 from tpjb_ident.dynamic.records.oil_force import oil_force
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
-from tpjb_ident.dynamic.records.windows import WindowSettings
+from tpjb_ident.dynamic.spectral_lines.lines import LineSet, LineSettings
+from tpjb_ident.dynamic.spectral_lines.windows import WindowSettings
 
 
 @dataclass(frozen=True)

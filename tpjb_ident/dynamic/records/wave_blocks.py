@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
-from tpjb_ident.dynamic.records.windows import line_design
+from tpjb_ident.dynamic.spectral_lines.windows import line_design
 
 #: Samples of a block.
 BLOCK = 256

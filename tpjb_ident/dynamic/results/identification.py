@@ -21,7 +21,7 @@ from tpjb_ident.dynamic.results.identification_tables import (
     point_columns,
 )
 from tpjb_ident.dynamic.results.point_result import PointResult
-from tpjb_ident.presentation import Presented
+from tpjb_ident.presentation import Presented, shown_by
 from tpjb_ident.rounding import with_interval
 from tpjb_ident.schema import DAMPING, STIFFNESS
 
@@ -84,9 +84,7 @@ class Identification(Presented):
         **options
             ``part``, ``over``, ``entries``, ``title``.
         """
-        from tpjb_ident.report.plots import direct_coefficients
-
-        return direct_coefficients({self.campaign: self}, **options)
+        return shown_by("report.plots", "direct_coefficients")({self.campaign: self}, **options)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per operating point, by the default method: ``coefficients.csv``."""

@@ -17,12 +17,12 @@ from rigdata.problem import RigDataError
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
-from tpjb_ident.dynamic.records.windows import RecordTooShortError
 from tpjb_ident.dynamic.runs.dead_channels import dead_accelerometers
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 from tpjb_ident.dynamic.runs.left_out import LeftOut
 from tpjb_ident.dynamic.runs.run_result import RunResult
 from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
+from tpjb_ident.dynamic.spectral_lines.windows import RecordTooShortError
 from tpjb_ident.runtime.executors import InProcessWorkers, Workers, each_finished
 
 Progress = Callable[[str, int, int], None]

@@ -23,10 +23,10 @@ import numpy as np
 
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.lines import Line, LineSet
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.dynamic.runs.run_result import RunResult
+from tpjb_ident.dynamic.spectral_lines.lines import Line, LineSet
 from tpjb_ident.runtime.provenance import sha256, source_stamp
 from tpjb_ident.runtime.tables import write_atomic
 

@@ -12,8 +12,8 @@ from matplotlib.patches import Ellipse
 
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.polygon import corners
-from tpjb_ident.report.plots.colours import LIGHT, VARIANT_LABEL, VARIANT_STYLE
-from tpjb_ident.report.plots.picture import FONT_SIZE, add_legend, new_picture
+from tpjb_ident.report.drawing.colours import LIGHT, VARIANT_LABEL, VARIANT_STYLE
+from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, new_picture
 
 if TYPE_CHECKING:
     from tpjb_ident.clearance.locus import Locus

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.colours import LIGHT
-from tpjb_ident.report.plots.picture import FONT_SIZE, add_legend, label, new_pictures, shrink
+from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, label, new_pictures, shrink
 from tpjb_ident.report.plots.series import as_table
 
 if TYPE_CHECKING:

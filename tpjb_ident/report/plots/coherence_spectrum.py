@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.report.plots.colours import LIGHT
-from tpjb_ident.report.plots.picture import FONT_SIZE, add_legend, new_picture
+from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, new_picture
 
 if TYPE_CHECKING:
     from rigdata.run import Run

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.colours import LIGHT
-from tpjb_ident.report.plots.picture import CHARACTER, LEFT, add_legend, new_picture, shrink
+from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.picture import CHARACTER, LEFT, add_legend, new_picture, shrink
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnose.diagnose import Diagnosis

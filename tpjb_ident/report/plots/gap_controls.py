@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.colours import LIGHT
-from tpjb_ident.report.plots.picture import CHARACTER, FONT_SIZE, LEFT, new_picture, shrink
+from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.picture import CHARACTER, FONT_SIZE, LEFT, new_picture, shrink
 
 STYLE = {"before": ("grey", "////"), "after": ("blue", None), "control": ("orange", "....")}
 

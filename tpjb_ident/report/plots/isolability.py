@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
-from tpjb_ident.report.plots.colours import LIGHT, SEQUENTIAL
-from tpjb_ident.report.plots.picture import CHARACTER, FONT_SIZE, add_colour_bar, label, new_pictures, shrink
+from tpjb_ident.report.drawing.colours import LIGHT, SEQUENTIAL
+from tpjb_ident.report.drawing.picture import CHARACTER, FONT_SIZE, add_colour_bar, label, new_pictures, shrink
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnose.plan.plan import CampaignPlan

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.colours import LIGHT, style_of_pad
-from tpjb_ident.report.plots.picture import add_legend, new_picture
+from tpjb_ident.report.drawing.colours import LIGHT, style_of_pad
+from tpjb_ident.report.drawing.picture import add_legend, new_picture
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve

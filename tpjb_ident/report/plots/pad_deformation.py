@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from tpjb_ident.report.plots.colours import style_of_pad
-from tpjb_ident.report.plots.picture import add_legend, label, new_pictures
+from tpjb_ident.report.drawing.colours import style_of_pad
+from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
 
 
 def pad_deformation(

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.report.plots.colours import LIGHT, style_of_pad
-from tpjb_ident.report.plots.picture import FONT_SIZE, add_legend, label, new_pictures
+from tpjb_ident.report.drawing.colours import LIGHT, style_of_pad
+from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, label, new_pictures
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.report.plots.colours import LIGHT, style_of_pad
-from tpjb_ident.report.plots.picture import add_legend, mark_extrapolated, new_picture
+from tpjb_ident.report.drawing.colours import LIGHT, style_of_pad
+from tpjb_ident.report.drawing.picture import add_legend, mark_extrapolated, new_picture
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.colours import LIGHT
-from tpjb_ident.report.plots.picture import add_legend, new_picture
+from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.picture import add_legend, new_picture
 from tpjb_ident.report.plots.pivot_stiffness import LOWEST, POINTS, Formula
 
 if TYPE_CHECKING:

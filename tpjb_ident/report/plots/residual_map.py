@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.colours import DIVERGING, LIGHT, VARIANT_LABEL
-from tpjb_ident.report.plots.picture import FONT_SIZE, add_colour_bar, label, new_pictures, shrink
+from tpjb_ident.report.drawing.colours import DIVERGING, LIGHT, VARIANT_LABEL
+from tpjb_ident.report.drawing.picture import FONT_SIZE, add_colour_bar, label, new_pictures, shrink
 from tpjb_ident.report.plots.residual_table import ENTRIES, residual_frame
 
 if TYPE_CHECKING:

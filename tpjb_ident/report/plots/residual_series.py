@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.plots.colours import LIGHT, VARIANT_LABEL
-from tpjb_ident.report.plots.picture import add_legend, new_picture
+from tpjb_ident.report.drawing.colours import LIGHT, VARIANT_LABEL
+from tpjb_ident.report.drawing.picture import add_legend, new_picture
 from tpjb_ident.report.plots.residual_table import residual_frame
 from tpjb_ident.report.plots.series import AXES
 

@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from rigdata.manifest_table import Findings, Table, shown
+from rigdata.manifest.table import Findings, Table, shown
 from rigdata.operating_point import OperatingPoint
 from rigdata.units import UnitError, parse_quantity
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rigdata.calibration import Channel
-from rigdata.manifest_channels import TextFile, read_channels
-from rigdata.manifest_runs import RunEntry, read_runs
-from rigdata.manifest_table import Findings, Table
+from rigdata.manifest.channels import TextFile, read_channels
+from rigdata.manifest.runs import RunEntry, read_runs
+from rigdata.manifest.table import Findings, Table
+from rigdata.manifest.toml_lines import key_lines
 from rigdata.problem import Problem, RigDataError
-from rigdata.toml_lines import key_lines
 
 SCHEMA = "tpjb-rig/1"
 #: Larger manifests are refused before they are parsed [bytes].

@@ -16,7 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 
-from tpjb_ident.report.plots.colours import LIGHT
+from tpjb_ident.report.drawing.colours import LIGHT
 
 WIDTH, HEIGHT = 5.2, 3.4  # inches: legible in one column of a phone
 FONT_SIZE = 9.0

@@ -14,7 +14,7 @@ from rigdata.calibration import (
     reading_zero,
 )
 from rigdata.channel_response import ChannelResponse, parse_filter, parse_response_table
-from rigdata.manifest_table import Findings, Table, shown
+from rigdata.manifest.table import Findings, Table, shown
 from rigdata.problem import RigDataError
 from rigdata.units import UnitError, is_signal
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from rigdata.manifest.toml_lines import Path, place_of
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, Severity
-from rigdata.toml_lines import Path, place_of
 from rigdata.units import UnitError, parse_quantity
 
 _MAX_FINDINGS = 1000

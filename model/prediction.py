@@ -1,0 +1,233 @@
+"""What a prediction holds: coefficients, position, fields, flows, and how far it can be trusted."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from model.arrays import ComplexArray, FloatArray
+from model.conditions import Condition
+from model.dynamics.reduction import PadMatrices, pad_matrices
+from model.setup import Setup
+from model.statics.conditions import largest_reynolds
+from model.statics.equilibrium import Equilibrium
+from model.statics.pad_flow import PadFlow, pad_flow
+from model.statics.power import power_loss
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What the model says about one operating point, as the records would show it.
+
+    Measurement-side effects are in `h`, `position` and `load_reading`; `bearing_h` and `bearing_position` are
+    free of them.
+
+    Attributes
+    ----------
+    load, load_direction : float
+        Static load [N] and where it pushes the shaft [rad].
+    speed : float
+        [rad/s]
+    excitation : float or (n,) ndarray
+        [rad/s]
+    h : (2, 2) or (n, 2, 2) complex ndarray
+        Dynamic stiffness k + i omega c [N/m].
+    position : (2,) ndarray
+        Journal from the bearing centre [m].
+    tilt, deflection, pad_load : (n_pads,) ndarray
+        [rad], [m], [N]
+    status : tuple of Condition
+        Named conditions, which compare and print like strings; empty when all is well.
+    equilibrium : Equilibrium
+    setup : Setup
+    solver : callable
+        `model.predict.predict_setup`, which made it: a coarser mesh is solved with the same.
+    """
+
+    load: float
+    load_direction: float
+    speed: float
+    excitation: float | FloatArray
+    h: ComplexArray
+    bearing_h: ComplexArray = field(repr=False)
+    position: FloatArray
+    bearing_position: FloatArray = field(repr=False)
+    load_reading: FloatArray = field(repr=False)
+    tilt: FloatArray = field(repr=False)
+    deflection: FloatArray = field(repr=False)
+    pad_load: FloatArray
+    status: tuple[Condition, ...]
+    equilibrium: Equilibrium = field(repr=False)
+    setup: Setup = field(repr=False)
+    solver: Callable[..., Prediction] = field(repr=False, compare=False)
+
+    def __str__(self) -> str:
+        x, y = 1e6 * self.position
+        return (
+            f"{self.load:g} N at {math.degrees(self.load_direction):.4g} deg, {self.speed / (2 * math.pi):.4g} Hz: "
+            f"shaft at ({x:.4g}, {y:.4g}) um, thinnest film {1e6 * self.min_film:.3g} um, "
+            f"hottest {self.max_temperature:.4g} degC; {', '.join(self.status) or 'all well'}"
+        )
+
+    @property
+    def converged(self) -> bool:
+        """Whether the equilibrium was found."""
+        return self.equilibrium.converged
+
+    @property
+    def idle_pads(self) -> tuple[int, ...]:
+        """Pads without a loaded attitude, numbers from 1."""
+        return tuple(f.number for f in self.equilibrium.films if f.idle)
+
+    @property
+    def k(self) -> FloatArray:
+        """Re h [N/m], shape of `h`."""
+        return self.h.real
+
+    @property
+    def c(self) -> FloatArray:
+        """Im h / omega [N s/m], shape of `h`."""
+        omega = np.asarray(self.excitation, float)[..., None, None]
+        return self.h.imag / omega
+
+    def __getattr__(self, name: str) -> Any:
+        if len(name) == 3 and name[0] in "kc" and set(name[1:]) <= {"x", "y"}:
+            table = self.k if name[0] == "k" else self.c
+            value = table[..., "xy".index(name[1]), "xy".index(name[2])]
+            return float(value) if value.ndim == 0 else value
+        raise AttributeError(f"Prediction has no attribute {name!r}")
+
+    @property
+    def pressure(self) -> tuple[FloatArray, ...]:
+        """Per pad, (nt + 1, nz + 1) on the half width (full if misaligned) [Pa]."""
+        return tuple(f.work.pressure for f in self.equilibrium.films)
+
+    @property
+    def film(self) -> tuple[FloatArray, ...]:
+        """Film thickness per pad [m], shapes as `pressure`."""
+        return tuple(f.work.thickness for f in self.equilibrium.films)
+
+    @property
+    def temperature(self) -> tuple[FloatArray, ...]:
+        """Film temperature per pad [degC], shapes as `pressure`."""
+        return tuple(f.work.temperature for f in self.equilibrium.films)
+
+    @property
+    def max_pressure(self) -> float:
+        """Highest film pressure [Pa]."""
+        return max(float(p.max()) for p in self.pressure)
+
+    @property
+    def max_temperature(self) -> float:
+        """Hottest film of a pad that carries [degC]."""
+        films = [f for f in self.equilibrium.films if not f.idle]
+        return max((float(f.work.temperature.max()) for f in films), default=self.setup.inlet_temperature)
+
+    @property
+    def min_film(self) -> float:
+        """Thinnest film [m]; infinite if no pad carries."""
+        return min((float(f.work.thickness.min()) for f in self.equilibrium.films if not f.idle), default=math.inf)
+
+    @property
+    def face_temperature(self) -> tuple[FloatArray, ...]:
+        """Temperature of the pads' faces [degC], shapes as `temperature`.
+
+        The film's own, unless the journal takes part: then the parabola across the film that passes its heat, flat at
+        the pad, is hotter there by half of what the mean is hotter than the journal.
+        """
+        journal = self.equilibrium.journal_temperature
+        if not math.isfinite(journal):
+            return self.temperature
+        return tuple(t + 0.5 * (t - journal) for t in self.temperature)
+
+    @functools.cached_property
+    def pad_flow(self) -> tuple[PadFlow, ...]:
+        """Per pad: oil in, out and over the sides [m^3/s], temperatures in and out [degC]."""
+        return tuple(pad_flow(f, self.setup.bearing.oil) for f in self.equilibrium.films)
+
+    @property
+    def reynolds(self) -> float:
+        """Largest local Reynolds number rho U h / mu of all films."""
+        return largest_reynolds(self.equilibrium.films, self.speed * self.setup.bearing.journal_radius)
+
+    @property
+    def sommerfeld(self) -> float:
+        """S = mu N D L / W (R / Cb)^2, N in rev/s, mu of the oil that enters, Cb the mean of the pads."""
+        bearing, clearance = self.setup.bearing, self._clearance
+        viscosity = float(bearing.oil.viscosity(self.setup.inlet_temperature))
+        turns = self.speed / (2.0 * math.pi)
+        size = viscosity * turns * bearing.journal_diameter * bearing.length
+        return size * (bearing.journal_radius / clearance) ** 2 / self.load if self.load > 0.0 else math.inf
+
+    @property
+    def eccentricity_ratio(self) -> float:
+        """Distance of the journal from the bearing centre over the mean Cb."""
+        return math.hypot(*self.bearing_position) / self._clearance
+
+    @property
+    def attitude_angle(self) -> float:
+        """Angle from the load's direction to that of the journal [rad], positive with rotation, within +-pi."""
+        x, y = self.bearing_position
+        return (math.atan2(y, x) - self.load_direction + math.pi) % (2.0 * math.pi) - math.pi
+
+    @property
+    def _clearance(self) -> float:
+        pads = self.setup.bearing.pads
+        return sum(p.assembled_clearance for p in pads) / len(pads) + self.setup.clearance_change
+
+    @property
+    def power_loss(self) -> float:
+        """Shear of all films, those of idle pads too [W]."""
+        turbulent = self.setup.options.turbulence != "none"
+        return power_loss(self.equilibrium, self.speed * self.setup.bearing.journal_radius, turbulent)
+
+    def pad_temperature(self, fraction: float = 0.75) -> FloatArray:
+        """Film temperature at mid-length, at a fraction of the arc from the leading edge, per pad [degC].
+
+        Parameters
+        ----------
+        fraction : float
+            Of the arc, from the leading edge.
+
+        Returns
+        -------
+        (n_pads,) ndarray
+            [degC]
+        """
+        out = []
+        for film in self.equilibrium.films:
+            angle = film.pad.leading_edge + fraction * film.pad.arc
+            middle = 0 if film.grid.first == 0 else len(film.grid.z) // 2
+            out.append(float(np.interp(angle, film.grid.angle, film.work.temperature[:, middle])))
+        return np.array(out)
+
+    @property
+    def pad_matrices(self) -> tuple[PadMatrices, ...]:
+        """Full matrices of the pads that carry, Eq. (11) and (12)."""
+        matrices = (pad_matrices(self.setup, f) for f in self.equilibrium.films)
+        return tuple(m for m in matrices if m is not None)
+
+    @functools.cached_property
+    def mesh_error(self) -> float:
+        """Estimated relative error of the direct coefficients from the mesh.
+
+        A third of the difference to a mesh half as fine (second order), the largest of kxx, kyy, cxx, cyy. Solved
+        when first asked for.
+        """
+        coarse = self.solver(
+            self.setup.change(mesh=self.setup.mesh.coarser()),
+            self.load, self.load_direction, self.speed, self.excitation,
+        )  # fmt: skip
+        if not (coarse.converged and self.converged):
+            return math.nan
+        worst = 0.0
+        for part in ("real", "imag"):
+            fine, rough = (np.diagonal(getattr(p.bearing_h, part), axis1=-2, axis2=-1) for p in (self, coarse))
+            scale = np.maximum(np.abs(fine), 0.05 * np.abs(np.diagonal(self.bearing_h, axis1=-2, axis2=-1)))
+            worst = max(worst, float(np.max(np.abs(fine - rough) / scale)) / 3.0)
+        return worst

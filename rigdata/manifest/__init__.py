@@ -1,0 +1,1 @@
+"""The manifest: parsed and checked as a whole, every problem at once."""

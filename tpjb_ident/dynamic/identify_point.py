@@ -1,0 +1,197 @@
+"""One operating point: its windows to an estimate by every method, with figures and flags."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.corrections.static_load import LoadMiss
+from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table
+from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
+from tpjb_ident.dynamic.estimators.rlm import RlmSettings
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.results.amplitude import AmplitudeSlope, amplitude_slope
+from tpjb_ident.dynamic.results.point_result import PointResult, WindowVerdict
+from tpjb_ident.dynamic.results.quality import (
+    amplitude,
+    coherence,
+    directional_pattern,
+    disagreeing_runs,
+    flags,
+    rejected_windows,
+)
+from tpjb_ident.dynamic.runs.nominal_drive import nominal_drive
+from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.dynamic.settings import IdentifySettings
+
+
+def first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffness:
+    """Estimate before any correction, for how H changes with load and how runs scatter; its weights are not needed."""
+    found = estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, own_method(settings.method))
+    return replace(found, weights=np.empty((0, 2)))
+
+
+def own_method(method: str) -> str:
+    """A method that needs no instruments, the one asked for if it is such."""
+    return "mm-eiv" if method == "iv" else method.partition(":")[0]
+
+
+def identify_point(
+    data: PointData,
+    temperatures: dict[str, dict[int, float]],
+    settings: IdentifySettings,
+    differ: bool = False,
+) -> PointResult:
+    """All methods on one operating point, and the figures that go with it.
+
+    Parameters
+    ----------
+    data : PointData
+    temperatures : dict
+        Mean temperature per run and pad [K].
+    settings : IdentifySettings
+    differ : bool
+        Whether runs are known to differ by more than their windows do.
+    """
+    figures = point_figures(data, settings, differ)
+    return point_result(data, figures, Completion(figures.by_method), temperatures, settings)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What the windows of a point say before its uncertainties are known."""
+
+    by_method: dict[str, DynamicStiffness]
+    outlier_fraction: float
+    coherence: float
+    amplitude: float
+    linearity: AmplitudeSlope | None
+    conditions: tuple[Condition, ...]
+    rejected: tuple[WindowVerdict, ...]
+
+
+@dataclass(frozen=True)
+class Completion:
+    """What corrections and systematic sources add: the estimates with their uncertainty, and what to say of them."""
+
+    by_method: dict[str, DynamicStiffness]
+    conditions: tuple[Condition, ...] = ()
+    load_miss: LoadMiss | None = None
+    budget: dict[str, FloatArray] = field(default_factory=dict)
+
+
+def point_figures(data: PointData, settings: IdentifySettings, differ: bool) -> Figures:
+    """Every method's answer on the windows of a point, and what is said of the default one.
+
+    Parameters
+    ----------
+    data : PointData
+    settings : IdentifySettings
+    differ : bool
+        Whether runs differ by more than their windows explain.
+    """
+    by_method = all_methods(data, settings, differ)
+    best = by_method[settings.method]
+    weights = best.weights.min(axis=1)
+    figure = coherence(data.D, data.F, best.h, weights)
+    size = amplitude(data, weights)
+    linearity = amplitude_slope(data, best.h, weights)
+    patterns = (directional_pattern(data, weights), disagreeing_runs(data, best.h, weights))
+    conditions = merged(
+        *(run.conditions for run in data.runs),
+        best.status,
+        flags(data, best, figure, size, settings.clearance),
+        tuple(pattern for pattern in patterns if pattern is not None),
+        () if linearity is None else linearity.condition(),
+        disagreement(by_method, settings.method),
+    )
+    rejected = rejected_windows(data, best.h, weights)
+    share = float((weights < REJECTED_WEIGHT).mean())
+    return Figures(by_method, share, figure, size, linearity, conditions, rejected)
+
+
+def point_result(
+    data: PointData,
+    figures: Figures,
+    completion: Completion,
+    temperatures: dict[str, dict[int, float]],
+    settings: IdentifySettings,
+) -> PointResult:
+    """The point, made once, with everything that is known of it."""
+    positions = data.mean_positions
+    return PointResult(
+        point=data.point,
+        stiffness=completion.by_method[settings.method],
+        by_method=completion.by_method,
+        static_load_measured=float(np.linalg.norm(data.mean_loads.mean(axis=0))),
+        position=positions.mean(axis=0),
+        position_se=positions.std(axis=0, ddof=1) / np.sqrt(len(positions))
+        if len(positions) > 1
+        else np.full(2, np.nan),
+        temperatures=pad_means([temperatures.get(run.run, {}) for run in data.runs]),
+        n_records=len(data.runs),
+        n_windows=len(data.D),
+        outlier_fraction=figures.outlier_fraction,
+        coherence=figures.coherence,
+        amplitude=figures.amplitude,
+        quality=merged(figures.conditions, completion.conditions),
+        rejected=figures.rejected,
+        runs=tuple(run.run for run in data.runs),
+        load_miss=completion.load_miss,
+        linearity=figures.linearity,
+        inertia_corrected=data.runs[0].acceleration is not None,
+        clearance=settings.clearance,
+        budget=completion.budget,
+    )
+
+
+def all_methods(data: PointData, settings: IdentifySettings, differ: bool) -> dict[str, DynamicStiffness]:
+    """Every method that was asked for and applies, the default one in any case."""
+    drive = nominal_drive(data)
+    table = phasor_table(data.D, data.F, data.run_index, drive)
+    table = replace(table, directions_differ=differ)
+    found: dict[str, DynamicStiffness] = {}
+    for name in dict.fromkeys((*settings.methods, settings.method)):
+        method, _, norm = name.partition(":")
+        if method != "iv" or drive is not None or settings.method == "iv":
+            found[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"))
+    return found
+
+
+def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[Condition, ...]:
+    """Say which methods differ from the default beyond both intervals.
+
+    Parameters
+    ----------
+    by_method : dict of str to DynamicStiffness
+    default : str
+        Method that the others are held against.
+    """
+    best = by_method[default]
+    found = []
+    for name, other in by_method.items():
+        if name == default or not (np.isfinite(other.h).all() and np.isfinite(best.h).all()):
+            continue
+        gap = np.abs(other.vector - best.vector)
+        room = np.hypot(other.half_width(systematic=False), best.half_width(systematic=False))
+        if (gap > room).any():
+            worst = int(np.argmax(gap / room))
+            found.append(f"{name} ({gap[worst] / room[worst]:.1f} times the interval)")
+    if not found:
+        return ()
+    return (Condition("methods-disagree", f"{', '.join(found)} away from {default}"),)
+
+
+def pad_means(runs: list[dict[int, float]]) -> dict[int, float]:
+    """Mean temperature by pad over the runs that have it [K].
+
+    Parameters
+    ----------
+    runs : list of dict
+        Temperature by pad number, per run.
+    """
+    pads = sorted({pad for run in runs for pad in run})
+    return {pad: float(np.mean([run[pad] for run in runs if pad in run])) for pad in pads}

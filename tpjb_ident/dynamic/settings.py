@@ -1,0 +1,43 @@
+"""What a user may choose when records become coefficients."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from tpjb_ident.dynamic.estimators.methods import TABLED
+from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
+
+
+@dataclass(frozen=True)
+class IdentifySettings:
+    """Choices of a campaign's identification.
+
+    Attributes
+    ----------
+    method : str
+        Default method, the one in ``coefficients.csv``.
+    methods : tuple of str
+        All that are run; ``"rlm:tukey"`` names a norm. ``"iv"`` takes the excitation directions of the manifest
+        for instruments and is left out where they cannot serve.
+    phasors : PhasorSettings
+    clearance : float or None
+        Assembled clearance [m], for the amplitude check; None leaves it out.
+    correct : bool
+        Bring every run to its set-point load (measured miss, slope over the campaign's loads) and take
+        mains off the excitation line where its size is known.
+    n_calibration : int
+        Monte-Carlo draws over the calibration uncertainties.
+    seed : int
+        Of those draws.
+    keep_weights : bool
+        Keep the weight of every window and method; without, only whether the window counted (nearly no memory).
+    """
+
+    method: str = "mm-eiv"
+    methods: tuple[str, ...] = TABLED
+    phasors: PhasorSettings = field(default_factory=PhasorSettings)
+    clearance: float | None = None
+    correct: bool = True
+    n_calibration: int = 400
+    seed: int = 20190722
+    keep_weights: bool = True
