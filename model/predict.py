@@ -164,7 +164,6 @@ def predict_setup(
     lines = np.atleast_1d(omega)
     h, regimes = _impedance(setup, equilibrium, lines)
     instruments = setup.instruments
-    outside = equilibrium.position + setup.structure @ force
     films = equilibrium.films
     shape = (2, 2) if omega.ndim == 0 else (len(lines), 2, 2)
     return Prediction(
@@ -174,7 +173,7 @@ def predict_setup(
         excitation=float(omega) if omega.ndim == 0 else omega,
         h=instruments.shown_stiffness(h, lines).reshape(shape),
         bearing_h=h.reshape(shape),
-        position=instruments.shown_position(outside),
+        position=instruments.shown_position(equilibrium.position + setup.structure @ force),
         bearing_position=equilibrium.position,
         load_reading=instruments.shown_load(force),
         tilt=np.array([f.tilt for f in films]),

@@ -41,13 +41,7 @@ MAY_IMPORT = {
             "view", "runtime"},
 }  # fmt: skip
 #: The one way back: a campaign is checked with the line fit and the oil force of identification, and with nothing else.
-ONE_WAY_BACK = ("check", "tpjb_ident/dynamic/records/")
-#: Results that show themselves: a function of theirs asks `report` for its picture and words, on first use.
-SHOW_THEMSELVES = {
-    "tpjb_ident/compare/comparison.py",
-    "tpjb_ident/diagnose/campaign.py",
-    "tpjb_ident/dynamic/results/identification.py",
-}
+ONE_WAY_BACK = ("check", ("tpjb_ident/dynamic/records/", "tpjb_ident/dynamic/spectral_lines/"))
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 IMPORT = ast.Import | ast.ImportFrom
@@ -81,12 +75,9 @@ def imported_files(tree: ast.AST, files: dict[str, str]) -> set[str]:
 
 @functools.cache
 def imports() -> dict[str, set[str]]:
-    """Which files each file imports; a package's own file only where it is meant itself, a result's pictures apart."""
+    """Which files each file imports; a package's own file only where it is meant itself."""
     dotted = {p.removesuffix(".py").removesuffix("/__init__").replace("/", "."): p for p in trees()}
     found = {path: imported_files(tree, dotted) - {path} for path, tree in trees().items()}
-    for path in SHOW_THEMSELVES:
-        at_top = imported_files(ast.Module([n for n in trees()[path].body if isinstance(n, IMPORT)], []), dotted)
-        found[path] = {f for f in found[path] if room(f) != "report" or f in at_top}
     # "from package import module" runs the package's file too, but does not ask it for anything
     return {path: {f for f in to if not f.endswith("/__init__.py") or asks(path, f)} for path, to in found.items()}
 
@@ -131,19 +122,19 @@ def test_no_files_import_each_other_in_a_circle():
     assert a_circle(imports()) == []
 
 
-def test_no_rooms_of_a_package_import_each_other_in_a_circle():
-    """Folders two deep: the rooms of `dynamic` and `diagnose` lean on each other, which the files' test watches."""
+def test_no_folders_import_each_other_in_a_circle():
+    """Every folder is a room; a file at the top of a package is one of its own, an `__init__` only hands names on."""
     edges: dict[str, set[str]] = {}
     for path, to in imports().items():
-        here = room_of_package(path)
-        if here and here != "tpjb_ident/check":  # it has its own wall below
-            edges.setdefault(here, set()).update({room_of_package(t) for t in to} - {here, ""})
+        if not path.endswith("__init__.py"):
+            here = folder(path)
+            edges.setdefault(here, set()).update({folder(t) for t in to if not t.endswith("__init__.py")} - {here})
     assert a_circle(edges) == []
 
 
-def room_of_package(path: str) -> str:
-    """Package and room of a file, "" of a file that stands in no room."""
-    return "/".join(path.split("/")[:2]) if path.count("/") > 1 else ""
+def folder(path: str) -> str:
+    """Folder of a file, the file itself where it stands at the top of a package."""
+    return path.rpartition("/")[0] if path.count("/") > 1 else path
 
 
 def test_rooms_know_only_what_they_may():
@@ -161,7 +152,7 @@ def test_rooms_know_only_what_they_may():
 
 
 def test_rooms_that_may_import_each_other_make_no_circle_but_the_named_one():
-    back = room(ONE_WAY_BACK[1])
+    back = room(ONE_WAY_BACK[1][0])
     assert (
         a_circle({here: to - ({back} if here == ONE_WAY_BACK[0] else set()) for here, to in MAY_IMPORT.items()}) == []
     )
