@@ -18,21 +18,6 @@ import numpy as np
 import pandas as pd
 
 from rigdata.operating_point import OperatingPoint
-from tests.studies.evidence.case import case_table
-from tests.studies.evidence.counts import SPECIAL, confusion_matrix
-from tests.studies.evidence.measures import closure_table, coverage_table, no_effect_p, power_table
-from tests.studies.evidence.next_tests import next_test_table, separations
-from tests.studies.evidence_cases import rows
-from tests.studies.pages import (
-    case_dots,
-    closure_boxes,
-    confusion_map,
-    coverage_dots,
-    next_test_dots,
-    outcome_bars,
-    p_values_line,
-    power_curves,
-)
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.clearance.polygon import corners
@@ -229,17 +214,6 @@ CASES = {
     "gap": lambda: plots.gap(GAPS),
     "gap_controls": lambda: plots.gap_controls(
         11.9, 1.2, {"best wrong effect": (6.3, 5.1, 7.7), "no-effect campaign": 1.04}, noise_floor=0.9
-    ),
-    "confusion": lambda: confusion_map.confusion(confusion_matrix(rows(), size=6.0), SPECIAL),
-    "power": lambda: power_curves.power(power_table(rows())),
-    "p_values": lambda: p_values_line.p_values(no_effect_p(rows()), 0.01),
-    "interval_coverage": lambda: coverage_dots.interval_coverage(coverage_table(rows())),
-    "closures": lambda: closure_boxes.closures(closure_table([r for r in rows() if "rung" not in r])),
-    "case_gaps": lambda: case_dots.case_gaps(case_table(rows())),
-    "next_tests": lambda: next_test_dots.next_tests(next_test_table(rows()), separations(rows())),
-    "outcomes": lambda: outcome_bars.outcomes(
-        {"hidden, d' = 6": {"named right": 7, "group right": 1, "consistent": 2, "named wrong": 1},
-         "left out": {"unexplained": 5, "group wrong": 1, "named wrong": 2}}, [11, 8]
     ),
 }  # fmt: skip
 

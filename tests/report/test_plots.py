@@ -32,9 +32,6 @@ from tpjb_ident.report.plots.residual_table import residual_frame
 
 #: Root mean square difference of grey levels, out of 255, that another freetype or anti-aliasing may make.
 TOLERANCE = 5.0
-#: Of the studies, which no command draws: seen in the whole run.
-STUDIES = [name for name in CASES if name not in plots.__all__]
-NAMES = [pytest.param(name, marks=pytest.mark.slow) if name in STUDIES else name for name in CASES]
 
 
 def kept(name):
@@ -50,11 +47,11 @@ def difference(one, other):
 
 
 def test_every_function_has_its_picture():
-    assert set(CASES) >= set(plots.__all__)
+    assert set(CASES) == set(plots.__all__)
     assert {p.stem for p in PICTURES.glob("*.png")} == set(CASES)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", CASES)
 def test_picture(name):
     assert difference(picture(name)[1], kept(name)) < TOLERANCE
 
@@ -76,7 +73,7 @@ def shown_ticks(axis):
     return [t.label1 for t in axis.get_major_ticks() if low - edge <= t.get_loc() <= high + edge]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", CASES)
 def test_all_text_lies_inside_and_says_its_unit(name):
     figure = picture(name)[0]
     width, height = figure.canvas.get_width_height()
@@ -99,7 +96,7 @@ UNITLESS = {"window, in the order of the runs", "robust weight", "multiple coher
             "fall of the squared misfit per point", "data set (ambiguous campaigns)"}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", CASES)
 def test_axes_have_units(name):
     for axes in picture(name)[0].axes:
         for text in (axes.get_xlabel(), axes.get_ylabel()):
@@ -108,7 +105,7 @@ def test_axes_have_units(name):
             }, text  # fmt: skip
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", CASES)
 def test_legends_do_not_cover_their_panels_nor_each_other(name):
     figure = picture(name)[0]
     boxes = [axes.get_legend().get_window_extent() for axes in figure.axes if axes.get_legend()]
@@ -120,7 +117,7 @@ def test_legends_do_not_cover_their_panels_nor_each_other(name):
             assert box.y0 > inside.y1 - 2 or box.y1 < inside.y0 + 2 or box.x0 > inside.x1 or box.x1 < inside.x0
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", CASES)
 def test_no_global_style(name):
     assert picture(name)[2]
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.campaign import Campaign
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
@@ -85,7 +86,7 @@ def _unit(draws: Mapping[str, FloatArray]) -> FloatArray:
     return np.broadcast_to(np.eye(2), (n, 2, 2))
 
 
-def systematic_sources(campaign: Any, n: int, seed: int) -> SystematicSources:
+def systematic_sources(campaign: Campaign, n: int, seed: int) -> SystematicSources:
     """Draw axes, delays and mass within what the manifest states, in pairs of opposite sign.
 
     Channels of one clock, or of one quantity where no clock is stated, share one device and so the error of its delay.
@@ -112,7 +113,7 @@ def systematic_sources(campaign: Any, n: int, seed: int) -> SystematicSources:
             delays[quantity] = np.stack([devices[c.clock or quantity] for c in channels], axis=1) * late
     uncertain = getattr(campaign, "mass_uncertainty", 0.0)
     mass = _pairs(rng, n, 1)[:, 0] * uncertain / campaign.housing_mass if uncertain else np.empty(0)
-    axes = {q: np.array([float(c.axis) for c in channels]) for q, channels in chosen.items()}
+    axes = {q: np.array([float(c.axis or 0.0) for c in channels]) for q, channels in chosen.items()}
     return SystematicSources(axes, turns, delays, mass)
 
 

@@ -8,19 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from rigdata.problem import Problem, RigDataError
 from rigdata.vector import inverse_directions
 from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.records.measured_run import MeasuredRun
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.records.slower_channels import SlowerChannel
 
 
-def compensated(result: RunPhasors, run: Any, slower: Mapping[str, SlowerChannel]) -> RunPhasors:
+def compensated(result: RunPhasors, run: MeasuredRun, slower: Mapping[str, SlowerChannel]) -> RunPhasors:
     """The run's phasors as channels without filters and delays would have given them.
 
     Parameters
@@ -51,7 +51,7 @@ def compensated(result: RunPhasors, run: Any, slower: Mapping[str, SlowerChannel
 
 
 def _undoing(
-    run: Any, quantity: str, slower: Mapping[str, SlowerChannel], frequencies: FloatArray, driven: int
+    run: MeasuredRun, quantity: str, slower: Mapping[str, SlowerChannel], frequencies: FloatArray, driven: int
 ) -> ComplexArray | None:
     """(n_lines, 2, 2) matrices on X, Y; None where no channel of the quantity has a response."""
     chosen = [c for c in run.channels.values() if c.quantity == quantity and getattr(c, "axis", None) is not None]
@@ -64,12 +64,12 @@ def _undoing(
             gains[:, k] *= _reached(response.at(frequencies), frequencies, driven, run, channel.name)
         if channel.name in slower:
             gains[:, k] *= slower[channel.name].at(frequencies)
-    axes = tuple(float(c.axis) for c in chosen)
+    axes = tuple(float(c.axis or 0.0) for c in chosen)
     readings = np.stack([np.cos(axes), np.sin(axes)], axis=1)
     return np.einsum("ac,lc,cb->lab", inverse_directions(axes), 1 / gains, readings)
 
 
-def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: Any, name: str) -> ComplexArray:
+def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: MeasuredRun, name: str) -> ComplexArray:
     """The gain, 1 at disturbing lines that a table does not reach."""
     known = np.isfinite(gain) & (np.abs(gain) > 1e-6)
     if not known[:driven].all():

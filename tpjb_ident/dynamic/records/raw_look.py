@@ -6,8 +6,6 @@ limits, or sampled slower than the others.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from rigdata.calibration import VECTOR_QUANTITIES
@@ -15,6 +13,7 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.records.measured_run import MeasuredRun
 from tpjb_ident.dynamic.records.slower_channels import SlowerChannel, slower_channel
 
 #: Samples from the start that are looked at.
@@ -23,7 +22,7 @@ LOOK = 2**14
 CLIPPED = 0.05
 
 
-def look_at_readings(run: Any) -> tuple[dict[str, SlowerChannel], tuple[Condition, ...]]:
+def look_at_readings(run: MeasuredRun) -> tuple[dict[str, SlowerChannel], tuple[Condition, ...]]:
     """Channels that were sampled slower than the export, by name, and what to say of them.
 
     Parameters
@@ -36,7 +35,7 @@ def look_at_readings(run: Any) -> tuple[dict[str, SlowerChannel], tuple[Conditio
     RigDataError
         A channel is clipped: its phasors are those of another signal.
     """
-    if type(run) is not Run:
+    if not isinstance(run, Run):
         return {}, ()
     names = [c.name for c in run.channels.values() if c.quantity in VECTOR_QUANTITIES and c.axis is not None]
     readings = run.reader.read(names, 0, min(run.length, LOOK))

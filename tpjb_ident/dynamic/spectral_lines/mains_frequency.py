@@ -7,11 +7,12 @@ other. So only then a few records are looked at, those in which nothing else sta
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
+from rigdata.run import Run
 from tpjb_ident.arrays import FloatArray
 
 CHOICES = (50.0, 60.0)
@@ -25,7 +26,7 @@ CLEAR = 6.0
 APART = 1.0
 
 
-def mains_frequency(campaign: Any, usual: float) -> float:
+def mains_frequency(campaign: Campaign, usual: float) -> float:
     """Frequency of the mains [Hz].
 
     Parameters
@@ -48,7 +49,7 @@ def mains_frequency(campaign: Any, usual: float) -> float:
     return best
 
 
-def _votes(runs: Sequence[Any], choice: float) -> int:
+def _votes(runs: Sequence[Run], choice: float) -> int:
     """In how many runs a line stands at `choice` where nothing else does."""
     count = seen = 0
     for run in runs:
@@ -65,7 +66,7 @@ def _votes(runs: Sequence[Any], choice: float) -> int:
     return count
 
 
-def _stands_out(run: Any, choice: float) -> bool | None:
+def _stands_out(run: Run, choice: float) -> bool | None:
     try:
         rate, length = run.sample_rate, min(run.length, LOOK)
         if rate < 3 * choice or length < rate:
