@@ -77,7 +77,9 @@ def test_a_former_result_survives_a_disk_that_has_become_full(tmp_path):
 
 
 def test_a_campaign_on_a_read_only_disk_gives_the_same_bits(small_campaign, tmp_path):
-    folder = small_campaign.parent
+    folder = tmp_path / "campaign"  # of its own: the shared one lies above the results
+    folder.mkdir()
+    small_campaign = Path(shutil.copy(small_campaign, folder))
     before = hashlib.sha256(small_campaign.read_bytes()).hexdigest()
     sealed = f"mount --bind {folder} {folder} && mount -o remount,ro,bind {folder} && ! touch {folder}/x 2>/dev/null"
     for name, mounting in (("sealed", sealed), ("open", "true")):

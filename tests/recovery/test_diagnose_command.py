@@ -52,7 +52,8 @@ def test_the_effects_file_is_read_by_predict_and_changes_what_the_cells_show(dia
 
 def test_the_page_stands_alone_and_the_record_vouches_for_it(diagnosed):
     page = (diagnosed / "report.html").read_text(encoding="utf-8")
-    assert "loadcell_crosstalk" in page
+    assert "The load cells hand" in page  # the finding in words, not the effect's name in code
+    assert "of each force to the other axis" in page
     assert 'src="http' not in page
     assert list((diagnosed / "figures").glob("*.svg"))
     assert tpjb("verify", diagnosed).exit_code == 0
