@@ -24,7 +24,7 @@ from model.statics.tilt_hold import tilt_hold
 #: and another one stands elsewhere.
 EDGE = 0.03
 #: Within this share of it the table is made anew for the film's present temperature. Made once only, one bearing of
-#: 1200 is lost; 0.03 and 0.3 do as well.
+#: 900 is lost; 0.03 and 0.3 do as well.
 NEAR_EDGE = 0.1
 #: How often a pad may take up and shed its load before it is left idle. With 3 one of 1200 is lost, 12 gains none.
 MAX_LOAD_CHANGES = 6
