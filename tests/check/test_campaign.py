@@ -172,6 +172,7 @@ def tiny(tmp_path, *faults, **truth):
     return check_campaign(tmp_path / "c.h5")
 
 
+@pytest.mark.slow
 def test_a_good_campaign_has_no_problem_and_progress_is_told(tmp_path):
     assert tiny(tmp_path) == []
     told = []
@@ -198,6 +199,7 @@ def test_every_problem_is_reported_not_just_the_first(tmp_path):
     assert all(p.what and p.cure and p.file for p in found)
 
 
+@pytest.mark.slow
 def test_shared_records_and_leftovers(tmp_path):
     import h5py
 

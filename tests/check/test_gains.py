@@ -285,6 +285,7 @@ def test_probe_centres_come_from_a_load_that_goes_around(tmp_path):
     assert probe_centres([]) == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shift", "told"), [(14e-6, False), (16e-6, True), (-60e-6, True)])
 def test_a_probe_that_steps_within_an_operating_point_is_told(tmp_path, shift, told):
     plan = replace(PLAN, locus=(), dry=(), clearance=())
@@ -293,6 +294,7 @@ def test_a_probe_that_steps_within_an_operating_point_is_told(tmp_path, shift, t
     assert found == ([(RUN, "channel X1B")] if told else [])
 
 
+@pytest.mark.slow
 def test_the_check_names_channel_and_gain_of_one_run(tmp_path):
     path = written(
         tmp_path / "c.h5", stiff_rig(5, Fault("scaled", RUN, "X1A", value=1.03), plan=replace(PLAN, locus=(), dry=()))

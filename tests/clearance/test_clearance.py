@@ -199,6 +199,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_sweep_that_is_none_is_refused(tmp_path, name):
     source, _ = made(tmp_path / "c.h5", faults=(FAULTS[name],))

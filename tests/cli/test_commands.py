@@ -70,6 +70,7 @@ def test_version():
     assert tpjb("--version").stdout.startswith("tpjb-ident 0.")
 
 
+@pytest.mark.slow
 def test_check_writes_its_findings(small_campaign, tmp_path):
     result = tpjb("check", small_campaign, "--out", tmp_path / "out")
     found = json.loads((tmp_path / "out" / "check.json").read_text(encoding="utf-8"))
@@ -79,6 +80,7 @@ def test_check_writes_its_findings(small_campaign, tmp_path):
     assert found["counts"]["error"] == 0
 
 
+@pytest.mark.slow
 def test_check_lists_every_error_and_exits_2(small_campaign, tmp_path):
     import h5py
 
@@ -136,6 +138,7 @@ def test_one_direction_is_no_answer_and_exits_3(small_campaign, tmp_path):
     assert (tmp_path / "out" / "coefficients.csv").exists()
 
 
+@pytest.mark.slow
 def test_locus_and_clearance(small_campaign, tmp_path):
     result = tpjb("locus", small_campaign, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output

@@ -63,6 +63,7 @@ def test_json_holds_no_nan(told_as_json):
     json.loads(told_as_json.stdout, parse_constant=refuse)
 
 
+@pytest.mark.slow
 def test_quiet_says_nothing_when_all_is_well_and_errors_when_not(small_campaign, tmp_path):
     result = tpjb("locus", small_campaign, "--out", tmp_path / "o", "--quiet")
     assert result.exit_code == 0
@@ -122,6 +123,7 @@ def complete(words: str) -> list[str]:
     return asked_by_shell("complete_bash", **words_typed(words)).split()
 
 
+@pytest.mark.slow
 def test_the_shell_completes_commands_options_and_values():
     # once as the shell itself does it
     environment = {**os.environ, "_TPJB_COMPLETE": "complete_bash", **words_typed("tpjb iden")}
@@ -193,6 +195,7 @@ def test_init_of_nothing(tmp_path):
 # show
 
 
+@pytest.mark.slow
 def test_show_lists_runs_and_channels(small_campaign):
     assert "d-02500-25-01" in tpjb("show", small_campaign).stdout
     shown = tpjb("show", small_campaign, "--run", "d-02500-25-01").stdout

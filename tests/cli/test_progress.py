@@ -46,6 +46,7 @@ def test_what_the_first_one_had_to_compile_is_not_foretold_of_the_rest(lines):
     assert lines(92.0, 5, 14)[-1] == "identifying: 5 of 14, about 1 min left (d-1)"
 
 
+@pytest.mark.slow
 def test_a_check_tells_how_many_runs_it_has_read(small_campaign, tmp_path, monkeypatch):
     monkeypatch.setattr(show, "LINE_EVERY", 0.0)
     result = tpjb("check", small_campaign, "--out", tmp_path / "out")

@@ -10,6 +10,7 @@ from rigdata.virtual_rig import Instruments, RigPlan, RigTruth, VirtualRig, oper
 from tpjb_ident.diagnose.observations.housing import cell_stiffness
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [(4e8, 6e8), (1.5e9, 8e8)])
 def test_cell_stiffness_is_read_from_the_records(tmp_path, stiffness):
     plan = RigPlan(dynamic=operating_points([(5000.0, 40.0)]))

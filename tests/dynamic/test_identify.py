@@ -242,6 +242,7 @@ class DriftingRun(HeldRun):
         return replace(record, values=record.values + 2 * np.pi * (turns + self.drift * record.time))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tach_noise", [0.05, None])
 def test_a_drifting_shaft_is_followed_by_its_runout(tach_noise):
     class Run(DriftingRun):
@@ -337,6 +338,7 @@ def test_memory_does_not_grow_with_the_record():
     assert peak < 80e6
 
 
+@pytest.mark.slow
 def test_cells_ten_times_off_in_all_runs_make_every_point_doubtful(tmp_path):
     wrong = replace(rig([(3500.0, 25.0)], seed=12), faults=(Fault("scaled", "*", "L1*", value=0.1),))
     write_campaign(tmp_path / "c.h5", wrong)

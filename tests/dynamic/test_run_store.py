@@ -91,6 +91,7 @@ def same(first, second) -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_finished_runs_are_not_repeated_and_come_back_bit_for_bit(path, whole, tmp_path, counted):
     campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
     with pytest.raises(KeyboardInterrupt):
@@ -107,6 +108,7 @@ def test_finished_runs_are_not_repeated_and_come_back_bit_for_bit(path, whole, t
     assert not (tmp_path / "kept").exists()
 
 
+@pytest.mark.slow
 def test_what_waits_on_disk_comes_back_bit_for_bit(path, whole, tmp_path, monkeypatch, counted):
     campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
     monkeypatch.setattr(finished_runs, "ROOM", 0)  # as if the campaign were large
@@ -145,6 +147,7 @@ def test_what_has_changed_is_done_again(path, tmp_path, counted):
     assert len(counted) == 6
 
 
+@pytest.mark.slow
 def test_a_damaged_or_foreign_file_is_no_result(path, tmp_path, counted):
     campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
     whole = all_runs(campaign, settings, silent, store=store)

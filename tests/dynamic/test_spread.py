@@ -441,6 +441,7 @@ def test_information_of_unit_weights_is_the_gram_matrix():
     np.testing.assert_allclose(information(D, D, inverse), np.kron(np.eye(2), D.conj().T @ D), atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("q", "enough"), [(1, 8), (2, 8), (3, 10), (4, 12)])
 def test_a_robust_fit_takes_two_windows_more_than_twice_what_a_core_must_hold(q, enough):
     rng = np.random.default_rng(q)

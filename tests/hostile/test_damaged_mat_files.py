@@ -52,6 +52,7 @@ def test_a_type_that_is_none_is_refused_before_scipy_looks_it_up(good, kind):
         read_foreign(good, "a.mat")
 
 
+@pytest.mark.slow
 def test_any_changed_byte_ends_in_numbers_or_in_a_named_error(good):
     whole = good.read_bytes()
     rng = random.Random(5)

@@ -57,6 +57,7 @@ def feed_effects(text, folder):
     return str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BOMBS)
 @pytest.mark.parametrize("feed", [feed_manifest, feed_bearing, feed_pivots, feed_effects], ids=lambda f: f.__name__)
 def test_a_bomb_is_refused_at_once(feed, name, tmp_path):

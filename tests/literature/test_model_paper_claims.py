@@ -32,6 +32,7 @@ def test_soft_pivots_enlarge_the_locus():  # claim 7
     assert 1.05 < with_measured / with_kirk < 1.3
 
 
+@pytest.mark.slow
 def test_growth_of_stiffness_with_load():  # claim 8: "nearly 200 %", "about 50 %"
     up = paper.growth(paper.measured("rocker"))
     assert up[KYY] == pytest.approx(2.0, abs=0.4)
@@ -68,6 +69,7 @@ def test_damping_hardly_depends_on_load_but_the_spherical_cyy():  # claim 10
     assert (np.diff(ball) < 0.0).all()
 
 
+@pytest.mark.slow
 def test_pivots_alone_do_not_lower_kxx_by_the_paper_s_amount_but_wider_sides_do():  # claim 12
     assert np.abs(paper.over("rocker", (), KXX)).max() < 0.08
     wide = [paper.over("rocker", paper.wider_sides(d), KXX) for d in (10e-6, 15e-6, 20e-6)]
@@ -93,6 +95,7 @@ def test_spherical_bearing_shows_the_sizes_of_the_rocker():  # claim 15
     assert (paper.over("spherical", (), CYY) > 1.8).all()
 
 
+@pytest.mark.slow
 def test_every_claim_has_a_row_with_a_verdict():
     claims = paper.all_claims()
     assert [c.number for c in claims] == list(range(1, 17))

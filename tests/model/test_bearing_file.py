@@ -93,6 +93,7 @@ def test_misspelt_keys_get_a_hint(text, section, key):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("section", "key"), [k for k in KEYS if k[1] != "kind"])
 @pytest.mark.parametrize("value", ['"3 parsnips"', '"1 s^7"', "true", '"1e999 mm"', '"nan mm"', '""', "{}"])
 def test_wrong_units_and_values_are_named(text, section, key, value):

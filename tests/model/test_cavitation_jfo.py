@@ -250,6 +250,7 @@ def test_plain_stiffness_is_the_derivative_of_the_discrete_force(wedge, filling)
         np.testing.assert_allclose(stiffness[:, k], want, atol=2e-6 * np.abs(stiffness).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("wedge", "filling"), CASES[1:])
 def test_stiffness_follows_the_fronts(wedge, filling):
     one = film((320, 12))

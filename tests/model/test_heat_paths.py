@@ -79,6 +79,7 @@ def test_heat_that_pads_take_is_what_their_solid_says(rocker):
     np.testing.assert_allclose(again, work.temperature, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_conduction_cools_and_a_pad_that_conducts_more_cools_more(rocker):
     hot = [run(rocker, thermal="tehd").max_temperature]
     for convection in (0.0, 500.0):

@@ -346,6 +346,7 @@ class TestStore:
         np.testing.assert_array_equal(first, second)
         assert [path.suffix for path in (tmp_path / "deep" / "folder").iterdir()] == [".npz"]
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("damage", [b"", b"not a zip", b"PK\x03\x04 cut off"])
     def test_damaged_file_is_solved_again(self, tmp_path, monkeypatch, counted, damage) -> None:
         monkeypatch.setenv("TPJB_CACHE", str(tmp_path))

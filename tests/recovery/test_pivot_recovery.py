@@ -102,6 +102,7 @@ def test_records_that_are_not_what_they_claim_are_refused(tmp_path):
         assert all(p.run and p.cure for p in caught.value.problems), fault
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "turn", "guess"),
     [
@@ -157,6 +158,7 @@ def test_a_pad_that_the_bearing_lacks(tmp_path):
         fit_pivots(source, ANGLES[:4])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROGRAMMES)
 def test_any_load_programme(tmp_path, name):
     law = Sphere(0.8)
@@ -196,6 +198,7 @@ def test_friction_shows_as_a_loop_and_is_taken_off(tmp_path):
     assert curve.hysteresis.energy == pytest.approx(np.trapezoid(width, load), rel=0.2)
 
 
+@pytest.mark.slow
 def test_up_and_down_in_two_runs_make_one_curve(tmp_path):
     law = Sphere()
     noise = Noise.like_samples()

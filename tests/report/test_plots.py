@@ -51,11 +51,13 @@ def test_every_function_has_its_picture():
     assert {p.stem for p in PICTURES.glob("*.png")} == set(CASES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_picture(name):
     assert difference(picture(name)[1], kept(name)) < TOLERANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pivot_stiffness", "clearance_and_locus", "coefficient", "gap"])
 def test_a_missing_or_other_curve_is_noticed(name):
     with default_style():
@@ -73,6 +75,7 @@ def shown_ticks(axis):
     return [t.label1 for t in axis.get_major_ticks() if low - edge <= t.get_loc() <= high + edge]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_all_text_lies_inside_and_says_its_unit(name):
     figure = picture(name)[0]

@@ -70,6 +70,7 @@ PREAMBLE = "HBM catman; Prüfstand\r\nDatum: 14.03.2019; 09:41\r\n\r\nKanäle;3;
 UNITS = "s;µm;µm\r\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("decimal", [",", "."])
 @pytest.mark.parametrize("end", ["\r\n", "\n", "\r"])
 @pytest.mark.parametrize("delimiter", [";", "\t", ",", "|", " "])
@@ -309,6 +310,7 @@ CELLS = st.one_of(
 )
 
 
+@pytest.mark.slow
 @given(
     rows=st.lists(st.tuples(CELLS, CELLS), min_size=1, max_size=20),
     delimiter=st.sampled_from([";", "\t", "|"]),
@@ -337,6 +339,7 @@ def _number(cell: str) -> float:
     return value if abs(value) < 1e30 else float("nan")
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=400))
 @settings(max_examples=40, deadline=None)
 def test_any_bytes_are_read_or_refused(tmp_path_factory, data):

@@ -169,6 +169,7 @@ FILE_FAULTS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("layout", "fault"), FILE_FAULTS, ids=lambda v: v if isinstance(v, str) else v.kind)
 def test_the_reader_reports_file_faults_of_that_run_only(tmp_path, layout, fault):
     target = tmp_path / ("c.h5" if layout == "hdf5" else "c")

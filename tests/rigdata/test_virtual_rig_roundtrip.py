@@ -77,6 +77,7 @@ def quiet(tmp_path_factory):
     return campaign
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_noise_free_records_give_back_the_stiffness(quiet, layout):
     runs = quiet(layout).of_kind("dynamic")
@@ -96,6 +97,7 @@ def test_the_check_finds_nothing_in_a_sound_campaign(tmp_path, layout):
     assert check_campaign(target) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_means_temperatures_and_speed_come_back(tmp_path, layout):
     rig = quiet_rig(instruments=Instruments.like_paper())

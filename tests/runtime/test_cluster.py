@@ -163,6 +163,7 @@ def test_a_client_killed_half_way_is_taken_up_where_it_stopped(cluster, campaign
         assert (out / f"{name}.csv").read_bytes() == (alone / f"{name}.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_named():
     answer = r"no Dask scheduler answers at tcp://127\.0\.0\.1:9 .*dask scheduler"
     with pytest.raises(ClusterError, match=answer), dask_workers("tcp://127.0.0.1:9", patience=1.0):

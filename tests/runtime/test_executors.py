@@ -86,6 +86,7 @@ def test_answers_stand_in_order_even_if_they_end_in_another():
     assert list(in_order(workers, doubled, jobs(8))) == [2 * i for i in range(8)]
 
 
+@pytest.mark.slow
 def test_here_and_in_processes_alike(two):
     shared = {"offset": 100}
     for workers in (InProcessWorkers(), two):
@@ -94,6 +95,7 @@ def test_here_and_in_processes_alike(two):
         assert list(in_order(workers, doubled, [])) == []
 
 
+@pytest.mark.slow
 def test_the_first_error_in_order_is_raised_where_it_stands(two):
     for workers in (InProcessWorkers(), two):
         answers = in_order(workers, refused, jobs(8))
@@ -112,6 +114,7 @@ def test_an_error_that_cannot_travel_comes_as_its_text(two):
         list(in_order(two, has_own_class, [()]))
 
 
+@pytest.mark.slow
 def test_a_killed_process_loses_nothing(tmp_path):
     with local_workers(2) as workers:
         assert list(in_order(workers, dies_once, [(str(tmp_path), i) for i in range(12)])) == [3 * i for i in range(12)]

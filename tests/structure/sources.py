@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import functools
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -15,6 +16,30 @@ Spoken = ast.Import | ast.ImportFrom | ast.Call
 def relative(path: Path) -> str:
     """Path from the checkout, with slashes."""
     return path.relative_to(ROOT).as_posix()
+
+
+@functools.cache
+def trees() -> dict[str, ast.Module]:
+    """Every source of the three packages, parsed, by its path."""
+    return {relative(p): ast.parse(p.read_text(encoding="utf-8")) for p in SOURCES}
+
+
+def statements(tree: ast.AST) -> Iterator[ast.stmt]:
+    """Every statement of `tree` at any depth; what stands inside expressions is not visited (a tenth of the nodes).
+
+    What is imported for types only is left out.
+    """
+    waiting = [tree]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.stmt):
+            yield node
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            waiting += node.orelse
+            continue
+        for part in ("body", "orelse", "finalbody", "handlers", "cases"):
+            below = getattr(node, part, ())
+            waiting += below if isinstance(below, list) else ()
 
 
 @functools.cache

@@ -49,6 +49,7 @@ def working(version: str) -> str | None:
     return old if old and subprocess.run([old, "-c", "pass"], capture_output=True).returncode == 0 else None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("entry", ENTRIES)
 @pytest.mark.parametrize("version", ["python2", "python3.6", "python3.8", "python3.10"])
 def test_an_old_python_gets_a_sentence(entry, version):

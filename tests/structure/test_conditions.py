@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.structure.sources import imports_and_calls
 from tpjb_ident.condition_kinds import ERRORS, KINDS, NOTES, WARNINGS, UnknownConditionError
 from tpjb_ident.conditions import Condition, merged, sentences, untrusted
 
@@ -16,7 +17,7 @@ PACKAGE = Path(__file__).parents[2] / "tpjb_ident"
 
 def stated_names(source):
     """Names that a module states in calls of `Condition(..)`."""
-    for node in ast.walk(ast.parse(source)):
+    for node in imports_and_calls(source):
         made = isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Condition" and node.args
         if made and isinstance(getattr(node.args[0], "value", None), str):
             yield node.args[0].value

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-from pathlib import Path
 
 import pytest
 
@@ -11,10 +10,10 @@ from rigdata.errors import RigError
 from rigdata.near_names import nearest_name
 from rigdata.problem import RigDataError
 from rigdata.units import UnitError
+from tests.structure.sources import statements, trees
 from tpjb_ident.dynamic.estimators.rlm import ComplexInputError
 from tpjb_ident.errors import TpjbError
 
-ROOT = Path(__file__).parents[2]
 #: Classes that are no refusals: a mistake of the code, and an answer that is not to be trusted.
 NO_REFUSALS = {"UnknownConditionError", "NotTrustedError"}
 
@@ -24,8 +23,8 @@ NO_REFUSALS = {"UnknownConditionError", "NotTrustedError"}
 )
 def test_every_error_class_of_a_package_has_its_one_base(package, base):
     bases = {}
-    for path in (ROOT / package).rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for tree in (tree for path, tree in trees().items() if path.startswith(f"{package}/")):
+        for node in statements(tree):
             if isinstance(node, ast.ClassDef) and node.name.endswith("Error") and node.bases:
                 bases[node.name] = {getattr(b, "id", "") for b in node.bases}
     assert base in bases

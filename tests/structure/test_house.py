@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.structure.sources import ROOT, SOURCES, relative
+from tests.structure.sources import ROOT, SOURCES, relative, statements, trees
 
 FILES_A_FOLDER, LINES_A_FILE, LINES_A_FUNCTION, PARAMETERS = 20, 400, 60, 6
 #: Folders with more: the catalogue of effects, and three that are a file or two over.
@@ -44,32 +44,17 @@ MAY_IMPORT = {
 ONE_WAY_BACK = ("check", ("tpjb_ident/dynamic/records/", "tpjb_ident/dynamic/spectral_lines/"))
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
-IMPORT = ast.Import | ast.ImportFrom
-
-
-@functools.cache
-def trees() -> dict[str, ast.Module]:
-    """Every source of the three packages, parsed, by its path."""
-    return {relative(p): ast.parse(p.read_text(encoding="utf-8")) for p in SOURCES}
-
-
-def is_for_types_only(node: ast.AST) -> bool:
-    return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
 
 
 def imported_files(tree: ast.AST, files: dict[str, str]) -> set[str]:
     """Files (values of `files`, by dotted name) that a tree imports at any depth, types apart."""
-    found, waiting = set(), [tree]
-    while waiting:
-        node = waiting.pop()
-        if is_for_types_only(node):
-            continue
+    found = set()
+    for node in statements(tree):
         if isinstance(node, ast.ImportFrom):
             names = [n for a in node.names for n in (f"{node.module}.{a.name}", str(node.module)) if n in files]
             found.update(files[n] for n in names)
         elif isinstance(node, ast.Import):
             found.update(files[a.name] for a in node.names if a.name in files)
-        waiting += ast.iter_child_nodes(node)
     return found
 
 
@@ -85,7 +70,7 @@ def imports() -> dict[str, set[str]]:
 def asks(path: str, package_file: str) -> bool:
     """Tell whether `path` takes a name from a package's own file, not one of its modules."""
     package = package_file.removesuffix("/__init__.py")
-    taken = [n for n in ast.walk(trees()[path]) if isinstance(n, ast.ImportFrom)]
+    taken = [n for n in statements(trees()[path]) if isinstance(n, ast.ImportFrom)]
     names = [a.name for n in taken if n.module == package.replace("/", ".") for a in n.names]
     return any(f"{package}/{n}.py" not in trees() and f"{package}/{n}/__init__.py" not in trees() for n in names)
 
@@ -162,7 +147,7 @@ def test_tests_and_studies_stay_out_of_the_wheel_and_of_the_product():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     assert project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"] == ["rigdata", "model", "tpjb_ident"]
     for path, tree in trees().items():
-        for node in ast.walk(tree):
+        for node in statements(tree):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
             assert not [n for n in names if n.split(".")[0] == "tests"], path
@@ -183,7 +168,7 @@ def test_files_are_short_enough_to_be_read():
 
 def functions() -> Iterator[tuple[str, Function]]:
     for path, tree in trees().items():
-        for node in ast.walk(tree):
+        for node in statements(tree):
             if isinstance(node, Function):
                 yield path, node
 

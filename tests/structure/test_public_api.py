@@ -75,6 +75,7 @@ def test_the_names_are_the_public_ones_only():
     assert set(dir(ti)) == set(ti.__all__)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", ["", "import tpjb_ident.diagnose.search.fit, tpjb_ident.export.points\n"])
 def test_a_package_that_bears_the_name_of_a_function_is_called_whatever_was_imported_first(first):
     code = (
