@@ -40,7 +40,18 @@ class AnalogFilter:
     corner: float
 
     def at(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Complex gain at `frequency` (n,) [Hz]."""
+        """Complex gain at `frequency` (n,) [Hz].
+
+        Parameters
+        ----------
+        frequency : array, shape (n,)
+            Frequencies [Hz].
+
+        Returns
+        -------
+        array, shape (n,)
+            Complex gain.
+        """
         from scipy.signal import bessel, butter, freqs_zpk
 
         corner = 2 * math.pi * self.corner
@@ -53,6 +64,16 @@ class AnalogFilter:
 
 def parse_filter(text: str) -> AnalogFilter:
     """Read ``"bessel 4 low 800 Hz"``.
+
+    Parameters
+    ----------
+    text : str
+        Family, order, side and corner with its unit.
+
+    Returns
+    -------
+    AnalogFilter
+        The filter.
 
     Raises
     ------
@@ -88,7 +109,18 @@ class ResponseTable:
     phase: tuple[float, ...]
 
     def at(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Complex gain at `frequency` (n,) [Hz], linear between the lines of the table, NaN outside it."""
+        """Complex gain at `frequency` (n,) [Hz], linear between the lines of the table, NaN outside it.
+
+        Parameters
+        ----------
+        frequency : array, shape (n,)
+            Frequencies [Hz].
+
+        Returns
+        -------
+        array, shape (n,)
+            Complex gain.
+        """
         f = np.asarray(frequency, dtype=float)
         gain = np.interp(f, self.frequency, self.gain, left=np.nan, right=np.nan)
         phase = np.interp(f, self.frequency, self.phase)
@@ -97,6 +129,16 @@ class ResponseTable:
 
 def parse_response_table(text: str) -> ResponseTable:
     """Read a table of frequency_Hz, gain, phase_deg, one line each, separated by commas or semicolons.
+
+    Parameters
+    ----------
+    text : str
+        The whole table.
+
+    Returns
+    -------
+    ResponseTable
+        Frequencies [Hz], gain, phase [rad].
 
     Raises
     ------
@@ -142,7 +184,18 @@ class ChannelResponse:
         return bool(self.filters) or self.delay != 0.0
 
     def at(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """What a phasor at `frequency` (n,) [Hz] was multiplied by."""
+        """What a phasor at `frequency` (n,) [Hz] was multiplied by.
+
+        Parameters
+        ----------
+        frequency : array, shape (n,)
+            Frequencies [Hz].
+
+        Returns
+        -------
+        array, shape (n,)
+            Complex gain of delay and filters together.
+        """
         f = np.asarray(frequency, dtype=float)
         total = np.exp(-2j * math.pi * f * self.delay)
         for each in self.filters:

@@ -36,7 +36,13 @@ class Coefficient:
     meaning: str
 
     def column(self, entry: str) -> str:
-        """Name of the column of one entry, ``"xx"`` to ``"yy"``."""
+        """Name of the column of one entry, ``"xx"`` to ``"yy"``.
+
+        Parameters
+        ----------
+        entry : str
+            ``"xx"``, ``"xy"``, ``"yx"`` or ``"yy"``.
+        """
         return f"{self.symbol}{entry}_{self.suffix}"
 
     @property

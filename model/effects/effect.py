@@ -54,6 +54,18 @@ def _rebuild(name: str, parameters: dict[str, float]) -> Effect:
 def apply_effects(setup: Setup, effects: Iterable[Effect]) -> Setup:
     """Apply effects one after the other.
 
+    Parameters
+    ----------
+    setup : Setup
+        Bearing, oil, pivots and instruments as they are without the effects.
+    effects : iterable of Effect
+        In the order in which they are applied.
+
+    Returns
+    -------
+    Setup
+        A new one; `setup` is not changed.
+
     Raises
     ------
     EffectError

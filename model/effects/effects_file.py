@@ -16,6 +16,16 @@ def load_effects(path: str | Path) -> tuple[Effect, ...]:
     Parameters are SI numbers or quantities with units; further keys of a table (``lo``, ``hi``, ``prior``, ..) may
     stand in a sub-table and are not read.
 
+    Parameters
+    ----------
+    path : str or Path
+        TOML file.
+
+    Returns
+    -------
+    tuple of Effect
+        In the order of the file.
+
     Raises
     ------
     EffectError

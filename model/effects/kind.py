@@ -58,13 +58,25 @@ class Parameter:
     options: tuple[float, ...] = ()
 
     def to_linear(self, value: float) -> float:
-        """Value in the form in which the effect is nearly linear."""
+        """Value in the form in which the effect is nearly linear.
+
+        Parameters
+        ----------
+        value : float
+            Amplitude in the unit of the parameter.
+        """
         if self.form == "inverse":
             return 1.0 / value
         return value**2 if self.form == "square" else value
 
     def from_linear(self, form: float) -> float:
-        """Undo `to_linear`."""
+        """Undo `to_linear`.
+
+        Parameters
+        ----------
+        form : float
+            What `to_linear` gave.
+        """
         if self.form == "inverse":
             return 1.0 / form if form else math.inf
         return math.sqrt(max(form, 0.0)) if self.form == "square" else form
@@ -115,18 +127,40 @@ class EffectKind:
     obstacle: Callable[[Bearing], str] | None = None
 
     def parameters_of(self, pads: int) -> tuple[Parameter, ...]:
-        """Every parameter, for a bearing of `pads` pads."""
+        """Every parameter, for a bearing of `pads` pads.
+
+        Parameters
+        ----------
+        pads : int
+            Number of pads of the bearing.
+        """
         if self.per_pad is None:
             return self.parameters
         each = (replace(self.per_pad, name=f"{self.per_pad.name}_{k}") for k in range(1, pads + 1))
         return (*self.parameters, *each)
 
     def missing(self, bearing: Bearing) -> str:
-        """Why a bearing cannot have this effect; empty if it can."""
+        """Why a bearing cannot have this effect; empty if it can.
+
+        Parameters
+        ----------
+        bearing : Bearing
+            The bearing that the effect is to act on.
+        """
         return self.obstacle(bearing) if self.obstacle is not None else ""
 
     def check(self, values: Mapping[str, Any]) -> dict[str, float]:
         """Parameters as SI numbers, complete and within their bounds.
+
+        Parameters
+        ----------
+        values : mapping of str to float or quantity
+            Parameters by name; a text or pint quantity carries its unit, a number is SI.
+
+        Returns
+        -------
+        dict of str to float
+            SI numbers by name.
 
         Raises
         ------

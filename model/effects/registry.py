@@ -31,6 +31,11 @@ def known_effects() -> dict[str, EffectKind]:
 def kind_of(name: str) -> EffectKind:
     """Look an effect up.
 
+    Parameters
+    ----------
+    name : str
+        Canonical name of the effect.
+
     Raises
     ------
     EffectError
@@ -44,6 +49,16 @@ def kind_of(name: str) -> EffectKind:
 
 def register(kind: EffectKind) -> EffectKind:
     """Add an effect of your own to the library.
+
+    Parameters
+    ----------
+    kind : EffectKind
+        Its name, parameters and function.
+
+    Returns
+    -------
+    EffectKind
+        The same, so that it may be bound to a name.
 
     Raises
     ------

@@ -176,7 +176,17 @@ def heat_step(
 
 @compiled
 def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
-    """Heat made per station of length dx and control-volume height [W], full film; shape (nt + 1, nz + 1)."""
+    """Heat made per station of length dx and control-volume height [W], full film; shape (nt + 1, nz + 1).
+
+    Parameters
+    ----------
+    grid : FilmGrid
+        Mesh of the film.
+    work : FilmWork
+        Solved pressure, thickness and viscosity.
+    speed : float
+        Surface speed of the journal [m/s].
+    """
     p, h, mu = work.pressure, work.thickness, work.viscosity
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     out = np.empty((nt + 1, nz + 1))

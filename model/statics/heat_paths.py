@@ -39,7 +39,13 @@ BOUNDLESS = 1e30
 
 
 def couples_heat(setup: Setup) -> bool:
-    """Whether the films' temperatures depend on more than their own inlets."""
+    """Whether the films' temperatures depend on more than their own inlets.
+
+    Parameters
+    ----------
+    setup : Setup
+        Bearing with its options.
+    """
     return setup.thermal != "isothermal" and bool(
         setup.carryover or setup.options.conduction or setup.options.isothermal_journal
     )
@@ -113,6 +119,11 @@ class FilmHeat:
         """Temperature of a film with all else at zero, per kelvin of its inlet, and per kelvin of the journal.
 
         Shape (3, nt + 1, nz + 1); None if the film carries nothing.
+
+        Parameters
+        ----------
+        film : PadFilm
+            A film with its flows solved.
         """
         if film.forces is None:
             return None
@@ -169,6 +180,20 @@ def minimal_residual(apply: Callable[[FloatArray], FloatArray], right: FloatArra
     """Solve apply(x) = right by GMRES, in at most `KRYLOV_STEPS` steps, to a share `tolerance` of the right-hand side.
 
     NaN where `apply` grows beyond `BOUNDLESS`.
+
+    Parameters
+    ----------
+    apply : callable
+        Linear map of (n,) to (n,).
+    right : array, shape (n,)
+        Right-hand side.
+    tolerance : float
+        Share of its norm that may be left.
+
+    Returns
+    -------
+    array, shape (n,)
+        The solution.
 
     Notes
     -----
@@ -234,7 +259,20 @@ def _balance(setup: Setup, order: list[PadFilm], parts: list[FloatArray | None])
 
 
 def mixing_shares(order: list[PadFilm], fraction: float) -> list[float]:
-    """Share s of what a pad drinks that comes from the pad before it, for the pads in the order of rotation."""
+    """Share s of what a pad drinks that comes from the pad before it, for the pads in the order of rotation.
+
+    Parameters
+    ----------
+    order : list of PadFilm
+        Pads in the order of rotation.
+    fraction : float
+        Share of a pad's outflow that reaches the next pad, 0 to 1.
+
+    Returns
+    -------
+    list of float
+        One share for each pad, 0 to 1.
+    """
     if fraction == 0.0:
         return [0.0] * len(order)
     flows = [through_flow(film) for film in order]

@@ -35,7 +35,13 @@ def first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffn
 
 
 def own_method(method: str) -> str:
-    """A method that needs no instruments, the one asked for if it is such."""
+    """A method that needs no instruments, the one asked for if it is such.
+
+    Parameters
+    ----------
+    method : str
+        Name of an estimator, with its norm after a colon.
+    """
     return "mm-eiv" if method == "iv" else method.partition(":")[0]
 
 
@@ -149,7 +155,22 @@ def point_result(
 
 
 def all_methods(data: PointData, settings: IdentifySettings, differ: bool) -> dict[str, DynamicStiffness]:
-    """Every method that was asked for and applies, the default one in any case."""
+    """Every method that was asked for and applies, the default one in any case.
+
+    Parameters
+    ----------
+    data : PointData
+        Corrected windows of the point.
+    settings : IdentifySettings
+        Which methods are asked for.
+    differ : bool
+        Whether the runs differ by more than their windows scatter.
+
+    Returns
+    -------
+    dict of str to DynamicStiffness
+        One estimate for each method.
+    """
     drive = nominal_drive(data)
     table = phasor_table(data.D, data.F, data.run_index, drive)
     table = replace(table, directions_differ=differ)

@@ -119,7 +119,20 @@ def _solved(data: PointData, settings: PlainSettings) -> PlainPoint:
 
 
 def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.DataFrame:
-    """One row per operating point: ``plain.csv``."""
+    """One row per operating point: ``plain.csv``.
+
+    Parameters
+    ----------
+    points : sequence of PlainPoint
+        Results by Eq. (13)-(15) alone.
+    settings : PlainSettings
+        For the level of the intervals.
+
+    Returns
+    -------
+    DataFrame
+        Columns as in docs/results.md.
+    """
     import pandas as pd
 
     rows = []
@@ -137,7 +150,15 @@ def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.Dat
 
 
 def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:
-    """Write R and f of Eq. (15), one group per point, with the run of every window, as HDF5."""
+    """Write R and f of Eq. (15), one group per point, with the run of every window, as HDF5.
+
+    Parameters
+    ----------
+    path : Path
+        File to be written.
+    points : sequence of PlainPoint
+        Their R matrices are written as they were fitted.
+    """
     import h5py
 
     with h5py.File(path, "w") as file:

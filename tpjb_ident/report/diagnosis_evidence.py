@@ -12,7 +12,18 @@ if TYPE_CHECKING:
 
 
 def evidence_sections(verdict: Verdict) -> list[Section]:
-    """Sections of the report; those for which a diagnosis holds nothing are left out."""
+    """Sections of the report; those for which a diagnosis holds nothing are left out.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        What a diagnosis found.
+
+    Returns
+    -------
+    list of Section
+        In the order of the page.
+    """
     out = [Section("What is left", left_sentences(verdict))]
     if verdict.assumptions:
         note = (

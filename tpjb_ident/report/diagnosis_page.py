@@ -31,7 +31,26 @@ def write_diagnosis_report(
     settings: Mapping[str, Any],
     inputs: Mapping[str, str],
 ) -> Path:
-    """Write report.html and its figures into an existing folder."""
+    """Write report.html and its figures into an existing folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists already; what stands in it under the same names is replaced.
+    campaign : Campaign
+        The campaign that was diagnosed.
+    result : CampaignDiagnosis
+        Diagnosis with identification and setup.
+    settings : mapping
+        Settings of the command, for the last section.
+    inputs : mapping of str to str
+        Input files and their hashes.
+
+    Returns
+    -------
+    Path
+        The page.
+    """
     page = diagnosis_page(campaign, result, settings, inputs)
     texts = save_panels([panel for section in page.sections for panel in section.panels], folder / "figures")
     path = folder / "report.html"
@@ -42,7 +61,22 @@ def write_diagnosis_report(
 def diagnosis_page(
     campaign: Campaign, result: CampaignDiagnosis, settings: Mapping[str, Any], inputs: Mapping[str, str]
 ) -> Page:
-    """Gather the content of the report; see `write_diagnosis_report`."""
+    """Gather the content of the report; see `write_diagnosis_report`.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The campaign that was diagnosed.
+    result : CampaignDiagnosis
+        Diagnosis with identification and setup.
+    settings, inputs : mapping
+        As there.
+
+    Returns
+    -------
+    Page
+        To be rendered.
+    """
     verdict = result.diagnosis.verdict
     table = before_and_after(result.diagnosis, result.identification)
     answer, *more = verdict_sentences(campaign.id, verdict, median_deviations(table))

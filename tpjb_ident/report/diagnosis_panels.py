@@ -21,7 +21,18 @@ OVER: tuple[tuple[Literal["load", "frequency"], str, str], ...] = (
 
 
 def diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
-    """Draw the residuals over load, over frequency and as a map, and the gap by observable, before and after."""
+    """Draw the residuals over load, over frequency and as a map, and the gap by observable, before and after.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Diagnosis with its residuals.
+
+    Returns
+    -------
+    list of Panel
+        Those for which there are data.
+    """
     panels = []
     frame = residual_frame(diagnosis)
     for over, name, title in OVER:

@@ -22,7 +22,18 @@ Command = TypeVar("Command", bound=Callable[..., None])
 
 
 def guarded(command: Command) -> Command:
-    """Wrap a command: any end of it is a result, one clear message, or a named bug. Never a traceback."""
+    """Wrap a command: any end of it is a result, one clear message, or a named bug. Never a traceback.
+
+    Parameters
+    ----------
+    command : callable
+        A command of the command line.
+
+    Returns
+    -------
+    callable
+        The same command, to be registered.
+    """
 
     @functools.wraps(command)
     def wrapper(*args: Any, **kwargs: Any) -> None:
@@ -59,7 +70,18 @@ class _Sink:
 
 
 def bad_input_message(error: Exception) -> str | None:
-    """Say what is wrong with the input; None if `error` is no fault of the input."""
+    """Say what is wrong with the input; None if `error` is no fault of the input.
+
+    Parameters
+    ----------
+    error : Exception
+        What ended a command.
+
+    Returns
+    -------
+    str or None
+        One message with its cure.
+    """
     if _is_refusal(error):
         return str(error)
     if isinstance(error, OSError) and error.strerror:

@@ -121,7 +121,20 @@ class DynamicStiffness:
         return np.hypot(random, calibration)
 
     def interval(self, level: float = 0.95, systematic: bool = True) -> Interval:
-        """Interval of the eight entries; see `half_width` for the arguments."""
+        """Interval of the eight entries; see `half_width` for the arguments.
+
+        Parameters
+        ----------
+        level : float
+            Probability that the interval is to hold.
+        systematic : bool
+            Whether what does not scatter (calibration, axes, delays, ..) counts.
+
+        Returns
+        -------
+        Interval
+            Lower and upper bounds, shape (8,) each, real parts first [N/m].
+        """
         half = self.half_width(level, systematic)
         return Interval(self.vector - half, self.vector + half)
 

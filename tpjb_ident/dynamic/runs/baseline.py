@@ -36,7 +36,13 @@ class Baseline:
     conditions: tuple[Condition, ...] = field(default=())
 
     def at(self, omega: float) -> tuple[ComplexArray, FloatArray] | None:
-        """H (2, 2) and its covariance (8, 8) at `omega` [rad/s], linear between frequencies; None outside them."""
+        """H (2, 2) and its covariance (8, 8) at `omega` [rad/s], linear between frequencies; None outside them.
+
+        Parameters
+        ----------
+        omega : float
+            Angular frequency of excitation [rad/s].
+        """
         known = np.array([est.omega for est in self.estimates])
         if not len(known) or not 0.98 * known[0] <= omega <= 1.02 * known[-1]:
             return None
@@ -48,12 +54,29 @@ class Baseline:
         return (1 - t) * low.h + t * high.h, (1 - t) ** 2 * low.covariance + t**2 * high.covariance
 
     def taken_off(self, data: PointData) -> PointData:
-        """The point's windows with the film's force alone."""
+        """The point's windows with the film's force alone.
+
+        Parameters
+        ----------
+        data : PointData
+            Windows of the point; force as the cells tell it.
+
+        Returns
+        -------
+        PointData
+            A new one.
+        """
         found = self.at(data.omega)
         return data if found is None else replace(data, F=data.F - data.D @ found[0].T)
 
     def missing(self, data: PointData) -> tuple[Condition, ...]:
-        """Say where a campaign has a baseline, but not at a point's frequency."""
+        """Say where a campaign has a baseline, but not at a point's frequency.
+
+        Parameters
+        ----------
+        data : PointData
+            Windows of the point.
+        """
         if not self.estimates or self.at(data.omega) is not None:
             return ()
         low, high = (est.omega / (2 * np.pi) for est in (self.estimates[0], self.estimates[-1]))
@@ -61,7 +84,13 @@ class Baseline:
         return (Condition("baseline-missing", told),)
 
     def spread(self, data: PointData) -> dict[str, FloatArray]:
-        """Covariance (8, 8) that the baseline's own errors leave in H [N^2/m^2], by source."""
+        """Covariance (8, 8) that the baseline's own errors leave in H [N^2/m^2], by source.
+
+        Parameters
+        ----------
+        data : PointData
+            Windows of the point.
+        """
         found = self.at(data.omega)
         return {} if found is None else {"baseline": found[1]}
 

@@ -41,11 +41,23 @@ class Structure:
     direction: float
 
     def across(self, angle: float) -> float:
-        """What it moves a shaft across a pad at an angle [rad], per newton [m/N]."""
+        """What it moves a shaft across a pad at an angle [rad], per newton [m/N].
+
+        Parameters
+        ----------
+        angle : float
+            Angle of the pad [rad].
+        """
         return -0.5 * self.compliance * math.sin(2.0 * (angle - self.direction))
 
     def along(self, angle: float) -> float:
-        """What it moves at least along the pad [m/N]."""
+        """What it moves at least along the pad [m/N].
+
+        Parameters
+        ----------
+        angle : float
+            Angle of the pad [rad].
+        """
         return self.compliance * math.cos(angle - self.direction) ** 2
 
     def __str__(self) -> str:
