@@ -53,7 +53,7 @@ def main(arguments: list[str]) -> int:
     print(f"{python}: {' '.join(wanted)}", flush=True)
     pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     subprocess.run([*pip, *wanted], check=True)
-    subprocess.run([*pip, "--no-deps", "--no-build-isolation", "--editable", ROOT], check=True)
+    subprocess.run([*pip, "--no-deps", "--editable", ROOT], check=True)
     tests = [python, "-P", "-m", "pytest", "-n", "2", "--dist", "loadfile", "-m", "not slow", *OLD, *arguments]
     return subprocess.run(tests, cwd=ROOT, env={**os.environ, "OMP_NUM_THREADS": "1"}).returncode
 

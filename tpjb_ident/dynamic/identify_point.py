@@ -29,7 +29,20 @@ from tpjb_ident.dynamic.settings import IdentifySettings
 
 
 def first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffness:
-    """Estimate before any correction, for how H changes with load and how runs scatter; its weights are not needed."""
+    """Estimate before any correction, for how H changes with load and how runs scatter; its weights are not needed.
+
+    Parameters
+    ----------
+    data : PointData
+        Windows of the point.
+    settings : IdentifySettings
+        For the method.
+
+    Returns
+    -------
+    DynamicStiffness
+        Without weights.
+    """
     found = estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, own_method(settings.method))
     return replace(found, weights=np.empty((0, 2)))
 
@@ -126,7 +139,26 @@ def point_result(
     temperatures: dict[str, dict[int, float]],
     settings: IdentifySettings,
 ) -> PointResult:
-    """The point, made once, with everything that is known of it."""
+    """The point, made once, with everything that is known of it.
+
+    Parameters
+    ----------
+    data : PointData
+        Windows of the point as they were fitted.
+    figures : Figures
+        What the raw readings and the windows tell (amplitudes, noise, drift).
+    completion : Completion
+        Estimates of every method, with the whole budget.
+    temperatures : dict of str to dict of int to float
+        Mean [degC] of every sensor, by run.
+    settings : IdentifySettings
+        Which method is the one to be used.
+
+    Returns
+    -------
+    PointResult
+        All that is known of the point.
+    """
     positions = data.mean_positions
     return PointResult(
         point=data.point,
