@@ -7,11 +7,12 @@ import itertools
 import os
 import stat
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from rigdata.calibration import Channel
-from rigdata.manifest.manifest import MAX_MANIFEST, Manifest, parse_manifest
+from rigdata.manifest.manifest import MAX_MANIFEST, CsvSpec, Manifest, parse_manifest
 from rigdata.manifest.runs import RunEntry
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError
@@ -215,6 +216,35 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
             reader = CsvReader(target, entry.file, entry.id, manifest.csv, manifest.channels, rate, cache)
         runs.append(_make_run(entry, channels, reader))
     return _finish(manifest, folder, bearing, channels, runs, problems, files)
+
+
+def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
+    """The same test in another file: a repeat, or a record that landed under another name.
+
+    Parameters
+    ----------
+    run : Run
+        Of a campaign in a folder.
+    path : Path
+        Where the record is.
+    file : str
+        Its display name.
+    run_id : str
+        Id of the run that it becomes.
+    """
+    from rigdata.readers.formats.foreign import ForeignReader, is_foreign
+    from rigdata.readers.text.csv import CsvReader
+
+    old: Any = run.reader
+    reader: RunReader
+    if isinstance(old, CsvReader) and not is_foreign(path):
+        reader = replace(old, path=path, file=file, run=run_id)
+    elif is_foreign(path):
+        described = frozenset(old.channels if isinstance(old, CsvReader) else old.described)
+        reader = ForeignReader(path, file, run_id, described, old.stated_rate)
+    else:
+        reader = CsvReader(path, file, run_id, CsvSpec(), run.channels, old.stated_rate)
+    return replace(run, id=run_id, reader=reader)
 
 
 def _bearing_text(folder: Path, manifest: Manifest, file: str, files: dict[str, Path], problems: list[Problem]) -> str:

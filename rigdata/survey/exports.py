@@ -52,6 +52,25 @@ def record_files(folder: Path) -> list[Path]:
     RigDataError
         There are none, or absurdly many.
     """
+    found = records_below(folder)
+    if not found:
+        known = ", ".join((*TEXT, *FORMATS))
+        raise RigDataError(Problem("error", str(folder), "", "holds no records", f"Known are {known}"))
+    return found
+
+
+def records_below(folder: Path) -> list[Path]:
+    """Files below `folder` that may be records, none among them; hidden ones are left alone.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Raises
+    ------
+    RigDataError
+        There are absurdly many.
+    """
     known = (*TEXT, *FORMATS)
     found = []
     for path in sorted(folder.rglob("*")):
@@ -61,9 +80,6 @@ def record_files(folder: Path) -> list[Path]:
         if len(found) > MOST_FILES:
             problem = Problem("error", str(folder), "", f"holds more than {MOST_FILES} records", "Give a folder below")
             raise RigDataError(problem)
-    if not found:
-        problem = Problem("error", str(folder), "", "holds no records", f"Known are {', '.join(known)}")
-        raise RigDataError(problem)
     return found
 
 

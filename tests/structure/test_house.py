@@ -48,10 +48,11 @@ MAY_IMPORT = {
     "export": {"dynamic", "runtime"},
     "compare": {"rigdata", "model", "dynamic", "pivot", "clearance", "runtime"},
     "diagnose": {"rigdata", "model", "dynamic", "pivot", "clearance", "compare", "runtime"},
-    "report": {"rigdata", "dynamic", "pivot", "clearance", "compare", "diagnose", "runtime"},
+    "watch": {"rigdata", "check", "dynamic", "pivot", "clearance", "runtime"},
+    "report": {"rigdata", "dynamic", "pivot", "clearance", "compare", "diagnose", "runtime", "watch"},
     "view": {"rigdata", "runtime"},
     "cli": {"rigdata", "model", "check", "dynamic", "pivot", "clearance", "compare", "diagnose", "report", "export",
-            "view", "runtime"},
+            "view", "watch", "runtime"},
 }  # fmt: skip
 #: The one way back: a campaign is checked with the line fit and the oil force of identification, and with nothing else.
 ONE_WAY_BACK = ("check", ("tpjb_ident/dynamic/records/", "tpjb_ident/dynamic/spectral_lines/"))

@@ -47,10 +47,21 @@ def check_campaign(path: str | Path, progress: Progress | None = None) -> list[P
         seen.append(observe(run))
         if progress is not None:
             progress(count, len(campaign.runs))
-    return _sorted([*campaign.notes, *_judge(campaign, seen)])
+    findings: list[Finding] = [f for one in judged(campaign, seen) for f in one.report.found]
+    merged = merge(findings, campaign.path.name, campaign.runs)
+    return _sorted([*campaign.notes, *merged, *leftovers(campaign)])
 
 
-def _judge(campaign: Campaign, seen: Sequence[Observation]) -> list[Problem]:
+def judged(campaign: Campaign, seen: Sequence[Observation]) -> list[Observation]:
+    """Judge runs beside each other; what is found stands in the reports of the copies that are given back.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    seen : sequence of Observation
+        What `observe` gave of each run. Left as it is, so that it can be judged again beside more runs.
+    """
+    seen = [replace(one, report=one.report.copy()) for one in seen]
     of_kind = {k: [s for s in seen if s.run.kind == k] for k in ("dynamic", "dry_pivot", "locus", "clearance")}
     for one in seen:
         check_static_load(one)
@@ -67,8 +78,7 @@ def _judge(campaign: Campaign, seen: Sequence[Observation]) -> list[Problem]:
     check_sweeps(of_kind["clearance"])
     check_locus(of_kind["locus"])
     _check_duplicates(seen)
-    findings: list[Finding] = [f for one in seen for f in one.report.found]
-    return [*merge(findings, campaign.path.name, campaign.runs), *leftovers(campaign)]
+    return seen
 
 
 def _spread_doubts(seen: Sequence[Observation]) -> None:

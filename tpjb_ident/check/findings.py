@@ -42,6 +42,10 @@ class Reporter:
     found: list[Finding] = field(default_factory=list)
     doubts: set[str] = field(default_factory=set)
 
+    def copy(self) -> Reporter:
+        """A reporter that has found the same so far."""
+        return Reporter(self.run, list(self.found), set(self.doubts))
+
     def say(self, key: str, severity: Severity, place: str, what: str, cure: str) -> None:
         """Note a finding; `key` is the same for equal findings in other runs.
 

@@ -21,6 +21,7 @@ from tpjb_ident.cli.commands.show import show
 from tpjb_ident.cli.commands.simulate import simulate
 from tpjb_ident.cli.commands.verify import verify
 from tpjb_ident.cli.commands.view import view
+from tpjb_ident.cli.commands.watch import watch
 from tpjb_ident.cli.common.registration import add_command
 
 # plain help: the markup renderer costs more start-up time than all the rest together
@@ -51,7 +52,7 @@ def _common(
 
 COMMANDS = (
     init, show, check, identify, pivot, locus, predict, compare, diagnose, plan, simulate, demo, export, view,
-    verify,
+    watch, verify,
 )  # fmt: skip
 for command in COMMANDS:
     add_command(app, command)

@@ -71,6 +71,10 @@ class Page:
     sections : sequence of Section
     settings, inputs : mapping of str to str
         How it was made; SHA-256 of what it was made from.
+    refresh : int
+        Seconds after which a browser loads the page again; 0: never.
+    beside : str
+        What lies beside the page.
     """
 
     title: str
@@ -81,6 +85,8 @@ class Page:
     sections: Sequence[Section] = ()
     settings: Mapping[str, str] = field(default_factory=dict)
     inputs: Mapping[str, str] = field(default_factory=dict)
+    refresh: int = 0
+    beside: str = "Figures are beside this file as SVG and PNG, tables as CSV and Parquet."
 
 
 def render_page(page: Page, svg: Mapping[str, str]) -> str:

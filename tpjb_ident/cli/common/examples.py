@@ -38,5 +38,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         f'tpjb simulate {ROCKER} --load "5 kN" --excitation "10..50:10 Hz" --fault "dead run=d-* channel=X1A"',
     ),
     "verify": ("tpjb verify tpjb-identify-out", "tpjb verify tpjb-identify-out --input campaigns/rocker-A"),
+    "watch": ("tpjb watch records", 'tpjb watch records --once --within "3 %"'),
     "view": (f"tpjb view {DEMO}", "tpjb view tpjb-compare-out"),
 }

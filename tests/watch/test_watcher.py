@@ -1,0 +1,228 @@
+"""A campaign that grows: records land whole, in part, again, under other names; the manifest is edited meanwhile."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from rigdata.virtual_rig import Fault, write_campaign
+from tests.command_line import tpjb
+from tests.good_campaigns import rocker_rig
+from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.watch.landing import Landings
+from tpjb_ident.watch.measured import Measuring
+from tpjb_ident.watch.watcher import Watcher
+
+pytestmark = pytest.mark.slow
+DYNAMIC = [f"d-05000-25-0{i}" for i in (1, 2, 3)]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """The whole campaign as CSV: three dynamic runs, three of the locus, dry tests, a sweep."""
+    folder = tmp_path_factory.mktemp("watch") / "finished"
+    write_campaign(folder, rocker_rig(3), "csv")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def clipped(tmp_path_factory):
+    """The same with a probe that clips in the second dynamic run."""
+    folder = tmp_path_factory.mktemp("watch") / "clipped"
+    write_campaign(folder, rocker_rig(3, Fault("clipped", run=DYNAMIC[1], channel="X1B", value=0.6)), "csv")
+    return folder
+
+
+@pytest.fixture
+def live(finished, tmp_path):
+    """A campaign folder that holds its manifest and no record."""
+    folder = tmp_path / "live"
+    (folder / "runs").mkdir(parents=True)
+    for path in finished.glob("*.toml"):
+        shutil.copy(path, folder)
+    return folder
+
+
+def land(source, live, *runs):
+    for run in runs:
+        shutil.copy(source / "runs" / f"{run}.csv", live / "runs")
+
+
+def watcher(live, settle: float = 0.0) -> Watcher:
+    return Watcher(live, Landings(settle), Measuring(IdentifySettings()))
+
+
+def states(snapshot) -> dict[str, str]:
+    return {s.run.id: s.state for s in snapshot.states if s.state != "to run"}
+
+
+def test_records_are_judged_as_they_land_and_identified_with_the_second_direction(live, finished):
+    watch = watcher(live)
+    first = watch.look()
+    assert states(first) == {}
+    assert first.steps[-1].text.startswith("Next: d-05000-25-01, 5 kN at -90 deg, shaft 22 Hz, excited at 25 Hz")
+    assert watch.look() is None
+    land(finished, live, *DYNAMIC[:2])
+    second = watch.look()
+    assert states(second) == dict.fromkeys(DYNAMIC[:2], "good")
+    assert second.new == tuple(DYNAMIC[:2])
+    (point,) = second.measured.points
+    assert point.stiffness.k[1, 1] == pytest.approx(2.0e8, rel=0.03)
+    assert second.steps[-1].runs == (DYNAMIC[2],)
+
+
+def test_a_clipped_run_is_to_be_repeated_before_the_load_is_changed(live, finished, clipped):
+    watch = watcher(live)
+    land(finished, live, DYNAMIC[0])
+    land(clipped, live, DYNAMIC[1])
+    step = watch.look().steps[0]
+    assert step.kind == "repeat"
+    assert step.text.startswith(f"Repeat {DYNAMIC[1]} before you change the load: channel X1B")
+    assert "clipped" in step.text
+    shutil.copy(finished / "runs" / f"{DYNAMIC[1]}.csv", live / "runs" / f"{DYNAMIC[1]}_2.csv")
+    after = watch.look()
+    assert states(after)[DYNAMIC[1]] == "replaced"
+    assert states(after)[f"{DYNAMIC[1]}_2"] == "good"
+    assert [s.kind for s in after.steps] == ["next"]
+
+
+def test_a_record_that_was_cut_off_is_named_and_mends_itself_when_the_rest_comes(live, finished):
+    watch = watcher(live)
+    land(finished, live, *DYNAMIC)
+    whole = (finished / "runs" / f"{DYNAMIC[2]}.csv").read_bytes()
+    (live / "runs" / f"{DYNAMIC[2]}.csv").write_bytes(whole[: len(whole) // 3])
+    cut = watch.look()
+    assert states(cut)[DYNAMIC[2]] == "repeat"
+    assert "cut off, or not written to its end" in cut.steps[0].text
+    (live / "runs" / f"{DYNAMIC[2]}.csv").write_bytes(whole)
+    assert states(watch.look()) == dict.fromkeys(DYNAMIC, "good")
+
+
+def test_a_file_that_is_being_written_is_neither_judged_nor_missing(live, finished):
+    watch = watcher(live, settle=60.0)
+    land(finished, live, DYNAMIC[0])
+    assert states(watch.look()) == {DYNAMIC[0]: "being written"}
+    assert watch.waits
+
+
+def test_records_under_other_names_are_placed_by_load_line_and_direction(live, finished):
+    watch = watcher(live)
+    shutil.copy(finished / "runs" / f"{DYNAMIC[1]}.csv", live / "runs" / "Record_0017.csv")
+    snapshot = watch.look()
+    (placed,) = snapshot.placed
+    assert (placed.like, placed.why) == (DYNAMIC[1], f"is {DYNAMIC[1]} by load and line")
+    assert states(snapshot) == {"Record_0017": "good"}
+    assert DYNAMIC[1] not in {s.run.id for s in snapshot.states}
+
+
+def test_a_record_that_fits_no_run_is_told_and_harms_nothing(live, finished):
+    watch = watcher(live)
+    land(finished, live, *DYNAMIC)
+    (live / "runs" / "notes.csv").write_text("this is no record\n")
+    snapshot = watch.look()
+    assert [p.file for p in snapshot.problems] == ["runs/notes.csv"]
+    assert len(snapshot.measured.points) == 1
+
+
+def test_a_manifest_that_is_being_edited_stops_nothing(live, finished):
+    watch = watcher(live)
+    land(finished, live, *DYNAMIC)
+    watch.look()
+    manifest = live / "campaign.toml"
+    text = manifest.read_text("utf-8")
+    manifest.write_text(text[: len(text) // 2])
+    snapshot = watch.look()
+    assert states(snapshot) == dict.fromkeys(DYNAMIC, "good")
+    assert "goes on with the last one" in str(snapshot.problems[0])
+    manifest.write_text(text)
+    assert not watch.look().problems
+
+
+def test_a_record_that_is_taken_away_is_to_be_run_again(live, finished):
+    watch = watcher(live)
+    land(finished, live, *DYNAMIC)
+    watch.look()
+    (live / "runs" / f"{DYNAMIC[0]}.csv").unlink()
+    snapshot = watch.look()
+    assert DYNAMIC[0] not in states(snapshot)
+    assert snapshot.measured.points[0].n_records == 2
+
+
+def test_a_share_that_is_away_for_a_while_loses_nothing(live, finished):
+    watch = watcher(live)
+    land(finished, live, *DYNAMIC)
+    watch.look()
+    away = live.rename(live.with_name("away"))
+    assert watch.look() is None
+    away.rename(live)
+    assert watch.look() is None
+
+
+def test_a_probe_that_is_dead_in_two_records_in_a_row_stops_the_campaign(live, finished, tmp_path):
+    dead = tmp_path / "dead"
+    write_campaign(dead, rocker_rig(3, Fault("dead", run="d-*", channel="X1B")), "csv")
+    land(finished, live, DYNAMIC[0])
+    for i, run in enumerate(DYNAMIC[1:]):
+        land(dead, live, run)
+        os.utime(live / "runs" / f"{run}.csv", (time.time() + i + 1,) * 2)
+    stop = watcher(live).look().steps[0]
+    assert stop.kind == "stop"
+    assert stop.text.startswith("Stop: channel X1B: is dead")
+    assert stop.runs == tuple(DYNAMIC[1:])
+
+
+def test_the_command_tells_scripts_by_its_exit_code(live, finished, clipped, tmp_path):
+    land(finished, live, *DYNAMIC)
+    words = ("watch", live, "--once", "--settle", "0 s", "--within", "0.01 %", "--out", tmp_path / "out")
+    good = tpjb(*words)
+    assert good.exit_code == 0, good.output
+    assert "more record" in good.stdout or "calibration sets that" in good.stdout
+    land(clipped, live, DYNAMIC[1])
+    bad = tpjb(*words)
+    assert bad.exit_code == 3
+    page = (tmp_path / "out" / "watch.html").read_text("utf-8")
+    assert f"Repeat {DYNAMIC[1]} before you change the load" in page
+    document = json.loads((tmp_path / "out" / "watch.json").read_text("utf-8"))
+    assert {r["id"]: r["state"] for r in document["runs"]}[DYNAMIC[1]] == "repeat"
+
+
+def test_killed_again_and_again_while_records_are_being_written_it_ends_with_the_same(live, finished, tmp_path):
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "tpjb_ident", "watch", str(live), "--out", str(out)]
+    watching = ["--every", "0.1 s", "--settle", "0.2 s"]
+    records = sorted((finished / "runs").glob("*.csv"))
+    for number, record in enumerate(records):
+        data = record.read_bytes()
+        half = len(data) // 2
+        with (live / "runs" / record.name).open("wb", buffering=0) as file:
+            file.write(data[:half])
+            if number % 4 == 1:
+                process = subprocess.Popen([*command, *watching], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                time.sleep(1.5 + 0.5 * (number % 3))
+            file.write(data[half:])
+        if number % 4 == 3:
+            time.sleep(0.3)
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+            page = out / "watch.html"
+            assert not page.exists() or page.read_text("utf-8").rstrip().endswith("</html>")
+    if process.poll() is None:
+        process.kill()
+        process.wait()
+    documents = []
+    for folder in (out, tmp_path / "fresh"):
+        done = tpjb("watch", live, "--once", "--settle", "0 s", "--out", folder)
+        assert done.exit_code == 0, done.output
+        documents.append(json.loads((folder / "watch.json").read_text("utf-8")))
+        assert not list(tmp_path.glob(f".{folder.name}.part-*"))
+    assert documents[0] == documents[1]
+    assert {r["state"] for r in documents[0]["runs"]} == {"good"}
+    tables = [(folder / "coefficients.csv").read_bytes() for folder in (out, tmp_path / "fresh")]
+    assert tables[0] == tables[1]

@@ -1,0 +1,190 @@
+"""The page of a campaign while it is measured: what to do now, what there is, what is still to run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from tpjb_ident.conditions import untrusted
+from tpjb_ident.report.figure import Panel, panel, svg_text
+from tpjb_ident.report.page import Page, Section, Table, render_page
+from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
+from tpjb_ident.rounding import with_interval
+from tpjb_ident.runtime.tables import write_text
+from tpjb_ident.watch.next_steps import described, said
+
+if TYPE_CHECKING:
+    from tpjb_ident.dynamic.results.point_result import PointResult
+    from tpjb_ident.watch.run_status import RunStatus
+    from tpjb_ident.watch.watcher import Snapshot
+
+#: Words of the page for the states of a run.
+WORDS = {"to run": "to run", "being written": "being written", "good": "good", "look": "good, with a remark",
+         "repeat": "repeat", "replaced": "replaced by a repeat"}  # fmt: skip
+KINDS = {"dynamic": "dynamic runs", "locus": "locus runs", "clearance": "clearance sweeps", "dry_pivot": "dry tests",
+         "baseline": "baseline runs"}  # fmt: skip
+
+
+def write_watch_page(folder: Path, snapshot: Snapshot, refresh: int, settings: Mapping[str, str]) -> Path:
+    """Write ``watch.html``, whole or not at all, with its figures inside.
+
+    Parameters
+    ----------
+    folder : Path
+        Existing.
+    snapshot : Snapshot
+    refresh : int
+        Seconds after which the browser loads it again; 0: never.
+    settings : mapping of str to str
+        How it was made, for the reader.
+    """
+    page = watch_page(snapshot, refresh, settings)
+    panels = [p for section in page.sections for p in section.panels]
+    path = folder / "watch.html"
+    write_text(path, render_page(page, {p.name: svg_text(p.figure, p.name) for p in panels}))
+    return path
+
+
+def watch_page(snapshot: Snapshot, refresh: int, settings: Mapping[str, str]) -> Page:
+    """Gather the content of the page; see `write_watch_page`.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+    refresh : int
+    settings : mapping of str to str
+    """
+    answer, *more = [step.text for step in snapshot.steps] or ["Nothing to do: records are being written."]
+    landed = snapshot.count("good", "look", "repeat", "replaced")
+    return Page(
+        title=f"{snapshot.campaign.id}: while it is measured",
+        subtitle=f"{landed} of {len(snapshot.states)} runs have landed, {snapshot.count('repeat')} to be repeated, "
+        f"{snapshot.count('to run')} to run",
+        answer=answer,
+        more=more,
+        key_table=coverage_table(snapshot),
+        sections=_sections(snapshot),
+        settings=settings,
+        inputs=snapshot.hashes,
+        refresh=refresh,
+        beside="coefficients.csv and watch.json are beside this file.",
+    )
+
+
+def coverage_table(snapshot: Snapshot) -> Table:
+    """How many runs of every kind and set-up have landed.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+    """
+    groups: dict[str, list[RunStatus]] = {}
+    for status in snapshot.states:
+        groups.setdefault(_group(status), []).append(status)
+    rows = []
+    for name, group in groups.items():
+        good = sum(s.counts for s in group)
+        again = sum(s.state == "repeat" for s in group)
+        missing = sum(s.state in ("to run", "being written") for s in group)
+        rows.append([name, str(good), str(again), str(missing)])
+    return Table("How far the plan is", ["", "good", "to repeat", "to run"], rows)
+
+
+def _group(status: RunStatus) -> str:
+    run, p = status.run, status.run.point
+    if run.kind != "dynamic":
+        return KINDS[run.kind]
+    where = f"{p.static_load / 1e3:g} kN, {p.static_load_direction_deg:g} deg, shaft {p.shaft_speed_hz:g} Hz"
+    return f"{where}, excited at {p.excitation_hz:g} Hz"
+
+
+def _sections(snapshot: Snapshot) -> list[Section]:
+    notes = [*snapshot.lacks, *(str(p) for p in snapshot.problems)]
+    sections = [Section("What the plan leaves out, and remarks", notes=notes)] if notes else []
+    measured = snapshot.measured
+    if measured.points or measured.refusals:
+        note = "From the good runs so far. They change while runs come in; tpjb identify has the last word."
+        tables = [points_table(measured.points)] if measured.points else []
+        panels = _panels(snapshot)
+        sections.append(Section("Stiffness and damping so far", [note, *measured.refusals], panels, tables))
+    if measured.curves:
+        rows = [[f"#{c.pad}", f"{c.valid_to / 1e3:.2f}", _pivot(c)] for c in measured.curves]
+        table = Table("Tangent stiffness of the pivots at the highest load", ["pad", "load, kN", "MN/m"], rows)
+        sections.append(Section("Pivots so far", tables=[table]))
+    if measured.polygon is not None:
+        c, se = 1e6 * measured.polygon.clearance, 1e6 * measured.polygon.clearance_se
+        rows = [[f"#{i + 1}", with_interval(c[i], c[i] - 1.96 * se[i], c[i] + 1.96 * se[i])] for i in range(len(c))]
+        table = Table("Assembled clearance by pad, from the sweep", ["pad", "\N{MICRO SIGN}m"], rows)
+        sections.append(Section("Clearance", tables=[table]))
+    sections.append(Section("Records", tables=[records_table(snapshot)]))
+    waiting = [s for s in snapshot.states if s.state in ("to run", "being written")]
+    if waiting:
+        rows = [[s.run.id, s.run.kind, described(s.run), s.run.file] for s in waiting]
+        table = Table("Runs to come", ["run", "kind", "set points", "file"], rows, frozenset(range(4)))
+        sections.append(Section("Still to run", tables=[table]))
+    return sections
+
+
+def _pivot(curve: object) -> str:
+    load = curve.valid_to  # type: ignore[attr-defined]
+    low, high = (float(v) for v in curve.stiffness_band(load))  # type: ignore[attr-defined]
+    return with_interval(float(curve.stiffness(load)), low, high, 1e6)  # type: ignore[attr-defined]
+
+
+def _panels(snapshot: Snapshot) -> list[Panel]:
+    found = snapshot.measured.identification
+    if found is None:
+        return []
+    good = [p for p in found.points if np.isfinite(p.stiffness.h).all() and not untrusted(p.quality)]
+    series: tuple[tuple[Literal["load", "frequency"], set[float]], ...] = (
+        ("load", {p.point.static_load for p in good}),
+        ("frequency", {p.point.excitation for p in good}),
+    )
+    panels = []
+    for over, values in series:
+        if len(values) > 1:
+            figure = direct_coefficients({found.campaign: found}, part="k", over=over)
+            panels.append(panel(f"k-over-{over}", f"Direct stiffness over {over}, 95 % intervals", figure, "K"))
+    return panels
+
+
+def points_table(points: tuple[PointResult, ...]) -> Table:
+    """K and C of every point so far, with intervals and flags.
+
+    Parameters
+    ----------
+    points : tuple of PointResult
+    """
+    rows = []
+    for p in points:
+        half, omega = p.stiffness.half_width(), p.stiffness.omega
+        cells = []
+        for i, scale in ((0, 1e6), (3, 1e6), (4, 1e3 * omega), (7, 1e3 * omega)):
+            value = p.stiffness.vector[i]
+            known = np.isfinite(p.stiffness.h).all()
+            cells.append(with_interval(value, value - half[i], value + half[i], scale) if known else "no answer")
+        flags = ", ".join(q.sentence() for q in p.quality)
+        place = [f"{p.point.static_load / 1e3:g}", f"{p.point.excitation_hz:g}", str(p.n_records)]
+        rows.append([*place, *cells, flags])
+    columns = ["load, kN", "excitation, Hz", "records", "kxx, MN/m", "kyy, MN/m", "cxx, kN s/m", "cyy, kN s/m", "flags"]
+    return Table("Direct coefficients so far, 95 % intervals", columns, rows, frozenset({7}))
+
+
+def records_table(snapshot: Snapshot) -> Table:
+    """Records that have landed, the newest first.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+    """
+    why = {one.run.id: one.why for one in snapshot.placed if one.run is not None}
+    landed = sorted((s for s in snapshot.states if s.landed), key=lambda s: s.landed, reverse=True)
+    rows = []
+    for s in landed:
+        remarks = [said(f.problem) for f in s.findings if f.problem.severity != "note"][:3]
+        remarks += [f"not in the manifest; {why[s.run.id]}"] if s.run.id in why else []
+        rows.append([s.landed[11:19], s.run.id, described(s.run), WORDS[s.state], "; ".join(remarks)])
+    return Table("Newest first", ["time", "run", "set points", "verdict", "why"], rows, frozenset(range(5)))

@@ -1,0 +1,1 @@
+"""A campaign while it is measured: each record checked, identified and placed as it lands."""

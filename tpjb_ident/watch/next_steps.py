@@ -1,0 +1,244 @@
+"""What to do next at the rig: what to mend, to repeat, to run, and what the plan lacks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rigdata.operating_point import OperatingPoint
+from rigdata.problem import Problem
+from rigdata.run import Run
+from tpjb_ident.check.findings import Finding
+from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.watch.run_status import LOST_SAMPLES, RunStatus
+
+#: From so many records in a row with one fault on, the sensor is to be mended before another one is made.
+IN_A_ROW = 2
+_LISTED = 4
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing to do.
+
+    Attributes
+    ----------
+    kind : str
+        ``"stop"``, ``"repeat"``, ``"mend"``, ``"more"`` or ``"next"``, most urgent first.
+    text : str
+        A sentence for the person at the rig.
+    runs : tuple of str
+        Ids of the runs concerned.
+    """
+
+    kind: str
+    text: str
+    runs: tuple[str, ...] = ()
+
+
+def next_steps(
+    states: Sequence[RunStatus],
+    common: Sequence[Sequence[Finding]],
+    points: Sequence[PointResult],
+    within: float | None = None,
+) -> list[Step]:
+    """Everything to do, most urgent first.
+
+    Parameters
+    ----------
+    states : sequence of RunStatus
+    common : sequence of sequence of Finding
+        Findings that many runs share.
+    points : sequence of PointResult
+        What is identified so far.
+    within : float, optional
+        Half 95 % interval of the direct coefficients that is aimed at, as a share of their mean.
+    """
+    stop, stopped = _stop(states)
+    at = here(states)
+    return [
+        *stop,
+        *_repeats([s for s in states if s.run.id not in stopped], at),
+        *(_mend(group) for group in common),
+        *_more(states, points, within),
+        *_next(states, at),
+    ]
+
+
+def here(states: Sequence[RunStatus]) -> Run | None:
+    """The running test that landed last: what the rig stands at."""
+    landed = [s for s in states if s.landed and s.run.kind in ("dynamic", "locus")]
+    return max(reversed(landed), key=lambda s: s.landed).run if landed else None
+
+
+def set_up(run: Run) -> tuple[float, float, float]:
+    """Load [N], its direction [rad] and speed [rad/s]: what takes time to change at the rig.
+
+    Parameters
+    ----------
+    run : Run
+    """
+    return run.point.static_load, run.point.static_load_direction, run.point.shaft_speed
+
+
+def described(run: Run) -> str:
+    """A test in words and units.
+
+    Parameters
+    ----------
+    run : Run
+    """
+    p = run.point
+    if run.kind == "dry_pivot":
+        return f"dry load steps on pad #{run.pad}, {run.branch}"
+    if run.kind == "clearance":
+        return "clearance sweep"
+    words = [f"{p.static_load / 1e3:g} kN at {p.static_load_direction_deg:g} deg", f"shaft {p.shaft_speed_hz:g} Hz"]
+    if p.excitation:
+        words.append(f"excited at {p.excitation_hz:g} Hz")
+    if run.excitation_direction is not None:
+        words.append(f"along {math.degrees(run.excitation_direction):.0f} deg")
+    return ", ".join(words)
+
+
+def said(problem: Problem) -> str:
+    """What is wrong and where, without the file's name.
+
+    Parameters
+    ----------
+    problem : Problem
+    """
+    return f"{problem.place}: {problem.what}" if problem.place else problem.what
+
+
+def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
+    """A fault of one channel in the last records in a row: the next one will have it too."""
+    landed = sorted((s for s in states if s.landed), key=lambda s: s.landed)
+    if not landed:
+        return [], set()
+    steps, stopped = [], set()
+    for finding in landed[-1].findings:
+        if not finding.key.startswith(LOST_SAMPLES) or finding.problem.severity == "note":
+            continue
+        row: list[str] = []
+        for status in reversed(landed):
+            if finding.key not in {f.key for f in status.findings}:
+                break
+            row.append(status.run.id)
+        if len(row) >= IN_A_ROW:
+            stopped.update(row)
+            runs = tuple(reversed(row))
+            p = finding.problem
+            text = f"Stop: {said(p)}, in the last {len(row)} records ({_named(runs)}). {p.cure}, then repeat them."
+            steps.append(Step("stop", text, runs))
+    return steps, stopped
+
+
+def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
+    now, later = [], []
+    for status in states:
+        problem = status.first
+        if status.state != "repeat" or problem is None:
+            continue
+        run, why = status.run, f"{said(problem)}. {problem.cure}."
+        if run.kind not in ("dynamic", "locus"):
+            now.append(Step("repeat", f"Repeat {run.id} ({described(run)}): {why}", (run.id,)))
+        elif at is None or set_up(run) == set_up(at):
+            now.append(Step("repeat", f"Repeat {run.id} before you change the load: {why}", (run.id,)))
+        else:
+            load = f"{run.point.static_load / 1e3:g} kN at {run.point.static_load_direction_deg:g} deg"
+            speed = f"{run.point.shaft_speed_hz:g} Hz"
+            later.append(Step("repeat", f"Repeat {run.id} when you are back at {load}, {speed}: {why}", (run.id,)))
+    return now + later
+
+
+def _mend(group: Sequence[Finding]) -> Step:
+    problem = group[0].problem
+    runs = tuple(dict.fromkeys(str(f.problem.run) for f in group))
+    text = f"Look into this, it is in {len(runs)} runs alike ({_named(runs)}): {said(problem)}. {problem.cure}."
+    return Step("mend", text, runs)
+
+
+def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: float | None) -> list[Step]:
+    """Points that are measured as planned and still not as sure as wanted."""
+    if within is None:
+        return []
+    steps = []
+    for point in points:
+        if any(s.state in ("to run", "being written", "repeat") and s.run.point == point.point for s in states):
+            continue
+        widest, name, records = _widest(point)
+        if not widest > within:
+            continue
+        place = f"{point.point.static_load / 1e3:g} kN, {point.point.excitation_hz:g} Hz"
+        share = f"{name} is known to {100 * widest:.1f} %, {100 * within:g} % is wanted"
+        random_alone, n = records
+        rest = within**2 - max(0.0, widest**2 - random_alone**2)
+        if rest <= 0.25 * within**2:
+            steps.append(Step("more", f"{place}: {share}; calibration sets that, more records do not help."))
+            continue
+        more = math.ceil(n * (random_alone**2 / rest - 1.0))
+        many = f"about {more} more record{'s' if more > 1 else ''} like those there would do"
+        steps.append(Step("more", f"{place}: {share}; {many}.", point.runs))
+    return steps
+
+
+def _widest(point: PointResult) -> tuple[float, str, tuple[float, int]]:
+    """Half interval of the direct coefficient known worst, as a share of their mean; its random part; records."""
+    est = point.stiffness
+    half = est.half_width()
+    random = est.half_width(systematic=False)
+    shares = []
+    for part, names in ((0, ("kxx", "kyy")), (4, ("cxx", "cyy"))):
+        mean = 0.5 * (abs(est.vector[part]) + abs(est.vector[part + 3]))
+        shares += [(float(half[part + j] / mean), n, float(random[part + j] / mean)) for j, n in zip((0, 3), names)]
+    finite = [s for s in shares if math.isfinite(s[0])]
+    if not finite:
+        return math.nan, "", (math.nan, 1)
+    share, name, own = max(finite)
+    return share, name, (own, point.n_records)
+
+
+def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
+    waiting = [s.run for s in states if s.state == "to run"]
+    if not waiting:
+        left = [s for s in states if s.state in ("repeat", "being written")]
+        return [] if left else [Step("next", "Every run of the plan has landed.")]
+    same = [run for run in waiting if at is not None and run.kind in ("dynamic", "locus") and set_up(run) == set_up(at)]
+    run = (same or waiting)[0]
+    more = f"{len(same) - 1} more at this load" if len(same) > 1 else f"{len(waiting) - 1} more in the plan"
+    change = "" if same or at is None else " (new set-up)"
+    return [Step("next", f"Next: {run.id}, {described(run)}{change}. After it {more}.", (run.id,))]
+
+
+def plan_lacks(runs: Sequence[Run], n_pads: int) -> list[str]:
+    """What a plan leaves out that the results will want.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Planned and landed.
+    n_pads : int
+        Of the bearing; 0 where it is not known.
+    """
+    found = []
+    single: dict[OperatingPoint, set[float | None]] = {}
+    for run in runs:
+        if run.kind == "dynamic":
+            single.setdefault(run.point, set()).add(run.excitation_direction)
+    lonely = [p for p, directions in single.items() if len(directions) == 1 and None not in directions]
+    if lonely:
+        first = ", ".join(f"{p.static_load / 1e3:g} kN {p.excitation_hz:g} Hz" for p in lonely[:3])
+        found.append(f"{len(lonely)} operating points have one excitation direction ({first}): K and C need two.")
+    pads = {run.pad for run in runs if run.kind == "dry_pivot"}
+    without = [f"#{pad}" for pad in range(1, n_pads + 1) if pad not in pads]
+    if n_pads and without:
+        found.append(f"No dry load steps on pad {', '.join(without)}: its pivot's stiffness stays unknown.")
+    if not any(run.kind == "clearance" for run in runs):
+        found.append("No clearance sweep: positions count from the probes' zero, and clearances stay the drawing's.")
+    return found
+
+
+def _named(runs: Sequence[str]) -> str:
+    return ", ".join(runs[:_LISTED]) + (", .." if len(runs) > _LISTED else "")
