@@ -67,7 +67,12 @@ def next_steps(
 
 
 def here(states: Sequence[RunStatus]) -> Run | None:
-    """The running test that landed last: what the rig stands at."""
+    """The running test that landed last: what the rig stands at.
+
+    Parameters
+    ----------
+    states : sequence of RunStatus
+    """
     landed = [s for s in states if s.landed and s.run.kind in ("dynamic", "locus")]
     return max(reversed(landed), key=lambda s: s.landed).run if landed else None
 
