@@ -101,7 +101,8 @@ WARNINGS = {
     "inertia-not-corrected": "Without accelerometers the housing's inertia stays in the force: small at low "
     "frequency, growing with its square.",
     "irregular": "The pads' clearances differ by more than their errors: worn, damaged or wrongly assembled pads.",
-    "large-amplitude": "The vibration is more than 5 % of the clearance: the film is no longer linear. Excite less.",
+    "large-amplitude": "The vibration is more than 5 % of the clearance, and the film's harmonics do not show that it "
+    "is still linear; or it is so large that no film is. Excite less, or check the probes.",
     "load-off-set-point": "The measured load of some runs misses its set point in size or direction.",
     "mains on excitation line": "The excitation stands on the mains frequency: pick-up cannot be told from "
     "signal, and the interval allows for it. Excite beside the mains frequency.",
@@ -156,6 +157,8 @@ NOTES = {
     "Excite in a third direction.",
     "structure-gives": "A compliant structure between bearing and probes bends the displacements of the dry tests; the "
     "curves hold it as well as the pivots.",
+    "zero amplitude": "The runs have several amplitudes: K and C were extrapolated to none, where they are those of "
+    "small motion.",
     "speed drifts": "The shaft speed moved during the record; its lines were followed window by window.",
     "unexpected lines": "The records hold lines that the manifest does not explain; they were fitted along.",
 }

@@ -70,8 +70,9 @@ def test_misses_are_relative_to_what_all_runs_share():
         np.testing.assert_allclose(first.size, scatter.real, atol=1e-12)
         np.testing.assert_allclose(first.sideways, scatter.imag, atol=1e-12)
         np.testing.assert_allclose(second.size, -scatter.real, atol=1e-12)
-        spread = np.concatenate([common * (1 + scatter), common * (1 - scatter)]).real
-        assert first.uncertainty == second.uncertainty == pytest.approx(np.std(spread) / math.sqrt(8))
+        spread = np.concatenate([scatter, -scatter])
+        assert first.uncertainty == second.uncertainty == pytest.approx(np.std(spread.real, ddof=1) / math.sqrt(8))
+        assert first.turn_uncertainty == pytest.approx(np.std(spread.imag, ddof=1) / math.sqrt(8))
 
 
 def test_one_run_far_off_does_not_move_what_all_share():
@@ -183,7 +184,7 @@ def test_what_is_not_known_of_the_miss_widens_the_interval():
     slope = np.array([[1.0 + 2j, 3.0], [-4j, 5.0]])
     shift = 0.003 * np.array([1, 3, 0, 5, 2, 0, -4, 0])
     np.testing.assert_allclose(widened(est, miss, slope).covariance, np.eye(8) + np.outer(shift, shift))
-    own = np.diag((UNKNOWN_EXPONENT * 0.01 * est.vector) ** 2)
+    own = np.diag((UNKNOWN_EXPONENT * math.hypot(0.01, 0.003) * est.vector) ** 2)
     np.testing.assert_allclose(widened(est, miss, None).covariance, np.eye(8) + own)
     lost = stiff(np.full((2, 2), np.nan))
     assert widened(lost, miss, slope) is lost
@@ -353,3 +354,16 @@ def test_forces_of_a_turned_load_are_taken_off():
     by_hand = [miss.sideways[k] * (turn.slope @ d) for k, d in zip(data.run_index, data.D, strict=True)]
     np.testing.assert_allclose(turned_back(data, miss, turn), by_hand)
     np.testing.assert_array_equal(turned_back(data, miss, None), np.zeros_like(data.F))
+
+
+def test_a_direction_that_all_loads_miss_alike_turns_the_whole_film():
+    """Where the runs tell no slope, H turns as a whole; else by the slope, and by what is not known of it."""
+    small = 1e-3
+    turned = np.array([[np.cos(small), -np.sin(small)], [np.sin(small), np.cos(small)]])
+    change = turned @ H @ turned.T - H
+    shift = np.concatenate([change.real.ravel(), change.imag.ravel()])
+    size = np.abs(shift).max()
+    np.testing.assert_allclose(load_direction.common_turn(H, None, small), np.outer(shift, shift), atol=5e-3 * size**2)
+    slope = load_direction.Turn(np.array([[1.0, 2j], [3.0, 4.0]]), np.zeros((8, 8)), 7.0 * np.eye(8))
+    own = np.array([1.0, 0, 3.0, 4.0, 0, 2.0, 0, 0])
+    np.testing.assert_allclose(load_direction.common_turn(H, slope, 0.5), 0.25 * (np.outer(own, own) + 7 * np.eye(8)))

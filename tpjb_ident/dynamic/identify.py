@@ -17,7 +17,9 @@ from tpjb_ident.dynamic.corrections.systematic_sources import SystematicSources,
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.identify_point import Completion, first_estimate, own_method, point_figures, point_result
-from tpjb_ident.dynamic.instruments.findings import InstrumentFindings, amplitude_findings, look_at_instruments
+from tpjb_ident.dynamic.instruments.findings import InstrumentFindings, film_change_at, look_at_instruments
+from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions, change_spread
+from tpjb_ident.dynamic.instruments.zero_amplitude import ZeroAmplitude, zero_amplitude
 from tpjb_ident.dynamic.results.budget import with_systematic
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.left_out_runs import lost_points, named_at_points
@@ -152,11 +154,17 @@ class _Points:
         used = correction if settings.correct else correction.measured_only()
         corrected = used.apply(data)
         figures = point_figures(corrected, settings, self.differ)
+        first = figures.by_method[settings.method]
+        film = film_change_at(source, first)
+        none = zero_amplitude(corrected, first.h, film.share) if settings.correct else None
+        if none is not None:
+            corrected = none.apply(corrected)
+            figures = point_figures(corrected, settings, self.differ)
         before = figures.by_method[settings.method]
         by_method = {name: used.widened(est) for name, est in figures.by_method.items()}
         best = by_method[settings.method]
+        amplitude_part, uncertain = _amplitude_part(film, none, best)
         changes = {"calibration": apparent_change(data, best, self.draws), **self.sources.changes(data, best)}
-        bent, amplitude_part = amplitude_findings(source, best)
         systematic = {name: np.cov(change.T, bias=True) for name, change in changes.items()}
         systematic |= self.findings.spreads(data, best) | source.baseline.spread(data) | amplitude_part
         if source.found(MAINS_ON_LINE) and self.mains_force.any():
@@ -164,11 +172,22 @@ class _Points:
         if not settings.keep_weights:
             by_method = {name: _counted_only(est) for name, est in by_method.items()}
         with_both = {name: with_systematic(est, systematic) for name, est in by_method.items()}
+        bent = change_conditions(film, uncertain, with_both[settings.method], figures.amplitude, settings.clearance)
+        bent += () if none is None else none.conditions()
         found = (used.conditions, self.findings.conditions(data), source.baseline.missing(data), bent)
         doubts = (gain_doubts(data, self.pairs), *found)
         completion = Completion(with_both, merged(*doubts), used.miss, {**used.budget(before), **systematic})
         finished = point_result(corrected, figures, completion, self.temperatures, settings)
         return finished, np.sum(list(changes.values()), axis=0)
+
+
+def _amplitude_part(
+    film: FilmChange, none: ZeroAmplitude | None, est: DynamicStiffness
+) -> tuple[dict[str, FloatArray], float]:
+    """Covariance by source that the amplitude of the excitation leaves, and the share of H that it may come to."""
+    if none is not None:
+        return {"amplitude": none.left}, none.uncertain(est.h)
+    return ({"amplitude": change_spread(film.share, est)} if film.share else {}), film.share
 
 
 def delays_stated(campaign: Campaign) -> bool:

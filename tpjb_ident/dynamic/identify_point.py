@@ -122,7 +122,7 @@ def point_figures(data: PointData, settings: IdentifySettings, differ: bool) -> 
     conditions = merged(
         *(run.conditions for run in data.runs),
         best.status,
-        flags(data, best, figure, size, settings.clearance),
+        flags(data, best, figure),
         tuple(pattern for pattern in patterns if pattern is not None),
         () if linearity is None else linearity.condition(),
         disagreement(by_method, settings.method),

@@ -9,7 +9,7 @@ import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.corrections.load_direction import Turn, direction_slopes, run_ratios, turned_back
+from tpjb_ident.dynamic.corrections.load_direction import Turn, common_turn, direction_slopes, run_ratios, turned_back
 from tpjb_ident.dynamic.corrections.mains import (
     MAINS_CORRECTED,
     MAINS_ON_LINE,
@@ -81,7 +81,8 @@ class Correction:
 
     def _load_known(self, est: DynamicStiffness) -> DynamicStiffness:
         wide = widened(est, self.miss, self.slope)
-        return wide if self.turn is None else replace(wide, covariance=wide.covariance + self.turn.left)
+        more = common_turn(est.h, self.turn, self.miss.turn_uncertainty)
+        return replace(wide, covariance=wide.covariance + more + (0.0 if self.turn is None else self.turn.left))
 
     def budget(self, est: DynamicStiffness) -> dict[str, FloatArray]:
         """Random covariance (8, 8) of `widened` by source, from the estimate before it [N^2/m^2].

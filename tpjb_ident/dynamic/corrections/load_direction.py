@@ -76,10 +76,13 @@ class Turn:
         [N/m per rad]
     left : (8, 8) ndarray
         Covariance that its own uncertainty leaves on H [(N/m)^2].
+    doubt : (8, 8) ndarray
+        Covariance of the slope itself [(N/m per rad)^2].
     """
 
     slope: ComplexArray
     left: FloatArray = field(repr=False)
+    doubt: FloatArray = field(repr=False, default_factory=lambda: np.zeros((8, 8)))
 
 
 def run_ratios(data: PointData, miss: LoadMiss, first: DynamicStiffness, trusted: bool = True) -> RunRatios | None:
@@ -202,12 +205,32 @@ def _turn(ratio: RunRatios, basis: ComplexArray, fits: list[tuple[FloatArray, Fl
     # a slope that is off by dS moves H by dS M^T: the misses of the runs, as the fit of H averages them
     mixing = np.linalg.pinv(ratio.shape) @ (ratio.sideways[:, None] * ratio.shape)
     moved = mixing @ basis
-    left = np.zeros((8, 8))
+    left, doubt = np.zeros((8, 8)), np.zeros((8, 8))
     for row, (_, covariance) in enumerate(fits):
         at = [2 * row, 2 * row + 1, 4 + 2 * row, 5 + 2 * row]
-        both = np.concatenate([moved.real, moved.imag])
-        left[np.ix_(at, at)] = both @ covariance @ both.T
-    return Turn(np.array([basis @ found for found, _ in fits]), left)
+        for total, part in ((left, moved), (doubt, basis)):
+            both = np.concatenate([part.real, part.imag])
+            total[np.ix_(at, at)] = both @ covariance @ both.T
+    return Turn(np.array([basis @ found for found, _ in fits]), left, doubt)
+
+
+def common_turn(h: ComplexArray, turn: Turn | None, angle: float) -> FloatArray:
+    """Covariance (8, 8) of H when the direction of all loads is known to `angle` [rad] only [N^2/m^2].
+
+    Where the runs do not tell how H turns with the load, it is taken to turn with it as a whole: J H - H J.
+
+    Parameters
+    ----------
+    h : (2, 2) complex ndarray
+        [N/m]
+    turn : Turn or None
+    angle : float
+        Standard error [rad].
+    """
+    quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+    slope = quarter @ h - h @ quarter if turn is None else turn.slope
+    shift = np.concatenate([slope.real.ravel(), slope.imag.ravel()])
+    return np.asarray(angle**2 * (np.outer(shift, shift) + (0.0 if turn is None else turn.doubt)))
 
 
 def turned_back(data: PointData, miss: LoadMiss, turn: Turn | None) -> ComplexArray:

@@ -48,11 +48,14 @@ class LoadMiss:
         The same across it [rad].
     uncertainty : float
         Standard error of the campaign's ratio, which is common to all sizes.
+    turn_uncertainty : float
+        Standard error of the campaign's direction, common to all `sideways` [rad].
     """
 
     size: FloatArray
     sideways: FloatArray
     uncertainty: float = 0.0
+    turn_uncertainty: float = 0.0
 
 
 class Loaded(Protocol):
@@ -126,11 +129,12 @@ def load_misses(points: Sequence[Loaded], zero: complex = 0.0) -> tuple[list[Loa
     distance = np.abs(known - middle)
     inner = known[distance <= 4 * np.median(distance) + 1e-12]
     common = complex(inner.mean())
-    uncertainty = float(inner.real.std() / np.sqrt(len(inner)))
+    spread = (inner / common - 1.0) / np.sqrt(max(len(inner) * (len(inner) - 1), 1))
+    known_to = float(np.linalg.norm(spread.real)), float(np.linalg.norm(spread.imag))
     misses = []
     for ratio in ratios:
         relative = np.nan_to_num(ratio / common - 1.0)
-        misses.append(LoadMiss(relative.real, relative.imag, uncertainty))
+        misses.append(LoadMiss(relative.real, relative.imag, *known_to))
     return misses, common
 
 
@@ -234,7 +238,7 @@ def widened(est: DynamicStiffness, miss: LoadMiss, slope: ComplexArray | None) -
     if not np.isfinite(est.h).all():
         return est
     if slope is None:
-        shift = UNKNOWN_EXPONENT * abs(float(miss.size.mean())) * np.abs(est.vector)
+        shift = UNKNOWN_EXPONENT * float(np.hypot(miss.size.mean(), miss.uncertainty)) * np.abs(est.vector)
         return replace(est, covariance=est.covariance + np.diag(shift**2))
     shift = miss.uncertainty * np.concatenate([slope.real.ravel(), slope.imag.ravel()])
     return replace(est, covariance=est.covariance + np.outer(shift, shift))

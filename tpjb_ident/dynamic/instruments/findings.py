@@ -9,7 +9,7 @@ import numpy as np
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.instruments.harmonics import change_conditions, change_spread, film_change
+from tpjb_ident.dynamic.instruments.harmonics import FilmChange, film_change
 from tpjb_ident.dynamic.instruments.housing_balance import Balance, balance_runs, balances, frequency_key
 from tpjb_ident.dynamic.runs.clock_rates import ClockRates, clock_rates, rate_samples
 from tpjb_ident.dynamic.runs.point_data import PointData
@@ -86,10 +86,8 @@ def look_at_instruments(
     return InstrumentFindings(clocks, verdicts, start), read
 
 
-def amplitude_findings(
-    source: PointSource, est: DynamicStiffness
-) -> tuple[tuple[Condition, ...], dict[str, FloatArray]]:
-    """Conditions and covariance that the film's own harmonics give rise to at one point.
+def film_change_at(source: PointSource, est: DynamicStiffness) -> FilmChange:
+    """What the film's own harmonics say at one point.
 
     Parameters
     ----------
@@ -97,5 +95,4 @@ def amplitude_findings(
     est : DynamicStiffness
     """
     pairs = [digest.harmonics[line] for digest, (_, line) in zip(source.digests, source.members) if digest.harmonics]
-    change = film_change([pair for pair in pairs if pair is not None], est)
-    return change_conditions(change), {"amplitude": change_spread(change, est)} if change else {}
+    return film_change([pair for pair in pairs if pair is not None], est)

@@ -12,6 +12,7 @@ the actuators is no part of it: what H explains of the harmonic force by the har
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,11 +31,31 @@ DISTINCT = 6.0
 NOTHING = 2e-4
 #: From here on no interval can be answered for.
 REFUSED = 0.05
+#: Share of the clearance from which a motion may be too large for a linear film, if the harmonics do not tell,
+MAX_AMPLITUDE = 0.05
+#: and from which none is linear: where it looks so, the motion is not what the probes say.
+NEVER_LINEAR = 0.3
 #: A change is known to be no larger than the figure above; as a standard deviation it is this part of it.
 AS_DEVIATION = 1 / 1.6
 
 
-def film_change(harmonics: Sequence[tuple[LineMean, LineMean]], est: DynamicStiffness) -> float:
+@dataclass(frozen=True)
+class FilmChange:
+    """What the second harmonics say of a point.
+
+    Attributes
+    ----------
+    share : float
+        By which h is off through the amplitude of the excitation; zero where the film answers as a linear one.
+    hidden : float
+        How large a share could stay unseen.
+    """
+
+    share: float = 0.0
+    hidden: float = np.inf
+
+
+def film_change(harmonics: Sequence[tuple[LineMean, LineMean]], est: DynamicStiffness) -> FilmChange:
     """Share by which h is off through the amplitude of the excitation, by the records' second harmonics.
 
     Parameters
@@ -43,35 +64,38 @@ def film_change(harmonics: Sequence[tuple[LineMean, LineMean]], est: DynamicStif
         Of every run: the excitation and its second harmonic.
     est : DynamicStiffness
         Its K and C stand for twice the frequency too; the harmonic displacement is small.
-
-    Returns
-    -------
-    float
-        Zero where nothing tells.
     """
     if not np.isfinite(est.h).all():
-        return 0.0
+        return FilmChange()
     doubled = est.h.real + 2j * est.h.imag
     kept = [(a, b) for a, b in harmonics if np.isfinite(b.force).all() and np.linalg.norm(a.force) > 0]
+    alone = [pair for pair in kept if not pair[1].shared]
     if len(kept) >= MIN_RUNS:
-        change = CHANGE * _quadratic_share(kept, doubled)
+        share, unseen = _quadratic_share(kept, doubled)
+        change, hidden = CHANGE * share, CHANGE * unseen
     else:
-        shares = [_share(first, second, doubled) for first, second in kept if not second.shared]
+        shares = [_share(first, second, doubled) for first, second in alone]
         change = CHANGE * float(np.median(shares)) if shares else 0.0
-    return change if change > NOTHING else 0.0
+        noise = [_noise(second, doubled) / float(np.linalg.norm(first.force)) for first, second in alone]
+        hidden = CHANGE * (2 * float(np.median(noise))) ** 2 if noise else np.inf
+    return FilmChange(change if change > NOTHING else 0.0, hidden)
+
+
+def _noise(second: LineMean, doubled: ComplexArray) -> float:
+    """Standard error of a component of the harmonic force that H does not explain [N]."""
+    return float(np.hypot(second.force_error, np.abs(doubled).max() * second.displacement_error))
 
 
 def _share(first: LineMean, second: LineMean, doubled: ComplexArray) -> float:
     """Squared second harmonic over squared fundamental of one run, less its noise."""
     bent = float(np.linalg.norm(second.force - doubled @ second.displacement))
-    noise = float(np.hypot(second.force_error, np.abs(doubled).max() * second.displacement_error))
-    return max(bent**2 - (2 * noise) ** 2, 0.0) / float(np.linalg.norm(first.force)) ** 2
+    return max(bent**2 - (2 * _noise(second, doubled)) ** 2, 0.0) / float(np.linalg.norm(first.force)) ** 2
 
 
-def _quadratic_share(kept: Sequence[tuple[LineMean, LineMean]], doubled: ComplexArray) -> float:
-    """The same of all runs together: only what goes with the squares of the motion, size and phase, is the film's.
+def _quadratic_share(kept: Sequence[tuple[LineMean, LineMean]], doubled: ComplexArray) -> tuple[float, float]:
+    """The same of all runs together, and how much of it could stay unseen.
 
-    Mains on the line, and noise, have any phase; they stay in the residual.
+    Only what goes with the squares of the motion, size and phase, is the film's. Mains on the line, and noise, have any phase; they stay in the residual.
     """
     size = np.array([np.linalg.norm(first.force) for first, _ in kept])[:, None]
     d = np.array([first.displacement for first, _ in kept])
@@ -80,9 +104,8 @@ def _quadratic_share(kept: Sequence[tuple[LineMean, LineMean]], doubled: Complex
     fitted = squares @ np.linalg.lstsq(squares, bent, rcond=None)[0]
     explained = float(np.sum(np.abs(fitted) ** 2)) / 3
     left = float(np.sum(np.abs(bent - fitted) ** 2)) / (len(kept) - 3)
-    if explained < DISTINCT * left:
-        return 0.0
-    return 3 * (explained - left) / len(kept)
+    unseen = 3 * (DISTINCT - 1) * left / len(kept)
+    return (3 * (explained - left) / len(kept) if explained >= DISTINCT * left else 0.0), unseen
 
 
 def change_spread(change: float, est: DynamicStiffness) -> FloatArray:
@@ -98,20 +121,43 @@ def change_spread(change: float, est: DynamicStiffness) -> FloatArray:
     return np.diag(shift**2)
 
 
-def change_conditions(change: float) -> tuple[Condition, ...]:
+def change_conditions(
+    change: FilmChange, uncertain: float, est: DynamicStiffness, amplitude: float, clearance: float | None
+) -> tuple[Condition, ...]:
     """What to say of a point.
+
+    A large motion alone is no fault where the harmonics show that the film answers it as a linear one.
 
     Parameters
     ----------
-    change : float
-        Share of H by which its entries may be off.
+    change : FilmChange
+    uncertain : float
+        What remains of it after the extrapolation to zero amplitude, if there is one [share of h].
+    est : DynamicStiffness
+        With all its uncertainties.
+    amplitude : float
+        [m]
+    clearance : float or None
+        [m]
     """
-    if change <= REFUSED:
+    if uncertain > REFUSED:
+        told = (
+            f"the film answers at twice the excitation frequency with {100 * np.sqrt(change.share / CHANGE):.0f} % of"
+        )
+        return (
+            Condition(
+                "film-not-linear",
+                f"{told} the force: the coefficients may be off by {100 * uncertain:.0f} %. Excite less",
+            ),
+        )
+    if not clearance or not np.isfinite(est.h).all() or not amplitude > MAX_AMPLITUDE * clearance:
         return ()
-    return (
-        Condition(
-            "film-not-linear",
-            f"the film answers at twice the excitation frequency with {100 * np.sqrt(change / CHANGE):.0f} % of the "
-            f"force: the coefficients may be off by {100 * change:.0f} %. Excite less",
-        ),
-    )
+    share = 100 * amplitude / clearance
+    if amplitude > NEVER_LINEAR * clearance and not change.share:
+        told = f"amplitude {share:.0f} % of the clearance without a harmonic of the film: check probes and clearance"
+        return (Condition("large-amplitude", told),)
+    room = float(np.min(np.abs(est.half_width()[[0, 3]] / np.diag(est.h).real)))
+    if change.hidden < room or uncertain < change.share:  # what stays unseen is less than the interval
+        return ()
+    told = f"amplitude {share:.1f} % of the clearance > 5 %, and the second harmonic does not tell what it does"
+    return (Condition("large-amplitude", told),)

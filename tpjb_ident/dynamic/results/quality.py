@@ -11,8 +11,6 @@ from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.results.point_result import WindowVerdict
 from tpjb_ident.dynamic.runs.point_data import PointData
 
-#: Coefficients are linear below this share of the clearance.
-MAX_AMPLITUDE = 0.05
 #: Share of the windows without phasors beyond which what is left may not stand for the record.
 MAX_LOST = 0.6
 #: Share of the force that H leaves in the runs' means beyond which they have no H in common.
@@ -107,9 +105,7 @@ def _shift(z: ComplexArray, repeats: ComplexArray) -> float:
     return float(np.linalg.norm(z - mean) / max(float(np.linalg.norm(mean)), np.finfo(float).tiny))
 
 
-def flags(
-    data: PointData, stiffness: DynamicStiffness, coherence: float, amplitude: float, clearance: float | None
-) -> tuple[Condition, ...]:
+def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> tuple[Condition, ...]:
     """Conditions that the point's figures give rise to.
 
     Parameters
@@ -117,17 +113,10 @@ def flags(
     data : PointData
     stiffness : DynamicStiffness
     coherence : float
-    amplitude : float
-        [m]
-    clearance : float or None
-        [m]
     """
     found = []
     if not coherence >= MIN_COHERENCE and np.isfinite(stiffness.h).all():
         found.append(Condition("low-coherence", f"coherence {coherence:.3f} < {MIN_COHERENCE}"))
-    if clearance and amplitude > MAX_AMPLITUDE * clearance:
-        share = 100 * amplitude / clearance
-        found.append(Condition("large-amplitude", f"amplitude {share:.1f} % of the clearance > 5 %"))
     found += _missing(data)
     if len(data.runs) and data.runs[0].acceleration is None and np.isfinite(stiffness.h).all():
         found.append(Condition("inertia-not-corrected", "no accelerometers: the housing's inertia stays in F"))

@@ -1,0 +1,81 @@
+"""A film that was shaken too hard: what its second harmonic says of one amplitude, what several amplitudes mend."""
+
+import numpy as np
+import pytest
+
+from rigdata import load_campaign
+from tests.dynamic.test_figures import stiff
+from tests.dynamic.test_quality import H, point_of, run
+from tests.studies.field.bearing import Bearing
+from tests.studies.field.campaign_file import plans_of, write_campaign
+from tests.studies.field.rig import Rig
+from tpjb_ident.dynamic.identify import identify
+from tpjb_ident.dynamic.instruments.harmonics import MAX_AMPLITUDE, NEVER_LINEAR, FilmChange, change_conditions
+from tpjb_ident.dynamic.instruments.zero_amplitude import zero_amplitude
+from tpjb_ident.dynamic.settings import IdentifySettings
+
+
+@pytest.mark.parametrize(
+    ("change", "size", "named"),
+    [
+        (FilmChange(0.0, hidden=1e-4), 0.29, ()),
+        (FilmChange(0.0, hidden=0.02), 0.29, ("large-amplitude",)),
+        (FilmChange(0.0, hidden=0.02), MAX_AMPLITUDE, ()),
+        (FilmChange(0.02, hidden=1e-4), 0.08, ()),
+        (FilmChange(0.06, hidden=1e-4), 0.08, ("film-not-linear",)),
+        (FilmChange(0.0, hidden=1e-4), NEVER_LINEAR * 1.01, ("large-amplitude",)),
+    ],
+)
+def test_a_large_motion_is_flagged_only_where_the_harmonics_do_not_show_a_linear_film(change, size, named):
+    est = stiff(H, 0.003 * np.abs(H[0, 0]))
+    assert change_conditions(change, change.share, est, size * 80e-6, 80e-6) == named
+    assert change_conditions(FilmChange(), 0.0, est, 1.0, None) == ()
+
+
+LARGEST = float(np.linalg.norm(np.linalg.solve(H, [1000.0, 0.0])))
+
+
+def runs_of(hardening, forces=(250.0, 500.0, 1000.0)):
+    """Runs whose stiffness grows with the square of their motion, by `hardening` at the largest."""
+    runs = []
+    for i in range(6):
+        for force in forces:
+            angle = i * np.pi / 6
+            motion = np.linalg.norm(np.linalg.solve(H, force * np.array([np.cos(angle), np.sin(angle)]))) / LARGEST
+            h = H * (1 + hardening * motion**2)
+            runs.append(run(f"r{i}-{force:g}", angle, force=force, h=h, seed=round(force) + i))
+    return point_of(runs)
+
+
+def test_several_amplitudes_give_the_stiffness_at_none():
+    data = runs_of(0.04)
+    found = zero_amplitude(data, H, 0.01)
+    assert found.uncertain(H) < 0.01
+    small = found.apply(data)
+    before, after = (np.linalg.lstsq(d.D, d.F, rcond=None)[0].T - H for d in (data, small))
+    assert np.abs(before).max() > 0.008 * np.abs(H).max()
+    assert np.abs(after).max() < 2e-3 * np.abs(H).max()
+    assert found.conditions() == ("zero amplitude",)
+
+
+def test_one_amplitude_or_a_linear_film_is_left_alone():
+    assert zero_amplitude(runs_of(0.0), H, 0.0) is None
+    assert zero_amplitude(runs_of(0.0, (500.0,)), H, 0.05) is None
+    linear = zero_amplitude(runs_of(0.0), H, 0.01)
+    assert np.abs(linear.change).max() < 3 * np.sqrt(np.diag(linear.left).max())
+
+
+@pytest.mark.slow
+def test_three_amplitudes_are_right_where_one_is_refused(tmp_path):
+    film = Bearing(second=3.0, third=5.0)
+    rig = Rig(bearing=film, amplitude=0.35, seconds=2.0, rate=1000.0)
+    for amplitudes, refused in (((1.0,), True), ((0.3, 0.6, 1.0), False)):
+        path = tmp_path / "field.h5"
+        write_campaign(path, rig, plans_of(loads=(5000.0,), amplitudes=amplitudes), 5)
+        (point,) = identify(load_campaign(path), IdentifySettings(clearance=80e-6)).points
+        assert ("film-not-linear" in point.quality) is refused
+        if not refused:
+            truth = film.h(2 * np.pi * 25, 5000.0)
+            off = point.stiffness.vector - np.concatenate([truth.real.ravel(), truth.imag.ravel()])
+            assert (np.abs(off) < 1.5 * point.stiffness.half_width()).all()
+            assert "amplitude" in point.budget
