@@ -95,7 +95,8 @@ def _share(first: LineMean, second: LineMean, doubled: ComplexArray) -> float:
 def _quadratic_share(kept: Sequence[tuple[LineMean, LineMean]], doubled: ComplexArray) -> tuple[float, float]:
     """The same of all runs together, and how much of it could stay unseen.
 
-    Only what goes with the squares of the motion, size and phase, is the film's. Mains on the line, and noise, have any phase; they stay in the residual.
+    Only what goes with the squares of the motion, size and phase, is the film's. Mains on the line, and noise, have
+    any phase; they stay in the residual.
     """
     size = np.array([np.linalg.norm(first.force) for first, _ in kept])[:, None]
     d = np.array([first.displacement for first, _ in kept])
