@@ -17,12 +17,12 @@ from rigdata.manifest.runs import RunEntry
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import RunReader
+from rigdata.readers.suffixes import TEXT
 from rigdata.run import Run
 from rigdata.safe_path import inside
 
 MANIFEST_NAME = "campaign.toml"
 HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
-RECORD_SUFFIXES = (".csv", ".txt", ".asc", ".dat", ".tsv")
 _MAX_BEARING = 2**20
 
 
@@ -161,7 +161,7 @@ def _kind_of(given: Path) -> str:
         raise _cannot(str(given)[:200], "there is no such file or folder", "Check the path")
     if not given.is_file():
         raise _cannot(str(given), "is not an ordinary file", f"Give a folder with {MANIFEST_NAME} or an HDF5 file")
-    if given.suffix.lower() in RECORD_SUFFIXES:
+    if given.suffix.lower() in TEXT:
         raise _cannot(str(given), "is a record, not a campaign", f"Give the folder that holds {MANIFEST_NAME}")
     return "manifest" if given.suffix.lower() == ".toml" else "hdf5"
 

@@ -46,6 +46,10 @@ _MAX_DELAY = 10.0
 _MAX_CHANNELS = 4096
 
 
+#: Parts of a name that lead elsewhere in an HDF5 file; "Date/Time" is a name.
+_PATH_STEPS = {"", ".", ".."}
+
+
 def read_channels(table: Table, findings: Findings, files: TextFile | None = None) -> dict[str, Channel]:
     """Read every channel; what is wrong is noted in `findings`, and that channel left out.
 
@@ -76,7 +80,7 @@ def read_channels(table: Table, findings: Findings, files: TextFile | None = Non
 
 def _read_channel(name: str, table: Table, files: TextFile | None) -> Channel | None:
     table.only(_KEYS, f"[channels.{name[:40]}]")
-    if not name.strip() or len(name) > 200 or not name.isprintable() or "/" in name or name in {".", ".."}:
+    if not name.strip() or len(name) > 200 or not name.isprintable() or _PATH_STEPS & set(name.split("/")):
         table.findings.error(table.path, f"channel name {shown(name)} cannot be used", "Use letters and digits")
         return None
     quantity = table.choice("quantity", _QUANTITIES, required=True)

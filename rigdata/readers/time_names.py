@@ -6,7 +6,10 @@ import re
 
 from rigdata.arrays import FloatArray
 
-_WORDS = "time|zeit|temps|tempo|tiempo|uhrzeit|timestamps?|elapsed ?time|relative ?time"
+_WORDS = (
+    r"date[ /_-]*time|date and time|datum[ /_+-]*(?:und )?(?:uhr)?zeit|time|zeit(?:stempel)?|temps|tempo|tiempo|uhrzeit"
+    r"|timestamps?|elapsed ?time|relative ?time"
+)
 # a lone t is a time, T and T1 are thermometers
 _TIME = re.compile(rf"(?:(?i:{_WORDS})\b|t$|t\s*[\[(])")
 _FACTORS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}

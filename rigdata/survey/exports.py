@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.formats.foreign import FORMATS, read_foreign
+from rigdata.readers.formats.foreign import read_foreign
 from rigdata.readers.series import Series, without_twins
+from rigdata.readers.suffixes import FORMATS, TEXT, suffix_hint
 from rigdata.readers.text.catman import time_column
 
-TEXT = (".csv", ".txt", ".asc", ".dat", ".tsv")
 MOST_FILES = 5000
 
 
@@ -54,8 +54,10 @@ def record_files(folder: Path) -> list[Path]:
     """
     found = records_below(folder)
     if not found:
-        known = ", ".join((*TEXT, *FORMATS))
-        raise RigDataError(Problem("error", str(folder), "", "holds no records", f"Known are {known}"))
+        others = [p for p in sorted(folder.rglob("*")) if p.is_file() and not p.name.startswith(".")][:1]
+        cure = suffix_hint(others[0]) if others else f"known are {', '.join((*TEXT, *FORMATS))}"
+        named = f"{others[0].name}: {cure}" if others else cure.capitalize()
+        raise RigDataError(Problem("error", str(folder), "", "holds no records", named))
     return found
 
 

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from rigdata import RigDataError, load_campaign
-from rigdata.readers.formats.foreign import FORMATS, ForeignReader, is_foreign, read_foreign
+from rigdata.readers.formats.foreign import ForeignReader, is_foreign, read_foreign
 from rigdata.readers.series import Series, on_one_clock
+from rigdata.readers.suffixes import FORMATS
 from rigdata.readers.time_names import is_time, seconds
 from tpjb_ident.check.campaign import check_campaign
 

@@ -17,25 +17,20 @@ from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import missing_channel, rate_of_time, undescribed
 from rigdata.readers.series import Columns, Series, on_one_clock
+from rigdata.readers.suffixes import FORMATS, suffix_hint
 
-#: Suffix -> module of this package, extra that brings its library.
-FORMATS = {
-    ".tdms": ("formats.tdms", "tdms"),
-    ".uff": ("formats.uff58", "uff"),
-    ".unv": ("formats.uff58", "uff"),
-    ".58": ("formats.uff58", "uff"),
-    ".mf4": ("formats.mdf4", "mdf"),
-    ".mdf": ("formats.mdf4", "mdf"),
-    ".mat": ("formats.mat", ""),
-    ".parquet": ("formats.parquet", ""),
-}
 #: Larger files are refused: these formats are read whole [bytes].
 LARGEST = 2**31
 _TEXT = (".asc", ".txt")
 
 
 def is_foreign(path: Path) -> bool:
-    """Whether a record is for this reader: by its suffix, or a text file with several time bases."""
+    """Whether a record is for this reader: by its suffix, or a text file with several time bases.
+
+    Parameters
+    ----------
+    path : Path
+    """
     if path.suffix.lower() in FORMATS:
         return True
     if path.suffix.lower() not in _TEXT or not path.is_file():
@@ -73,7 +68,9 @@ def read_foreign(path: Path, file: str, run: str | None = None) -> list[Series]:
     try:
         series: list[Series] = module.read_series(path)
     except RigDataError as error:
-        raise RigDataError([Problem(p.severity, file, p.place, p.what, p.cure, run) for p in error.problems]) from error
+        hint = suffix_hint(path)
+        named = [Problem(p.severity, file, p.place, p.what, hint or p.cure, run) for p in error.problems]
+        raise RigDataError(named) from error
     except ModuleNotFoundError as error:
         what = f"{path.suffix} files need the library {error.name}, which is not installed"
         raise refuse(what, f'Install it with: pip install "tpjb-ident[{extra}]"') from error

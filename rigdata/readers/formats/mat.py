@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,13 @@ import numpy as np
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.formats.mat5_elements import check_mat5
 from rigdata.readers.series import Series, equidistant
-from rigdata.readers.time_names import is_time
+from rigdata.readers.time_names import is_time, seconds
 
 _RATES = ("fs", "sample_rate", "samplerate", "sample_rate_hz", "abtastrate")
-_SHORTEST = 8
+#: Variables that name the columns of a matrix, and state their units.
+_NAMES = re.compile(r"name|label|header|kanal|channel|signal|voie|column")
+_UNITS = re.compile(r"unit|einheit|unite")
+_SHORTEST, _MOST_NAMES, _LONGEST = 8, 4096, 1000
 _DEEPEST = 4
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -22,30 +26,37 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 def read_series(path: Path) -> list[Series]:
     """Read every numeric vector.
 
-    A variable or structure field with at least eight numbers is a channel, the columns of a matrix are channels
-    ``name_1``, ``name_2``, ..; one named like a time (``t``, ``time``, ``Zeit``) is the clock, a scalar ``fs`` or
-    ``sample_rate`` [Hz] stands in for it.
+    A variable or structure field with at least eight numbers is a channel. The columns of a matrix are channels,
+    named by a list of as many texts beside it (``ChannelNames``, ``labels``, ..; units likewise), else ``name_1``,
+    ``name_2``, ..; where the list has as many names as the matrix has rows, its rows are the channels. One named like
+    a time (``t``, ``time``, ``Zeit``) is the clock, a scalar ``fs`` or ``sample_rate`` [Hz] stands in for it.
 
     Parameters
     ----------
     path : Path
         ``.mat``
     """
-    vectors, scalars = {}, {}
-    for name, value in _flattened(_load(path), "", 0):
+    flat = list(_flattened(_load(path), "", 0))
+    texts = {name: value for name, value in flat if isinstance(value, list)}
+    vectors, scalars, units = {}, {}, {}
+    for name, value in flat:
+        if isinstance(value, list):
+            continue
         if value.size == 1:
             scalars[name] = float(value.reshape(-1)[0])
         elif value.size >= _SHORTEST:
-            vectors.update(_columns(name, value))
+            named, stated = _columns(name, value, texts)
+            vectors.update(named)
+            units.update(stated)
     clock = next((n for n in vectors if is_time(n.rpartition(".")[2])), None)
-    time = None if clock is None else vectors.pop(clock)
+    time = None if clock is None else seconds(vectors.pop(clock), units.get(clock, ""))
     rate = next((v for n, v in scalars.items() if n.rpartition(".")[2].lower() in _RATES and v > 0), None)
     found = []
     for name, values in vectors.items():
         own = time if time is not None and len(time) == len(values) else None
         if own is None and rate is not None:
             own = equidistant(len(values), 1.0 / rate)
-        found.append(Series(name, "", values, own))
+        found.append(Series(name, units.get(name, ""), values, own))
     return found
 
 
@@ -85,8 +96,27 @@ def _group(group: Any, path: Path, depth: int) -> dict[str, Any]:
         item = group[name]
         if isinstance(item, h5py.Group):
             found[name] = _group(item, path, depth + 1)
+        elif item.dtype == h5py.ref_dtype:
+            texts = _cell_texts(item)
+            if texts:
+                found[name] = np.array(texts, dtype=object)
         elif item.dtype.kind in "fiu" and not (item.is_virtual or item.external or _is_text(item)):
             found[name] = np.asarray(item[()], dtype=float).T  # MATLAB writes columns first
+    return found
+
+
+def _cell_texts(item: Any) -> list[str]:
+    """Texts of a cell array of characters in a 7.3 file, which holds a reference to each; none if it holds others."""
+    if item.size > _MOST_NAMES or item.is_virtual or item.external:
+        return []
+    found = []
+    for reference in np.asarray(item[()]).T.reshape(-1):
+        text = item.file[reference] if reference else None
+        if text is None or not hasattr(text, "dtype") or text.dtype.kind != "u" or text.size > _LONGEST:
+            return []
+        if not _is_text(text) or text.is_virtual or text.external:
+            return []
+        found.append("".join(chr(int(c)) for c in np.asarray(text[()]).T.reshape(-1)))
     return found
 
 
@@ -94,7 +124,8 @@ def _is_text(item: Any) -> bool:
     return item.attrs.get("MATLAB_class") in (b"char", "char")
 
 
-def _flattened(value: Any, name: str, depth: int) -> Iterator[tuple[str, np.ndarray]]:
+def _flattened(value: Any, name: str, depth: int) -> Iterator[tuple[str, np.ndarray | list[str]]]:
+    """Numbers as arrays and lists of texts, by their dotted names."""
     if isinstance(value, dict):
         if depth <= _DEEPEST:
             for key, inner in value.items():
@@ -103,9 +134,23 @@ def _flattened(value: Any, name: str, depth: int) -> Iterator[tuple[str, np.ndar
     array = np.asarray(value)
     if array.dtype.kind in "fiu" and array.size and array.ndim <= 2:
         yield name, array.astype(float)
+    elif array.dtype.kind in "UO" and array.size <= _MOST_NAMES:
+        texts = [str(cell).strip() for cell in array.reshape(-1)]
+        if texts and all(isinstance(cell, str) for cell in array.reshape(-1)):
+            yield name, texts
 
 
-def _columns(name: str, value: np.ndarray) -> dict[str, np.ndarray]:
+def _columns(name: str, value: np.ndarray, texts: dict[str, list[str]]) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Channels of a variable, and units of those that a list beside it tells."""
     if value.ndim == 1 or 1 in value.shape:
-        return {name: np.ascontiguousarray(value).reshape(-1)}
-    return {f"{name}_{i + 1}": np.ascontiguousarray(value[:, i]) for i in range(value.shape[1])}
+        return {name: np.ascontiguousarray(value).reshape(-1)}, {}
+    level = name.rpartition(".")[0]
+    beside = {k.rpartition(".")[2].lower(): v for k, v in texts.items() if k.rpartition(".")[0] == level}
+    names = next((v for k, v in beside.items() if _NAMES.search(k) and len(v) in value.shape), None)
+    if names is None:
+        return {f"{name}_{i + 1}": np.ascontiguousarray(value[:, i]) for i in range(value.shape[1])}, {}
+    if len(names) != value.shape[1]:
+        value = value.T
+    units = next((v for k, v in beside.items() if _UNITS.search(k) and len(v) == len(names)), [""] * len(names))
+    labels = [n if n and names.count(n) == 1 else f"{n or name}_{i + 1}" for i, n in enumerate(names)]
+    return {n: np.ascontiguousarray(value[:, i]) for i, n in enumerate(labels)}, dict(zip(labels, units, strict=True))

@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from rigdata.problem import Problem, RigDataError
 from rigdata.readers.series import Series, equidistant
 
 #: Function types of data set 58 that are records over time.
 _GENERAL, _TIME_RESPONSE = 0, 1
+_FUNCTIONS = {1: "complex time response", 2: "auto spectrum", 3: "cross spectrum", 4: "frequency response function",
+              6: "coherence", 7: "auto correlation", 9: "power spectral density", 12: "spectrum"}  # fmt: skip
 
 
 def read_series(path: Path) -> list[Series]:
@@ -23,17 +26,32 @@ def read_series(path: Path) -> list[Series]:
     ----------
     path : Path
         ``.uff``, ``.unv`` or ``.58``.
+
+    Raises
+    ------
+    RigDataError
+        It holds none: says what it holds.
     """
     import pyuff
 
     file = pyuff.UFF(str(path))
-    found = []
+    found, others = [], []
     for index, kind in enumerate(file.get_set_types()):
-        if int(kind) == 58:
-            data = file.read_sets(index)
-            over_time = int(data.get("func_type", 0)) in (_GENERAL, _TIME_RESPONSE)
-            if over_time and not np.iscomplexobj(data["data"]):
-                found.append(_series(data, index))
+        if int(kind) != 58:
+            others.append(f"data set {int(kind)}")
+            continue
+        data = file.read_sets(index)
+        function = int(data.get("func_type", 0))
+        if function in (_GENERAL, _TIME_RESPONSE) and not np.iscomplexobj(data["data"]):
+            found.append(_series(data, index))
+        else:
+            others.append(_FUNCTIONS.get(function, f"function type {function}"))
+    if not found:
+        counted = [f"{others.count(one)} x {one}" for one in dict.fromkeys(others)]
+        what = f"holds no record over time, only {', '.join(counted[:6])}" if others else "holds no data set"
+        raise RigDataError(
+            Problem("error", path.name, "", what, "Export the time records (data set 58, time response)")
+        )
     return found
 
 

@@ -18,7 +18,12 @@ _SPARE = re.compile(r"\s+(?:\d+\s*)?-.*$")  # "Time  1 - default sample rate"
 
 
 def has_several_clocks(path: Path) -> bool:
-    """Whether the names line of a text file holds more than one time column."""
+    """Whether the names line of a text file holds more than one time column.
+
+    Parameters
+    ----------
+    path : Path
+    """
     try:
         head = find_head(path)
     except (RigDataError, OSError):
@@ -27,7 +32,12 @@ def has_several_clocks(path: Path) -> bool:
 
 
 def time_column(path: Path) -> str:
-    """Name of the first time column of a text file; "" without one."""
+    """Name of the first time column of a text file; "" without one.
+
+    Parameters
+    ----------
+    path : Path
+    """
     return next((n for n in map(_short, find_head(path).names) if is_time(n)), "")
 
 
@@ -46,10 +56,13 @@ def read_series(path: Path) -> list[Series]:
     """
     head = find_head(path)
     labels = tuple(f"{i}:{_short(n)}" for i, n in enumerate(head.names))  # names need not be unique, labels must
-    table = read_table(Source(path, path.name, None, head.dialect(labels)), labels)
+    numbers = [label for i, label in enumerate(labels) if i not in head.dates]
+    table = read_table(Source(path, path.name, None, head.dialect(labels)), numbers)
     clock: np.ndarray | None = None
     found = []
     for i, (name, label) in enumerate(zip(head.names, labels, strict=True)):
+        if label not in table.columns:
+            continue
         values, unit = table.columns[label], head.units[i]
         if is_time(_short(name)):
             clock = seconds(values, unit)

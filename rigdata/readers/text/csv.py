@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from rigdata.calibration import Channel
 from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import missing_channel, rate_of_time, undescribed
+from rigdata.readers.suffixes import suffix_hint
 from rigdata.readers.text.csv_table import Source, Table, read_table
 from rigdata.readers.text.dialect import Dialect, DialectFinder
 
@@ -112,6 +113,11 @@ class CsvReader:
         finder = DialectFinder(self.path, self.file, self.run, self.spec, self.channels)
         try:
             return self.cache.dialect(self._signature(), finder.find)
+        except RigDataError as error:
+            hint = suffix_hint(self.path)
+            if not hint:
+                raise
+            raise RigDataError([replace(p, cure=hint) for p in error.problems]) from error
         except OSError as error:
             raise self._error("", f"cannot be read ({error.strerror})", "Check the rights of the file") from error
 

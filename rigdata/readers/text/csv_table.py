@@ -23,6 +23,7 @@ from rigdata.readers.text.byte_stream import (
     squeeze_blanks,
 )
 from rigdata.readers.text.dialect import Dialect, split_line
+from rigdata.readers.text.stamps import is_stamp, stamp_seconds
 
 #: Lines longer than this are refused [bytes].
 _BLOCK = 2**22
@@ -130,7 +131,9 @@ def _options(source: Source, names: Sequence[str], numbers: bool, odd: list[Any]
             delimiter="\t" if dialect.delimiter == " " else dialect.delimiter, invalid_row_handler=note
         ),
         "convert_options": pv.ConvertOptions(
-            column_types=dict.fromkeys(wanted, pa.float64() if numbers else pa.string()),
+            column_types={
+                w: pa.float64() if numbers and int(w[1:]) not in dialect.stamps else pa.string() for w in wanted
+            },
             include_columns=wanted,
             null_values=list(MISSING),
             strings_can_be_null=False,
@@ -144,9 +147,11 @@ def _parse(
     source: Source, names: Sequence[str], numbers: bool
 ) -> tuple[dict[str, FloatArray], int, list[tuple[int, str]]]:
     import pyarrow as pa
+    import pyarrow.compute as pc
     import pyarrow.csv as pv
 
     odd: list[tuple[int, str]] = []
+    stamps = {i for i, n in enumerate(names) if source.dialect.names.index(n) in source.dialect.stamps}
     parts: list[list[FloatArray]] = [[] for _ in names]
     length = 0
     faults: list[list[str]] = [[] for _ in names]
@@ -158,6 +163,9 @@ def _parse(
             for batch in reader:
                 length += batch.num_rows
                 for index, column in enumerate(batch.columns):
+                    if index in stamps:
+                        parts[index].append(pc.ascii_trim_whitespace(column).to_numpy(zero_copy_only=False))
+                        continue
                     values = column if numbers else _to_numbers(column, source.dialect.decimal, faults[index])
                     parts[index].append(values.to_numpy(zero_copy_only=False))
                 if length > MAX_SAMPLES:
@@ -167,6 +175,11 @@ def _parse(
                 raise
             what = f"cannot be parsed ({str(error).splitlines()[0][:160]})"
             raise RigDataError(source.problem("error", "", what, "Export the run again")) from error
+    for index in stamps:
+        cells = [None if c is None or is_missing(c) else c for part in parts[index] for c in part]
+        seconds, bad = stamp_seconds(cells)
+        parts[index] = [seconds]
+        faults[index] += ["text"] * bad
     if any(faults):
         raise RigDataError(_locate_text(source, [n for n, f in zip(names, faults) if f]))
     empty = np.empty(0)
@@ -201,7 +214,8 @@ def _locate_text(source: Source, names: Sequence[str]) -> list[Problem]:
         if len(cells) != len(dialect.names):
             continue
         for name, index in where.items():
-            if not (is_number(cells[index], dialect.decimal) or is_missing(cells[index])):
+            known = is_stamp(cells[index]) if index in dialect.stamps else is_number(cells[index], dialect.decimal)
+            if not (known or is_missing(cells[index])):
                 counts[name] += 1
                 if len(found[name]) < _LISTED:
                     found[name].append((number, cells[index][:40]))
@@ -211,7 +225,8 @@ def _locate_text(source: Source, names: Sequence[str]) -> list[Problem]:
         column = f"column {where[name] + 1} ({name})"
         line_number, text = places[0] if places else (dialect.data_line, "?")
         more = f", and in {counts[name] - 1} more lines" if counts[name] > 1 else ""
-        what = f"{text!r} is not a number{more}"
+        kind = "time stamp" if where[name] in dialect.stamps else "number"
+        what = f"{text!r} is not a {kind}{more}"
         problems.append(source.problem("error", f"line {line_number}, {column}", what, cure))
     return problems
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv as _csv
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.numbers import is_missing, is_number, looks_like
 from rigdata.readers.text.byte_stream import HEAD, codec_of_bytes, head_lines, text_encoding
+from rigdata.readers.text.stamps import is_stamp
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _SUFFIX = re.compile(r"\s*[\[(].*[\])]\s*$")
@@ -37,6 +38,8 @@ class Dialect:
         One per cell of a data line, "" where a column has no name.
     sure : bool
         Whether the decimal mark was given or seen; else the file's head holds whole numbers only.
+    stamps : frozenset of int
+        Columns of dates and times of day, counted from 0.
     """
 
     encoding: str
@@ -47,6 +50,7 @@ class Dialect:
     data_offset: int
     names: tuple[str, ...]
     sure: bool = True
+    stamps: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -101,6 +105,7 @@ class DialectFinder:
             data_offset=raw[first][1],
             names=self._widen(header, sample),
             sure=decimal is not None,
+            stamps=columns_of(is_stamp, sample),
         )
 
     def _header(self, lines: list[str]) -> _Header:
@@ -211,8 +216,31 @@ class DialectFinder:
         return names[:width]
 
 
+def columns_of(kind: Callable[[str], bool], sample: list[list[str]]) -> frozenset[int]:
+    """Columns whose cells are all of a kind, missing ones apart.
+
+    Parameters
+    ----------
+    kind : callable
+        Such as `is_stamp`.
+    sample : list of list of str
+        Cells of some lines.
+    """
+    width = min((len(row) for row in sample), default=0)
+    columns = [[row[i] for row in sample if row[i]] for i in range(width)]
+    return frozenset(i for i, cells in enumerate(columns) if cells and all(kind(c) for c in cells))
+
+
 def split_line(line: str, delimiter: str) -> list[str]:
-    """Cells of a line, stripped of white space and quotes; empty for a blank line."""
+    """Cells of a line, stripped of white space and quotes; empty for a blank line.
+
+    Parameters
+    ----------
+    line : str
+        Without its end.
+    delimiter : str
+        A space stands for any run of white space.
+    """
     if not line.strip():
         return []
     if delimiter == " ":

@@ -9,7 +9,8 @@ from pathlib import Path
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.numbers import is_missing, is_number
 from rigdata.readers.text.byte_stream import codec_of_bytes, head_lines, text_encoding
-from rigdata.readers.text.dialect import Dialect, split_line
+from rigdata.readers.text.dialect import Dialect, columns_of, split_line
+from rigdata.readers.text.stamps import is_date, is_stamp
 
 DELIMITERS = (";", "\t", ",", "|", " ")
 _UNIT = re.compile(r"[\[(]([^\])]*)[\])]\s*$")
@@ -33,6 +34,10 @@ class TextHead:
         Byte at which the numbers begin.
     preamble : tuple of str
         Lines above the names.
+    stamps : frozenset of int
+        Columns of times of day, with or without a date.
+    dates : frozenset of int
+        Columns of dates alone.
     """
 
     encoding: str
@@ -44,9 +49,17 @@ class TextHead:
     data_line: int
     data_offset: int
     preamble: tuple[str, ...]
+    stamps: frozenset[int] = frozenset()
+    dates: frozenset[int] = frozenset()
 
     def dialect(self, labels: tuple[str, ...]) -> Dialect:
-        """Describe the file as the CSV parser wants it, its columns called `labels`."""
+        """Describe the file as the CSV parser wants it.
+
+        Parameters
+        ----------
+        labels : tuple of str
+            What its columns are called.
+        """
         return Dialect(
             encoding=self.encoding,
             delimiter=self.delimiter,
@@ -56,6 +69,7 @@ class TextHead:
             data_offset=self.data_offset,
             names=labels,
             sure=True,
+            stamps=self.stamps,
         )
 
 
@@ -77,8 +91,8 @@ def find_head(path: Path) -> TextHead:
     best: tuple[int, int, str, str] | None = None  # columns, first line, delimiter, decimal
     for delimiter in DELIMITERS:
         for decimal in ".,":
-            if delimiter == decimal:
-                continue
+            if delimiter == decimal or (delimiter == " " and best is not None):
+                continue  # a blank within a stamp parts no cells where another delimiter does
             found = _table_start(lines, delimiter, decimal)
             if found is not None and (best is None or found[1] > best[0]):
                 best = (found[1], found[0], delimiter, decimal)
@@ -86,6 +100,7 @@ def find_head(path: Path) -> TextHead:
         problem = Problem("error", path.name, "", "no table of numbers begins in its first lines", "Is it a record?")
         raise RigDataError(problem)
     width, first, delimiter, decimal = best
+    sample = [c for c in (_cells(t, delimiter) for t in lines[first : first + _SAMPLE]) if c]
     header, names = _names(lines, first, width, delimiter)
     return TextHead(
         encoding=encoding,
@@ -97,6 +112,8 @@ def find_head(path: Path) -> TextHead:
         data_line=first + 1,
         data_offset=raw[first][1],
         preamble=tuple(lines[: max(header, 0)]),
+        stamps=columns_of(is_stamp, sample),
+        dates=columns_of(is_date, sample),
     )
 
 
@@ -105,7 +122,9 @@ def _table_start(lines: list[str], delimiter: str, decimal: str) -> tuple[int, i
     run, width = 0, 0
     for i, line in enumerate(lines):
         cells = _cells(line, delimiter)
-        good = len(cells) > 1 and all(is_number(c, decimal) or is_missing(c) for c in cells)
+        good = len(cells) > 1 and all(
+            is_number(c, decimal) or is_missing(c) or is_stamp(c) or is_date(c) for c in cells
+        )
         good = good and any(is_number(c, decimal) for c in cells)
         run, width = (run + 1, width) if good and len(cells) == width else (int(good), len(cells) if good else 0)
         last = i == len(lines) - 1
