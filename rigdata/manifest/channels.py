@@ -14,11 +14,12 @@ from rigdata.calibration import (
     reading_zero,
 )
 from rigdata.channel_response import ChannelResponse, parse_filter, parse_response_table
-from rigdata.manifest.table import Findings, Table, shown
+from rigdata.manifest.table import Findings, Table, nearest, shown
 from rigdata.problem import RigDataError
 from rigdata.units import UnitError, is_signal
 
 _KEYS = (
+    "like",
     "quantity",
     "axis",
     "unit",
@@ -38,6 +39,8 @@ _KEYS = (
     "clock",
     "zero_uncertainty",
 )
+#: Entries that say where a sensor sits: a channel that is `like` another has its own.
+_PLACE = ("axis", "pad", "position")
 _QUANTITIES = (*DIMENSIONS, *UNCALIBRATED, "ignore")
 #: Gives the text of a file of the campaign, by its name in the manifest; raises RigDataError.
 TextFile = Callable[[str, str], str]
@@ -68,14 +71,34 @@ def read_channels(table: Table, findings: Findings, files: TextFile | None = Non
     if len(table.data) > _MAX_CHANNELS:
         findings.error(("channels",), f"more than {_MAX_CHANNELS} channels", "Is it the right file?")
         return channels
-    for name in table.data:
+    tables = {name: table.subtable(name) for name in table.data}
+    for name in sorted(tables, key=lambda n: "like" in tables[n].data):
+        own = tables[name]
+        if "like" in own.data and not _complete(own, name, tables, channels):
+            continue
         before = len(findings.problems)
-        channel = _read_channel(name, table.subtable(name), files)
+        channel = _read_channel(name, own, files)
         if not any(p.severity == "error" for p in findings.problems[before:]) and channel is not None:
             channels[name] = channel
+    channels = {name: channels[name] for name in tables if name in channels}
     if sum(c.quantity == "time" for c in channels.values()) > 1:
         findings.error(("channels",), "more than one channel is the time", 'Set the others to quantity = "ignore"')
     return channels
+
+
+def _complete(own: Table, name: str, tables: dict[str, Table], read: dict[str, Channel]) -> bool:
+    """Give a channel the entries of the one that it is `like`, but for its place; whether that can be read."""
+    model = own.text("like")
+    if model is None:
+        return False
+    if model not in tables or model == name or "like" in tables[model].data:
+        known = [n for n, t in tables.items() if "like" not in t.data and n != name]
+        own.error("like", f"is no channel that is described in full ({shown(model)})", nearest(model, known))
+        return False
+    if model not in read:  # what is wrong with it has been said there
+        return False
+    own.data.update({k: v for k, v in tables[model].data.items() if k not in own.data and k not in _PLACE})
+    return True
 
 
 def _read_channel(name: str, table: Table, files: TextFile | None) -> Channel | None:

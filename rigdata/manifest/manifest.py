@@ -23,7 +23,7 @@ MAX_MANIFEST = 4 * 2**20
 MAX_LINE, MAX_DOTS = 40_000, 100
 _QUOTED = re.compile(r'"[^"\\]*"|\'[^\']*\'')
 _TOP = ("schema", "id", "bearing", "description", "housing", "acquisition", "csv", "channels", "runs")
-_CSV = ("delimiter", "decimal", "encoding", "header_line", "units_line")
+_CSV = ("delimiter", "decimal", "encoding", "header_line", "units_line", "names")
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,8 @@ class CsvSpec:
         Python codec name.
     header_line, units_line : int or None
         1-based lines of the column names and of their units.
+    names : tuple of str
+        Of the columns, where the files have none; empty else.
     """
 
     delimiter: str | None = None
@@ -45,6 +47,7 @@ class CsvSpec:
     encoding: str | None = None
     header_line: int | None = None
     units_line: int | None = None
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -186,11 +189,17 @@ def _read_csv(table: Table, findings: Findings) -> CsvSpec:
     header, units = table.integer("header_line", low=1), table.integer("units_line", low=1)
     if header is not None and units is not None and units <= header:
         findings.error(
-            ("csv", "units_line"),
+            ("csv", "units_line", "names"),
             f"units_line {units} is not below header_line {header}",
             "Lines count from 1",
         )
-    return CsvSpec(delimiter, decimal, _codec(table.text("encoding"), findings), header, units)
+    names = table.data.get("names", [])
+    if not isinstance(names, list) or not all(isinstance(n, str) and n.strip() for n in names):
+        findings.error(
+            ("csv", "names"), "names is no list of texts", 'Write names = ["time", "X1A", ..], one per column'
+        )
+        names = []
+    return CsvSpec(delimiter, decimal, _codec(table.text("encoding"), findings), header, units, tuple(names))
 
 
 def _codec(encoding: str | None, findings: Findings) -> str | None:

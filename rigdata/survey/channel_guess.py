@@ -112,7 +112,9 @@ def _axis(name: str, quantity: str) -> str:
     """Direction from the letters at a name's end, for quantities that have one."""
     if quantity not in ("displacement", "force", "acceleration"):
         return ""
-    end = re.search(r"(?:^|[\d_\-. ])([xyhv])$", name.strip(), re.IGNORECASE) or re.match(r"[fd]([xy])$", name, re.I)
+    end = re.search(r"(?:^|[\d_\-. ])([xyhv])$", name.strip(), re.IGNORECASE) or re.match(
+        r"[fdal]([xyhv])$", name.strip(), re.I
+    )
     if end is None:
         return ""
     return "0 deg" if end[1].lower() in "xh" else "90 deg"

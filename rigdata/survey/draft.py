@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rigdata.survey.channel_guess import ChannelGuess, guess_channel, quantity_of_unit
@@ -48,6 +48,8 @@ class Survey:
         Frequency that stands in every running record [Hz]: perhaps the shaft speed; NaN if none does.
     clock : str
         Name of the time column of text files; "" without one.
+    nameless : int
+        Columns of text files that have no names; 0 where they have.
     """
 
     exports: tuple[str, ...]
@@ -56,20 +58,23 @@ class Survey:
     runs: tuple[RunGuess, ...]
     speed_line: float = float("nan")
     clock: str = ""
+    nameless: int = 0
 
 
-def survey(exports: Sequence[Export]) -> Survey:
+def survey(exports: Sequence[Export], given: Mapping[str, ChannelGuess] | None = None) -> Survey:
     """Guess channels and runs of a folder of exports.
 
     Parameters
     ----------
     exports : sequence of Export
+    given : mapping of str to ChannelGuess, optional
+        What is known of channels by name: its quantity, unit and axis count before every guess.
     """
     channels: dict[str, ChannelGuess] = {}
     for export in exports:
         for one in export.series:
             if one.name not in channels:
-                channels[one.name] = guess_channel(one.name, one.unit)
+                channels[one.name] = _with_given(guess_channel(one.name, one.unit), (given or {}).get(one.name))
     quantities = {name: guess.quantity for name, guess in channels.items()}
     runs = _one_direction([guess_run(export, channels) for export in exports])
     return Survey(
@@ -79,7 +84,16 @@ def survey(exports: Sequence[Export]) -> Survey:
         runs=runs,
         speed_line=_common_line(exports, quantities, runs),
         clock=next((e.clock for e in exports if e.clock), ""),
+        nameless=max((e.nameless for e in exports), default=0),
     )
+
+
+def _with_given(guess: ChannelGuess, known: ChannelGuess | None) -> ChannelGuess:
+    if known is None:
+        return guess
+    if known.quantity and known.quantity != guess.quantity:
+        guess = replace(guess, quantity=known.quantity, axis="", why=known.why)
+    return replace(guess, unit=known.unit or guess.unit, axis=known.axis or guess.axis)
 
 
 def _one_direction(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
@@ -140,7 +154,8 @@ def draft_manifest(found: Survey, name: str, bearing: str | None) -> str:
     """
     lines = [
         "# Draft by `tpjb init`. Places marked ?? only you can know; what is marked (guess) is worth a look.",
-        "# When they are filled in, `tpjb check` lists what is left. Signs and frame: docs/guide/mounting.md",
+        "# After changes to channels, `tpjb init --update` guesses the rest anew; `tpjb check` lists what is left.",
+        "# Signs and frame: docs/guide/mounting.md",
         'schema = "tpjb-rig/1"',
         f"id = {toml_string(name)}",
         f"bearing = {toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # bearing file, beside this one',
@@ -152,18 +167,44 @@ def draft_manifest(found: Survey, name: str, bearing: str | None) -> str:
     ]
     if not all(rate > 0 for rate in found.rates):
         lines += ["[acquisition]", f'sample_rate = "{MARK} Hz"   # some files hold no times', ""]
+    if found.nameless:
+        names = ", ".join(toml_string(f"column{i + 1}") for i in range(found.nameless))
+        lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
     if found.clock:
-        lines += [f"[channels.{_key(found.clock)}]", 'quantity = "time"', 'unit = "s"', ""]
-    for channel, guess in found.channels.items():
-        lines += [*_channel_lines(channel, guess), ""]
+        head = f"[channels.{_key(found.clock)}]"
+        lines += [
+            head,
+            'quantity = "time"   # (guess) by its name',
+            'unit = "s"   # (guess); times of day become seconds',
+            "",
+        ]
+    for block in channel_blocks(found).values():
+        lines += [*block, ""]
     for export, run in zip(found.exports, found.runs, strict=True):
-        lines += [*_run_lines(export, run, found), ""]
+        lines += [*run_lines(export, run, found), ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _channel_lines(name: str, guess: ChannelGuess) -> list[str]:
+def channel_blocks(found: Survey) -> dict[str, list[str]]:
+    """Lines of every channel's table; sensors of one kind and unit are described once, the others are `like` it.
+
+    Parameters
+    ----------
+    found : Survey
+    """
+    first: dict[tuple[str, str], str] = {}
+    blocks = {}
+    for name, guess in found.channels.items():
+        kind = (guess.quantity, guess.unit)
+        open_still = guess.quantity in _EXAMPLE and quantity_of_unit(guess.unit) == ""
+        model = first.setdefault(kind, name) if open_still else name
+        blocks[name] = _channel_lines(name, guess, "" if model == name else model)
+    return blocks
+
+
+def _channel_lines(name: str, guess: ChannelGuess, like: str) -> list[str]:
     head = f"[channels.{_key(name)}]"
-    if not guess.quantity:
+    if not guess.quantity or guess.quantity == "ignore":
         return [
             head,
             f'quantity = "ignore"   # (guess) {guess.why}; or displacement, force, acceleration, ..',
@@ -173,11 +214,16 @@ def _channel_lines(name: str, guess: ChannelGuess) -> list[str]:
         known = f'axis = "{guess.axis}"   # (guess) by its name' if guess.axis else f'axis = "{MARK} deg"'
         where = "direction of the positive quantity, counter-clockwise from horizontal"
         lines.append(known if guess.axis else f"{known}   # {where}")
-    lines.append(f'unit = "{guess.unit or MARK}"')
-    if quantity_of_unit(guess.unit) == "":
-        lines.append(f'sensitivity = "{MARK}"   # such as {_EXAMPLE[guess.quantity]}')
-    if guess.quantity == "displacement":
-        lines.append("# polarity = -1   # an eddy-current probe reads less as the shaft comes nearer")
+    if like:
+        lines.append(
+            f"like = {toml_string(like)}   # (guess) a sensor of the same type; or its own unit, sensitivity, .."
+        )
+    else:
+        lines.append(f'unit = "{guess.unit or MARK}"')
+        if quantity_of_unit(guess.unit) == "":
+            lines.append(f'sensitivity = "{MARK}"   # such as {_EXAMPLE.get(guess.quantity, "1 V per unit")}')
+        if guess.quantity == "displacement":
+            lines.append("# polarity = -1   # an eddy-current probe reads less as the shaft comes nearer")
     if guess.quantity == "temperature":
         pad = re.search(r"(?:pad|t|tc|temp\w*?)[-_ #]*(\d{1,2})(?!\d)", name, re.IGNORECASE)
         lines.append(f"pad = {int(pad[1])}   # (guess) by its name" if pad and int(pad[1]) else "# pad = 1")
@@ -185,7 +231,17 @@ def _channel_lines(name: str, guess: ChannelGuess) -> list[str]:
     return lines
 
 
-def _run_lines(export: str, run: RunGuess, found: Survey) -> list[str]:
+def run_lines(export: str, run: RunGuess, found: Survey) -> list[str]:
+    """Lines of a run's table.
+
+    Parameters
+    ----------
+    export : str
+        Name of its file.
+    run : RunGuess
+    found : Survey
+        Of the folder.
+    """
     stem = export.rpartition("/")[2].rpartition(".")[0]
     kind = f'kind = "{MARK}"   # dynamic, dry_pivot, locus, clearance'
     if run.kind:

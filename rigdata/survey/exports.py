@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+import numpy as np
 
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.formats.foreign import read_foreign
 from rigdata.readers.series import Series, without_twins
 from rigdata.readers.suffixes import FORMATS, TEXT, suffix_hint
 from rigdata.readers.text.catman import time_column
+from rigdata.readers.text.head import find_head
 
 MOST_FILES = 5000
 
@@ -27,11 +30,14 @@ class Export:
         Its channels, each on its own clock.
     clock : str
         Name of the time column of a text file; "" without one.
+    nameless : int
+        Columns of a text file without names, which are then ``column1``, ``column2``, ..; 0 where it has names.
     """
 
     name: str
     series: tuple[Series, ...] = field(repr=False)
     clock: str = ""
+    nameless: int = 0
 
     @property
     def rate(self) -> float:
@@ -101,8 +107,22 @@ def read_export(path: Path, name: str | None = None) -> Export:
     """
     name = name or path.name
     series = tuple(without_twins(read_foreign(path, name)))
-    clock = time_column(path) if path.suffix.lower() in TEXT else ""
-    return Export(name, series, clock)
+    if path.suffix.lower() not in TEXT:
+        return Export(name, series)
+    head = find_head(path)
+    if head.header_line:
+        return Export(name, series, time_column(path))
+    times = next((s for s in series if _counts_evenly(s)), None)
+    if times is not None:
+        series = tuple(replace(s, time=times.values) for s in series if s is not times)
+    return Export(name, series, times.name if times is not None else "", len(head.names))
+
+
+def _counts_evenly(one: Series) -> bool:
+    """Whether a nameless column rises in equal steps, as times do and nothing that is measured."""
+    steps = np.diff(one.values)
+    mean = float(steps.mean()) if len(steps) > 8 else 0.0
+    return mean > 0 and bool(np.all(np.abs(steps - mean) < 0.1 * mean))
 
 
 def read_exports(folder: Path, problems: list[Problem]) -> Iterator[Export]:

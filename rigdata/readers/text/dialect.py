@@ -109,6 +109,8 @@ class DialectFinder:
         )
 
     def _header(self, lines: list[str]) -> _Header:
+        if self.spec.names:
+            return self._nameless(lines)
         free = self._best(lines, _DELIMITERS, range(len(lines)))
         if free is None:
             cure = "Name the manifest's channels as the columns are named"
@@ -131,6 +133,18 @@ class DialectFinder:
             f"{there.delimiter!r} finds {there.matched}"
         )
         raise self._error(f"line {there.line}", what, f"Set [csv] delimiter = {there.delimiter!r}, or leave it out")
+
+    def _nameless(self, lines: list[str]) -> _Header:
+        """The first line of numbers with as many cells as the manifest has names."""
+        width = len(self.spec.names)
+        for number, line in enumerate(lines):
+            for delimiter in _DELIMITERS if self.spec.delimiter is None else (self.spec.delimiter,):
+                cells = split_line(line, delimiter)
+                numbers = sum(looks_like(c) or is_stamp(c) for c in cells)
+                if width <= len(cells) <= width + 1 and 0 < numbers >= width - 1:
+                    return _Header(number, delimiter, self.spec.names, width)
+        what = f"no line holds {width} numbers, as [csv] names has names"
+        raise self._error("", what, "Give one name per column, or delete [csv] names where the files name them")
 
     def _wanted(self) -> str:
         names = sorted(self.channels)

@@ -1,0 +1,159 @@
+"""`tpjb init` beyond the first draft: columns without names, edited manifests, the bearing's draft."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from model.bearing import BearingError
+from model.bearing_file import load_bearing
+from rigdata import RigDataError, load_campaign
+from rigdata.manifest.manifest import parse_manifest
+from tests.command_line import tpjb
+
+TIME = np.arange(2000) / 1000.0
+
+
+def record(path, names, frequency=25.0, load=5000.0):
+    """Two probes in volts and two cells in newtons; the cells swing at a frequency."""
+    swing = np.cos(2 * np.pi * frequency * TIME)
+    columns = [TIME, 0.1 * swing, 0.2 * swing + 0.02 * np.sin(2 * np.pi * 22 * TIME), 300 * swing, 400 * swing - load]
+    rows = [";".join(f"{v:.6f}" for v in row) for row in np.stack(columns, axis=1)]
+    head = [";".join(names)] if names else []
+    path.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "a").mkdir()
+    return tmp_path / "a"
+
+
+def edit(path, *pairs):
+    text = path.read_text("utf-8")
+    for old, new in pairs:
+        assert old in text, old
+        text = text.replace(old, new)
+    path.write_text(text, "utf-8")
+
+
+def test_columns_without_names_are_named_by_hand_and_guessed_anew(folder):
+    record(folder / "test-5kN-1320rpm.csv", ())
+    assert tpjb("init", folder).exit_code == 0
+    manifest = folder / "campaign.toml"
+    text = manifest.read_text("utf-8")
+    assert 'names = ["column1", "column2", "column3", "column4", "column5"]' in text
+    assert '[channels.column1]\nquantity = "time"' in text
+    edit(manifest, ('"column1", "column2", "column3", "column4", "column5"', '"t", "X1", "X2", "FH", "FV"'))
+    edit(manifest, ("[channels.column1]", "[channels.t]"))
+    for number in (2, 3, 4, 5):
+        start = manifest.read_text("utf-8").index(f"[channels.column{number}]")
+        end = manifest.read_text("utf-8").index("[", start + 5)
+        manifest.write_text(manifest.read_text("utf-8")[:start] + manifest.read_text("utf-8")[end:], "utf-8")
+    result = tpjb("init", folder, "--update")
+    assert result.exit_code == 0, result.stderr
+    after = manifest.read_text("utf-8")
+    assert '[channels.X1]\nquantity = "displacement"' in after
+    assert '[channels.FV]\nquantity = "force"' in after
+    assert (folder / "campaign.toml.bak").read_text("utf-8") != after
+    edit(manifest, ('axis = "?? deg"', 'axis = "45 deg"'), ('"?? kg"', '"30 kg"'), ('unit = "??"', 'unit = "V"'),
+         ('sensitivity = "??"   # such as "7.78', 'sensitivity = "8 V/mm"   # such as "7.78'),
+         ('sensitivity = "??"', 'sensitivity = "1 V/N"'))  # fmt: skip
+    assert load_campaign(folder).runs[0].record("X1").rate == pytest.approx(1000.0)
+
+
+def test_a_channel_that_was_given_its_quantity_gets_the_entries_that_it_lacks(folder):
+    record(folder / "test-5kN.csv", ("Time", "Dev1_ai0", "Dev1_ai1", "FH [N]", "FV [N]"))
+    tpjb("init", folder)
+    manifest = folder / "campaign.toml"
+    why = 'quantity = "ignore"   # (guess) neither name nor unit tell; or displacement, force, acceleration, ..'
+    edit(manifest, (why, 'quantity = "displacement"'))
+    result = tpjb("init", folder, "--update")
+    assert "channel Dev1_ai0: axis '?? deg' added" in result.stdout
+    text = manifest.read_text("utf-8")
+    assert '[channels.Dev1_ai0]\nquantity = "displacement"\naxis = "?? deg"' in text
+    assert 'like = "Dev1_ai0"' in text
+    assert "nothing to change" in tpjb("init", folder, "--update").stdout
+
+
+def test_what_was_changed_by_hand_stays_and_new_records_become_runs(folder):
+    record(folder / "dyn-5kN-25Hz.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"))
+    tpjb("init", folder)
+    manifest = folder / "campaign.toml"
+    edit(manifest, ('static_load = "5 kN"   # (guess) by the file\'s name; per bearing', 'static_load = "4.9 kN"'),
+         ('mass = "?? kg"   # stator mass between oil film and load cells', 'mass = "31 kg"  # weighed'))  # fmt: skip
+    record(folder / "dyn-5kN-30Hz.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"), frequency=30.0)
+    result = tpjb("init", folder, "--update")
+    text = manifest.read_text("utf-8")
+    assert "run dyn-5kN-30Hz.csv: new" in result.stdout
+    assert 'mass = "31 kg"  # weighed' in text
+    assert text.count('static_load = "4.9 kN"') == 1
+    assert 'excitation_frequency = "30 Hz"' in text
+
+
+def test_update_without_a_manifest_says_so(folder):
+    record(folder / "a.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"))
+    result = tpjb("init", folder, "--update")
+    assert result.exit_code == 2
+    assert "nothing to carry on" in result.stderr
+
+
+def test_the_draft_of_the_bearing_explains_every_entry_and_is_refused_by_name_until_it_is_filled_in(folder):
+    record(folder / "a.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"))
+    tpjb("init", folder)
+    draft = folder / "bearing.toml"
+    with pytest.raises(BearingError, match=r"bearing\.toml.*diameter"):
+        load_bearing(draft)
+    values = {"diameter": "100", "length": "70", "assembled_clearance": "0.08", "pad_clearance": "0.13",
+              "thickness": "16", "arc": "60", "mass": "0.5", "moment_of_inertia": "2e-4", "viscosity_40C": "0.04",
+              "viscosity_exponent": "0.03"}  # fmt: skip
+    for key, value in values.items():
+        edit(draft, (f'{key} = "??', f'{key} = "{value}'))
+    edit(draft, ('["?? deg"]', '["-90 deg", "0 deg", "90 deg", "180 deg"]'), ('kind = "??"', 'kind = "rigid"'))
+    assert len(load_bearing(draft).pads) == 4
+
+
+def test_the_pads_angles_are_drafted_where_dry_steps_tell_them(folder):
+    steps = np.floor(4 * TIME) * 500.0
+    for pad, angle in ((1, -90.0), (2, 0.0), (3, 90.0), (4, 180.0)):
+        x, y = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        rows = [f"{t:.4f};{0.001 * s * x:.5f};{0.001 * s * y:.5f};{s * x:.2f};{s * y:.2f}" for t, s in zip(TIME, steps)]
+        (folder / f"pad{pad}-steps.csv").write_text("\n".join(["Time;X1;X2;FH [N];FV [N]", *rows]), "utf-8")
+    tpjb("init", folder)
+    assert 'pivot_angles = ["-90 deg", "0 deg", "90 deg", "180 deg"]' in (folder / "bearing.toml").read_text("utf-8")
+
+
+MANIFEST = """
+schema = "tpjb-rig/1"
+id = "x"
+bearing = "b.toml"
+[channels.A]
+quantity = "displacement"
+axis = "45 deg"
+unit = "V"
+sensitivity = "8 V/mm"
+polarity = -1
+[channels.B]
+like = "A"
+axis = "135 deg"
+[[runs]]
+id = "c"
+file = "c.csv"
+kind = "clearance"
+"""
+
+
+def test_a_sensor_that_is_like_another_has_its_calibration_and_its_own_place():
+    a, b = parse_manifest(MANIFEST, "campaign.toml").channels.values()
+    assert (b.quantity, b.gain, b.polarity, b.unit) == (a.quantity, a.gain, -1, "V")
+    assert np.degrees(b.axis) == pytest.approx(135.0)
+
+
+def test_what_a_sensor_is_like_must_be_described_in_full():
+    with pytest.raises(RigDataError, match=r"like.*no channel that is described in full.*Known: A"):
+        parse_manifest(MANIFEST.replace('like = "A"', 'like = "AA"'), "campaign.toml")
+    with pytest.raises(RigDataError, match="described in full"):
+        parse_manifest(MANIFEST.replace('like = "A"', 'like = "B"'), "campaign.toml")
+    with pytest.raises(RigDataError) as one:  # a fault of the model is told once
+        parse_manifest(MANIFEST.replace("8 V/mm", "??"), "campaign.toml")
+    assert len(one.value.problems) == 1
