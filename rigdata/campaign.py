@@ -215,7 +215,7 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
         else:
             reader = CsvReader(target, entry.file, entry.id, manifest.csv, manifest.channels, rate, cache)
         runs.append(_make_run(entry, channels, reader))
-    return _finish(manifest, folder, bearing, channels, runs, problems, files)
+    return _finish(manifest, _Opened(folder, bearing, files), channels, runs, problems)
 
 
 def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
@@ -284,7 +284,7 @@ def _load_hdf5(path: Path) -> Campaign:
         rate = entry.sample_rate or manifest.sample_rate
         reader = Hdf5Reader(path, entry.id, path.name, rate, described, clock)
         runs.append(_make_run(entry, channels, reader))
-    return _finish(manifest, path, bearing, channels, runs, problems, files)
+    return _finish(manifest, _Opened(path, bearing, files), channels, runs, problems)
 
 
 def _make_run(entry: RunEntry, channels: Mapping[str, Channel], reader: RunReader) -> Run:
@@ -313,28 +313,31 @@ def _named_file(folder: Path, file: str, files: dict[str, Path]) -> Callable[[st
     return read
 
 
+@dataclass(frozen=True)
+class _Opened:
+    """What of a campaign stands on the disk: folder or file, text of the bearing, every file that was read."""
+
+    path: Path
+    bearing: str
+    files: dict[str, Path]
+
+
 def _finish(
-    manifest: Manifest,
-    path: Path,
-    bearing: str,
-    channels: Mapping[str, Channel],
-    runs: list[Run],
-    problems: list[Problem],
-    files: dict[str, Path],
+    manifest: Manifest, opened: _Opened, channels: Mapping[str, Channel], runs: list[Run], problems: list[Problem]
 ) -> Campaign:
     if any(p.severity == "error" for p in problems):
         raise RigDataError([*manifest.notes, *problems])
     return Campaign(
         id=manifest.id,
         description=manifest.description,
-        path=path,
+        path=opened.path,
         bearing_name=manifest.bearing,
-        bearing_text=bearing,
+        bearing_text=opened.bearing,
         housing_mass=manifest.housing_mass,
         channels=channels,
         runs=tuple(runs),
         notes=(*manifest.notes, *problems),
-        files=files,
+        files=opened.files,
         mass_uncertainty=manifest.mass_uncertainty,
         mains=manifest.mains,
     )

@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.units import UnitError, parse_quantity
 
 FAMILIES = ("bessel", "butterworth")
@@ -39,7 +39,7 @@ class AnalogFilter:
     side: str
     corner: float
 
-    def at(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def at(self, frequency: FloatArray) -> ComplexArray:
         """Complex gain at `frequency` (n,) [Hz].
 
         Parameters
@@ -108,7 +108,7 @@ class ResponseTable:
     gain: tuple[float, ...]
     phase: tuple[float, ...]
 
-    def at(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def at(self, frequency: FloatArray) -> ComplexArray:
         """Complex gain at `frequency` (n,) [Hz], linear between the lines of the table, NaN outside it.
 
         Parameters
@@ -183,7 +183,7 @@ class ChannelResponse:
     def __bool__(self) -> bool:
         return bool(self.filters) or self.delay != 0.0
 
-    def at(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def at(self, frequency: FloatArray) -> ComplexArray:
         """What a phasor at `frequency` (n,) [Hz] was multiplied by.
 
         Parameters

@@ -9,10 +9,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Instruments, RigTruth
+from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.compare.predictions import ModelSettings
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.model_guard import check_model
@@ -27,8 +27,6 @@ from model.predict import predict_setup  # noqa: E402
 from model.prediction import Prediction  # noqa: E402
 from model.setup import Setup  # noqa: E402
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 #: Effects that act on the records: which error of the virtual instruments each one is, and its parameter.
 INSTRUMENT_ERRORS = {
     "probe_gain": ("probe_gain", "factor"),

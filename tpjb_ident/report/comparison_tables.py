@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.report.drawing.colours import VARIANT_LABEL
 from tpjb_ident.report.page import Table
 from tpjb_ident.rounding import fixed, percent, signed, with_interval
@@ -141,7 +140,7 @@ def pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) ->
     return Table("Measured tangent stiffness, 95 %", columns, rows, frozenset({0, 1}))
 
 
-def clearance_table(polygon: ClearancePolygon, drawn: NDArray[np.float64]) -> Table:
+def clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
     """Clearance per pad beside the drawing's, in µm.
 
     Parameters

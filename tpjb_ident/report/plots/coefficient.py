@@ -60,7 +60,7 @@ def coefficient(
     figure, axes = new_picture(axis_label, f"{name}, {kind.display_unit}", title=title)
     for variant in dict.fromkeys(series["pivots"]):
         rows = series[series["pivots"] == variant].sort_values(column)
-        _line(axes, rows, column, axis_scale, f"{key}_predicted", scale, str(variant))
+        _line(axes, rows[column] / axis_scale, rows[f"{key}_predicted"] / scale, rows, str(variant))
     measured = series.drop_duplicates(column).sort_values(column)
     value, low, high = (measured[f"{key}{end}"].to_numpy(float) / scale for end in ("", "_lo", "_hi"))
     axes.errorbar(
@@ -84,9 +84,9 @@ def _table(comparison: Comparison | pd.DataFrame) -> pd.DataFrame:
     return comparison_frame(comparison)
 
 
-def _line(axes: Axes, rows: pd.DataFrame, column: str, axis_scale: float, key: str, scale: float, variant: str) -> None:
+def _line(axes: Axes, over: pd.Series, predicted: pd.Series, rows: pd.DataFrame, variant: str) -> None:
     colour, dashes, marker = VARIANT_STYLE.get(variant, ("green", (0, (4, 1, 1, 1)), "*"))
-    x, y = rows[column].to_numpy(float) / axis_scale, rows[key].to_numpy(float) / scale
+    x, y = over.to_numpy(float), predicted.to_numpy(float)
     axes.plot(x, y, color=LIGHT[colour], linestyle=dashes, linewidth=1.6, marker=marker, markersize=4,
               label=VARIANT_LABEL.get(variant, variant))  # fmt: skip
     if variant == "measured" and "pivot_extrapolated" in rows:
