@@ -29,6 +29,11 @@ CLEAR = 8.0
 #: A lag of the cells counts from so many standard errors on.
 CLEAR_LAG = 2.0
 MIN_RUNS = 3
+#: No housing stands on springs as stiff as this [N/m]: a steel bar of 1 m^2 and 2 m has it. One that seems to does not
+#: move for its accelerometers, which are dead.
+STIFFEST = 1e11
+#: Springs that a housing is taken to stand on [N/m] where its accelerometers cannot tell: those of soft cells.
+SOFT = 3e8
 
 
 @dataclass(frozen=True)
@@ -43,12 +48,15 @@ class BalanceRun:
         [N], [m/s^2]
     inertia : float
         |m a| over |F_oil|.
+    mass : float
+        Of the housing [kg].
     """
 
     frequency: float
     cells: ComplexArray
     acceleration: ComplexArray
     inertia: float
+    mass: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -98,7 +106,7 @@ def balance_runs(data: PointData) -> list[BalanceRun]:
             continue
         F, A = _middle(data.F[mine], data.D[mine]), _middle(data.A[mine], data.D[mine])
         share = float(mass * np.linalg.norm(A) / max(float(np.linalg.norm(F)), 1e-300))
-        found.append(BalanceRun(run.lines.excitation[line].frequency, F - mass * A, A, share))
+        found.append(BalanceRun(run.lines.excitation[line].frequency, F - mass * A, A, share, mass))
     return found
 
 
@@ -161,7 +169,7 @@ def _judge(group: Sequence[BalanceRun]) -> Balance:
     if not np.abs(np.diag(G)).min() > CLEAR * error:
         if np.abs(G).max() > CLEAR * error and np.abs(G - np.diag(np.diag(G))).max() > MAX_CROSS * np.abs(G).max():
             return Balance(0.0, _contradiction(group, G, "each answers the force along the other's axis"))
-        return Balance()
+        return Balance(0.0, _silence(group, G, error))
     direct = np.diag(G)
     cross = float(np.sqrt(abs(G[0, 1] * G[1, 0]) / abs(direct[0] * direct[1])))
     if cross > MAX_CROSS:
@@ -203,6 +211,23 @@ def _contradiction(group: Sequence[BalanceRun], G: ComplexArray, what: str) -> t
             f"inertia is {100 * share:.2g} % of the force",
         ),
     )
+
+
+def _silence(group: Sequence[BalanceRun], G: ComplexArray, error: float) -> tuple[Condition, ...]:
+    """Accelerometers that show nothing of a force that must move the housing."""
+    omega = 2 * np.pi * group[0].frequency
+    stiffness = omega**2 / (np.abs(np.diag(G)) + CLEAR * error)
+    silent = [axis for axis, k in zip("XY", stiffness, strict=True) if k > STIFFEST]
+    if not silent:
+        return ()
+    share = group[0].mass * omega**2 / SOFT
+    name = "accelerometers-contradict-cells" if share > HARMLESS else "accelerometers-doubtful"
+    what = (
+        f"they show nothing along {' and '.join(silent)} at {group[0].frequency:g} Hz: the housing would stand on "
+        f"springs of over {stiffness.max():.1e} N/m. Are they connected? On soft cells inertia is {100 * share:.2g} % "
+        "of the force"
+    )
+    return (Condition(name, what),)
 
 
 def _shown(G: ComplexArray) -> str:
