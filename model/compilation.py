@@ -30,8 +30,15 @@ KERNELS = (
     "film/reynolds.py",
     "film/slopes.py",
     "film/turbulence.py",
-    "statics/first_position.py",
-    "statics/newton_step.py",
+    "statics/compiled/anderson.py",
+    "statics/compiled/carrying.py",
+    "statics/compiled/constants.py",
+    "statics/compiled/elimination.py",
+    "statics/compiled/first_position.py",
+    "statics/compiled/iteration.py",
+    "statics/compiled/laws.py",
+    "statics/compiled/stack.py",
+    "statics/compiled/step.py",
 )
 #: Sums may be reordered, but NaN and infinity keep their meaning.
 OPTIONS: dict[str, Any] = {

@@ -66,6 +66,11 @@ class MeasuredPivot:
         object.__setattr__(self, "deflection_points", points)
         object.__setattr__(self, "_coefficients", PchipInterpolator(load, points).c)
 
+    @property
+    def coefficients(self) -> FloatArray:
+        """Of the cubics between the points, highest power first, (4, n - 1)."""
+        return self._coefficients
+
     def _piece(self, load: float) -> tuple[int, float]:
         i = int(np.searchsorted(self.load, load, side="right")) - 1
         i = min(max(i, 0), len(self.load) - 2)

@@ -60,7 +60,7 @@ class Branch:
         return a, float(np.interp(rigid_approach, self.rigid_approach, self.wedge))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LoadedAttitude:
     """Attitudes that tilt freely, and their load, along the wedge.
 

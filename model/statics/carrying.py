@@ -3,10 +3,6 @@
 A pad behind whose middle the pivot stands takes up its load with a jump, and on the way to the equilibrium pads do
 so more than once. What is tabulated for an isothermal film (`model.film.loaded_attitude`) tells about where; near
 that edge the film itself decides.
-
-The constants were tried on random bearings: 300 as `tests/studies/robustness_model.py` draws them (seed 7), and 300 or
-900 with preloads down to zero, offsets to 0.62 and loads from 0.03 MPa (seed 8), where pads take up and shed their load
-all the time. What was found stands with each; what made no difference has gone.
 """
 
 from __future__ import annotations
@@ -16,21 +12,9 @@ import math
 from model.arrays import FloatArray
 from model.film.loaded_attitude import Branch, LoadedAttitude, loaded_attitude
 from model.setup import Setup
+from model.statics.compiled.constants import EDGE, LONGEST_STEP, MAX_LOAD_CHANGES, NEAR_EDGE
 from model.statics.pad_film import PadFilm
 from model.statics.tilt_hold import tilt_hold
-
-#: The tabulated edge of carrying may be wrong by this share of the pad clearance, because the film is not isothermal:
-#: within it the film decides. Taken as exact, 6 of 600 bearings find no equilibrium any more; with 0.1 one more does,
-#: and another one stands elsewhere.
-EDGE = 0.03
-#: Within this share of it the table is made anew for the film's present temperature. Made once only, one bearing of
-#: 900 is lost; 0.03 and 0.3 do as well.
-NEAR_EDGE = 0.1
-#: How often a pad may take up and shed its load before it is left idle. With 3 one of 1200 is lost, 12 gains none.
-MAX_LOAD_CHANGES = 6
-#: Largest step of the journal, as a share of the least clearance: the films' slopes are those of where it stands.
-#: Half and twice of it change nothing.
-LONGEST_STEP = 0.3
 
 
 def attitude_of(setup: Setup, film: PadFilm) -> LoadedAttitude:

@@ -14,6 +14,7 @@ import numpy as np
 from model.arrays import FloatArray
 from model.conditions import Condition
 from model.setup import Setup
+from model.statics.compiled.constants import MAX_LOAD_CHANGES
 from model.statics.pad_film import PadFilm
 
 #: Below this film the surfaces touch: three times the combined roughness, 1 um, of ground journal and bored pad [m].
@@ -129,6 +130,21 @@ def alternating(pads: Sequence[int]) -> Condition:
     return Condition(
         f"pads {_listed(pads)} take up and shed their load", "error", "the iteration finds no rest", tuple(pads)
     )
+
+
+def never_at_rest(films: Sequence[PadFilm]) -> tuple[Condition, ...]:
+    """Names the pads that went on taking up and shedding their load, if any did.
+
+    Parameters
+    ----------
+    films : sequence of PadFilm
+
+    Returns
+    -------
+    tuple of Condition
+    """
+    pads = [f.number for f in films if f.load_changes >= MAX_LOAD_CHANGES]
+    return (alternating(pads),) if pads else ()
 
 
 def _listed(pads: Sequence[int]) -> str:

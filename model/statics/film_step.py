@@ -6,16 +6,10 @@ import math
 
 from model.pad.bending import SolvedFilm, bending_step, wanted_shapes
 from model.statics.carrying import set_loaded
-from model.statics.heat_paths import BOUNDLESS, couples_heat, settle_temperatures
+from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP
+from model.statics.heat_paths import couples_heat, settle_temperatures
 from model.statics.pad_film import PadFilm
 from model.statics.search import Search
-
-#: Largest change of a film temperature in one step [K]: a turbine oil (0.034 1/K) loses 40 % of its viscosity.
-HEATING_STEP = 15.0
-#: Weight of a temperature change against a share of the load [K]: film temperatures count as settled when one more step
-#: would change them by this times `Setup.accuracy`, 3e-5 K as a rule. That is 1e-6 of the viscosity, and of that the
-#: step leaves a tenth.
-HEAT_PER_FORCE = 300.0
 
 
 def solve_films(search: Search) -> float:

@@ -26,6 +26,7 @@ from model.arrays import FloatArray
 from model.film.energy import dissipation, march
 from model.pad.bending import PadDeformation
 from model.setup import Setup
+from model.statics.compiled.constants import BOUNDLESS
 from model.statics.pad_film import PadFilm
 from model.statics.pad_flow import flow_weighted, outlet_temperature, through_flow
 
@@ -34,8 +35,6 @@ NUSSELT = 3.0
 #: Conduction is solved to this share in every step of the equilibrium; what is left contracts with the rest.
 CONDUCTION_TOLERANCE = 0.01
 KRYLOV_STEPS = 12
-#: Kelvins beyond which a film is no film: squares would overflow.
-BOUNDLESS = 1e30
 
 
 def couples_heat(setup: Setup) -> bool:

@@ -16,29 +16,23 @@ from model.film.oil_state import least_share
 from model.pad.bending import change_of_shape
 from model.statics import conditions
 from model.statics.acceleration import Anderson
-from model.statics.carrying import (
-    MAX_LOAD_CHANGES,
-    leave_unstable,
-    longest_step,
-    unloaded_pads,
-    update_carrying,
+from model.statics.carrying import leave_unstable, longest_step, unloaded_pads, update_carrying
+from model.statics.compiled.constants import (
+    BOUNDLESS,
+    HEAT_PER_FORCE,
+    MAX_ITERATIONS,
+    NEAR,
+    NEAR_HEAT,
+    PATIENCE,
+    PROGRESS,
+    RELAXATION,
+    SHRINK,
+    SLOW,
 )
 from model.statics.equilibrium import Equilibrium
-from model.statics.film_step import HEAT_PER_FORCE, refine_derivatives, solve_films
-from model.statics.heat_paths import BOUNDLESS
+from model.statics.film_step import refine_derivatives, solve_films
 from model.statics.newton_step import newton_step
-from model.statics.search import RELAXATION, Search
-
-MAX_ITERATIONS = 80
-#: Below this residual, and this change of temperature [K], the iteration is accelerated and the temperature no longer
-#: relaxed.
-NEAR, NEAR_HEAT = 0.3, 25.0
-#: Steps that leave more than this share of what was left are accelerated; the others need no help.
-SLOW = 0.4
-#: A film may shrink to this share of itself in one step.
-SHRINK = 0.4
-#: A residual that has not fallen by this factor for so many steps has the steps halved.
-PROGRESS, PATIENCE = 0.7, 12
+from model.statics.search import Search
 
 
 def iterate(search: Search) -> Equilibrium:
@@ -85,9 +79,8 @@ def iterate(search: Search) -> Equilibrium:
             search.set_vector(memory.next(before, search.vector()))
         else:
             memory.reset()
-    alternating = [f.number for f in search.films if f.load_changes >= MAX_LOAD_CHANGES]
-    names = (conditions.alternating(alternating),) if alternating else ()
-    return _result(search, (MAX_ITERATIONS, residual, heat), (*names, conditions.NOT_CONVERGED))
+    status = (*conditions.never_at_rest(search.films), conditions.NOT_CONVERGED)
+    return ended(search, (MAX_ITERATIONS, residual, heat), status)
 
 
 def _move(search: Search, step: tuple[FloatArray, FloatArray], damping: float) -> bool:
@@ -122,20 +115,40 @@ _RIGID = np.empty((0, 0))
 
 def _settled(search: Search, iterations: int, residual: float, heat: float) -> Equilibrium:
     """What an iteration ends with whose residuals are below the tolerances."""
+    status = settled_status(search)
+    if has_answer(status):
+        refine_derivatives(search)
+    return ended(search, (iterations, residual, heat), status)
+
+
+def settled_status(search: Search) -> tuple[Condition, ...]:
+    """What is to be said of pads that idle where an iteration has settled.
+
+    Parameters
+    ----------
+    search : Search
+    """
     staying, restarting = unloaded_pads(search.films, search.position)
-    figures = iterations, residual, heat
     if restarting:
-        return _result(search, figures, (conditions.undecided(restarting), conditions.NOT_CONVERGED))
-    refine_derivatives(search)
-    return _result(search, figures, (conditions.left_unloaded(staying),) if staying else ())
+        return (conditions.undecided(restarting), conditions.NOT_CONVERGED)
+    return (conditions.left_unloaded(staying),) if staying else ()
 
 
 def _failed(search: Search, iterations: int, heat: float, why: Condition) -> Equilibrium:
-    return _result(search, (iterations, math.inf, heat), (why, conditions.NOT_CONVERGED))
+    return ended(search, (iterations, math.inf, heat), (why, conditions.NOT_CONVERGED))
 
 
-def _result(search: Search, figures: tuple[int, float, float], status: tuple[Condition, ...]) -> Equilibrium:
-    """The state as an answer: iterations, residual and change of temperature, and what is to be said besides."""
+def ended(search: Search, figures: tuple[int, float, float], status: tuple[Condition, ...]) -> Equilibrium:
+    """The state as an answer.
+
+    Parameters
+    ----------
+    search : Search
+    figures : tuple
+        Iterations, residual and change of temperature [K].
+    status : tuple of Condition
+        What is to be said besides.
+    """
     names = list(status)
     for film in search.films:
         film.rest(search.position, search.surface_speed, search.setup.bearing.oil)

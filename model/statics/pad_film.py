@@ -11,7 +11,7 @@ from model.arrays import FloatArray
 from model.bearing import Oil, Pad
 from model.film.energy import heat_step
 from model.film.loaded_attitude import Branch
-from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film.mesh import FilmGrid, FilmWork, film_grid
 from model.film.models import FilmSolver, film_solver
 from model.film.oil_state import set_viscosity
 from model.film.resting import RestingFilm, resting_film
@@ -20,6 +20,7 @@ from model.film.slopes import pressure_change
 from model.film.turbulence import solve_turbulent_film
 from model.pad.bending import BendingStep, PadDeformation, pad_deformation
 from model.setup import Setup
+from model.statics.compiled.stack import film_works
 
 
 @dataclass
@@ -209,7 +210,7 @@ class PadFilm:
         return pressure
 
 
-def pad_films(setup: Setup) -> list[PadFilm]:
+def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FloatArray]:
     """Lay out every pad's film.
 
     Parameters
@@ -218,8 +219,12 @@ def pad_films(setup: Setup) -> list[PadFilm]:
 
     Returns
     -------
-    list of PadFilm
+    films : list of PadFilm
         Pad #1 first.
+    works : FilmWork
+        Their arrays side by side, with a leading axis for the pad.
+    shifts : (n, unknowns) ndarray
+        Their `pressure_change`.
     """
     bearing = setup.bearing
     symmetric = setup.misalignment[0] == 0.0
@@ -228,17 +233,17 @@ def pad_films(setup: Setup) -> list[PadFilm]:
     films = []
     laminar = setup.options.turbulence == "none"
     solver = film_solver(setup.options.cavitation) if laminar else solve_turbulent_film
-    for number, pad in enumerate(bearing.pads, start=1):
-        start = pad.leading_edge + setup.starvation * pad.arc
-        shape = (setup.mesh.along, setup.mesh.across * (1 if symmetric else 2))
-        grid = film_grid(start, pad.leading_edge + pad.arc, bearing.journal_radius, bearing.length, shape, symmetric)
-        work = film_work(grid, setup.inlet_temperature)
+    grids = [_grid(setup, pad, symmetric) for pad in bearing.pads]
+    works, each = film_works(grids, setup.inlet_temperature)
+    shifts = np.zeros_like(works.unknown)
+    bent = np.zeros_like(works.extra)
+    for k, (pad, grid, work) in enumerate(zip(bearing.pads, grids, each, strict=True)):
         if not symmetric:
             # the axis leans by `angle` towards `toward`: at z the journal stands z * angle further that way
             work.extra[:, :] = -np.outer(np.cos(grid.angle + pad.pivot_angle - toward), grid.z * angle)
         films.append(
             PadFilm(
-                number=number,
+                number=k + 1,
                 pad=pad,
                 normal=np.array([math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)]),
                 tangent=np.array([-math.sin(pad.pivot_angle), math.cos(pad.pivot_angle)]),
@@ -247,14 +252,21 @@ def pad_films(setup: Setup) -> list[PadFilm]:
                 grid=grid,
                 work=work,
                 inlet=setup.inlet_temperature,
-                bent=np.zeros_like(work.extra),
-                pressure_change=np.zeros_like(work.unknown),
+                bent=bent[k],
+                pressure_change=shifts[k],
                 deformation=pad_deformation(pad, bearing, grid) if solid else None,
                 kept=1.0 - setup.heat_loss,
                 solver=solver,
             )
         )
-    return films
+    return films, works, shifts
+
+
+def _grid(setup: Setup, pad: Pad, symmetric: bool) -> FilmGrid:
+    bearing = setup.bearing
+    start = pad.leading_edge + setup.starvation * pad.arc
+    shape = (setup.mesh.along, setup.mesh.across * (1 if symmetric else 2))
+    return film_grid(start, pad.leading_edge + pad.arc, bearing.journal_radius, bearing.length, shape, symmetric)
 
 
 def oil_constants(oil: Oil) -> tuple[float, float, float, float]:

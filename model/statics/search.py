@@ -8,19 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from model.arrays import FloatArray
+from model.film.mesh import FilmWork
 from model.setup import Setup
 from model.statics.carrying import find_branch, set_loaded
+from model.statics.compiled.constants import FIRST_HEATING, MICROMETRE, RELAXATION
+from model.statics.compiled.first_position import first_position
 from model.statics.equilibrium import Equilibrium
-from model.statics.first_position import first_position
 from model.statics.pad_film import PadFilm, pad_films
-
-#: Unit of lengths in the state vector [m]: a micrometre weighs as much as a kelvin.
-MICROMETRE = 1e-6
-#: Share of a change of temperature that is made far from the equilibrium: a much hotter film carries less and heats
-#: less, and undamped the two would swing.
-RELAXATION = 0.6
-#: How much hotter than the supply a film that makes heat is taken to be before it is solved [K].
-FIRST_HEATING = 3.0
 
 
 @dataclass
@@ -43,6 +37,10 @@ class Search:
         The journal's temperature [degC]; NaN where it takes no heat.
     relaxation : float
         Share of a change of temperature that is made.
+    works : FilmWork
+        The arrays of all films side by side, with a leading axis for the pad.
+    shifts : (n, unknowns) ndarray
+        Their changes of pressure.
     """
 
     setup: Setup
@@ -53,6 +51,8 @@ class Search:
     limited: float = 0.0
     journal: float = math.nan
     relaxation: float = RELAXATION
+    works: FilmWork = field(init=False)
+    shifts: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
         self.lay_out()
@@ -69,7 +69,7 @@ class Search:
 
     def lay_out(self) -> None:
         """Make all films anew."""
-        self.films = pad_films(self.setup)
+        self.films, self.works, self.shifts = pad_films(self.setup)
 
     def start_from(self, start: Equilibrium) -> bool:
         """Take over a neighbour's state; False if it has none or its mesh does not fit.

@@ -6,6 +6,7 @@ import numpy as np
 
 from model.arrays import FloatArray
 from model.setup import Setup
+from model.statics.at_once import able, iterate_at_once
 from model.statics.equilibrium import Equilibrium
 from model.statics.newton_iteration import iterate
 from model.statics.search import Search
@@ -34,13 +35,21 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
     """
     search = Search(setup, np.asarray(load, float), speed)
     if start is not None and search.start_from(start):
-        result = iterate(search)
+        result = _iterated(search, cold=False)
         if result.converged:
             return result
         search.lay_out()
-    search.start_cold()
-    result = iterate(search)
+    result = _iterated(search, cold=True)
     return result if result.converged else _raise_load(search, result)
+
+
+def _iterated(search: Search, cold: bool) -> Equilibrium:
+    """Iterate from where a search stands, or from a cold start; in one compiled call where that is possible."""
+    if able(search.setup):
+        return iterate_at_once(search, cold)
+    if cold:
+        search.start_cold()
+    return iterate(search)
 
 
 def _raise_load(search: Search, failed: Equilibrium) -> Equilibrium:
@@ -51,9 +60,7 @@ def _raise_load(search: Search, failed: Equilibrium) -> Equilibrium:
         share = min(1.0, reached + step)
         search.load = share * load
         search.lay_out()
-        if last is None or not search.start_from(last):
-            search.start_cold()
-        result = iterate(search)
+        result = _iterated(search, cold=last is None or not search.start_from(last))
         if result.converged:
             last, reached = result, share
         else:

@@ -16,7 +16,7 @@ from model.bearing_file import load_bearing
 from model.pivots import ConstantPivot
 from model.predict import predict
 from model.prediction import Prediction
-from model.statics.carrying import EDGE
+from model.statics.compiled.constants import EDGE
 
 SPEED = 2 * math.pi * 22.0
 DOWN = -math.pi / 2

@@ -39,28 +39,44 @@ def first_position(load: FloatArray, normals: FloatArray, distances: FloatArray,
         row[1, : len(branch.load)] = branch.load
     lengths = np.array([len(b.rigid_approach) for b in branches])
     room = min(float(b.approach[-1]) - g for b, g in zip(branches, distances, strict=True))
-    return _first_position(np.asarray(load, float), np.column_stack([normals, distances]), curves, lengths, room)
+    pads = np.column_stack([normals, distances])
+    return balance(np.asarray(load, float), pads, curves[:, 0], curves[:, 1], lengths, room)
 
 
 @compiled
-def _first_position(
-    load: FloatArray, pads: FloatArray, curves: FloatArray, lengths: IntArray, room: float
+def balance(
+    load: FloatArray, pads: FloatArray, rigid: FloatArray, carried: FloatArray, lengths: IntArray, room: float
 ) -> FloatArray:
+    """Journal position [m] that balances a load on tabulated films.
+
+    Parameters
+    ----------
+    load : (2,) ndarray
+        [N]
+    pads : (n, 3) ndarray
+        Unit vectors at the pivots, and Cp - Cb [m].
+    rigid, carried : (n, r) ndarray
+        Rigid approach [m], rising, and load [N] there.
+    lengths : (n,) ndarray of int
+        How many of the r there are.
+    room : float
+        Of the journal [m].
+    """
     size = math.hypot(load[0], load[1])
     position = np.zeros(2)
     if size == 0.0:
         return position
     x, y = load[0] / size * 0.4 * room, load[1] / size * 0.4 * room
-    fx, fy = _missing(x, y, load, pads, curves, lengths)
+    fx, fy = _missing(x, y, load, pads, rigid, carried, lengths)
     error = math.hypot(fx, fy)
     step = 1e-4 * room
     for _ in range(60):
         if error < GOOD_ENOUGH * size:
             break
-        ax, ay = _missing(x + step, y, load, pads, curves, lengths)
-        bx, by = _missing(x - step, y, load, pads, curves, lengths)
-        cx, cy = _missing(x, y + step, load, pads, curves, lengths)
-        dx, dy = _missing(x, y - step, load, pads, curves, lengths)
+        ax, ay = _missing(x + step, y, load, pads, rigid, carried, lengths)
+        bx, by = _missing(x - step, y, load, pads, rigid, carried, lengths)
+        cx, cy = _missing(x, y + step, load, pads, rigid, carried, lengths)
+        dx, dy = _missing(x, y - step, load, pads, rigid, carried, lengths)
         jxx, jyx = (bx - ax) / (2 * step), (by - ay) / (2 * step)
         jxy, jyy = (dx - cx) / (2 * step), (dy - cy) / (2 * step)
         det = jxx * jyy - jxy * jyx
@@ -73,7 +89,7 @@ def _first_position(
             mx, my = share * mx, share * my
         for halving in range(8):  # a pad that takes up or sheds its load on the way bends the force sharply
             tx, ty = x + mx * 0.5**halving, y + my * 0.5**halving
-            gx, gy = _missing(tx, ty, load, pads, curves, lengths)
+            gx, gy = _missing(tx, ty, load, pads, rigid, carried, lengths)
             left = math.hypot(gx, gy)
             if left < error or halving == 7:
                 x, y, fx, fy, error = tx, ty, gx, gy, left
@@ -84,23 +100,23 @@ def _first_position(
 
 @compiled
 def _missing(
-    x: float, y: float, load: FloatArray, pads: FloatArray, curves: FloatArray, lengths: IntArray
+    x: float, y: float, load: FloatArray, pads: FloatArray, rigid: FloatArray, carried: FloatArray, lengths: IntArray
 ) -> tuple[float, float]:
     """Part of the load that the tabulated films do not carry at a position."""
     fx, fy = load[0], load[1]
     for m in range(pads.shape[0]):
-        rigid = pads[m, 2] + pads[m, 0] * x + pads[m, 1] * y
-        if rigid < curves[m, 0, 0]:
+        at = pads[m, 2] + pads[m, 0] * x + pads[m, 1] * y
+        if at < rigid[m, 0]:
             continue
         low, high = 0, lengths[m] - 1  # beyond the end: the last slope
         while high - low > 1:
             middle = (low + high) // 2
-            if curves[m, 0, middle] < rigid:
+            if rigid[m, middle] < at:
                 low = middle
             else:
                 high = middle
-        slope = (curves[m, 1, high] - curves[m, 1, low]) / (curves[m, 0, high] - curves[m, 0, low])
-        carried = curves[m, 1, low] + slope * (rigid - curves[m, 0, low])
-        fx -= pads[m, 0] * carried
-        fy -= pads[m, 1] * carried
+        slope = (carried[m, high] - carried[m, low]) / (rigid[m, high] - rigid[m, low])
+        force = carried[m, low] + slope * (at - rigid[m, low])
+        fx -= pads[m, 0] * force
+        fy -= pads[m, 1] * force
     return fx, fy

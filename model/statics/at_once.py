@@ -1,0 +1,162 @@
+"""From a search to the arrays of a compiled one and back, where the compiled one knows all of the physics."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import lru_cache
+
+import numpy as np
+
+from model.arrays import FloatArray, IntArray
+from model.film.loaded_attitude import Branch, LoadedAttitude
+from model.film.reynolds import FilmForces
+from model.options import Options
+from model.setup import Setup
+from model.statics import conditions
+from model.statics.carrying import attitude_of
+from model.statics.compiled.carrying import Case
+from model.statics.compiled.iteration import BOUNDLESS_HEAT, FILM_LOST, RESTARTING, SETTLED, SINGULAR, iterate
+from model.statics.compiled.laws import encoded
+from model.statics.compiled.stack import PadStack, PadState, stacked_grids
+from model.statics.equilibrium import Equilibrium
+from model.statics.newton_iteration import ended, settled_status
+from model.statics.pad_film import oil_constants
+from model.statics.search import Search
+from model.statics.tilt_hold import rolling_radius
+
+#: Parts of a set-up that the compiled search takes into account, or that do not concern it; any other one must be at
+#: its default.
+_KNOWN = frozenset({
+    "bearing", "pivots", "thermal", "mesh", "supply_change", "options", "rotational_stiffness", "pivot_damping",
+    "misalignment", "starvation", "rolling", "vibration", "heat_loss", "series_compliance", "added_mass",
+    "parallel_stiffness", "parallel_damping", "instruments", "clearance_change", "accuracy",
+})  # fmt: skip
+_DEFAULTS = {
+    f.name: f.default for f in dataclasses.fields(Setup) if f.name not in _KNOWN
+}  # those of others are no factories
+_PLAIN = Options()
+
+
+def able(setup: Setup) -> bool:
+    """Whether the compiled search knows all of a set-up's physics.
+
+    Parameters
+    ----------
+    setup : Setup
+    """
+    if setup.thermal == "tehd" or _felt(setup) != _PLAIN:
+        return False
+    if any(getattr(setup, name) != value for name, value in _DEFAULTS.items()):
+        return False
+    return encoded(setup.pivots) is not None
+
+
+def _felt(setup: Setup) -> Options:
+    """Options without those that do nothing where films keep their inlet's temperature."""
+    if setup.thermal != "isothermal":
+        return setup.options
+    return dataclasses.replace(setup.options, conduction=False, isothermal_journal=False)
+
+
+def iterate_at_once(search: Search, cold: bool) -> Equilibrium:
+    """Iterate from where a search stands, or from a cold start, in one compiled call.
+
+    Parameters
+    ----------
+    search : Search
+        Of a set-up that is `able`; left where the iteration ends.
+    cold : bool
+
+    Returns
+    -------
+    Equilibrium
+        ``status`` names what is wrong, if anything is.
+    """
+    setup, films = search.setup, search.films
+    pads = _pads(search)
+    state = _state(search, pads.attitudes.shape[2])
+    oil = setup.bearing.oil
+    kept = 1.0 - setup.heat_loss
+    roll = setup.rolling * rolling_radius(setup.bearing.pivot) if setup.rolling else 0.0
+    size = setup.bearing.journal_radius**2 * setup.bearing.length
+    case = Case(
+        search.load, search.surface_speed, oil_constants(oil), (oil.specific_heat / kept, oil.conductivity / kept),
+        (float(setup.rotational_stiffness), roll), size, setup.accuracy, setup.thermal == "isothermal",
+    )  # fmt: skip
+    grids = stacked_grids(tuple(f.grid for f in films))
+    code, iterations, residual, heat, limited = iterate(grids, pads, search.works, state, case, cold)
+    _take_over(search, state)
+    search.limited = limited
+    figures = iterations, residual, heat
+    if code in (SETTLED, RESTARTING):
+        return ended(search, figures, settled_status(search))
+    names = {
+        FILM_LOST: conditions.FILM_LOST, BOUNDLESS_HEAT: conditions.BOUNDLESS_HEAT, SINGULAR: conditions.SINGULAR,
+    }  # fmt: skip
+    why = (names[code],) if code in names else conditions.never_at_rest(films)
+    return ended(search, figures, (*why, conditions.NOT_CONVERGED))
+
+
+def _pads(search: Search) -> PadStack:
+    setup, films = search.setup, search.films
+    known = encoded(setup.pivots)
+    assert known is not None
+    attitudes, rows = _tables(tuple(attitude_of(setup, f) for f in films))
+    count = len(films)
+    frame = np.empty((count, 2, 2))
+    for m, f in enumerate(films):
+        frame[m, 0], frame[m, 1] = f.normal, f.tangent
+    numbers = [(f.preload_distance, f.pivot_radius, f.pad.pad_clearance, f.inlet) for f in films]
+    preload, radius, clearance, inlet = np.array(numbers, dtype=float).T.copy()
+    return PadStack(frame, preload, radius, clearance, inlet, *known, attitudes, rows)
+
+
+@lru_cache(maxsize=64)
+def _tables(attitudes: tuple[LoadedAttitude, ...]) -> tuple[FloatArray, IntArray]:
+    longest = max(2, *(len(a.curvature) for a in attitudes))
+    table = np.zeros((len(attitudes), 3, longest))
+    for row, a in zip(table, attitudes, strict=True):
+        row[:, : len(a.curvature)] = a.curvature, a.wedge, a.load
+    return table, np.array([len(a.curvature) for a in attitudes], dtype=np.int64)
+
+
+def _state(search: Search, longest: int) -> PadState:
+    films = search.films
+    n = len(films)
+    return PadState(
+        position=np.array(search.position, dtype=float),
+        tilt=np.array([f.tilt for f in films], dtype=float),
+        deflection=np.array([f.deflection for f in films], dtype=float),
+        idle=np.array([f.idle for f in films], dtype=np.bool_),
+        solved=np.zeros(n, dtype=np.bool_),
+        changes=np.array([f.load_changes for f in films], dtype=np.int64),
+        branch=np.zeros((n, 4, longest)),
+        length=np.zeros(n, dtype=np.int64),
+        force=np.zeros((n, 2)),
+        corrected=np.zeros((n, 2)),
+        stiffness=np.zeros((n, 2, 2)),
+        damping=np.zeros((n, 2, 2)),
+        least=np.zeros(n),
+        steps=np.zeros(n, dtype=np.int64),
+        heating=np.full(n, np.inf),
+        shift=search.shifts,
+    )
+
+
+def _take_over(search: Search, state: PadState) -> None:
+    """Leave a search where the arrays stand."""
+    search.position = state.position
+    scalars = zip(
+        state.tilt.tolist(), state.deflection.tolist(), state.idle.tolist(), state.changes.tolist(),
+        state.heating.tolist(), state.solved.tolist(), state.least.tolist(), state.steps.tolist(),
+        state.length.tolist(), strict=True,
+    )  # fmt: skip
+    for m, (f, (tilt, give, idle, changes, heating, solved, least, steps, rows)) in enumerate(
+        zip(search.films, scalars, strict=True)
+    ):
+        f.tilt, f.deflection, f.idle, f.load_changes, f.temperature_change = tilt, give, idle, changes, heating
+        f.forces = f.corrected = None
+        if solved:
+            f.forces = FilmForces(state.force[m], state.stiffness[m], state.damping[m], least, steps)
+            f.corrected = f.forces._replace(force=state.corrected[m])
+        f.branch = Branch(*state.branch[m, :, :rows]) if rows else None

@@ -1,0 +1,209 @@
+"""Which pads carry: what `model.statics.carrying` decides, on the arrays of a compiled search."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from model.arrays import FloatArray
+from model.compilation import compiled
+from model.film.mesh import FilmWork
+from model.statics.compiled.constants import EDGE, MAX_LOAD_CHANGES, NEAR_EDGE
+from model.statics.compiled.laws import compliance, deflection
+from model.statics.compiled.stack import PadStack, PadState
+
+#: Every so many rows of an attitude's table the pivot is asked; between them its give is as good as straight.
+EVERY = 4
+
+
+class Case(NamedTuple):
+    """The numbers of one search.
+
+    Attributes
+    ----------
+    load : (2,) ndarray
+        [N]
+    speed : float
+        Surface speed of the journal [m/s].
+    oil : tuple of float
+        See `model.statics.pad_film.oil_constants`.
+    heat : tuple of float
+        Specific heat [J/kg/K] and conductivity [W/m/K], both over the share of the heat that stays in the film.
+    hold : tuple of float
+        Rotational stiffness of the pivots [N m/rad], and what every newton of pad load adds to it [m].
+    size : float
+        R^2 L of a film [m^3].
+    accuracy : float
+        See `model.setup.Setup`.
+    isothermal : bool
+    """
+
+    load: FloatArray
+    speed: float
+    oil: tuple[float, float, float, float]
+    heat: tuple[float, float]
+    hold: tuple[float, float]
+    size: float
+    accuracy: float
+    isothermal: bool
+
+
+@compiled
+def rigid_approach(pads: PadStack, state: PadState, m: int) -> float:
+    """Approach of a film if its pivot were rigid [m]."""
+    return pads.preload[m] + pads.frame[m, 0, 0] * state.position[0] + pads.frame[m, 0, 1] * state.position[1]
+
+
+@compiled
+def along(pads: PadStack, state: PadState, m: int) -> float:
+    """Journal's place across the pivot line [m]."""
+    return pads.frame[m, 1, 0] * state.position[0] + pads.frame[m, 1, 1] * state.position[1]
+
+
+@compiled
+def margin(pads: PadStack, state: PadState, m: int) -> float:
+    """How far a pad is from where it stops carrying, as a share of its clearance; negative beyond."""
+    return (rigid_approach(pads, state, m) - state.branch[m, 0, 0]) / pads.clearance[m]
+
+
+@compiled
+def find_branch(case: Case, pads: PadStack, works: FilmWork, state: PadState, m: int, hotter: float) -> None:
+    """Loaded attitudes of a pad at its film's mean temperature, or `hotter` [K] than that."""
+    count = pads.rows[m]
+    if count < 2:
+        state.branch[m] = 0.0
+        state.branch[m, 0, :2] = math.inf
+        state.length[m] = 2
+        return
+    warm = works.temperature[m]
+    mean = 0.0
+    for i in range(warm.shape[0]):
+        for j in range(warm.shape[1]):
+            mean += warm[i, j]
+    mean = mean / warm.size + hotter
+    scale = case.oil[0] * math.exp(case.oil[1] * (40.0 - mean)) * case.speed * case.size
+    table, clearance = pads.attitudes[m], pads.clearance[m]
+    load = np.empty(count)
+    for k in range(count):
+        load[k] = scale * table[2, k] / (clearance / (1.0 + table[0, k])) ** 2
+    # the pivot's give between the loads at which it is asked
+    asked = np.sort(load[::EVERY])
+    given = np.empty(len(asked))
+    for k in range(len(asked)):
+        given[k] = deflection(pads.laws[m], pads.curves[m], asked[k])
+    rigid = np.empty(count)
+    last_fall = -1
+    for k in range(count):
+        rigid[k] = clearance - clearance / (1.0 + table[0, k]) + interpolate(asked, given, len(asked), load[k])
+        if k > 0 and rigid[k] - rigid[k - 1] <= 0.0:
+            last_fall = k - 1
+    rising = last_fall + 1
+    for k in range(rising, count):
+        room = clearance / (1.0 + table[0, k])
+        state.branch[m, 0, k - rising] = rigid[k]
+        state.branch[m, 1, k - rising] = clearance - room
+        state.branch[m, 2, k - rising] = table[1, k] * room
+        state.branch[m, 3, k - rising] = load[k]
+    state.length[m] = count - rising
+
+
+@compiled
+def interpolate(x: FloatArray, y: FloatArray, count: int, at: float) -> float:
+    """Straight between the first `count` points, constant beyond them."""
+    if at <= x[0]:
+        return y[0]
+    if at >= x[count - 1]:
+        return y[count - 1]
+    low, high = 0, count - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x[middle] <= at:
+            low = middle
+        else:
+            high = middle
+    return y[low] + (y[high] - y[low]) / (x[high] - x[low]) * (at - x[low])
+
+
+@compiled
+def let_idle(state: PadState, m: int) -> None:
+    """Let a pad carry nothing."""
+    state.idle[m] = True
+    state.deflection[m] = 0.0
+    state.tilt[m] = 0.0
+
+
+@compiled
+def set_loaded(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None:
+    """Put a pad on its loaded attitude, or let it idle."""
+    let_idle(state, m)
+    state.idle[m] = margin(pads, state, m) <= 0.0
+    works.ruptured[m] = False
+    if not state.idle[m]:
+        rigid, count = rigid_approach(pads, state, m), state.length[m]
+        a = interpolate(state.branch[m, 0], state.branch[m, 1], count, rigid)
+        b = interpolate(state.branch[m, 0], state.branch[m, 2], count, rigid)
+        state.deflection[m] = rigid - a
+        state.tilt[m] = (b - along(pads, state, m)) / pads.pivot_radius[m]
+
+
+@compiled
+def hold_of(case: Case, state: PadState, m: int, load: float) -> tuple[float, float]:
+    """What holds a tilt back: its slope by the tilt [N m/rad] and by the pad's load [m]."""
+    stiffness = case.hold[0] + case.hold[1] * max(load, 0.0)
+    return stiffness, case.hold[1] * state.tilt[m] if load > 0.0 else 0.0
+
+
+@compiled
+def is_stable(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
+    """Whether film and pivot push a pad back from a small change of tilt and deflection."""
+    k, load, radius = state.stiffness[m], state.force[m, 0], pads.pivot_radius[m]
+    give = compliance(pads.laws[m], pads.curves[m], max(load, 1e-6))
+    stiffness, arm = hold_of(case, state, m, load)
+    arm = arm / radius
+    turning = k[1, 1] + arm * k[0, 1] + stiffness / radius**2
+    return turning * (1.0 + give * k[0, 0]) > give * (k[1, 0] + arm * k[0, 0]) * k[0, 1]
+
+
+@compiled
+def update_carrying(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> bool:
+    """Let pads take up or shed their load as the journal's position has it; True if any did."""
+    changed = False
+    for m in range(len(state.tilt)):
+        if state.length[m] == 0 or abs(margin(pads, state, m)) < NEAR_EDGE:
+            find_branch(case, pads, works, state, m, 0.0)
+        inside = margin(pads, state, m)
+        if state.idle[m] and inside > 0.0 and state.changes[m] < MAX_LOAD_CHANGES:
+            set_loaded(pads, works, state, m)
+        elif not state.idle[m] and case.hold[0] == 0.0 and not _keeps_its_load(case, pads, state, m, inside):
+            let_idle(state, m)
+        else:
+            continue
+        state.changes[m] += 1
+        changed = True
+    return changed
+
+
+@compiled
+def _keeps_its_load(case: Case, pads: PadStack, state: PadState, m: int, inside: float) -> bool:
+    if inside > 0.0 or inside < -EDGE or not state.solved[m]:
+        return inside > 0.0
+    return is_stable(case, pads, state, m)
+
+
+@compiled
+def leave_unstable(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> bool:
+    """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any."""
+    found = False
+    for m in range(len(state.tilt)):
+        if not state.solved[m] or case.hold[0] > 0.0 or is_stable(case, pads, state, m):
+            continue
+        found = True
+        state.changes[m] += 1
+        if margin(pads, state, m) > EDGE and state.changes[m] < MAX_LOAD_CHANGES:
+            set_loaded(pads, works, state, m)
+        else:
+            let_idle(state, m)
+            state.changes[m] = MAX_LOAD_CHANGES
+    return found

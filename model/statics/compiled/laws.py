@@ -1,0 +1,142 @@
+"""Pivot laws as numbers, so that a compiled search can ask them: the formulas are those of `model.pivots`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from model.arrays import FloatArray
+from model.compilation import compiled
+from model.measured_pivot import MeasuredPivot
+from model.pivots import ConstantPivot, PivotLaw, RigidPivot, RockerPivot, ScaledPivot, SphericalPivot
+
+#: First number of a law's row: which formula; the others are its constants, the last the factor on the stiffness.
+RIGID, CONSTANT, ROCKER, SPHERICAL, MEASURED = range(5)
+
+
+def encoded(laws: Sequence[PivotLaw]) -> tuple[FloatArray, FloatArray] | None:
+    """Laws as rows of numbers, (n, 4), and the measured curves among them, (n, 5, m); None for a law unknown here.
+
+    Parameters
+    ----------
+    laws : sequence of PivotLaw
+    """
+    try:
+        return _encoded(tuple(laws))
+    except TypeError:  # a law of somebody's own that has no hash
+        return None
+
+
+@lru_cache(maxsize=256)
+def _encoded(laws: tuple[PivotLaw, ...]) -> tuple[FloatArray, FloatArray] | None:
+    rows, curves = [], []
+    for law in laws:
+        row = _row(law)
+        if row is None:
+            return None
+        rows.append(row[0])
+        curves.append(row[1])
+    longest = max(c.shape[1] for c in curves)
+    table = np.zeros((len(laws), 5, longest))
+    for own, curve in zip(table, curves, strict=True):
+        own[:, : curve.shape[1]] = curve
+    return np.array(rows, dtype=float), table
+
+
+def _row(law: PivotLaw) -> tuple[tuple[float, float, float, float], FloatArray] | None:
+    nothing = np.zeros((5, 1))
+    factor = 1.0
+    while type(law) is ScaledPivot:
+        factor *= law.stiffness_factor
+        law = law.law
+    if type(law) is RigidPivot:
+        return (RIGID, 0.0, 0.0, factor), nothing
+    if type(law) is ConstantPivot:
+        return (CONSTANT, law.value, 0.0, factor), nothing
+    if type(law) is RockerPivot:
+        return (ROCKER, law.line_modulus, law.load_scale, factor), nothing
+    if type(law) is SphericalPivot:
+        return (SPHERICAL, law.compliance, 0.0, factor), nothing
+    if type(law) is MeasuredPivot:
+        curve = np.zeros((5, len(law.load)))
+        curve[0], curve[1:, :-1] = law.load, law.coefficients
+        return (MEASURED, len(law.load), 0.0, factor), curve
+    return None
+
+
+@compiled
+def deflection(law: FloatArray, curve: FloatArray, load: float) -> float:
+    """Give of a pivot, delta(W) [m].
+
+    Parameters
+    ----------
+    law : (4,) ndarray
+        A row of `encoded`.
+    curve : (5, m) ndarray
+        Of a measured one.
+    load : float
+        [N]
+    """
+    if not load > 0.0 or law[0] == RIGID:
+        return 0.0
+    if law[0] == CONSTANT:
+        give = load / law[1]
+    elif law[0] == ROCKER:
+        give = load * (2.0 / 3.0 + _logarithm(law[2], load)) / law[1]
+    elif law[0] == SPHERICAL:
+        give = law[1] * load ** (2.0 / 3.0)
+    else:
+        end = curve[0, int(law[1]) - 1]
+        i, s = _piece(law, curve, min(load, end))
+        give = ((curve[1, i] * s + curve[2, i]) * s + curve[3, i]) * s + curve[4, i]
+        if load > end:
+            give += (load - end) * _measured_compliance(law, curve, end)
+    return give / law[3]
+
+
+@compiled
+def compliance(law: FloatArray, curve: FloatArray, load: float) -> float:
+    """Tangent d delta / dW [m/N]; zero for a rigid pivot.
+
+    Parameters
+    ----------
+    law, curve, load
+        As for `deflection`.
+    """
+    if law[0] == RIGID:
+        return 0.0
+    if law[0] == CONSTANT:
+        value = 1.0 / law[1]
+    elif law[0] == ROCKER:
+        value = (_logarithm(law[2], load) - 1.0 / 3.0) / law[1]
+    elif law[0] == SPHERICAL:
+        value = law[1] / (1.5 * max(load, 1e-9) ** (1.0 / 3.0))
+    else:
+        value = _measured_compliance(law, curve, load)
+    return value / law[3]
+
+
+@compiled
+def _logarithm(load_scale: float, load: float) -> float:
+    return math.log(load_scale / min(max(load, 1e-9), load_scale / math.e))
+
+
+@compiled
+def _piece(law: FloatArray, curve: FloatArray, load: float) -> tuple[int, float]:
+    low, high = 0, int(law[1]) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if curve[0, middle] <= load:
+            low = middle
+        else:
+            high = middle
+    return low, load - curve[0, low]
+
+
+@compiled
+def _measured_compliance(law: FloatArray, curve: FloatArray, load: float) -> float:
+    i, s = _piece(law, curve, min(max(load, 0.0), curve[0, int(law[1]) - 1]))
+    return max((3.0 * curve[1, i] * s + 2.0 * curve[2, i]) * s + curve[3, i], 1e-15)

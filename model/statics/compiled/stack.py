@@ -1,0 +1,223 @@
+"""All pads of a bearing side by side: the same arrays as one film has, with a leading axis for the pad."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from model.arrays import BoolArray, FloatArray, IntArray
+from model.compilation import compiled
+from model.film.mesh import FilmGrid, FilmWork
+
+
+class GridStack(NamedTuple):
+    """The meshes of n pads: arrays as of `FilmGrid`, the pad first; `dx` is (n,), `first` the same for all."""
+
+    angle: FloatArray
+    z: FloatArray
+    cos: FloatArray
+    sin: FloatArray
+    cos_face: FloatArray
+    sin_face: FloatArray
+    dx: FloatArray
+    dz: FloatArray
+    height: FloatArray
+    area: FloatArray
+    first: int
+
+
+class PadStack(NamedTuple):
+    """What a search leaves as it is.
+
+    Attributes
+    ----------
+    frame : (n, 2, 2) ndarray
+        Rows: unit vectors along the pivot (normal) and across it (tangent).
+    preload : (n,) ndarray
+        Cp - Cb, plus running changes [m].
+    pivot_radius, clearance : (n,) ndarray
+        R_P and Cp [m].
+    inlet : (n,) ndarray
+        [degC]
+    laws : (n, 4) ndarray
+        The pivots, see `model.statics.compiled.laws`.
+    curves : (n, 5, m) ndarray
+        Measured ones.
+    attitudes : (n, 3, r) ndarray
+        Curvature, wedge and load of the loaded attitudes, see `model.film.loaded_attitude.LoadedAttitude`.
+    rows : (n,) ndarray of int
+        How many of the r there are.
+    """
+
+    frame: FloatArray
+    preload: FloatArray
+    pivot_radius: FloatArray
+    clearance: FloatArray
+    inlet: FloatArray
+    laws: FloatArray
+    curves: FloatArray
+    attitudes: FloatArray
+    rows: IntArray
+
+
+class PadState(NamedTuple):
+    """What a search changes besides the films' arrays.
+
+    Attributes
+    ----------
+    position : (2,) ndarray
+        Journal [m].
+    tilt, deflection : (n,) ndarray
+        t [rad], eta [m].
+    idle, solved : (n,) ndarray of bool
+        Carries nothing; has a pressure.
+    changes : (n,) ndarray of int
+        How often the pad has taken up or shed its load.
+    branch : (n, 4, r) ndarray
+        Rigid approach, approach, wedge and load, see `model.film.loaded_attitude.Branch`.
+    length : (n,) ndarray of int
+        How many of the r there are; 0 before the first.
+    force, corrected : (n, 2) ndarray
+        As the pressure was solved, and at the temperature found since [N].
+    stiffness, damping : (n, 2, 2) ndarray
+        [N/m], [N s/m]
+    least : (n,) ndarray
+        Thinnest film [m].
+    steps : (n,) ndarray of int
+        See `model.film.reynolds.FilmForces`.
+    heating : (n,) ndarray
+        Largest change of temperature that the last step asked for [K].
+    shift : (n, unknowns) ndarray
+        See `model.statics.pad_film.PadFilm.pressure_change`.
+    """
+
+    position: FloatArray
+    tilt: FloatArray
+    deflection: FloatArray
+    idle: BoolArray
+    solved: BoolArray
+    changes: IntArray
+    branch: FloatArray
+    length: IntArray
+    force: FloatArray
+    corrected: FloatArray
+    stiffness: FloatArray
+    damping: FloatArray
+    least: FloatArray
+    steps: IntArray
+    heating: FloatArray
+    shift: FloatArray
+
+
+def stacked_grids(grids: tuple[FilmGrid, ...]) -> GridStack:
+    """The meshes of several pads as one.
+
+    Parameters
+    ----------
+    grids : tuple of FilmGrid
+        Of one shape.
+
+    Returns
+    -------
+    GridStack
+        The same object for the same meshes.
+    """
+    return _stacked(tuple(map(_Same, grids)))
+
+
+class _Same:
+    """A mesh by its identity: `film_grid` returns the same object for the same arguments."""
+
+    def __init__(self, grid: FilmGrid) -> None:
+        self.grid = grid
+
+    def __hash__(self) -> int:
+        return id(self.grid)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and self.grid is other.grid
+
+
+@lru_cache(maxsize=64)
+def _stacked(same: tuple[_Same, ...]) -> GridStack:
+    grids = [one.grid for one in same]
+    arrays = {name: np.array([getattr(g, name) for g in grids]) for name in GridStack._fields if name != "first"}
+    return GridStack(**arrays, first=grids[0].first)
+
+
+def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWork, list[FilmWork]]:
+    """Allocate the arrays of all films, at rest at the inlet temperature.
+
+    Parameters
+    ----------
+    grids : list of FilmGrid
+        Of one shape.
+    inlet_temperature : float
+        [degC]
+
+    Returns
+    -------
+    stack : FilmWork
+        All of them, with a leading axis for the pad.
+    works : list of FilmWork
+        Every film's part of it.
+    """
+    nt, nz = len(grids[0].angle) - 1, len(grids[0].z) - 1
+    unknowns = nz - grids[0].first
+    count, n = len(grids), (nt - 1) * unknowns
+    fields = np.zeros((8, count, nt + 1, nz + 1))
+    fields[1] = inlet_temperature
+    pressure, temperature, viscosity, density, exchange, gained, thickness, extra = fields
+    stack = FilmWork(
+        pressure,
+        np.zeros((count, nt + 1, nz + 1), dtype=np.bool_),
+        temperature,
+        viscosity,
+        density,
+        exchange,
+        gained,
+        thickness,
+        extra,
+        np.zeros((count, nt, nz + 1)),
+        np.zeros((count, nt + 1, nz)),
+        np.zeros((count, n, unknowns + 1)),
+        np.zeros((count, n)),
+        np.zeros((count, n, 4)),
+    )
+    return stack, [FilmWork(*parts) for parts in zip(*stack, strict=True)]
+
+
+@compiled
+def grid_of(grids: GridStack, m: int) -> FilmGrid:
+    """One pad's mesh.
+
+    Parameters
+    ----------
+    grids : GridStack
+    m : int
+        Pad, from 0.
+    """
+    return FilmGrid(
+        grids.angle[m], grids.z[m], grids.cos[m], grids.sin[m], grids.cos_face[m], grids.sin_face[m], grids.dx[m],
+        grids.dz[m], grids.height[m], grids.area[m], grids.first,
+    )  # fmt: skip
+
+
+@compiled
+def work_of(works: FilmWork, m: int) -> FilmWork:
+    """One film's arrays.
+
+    Parameters
+    ----------
+    works : FilmWork
+        With a leading axis for the pad.
+    m : int
+        Pad, from 0.
+    """
+    return FilmWork(
+        works.pressure[m], works.ruptured[m], works.temperature[m], works.viscosity[m], works.density[m],
+        works.exchange[m], works.gained[m], works.thickness[m], works.extra[m], works.flow_x[m], works.flow_z[m],
+        works.band[m], works.unknown[m], works.slopes[m],
+    )  # fmt: skip
