@@ -52,25 +52,62 @@ class Case(NamedTuple):
 
 @compiled
 def rigid_approach(pads: PadStack, state: PadState, m: int) -> float:
-    """Approach of a film if its pivot were rigid [m]."""
+    """Approach of a film if its pivot were rigid [m].
+
+    Parameters
+    ----------
+    pads : PadStack
+    state : PadState
+    m : int
+        Pad, from 0.
+    """
     return pads.preload[m] + pads.frame[m, 0, 0] * state.position[0] + pads.frame[m, 0, 1] * state.position[1]
 
 
 @compiled
 def along(pads: PadStack, state: PadState, m: int) -> float:
-    """Journal's place across the pivot line [m]."""
+    """Journal's place across the pivot line [m].
+
+    Parameters
+    ----------
+    pads : PadStack
+    state : PadState
+    m : int
+        Pad, from 0.
+    """
     return pads.frame[m, 1, 0] * state.position[0] + pads.frame[m, 1, 1] * state.position[1]
 
 
 @compiled
 def margin(pads: PadStack, state: PadState, m: int) -> float:
-    """How far a pad is from where it stops carrying, as a share of its clearance; negative beyond."""
+    """How far a pad is from where it stops carrying, as a share of its clearance; negative beyond.
+
+    Parameters
+    ----------
+    pads : PadStack
+    state : PadState
+    m : int
+        Pad, from 0.
+    """
     return (rigid_approach(pads, state, m) - state.branch[m, 0, 0]) / pads.clearance[m]
 
 
 @compiled
 def find_branch(case: Case, pads: PadStack, works: FilmWork, state: PadState, m: int, hotter: float) -> None:
-    """Loaded attitudes of a pad at its film's mean temperature, or `hotter` [K] than that."""
+    """Loaded attitudes of a pad at its film's mean temperature, or `hotter` [K] than that.
+
+    Parameters
+    ----------
+    case : Case
+    pads : PadStack
+    works : FilmWork
+        With a leading axis for the pad.
+    state : PadState
+    m : int
+        Pad, from 0.
+    hotter : float
+        [K]
+    """
     count = pads.rows[m]
     if count < 2:
         state.branch[m] = 0.0
@@ -111,7 +148,19 @@ def find_branch(case: Case, pads: PadStack, works: FilmWork, state: PadState, m:
 
 @compiled
 def interpolate(x: FloatArray, y: FloatArray, count: int, at: float) -> float:
-    """Straight between the first `count` points, constant beyond them."""
+    """Straight between the first `count` points, constant beyond them.
+
+    Parameters
+    ----------
+    x : ndarray
+        Rising.
+    y : ndarray
+        Values there.
+    count : int
+        How many count.
+    at : float
+        Where.
+    """
     if at <= x[0]:
         return y[0]
     if at >= x[count - 1]:
@@ -128,7 +177,14 @@ def interpolate(x: FloatArray, y: FloatArray, count: int, at: float) -> float:
 
 @compiled
 def let_idle(state: PadState, m: int) -> None:
-    """Let a pad carry nothing."""
+    """Let a pad carry nothing.
+
+    Parameters
+    ----------
+    state : PadState
+    m : int
+        Pad, from 0.
+    """
     state.idle[m] = True
     state.deflection[m] = 0.0
     state.tilt[m] = 0.0
@@ -136,7 +192,17 @@ def let_idle(state: PadState, m: int) -> None:
 
 @compiled
 def set_loaded(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None:
-    """Put a pad on its loaded attitude, or let it idle."""
+    """Put a pad on its loaded attitude, or let it idle.
+
+    Parameters
+    ----------
+    pads : PadStack
+    works : FilmWork
+        With a leading axis for the pad.
+    state : PadState
+    m : int
+        Pad, from 0.
+    """
     let_idle(state, m)
     state.idle[m] = margin(pads, state, m) <= 0.0
     works.ruptured[m] = False
@@ -150,14 +216,33 @@ def set_loaded(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None
 
 @compiled
 def hold_of(case: Case, state: PadState, m: int, load: float) -> tuple[float, float]:
-    """What holds a tilt back: its slope by the tilt [N m/rad] and by the pad's load [m]."""
+    """What holds a tilt back: its slope by the tilt [N m/rad] and by the pad's load [m].
+
+    Parameters
+    ----------
+    case : Case
+    state : PadState
+    m : int
+        Pad, from 0.
+    load : float
+        Pad load [N].
+    """
     stiffness = case.hold[0] + case.hold[1] * max(load, 0.0)
     return stiffness, case.hold[1] * state.tilt[m] if load > 0.0 else 0.0
 
 
 @compiled
 def is_stable(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
-    """Whether film and pivot push a pad back from a small change of tilt and deflection."""
+    """Whether film and pivot push a pad back from a small change of tilt and deflection.
+
+    Parameters
+    ----------
+    case : Case
+    pads : PadStack
+    state : PadState
+    m : int
+        Pad, from 0.
+    """
     k, load, radius = state.stiffness[m], state.force[m, 0], pads.pivot_radius[m]
     give = compliance(pads.laws[m], pads.curves[m], max(load, 1e-6))
     stiffness, arm = hold_of(case, state, m, load)
@@ -168,7 +253,16 @@ def is_stable(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
 
 @compiled
 def update_carrying(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> bool:
-    """Let pads take up or shed their load as the journal's position has it; True if any did."""
+    """Let pads take up or shed their load as the journal's position has it; True if any did.
+
+    Parameters
+    ----------
+    case : Case
+    pads : PadStack
+    works : FilmWork
+        With a leading axis for the pad.
+    state : PadState
+    """
     changed = False
     for m in range(len(state.tilt)):
         if state.length[m] == 0 or abs(margin(pads, state, m)) < NEAR_EDGE:
@@ -194,7 +288,16 @@ def _keeps_its_load(case: Case, pads: PadStack, state: PadState, m: int, inside:
 
 @compiled
 def leave_unstable(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> bool:
-    """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any."""
+    """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any.
+
+    Parameters
+    ----------
+    case : Case
+    pads : PadStack
+    works : FilmWork
+        With a leading axis for the pad.
+    state : PadState
+    """
     found = False
     for m in range(len(state.tilt)):
         if not state.solved[m] or case.hold[0] > 0.0 or is_stable(case, pads, state, m):

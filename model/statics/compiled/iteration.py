@@ -43,7 +43,16 @@ SETTLED, RESTARTING, FILM_LOST, BOUNDLESS_HEAT, SINGULAR, NOT_CONVERGED = range(
 
 @compiled
 def start_cold(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> None:
-    """Balance the load with the tabulated isothermal films, then put every pad on its loaded attitude."""
+    """Balance the load with the tabulated isothermal films, then put every pad on its loaded attitude.
+
+    Parameters
+    ----------
+    case : Case
+    pads : PadStack
+    works : FilmWork
+        With a leading axis for the pad.
+    state : PadState
+    """
     hotter = 0.0 if case.isothermal else FIRST_HEATING
     n = len(state.tilt)
     distances = np.empty((n, 3))
@@ -65,6 +74,17 @@ def iterate(
     grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case, cold: bool
 ) -> tuple[int, int, float, float, float]:
     """Iterate from where the arrays stand, or from a cold start.
+
+    Parameters
+    ----------
+    grids : GridStack
+    pads : PadStack
+    works : FilmWork
+        With a leading axis for the pad.
+    state : PadState
+    case : Case
+    cold : bool
+        Start anew.
 
     Returns
     -------
@@ -150,7 +170,17 @@ def _size(works: FilmWork) -> int:
 
 @compiled
 def write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatArray) -> None:
-    """Journal, pads and film temperatures as one vector, in micrometres and kelvins."""
+    """Journal, pads and film temperatures as one vector, in micrometres and kelvins.
+
+    Parameters
+    ----------
+    pads : PadStack
+    works : FilmWork
+        With a leading axis for the pad.
+    state : PadState
+    out : ndarray
+        Overwritten.
+    """
     out[0], out[1] = state.position[0] / MICROMETRE, state.position[1] / MICROMETRE
     at = 2
     for m in range(len(state.tilt)):
@@ -166,7 +196,17 @@ def write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatArr
 
 @compiled
 def read_vector(pads: PadStack, works: FilmWork, state: PadState, vector: FloatArray) -> None:
-    """Undo `write_vector`."""
+    """Undo `write_vector`.
+
+    Parameters
+    ----------
+    pads : PadStack
+    works : FilmWork
+        With a leading axis for the pad.
+    state : PadState
+    vector : ndarray
+        As written by `write_vector`.
+    """
     state.position[0], state.position[1] = vector[0] * MICROMETRE, vector[1] * MICROMETRE
     at = 2
     for m in range(len(state.tilt)):

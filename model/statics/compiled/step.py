@@ -23,7 +23,21 @@ from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of,
 def solve_pressure(
     grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case, m: int, sharp: bool
 ) -> None:
-    """Pressure of one film at its present temperature."""
+    """Pressure of one film at its present temperature.
+
+    Parameters
+    ----------
+    grids : GridStack
+    pads : PadStack
+    works : FilmWork
+        With a leading axis for the pad.
+    state : PadState
+    case : Case
+    m : int
+        Pad, from 0.
+    sharp : bool
+        See `model.film.reynolds.solve_film`.
+    """
     grid, work = grid_of(grids, m), work_of(works, m)
     if not sharp:
         set_viscosity(work, case.oil)
@@ -42,6 +56,17 @@ def solve_films(
     grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case, relaxation: float
 ) -> tuple[float, float]:
     """Solve every film that carries once: pressure, then temperature.
+
+    Parameters
+    ----------
+    grids : GridStack
+    pads : PadStack
+    works : FilmWork
+        With a leading axis for the pad.
+    state : PadState
+    case : Case
+    relaxation : float
+        Of a change of temperature.
 
     Returns
     -------
@@ -84,6 +109,12 @@ def solve_films(
 @compiled
 def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArray, FloatArray]:
     """Solve the linearised equilibrium once.
+
+    Parameters
+    ----------
+    case : Case
+    pads : PadStack
+    state : PadState
 
     Returns
     -------
@@ -128,7 +159,20 @@ def move(
     grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, step: tuple[FloatArray, FloatArray],
     damping: float,
 ) -> bool:  # fmt: skip
-    """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
+    """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way.
+
+    Parameters
+    ----------
+    grids : GridStack
+    pads : PadStack
+    works : FilmWork
+        With a leading axis for the pad.
+    state : PadState
+    step : tuple
+        Shift of the journal and moves of the pads, see `newton`.
+    damping : float
+        Largest share of the step.
+    """
     shift, moves = step
     longest = LONGEST_STEP * pads.clearance.min() / max(math.hypot(shift[0], shift[1]), 1e-30)
     scale = min(damping, longest)
