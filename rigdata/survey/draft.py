@@ -6,7 +6,9 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from rigdata.survey.channel_guess import ChannelGuess, guess_channel, quantity_of_unit
 from rigdata.survey.exports import Export
@@ -27,6 +29,8 @@ _NEAR = 0.02
 #: Directions [deg] no farther apart than this are meant to be one.
 _ALIKE = 3.0
 _MAINS_NEAR = 0.005
+#: Speeds that differ by no more than this factor are one set point; a round number so near is meant.
+_ONE_SPEED, _ROUND = 1.015, 0.003
 #: Share of the running records in which the shaft speed must show.
 _MOST_OF = 0.8
 
@@ -50,6 +54,8 @@ class Survey:
         Name of the time column of text files; "" without one.
     nameless : int
         Columns of text files that have no names; 0 where they have.
+    per_hertz : dict of str to float
+        Reading per hertz of tachometers in volts, where the speed shows in the probes.
     """
 
     exports: tuple[str, ...]
@@ -59,6 +65,7 @@ class Survey:
     speed_line: float = float("nan")
     clock: str = ""
     nameless: int = 0
+    per_hertz: dict[str, float] = field(default_factory=dict)
 
 
 def survey(exports: Sequence[Export], given: Mapping[str, ChannelGuess] | None = None) -> Survey:
@@ -76,13 +83,15 @@ def survey(exports: Sequence[Export], given: Mapping[str, ChannelGuess] | None =
             if one.name not in channels:
                 channels[one.name] = _with_given(guess_channel(one.name, one.unit), (given or {}).get(one.name))
     quantities = {name: guess.quantity for name, guess in channels.items()}
-    runs = _one_direction([guess_run(export, channels) for export in exports])
+    runs = _common_speeds(_one_direction([guess_run(export, channels) for export in exports]))
+    line = _common_line(exports, quantities, runs)
     return Survey(
         exports=tuple(e.name for e in exports),
         rates=tuple(e.rate for e in exports),
         channels=channels,
         runs=runs,
-        speed_line=_common_line(exports, quantities, runs),
+        speed_line=line,
+        per_hertz=_tachometers(exports, channels, runs, line),
         clock=next((e.clock for e in exports if e.clock), ""),
         nameless=max((e.nameless for e in exports), default=0),
     )
@@ -114,6 +123,40 @@ def _one_direction(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
     return tuple(replace(r, direction=common.get(r.direction, r.direction)) for r in runs)
 
 
+def _common_speeds(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
+    """Speeds within a per cent or so of each other are one set point: a tachometer shows what came of it."""
+    known = sorted({r.speed for r in runs if math.isfinite(r.speed)})
+    groups: list[list[float]] = []
+    for speed in known:
+        if groups and speed <= _ONE_SPEED * groups[-1][0]:
+            groups[-1].append(speed)
+        else:
+            groups.append([speed])
+    common: dict[float, float] = {}
+    for group in groups:
+        every = sorted(r.speed for r in runs if r.speed in group)
+        middle = every[len(every) // 2]
+        round_one = float(f"{middle:.2g}")  # 21.99 Hz was meant to be 22 Hz
+        near = abs(round_one - middle) <= _ROUND * middle
+        common |= dict.fromkeys(group, round_one if near else float(f"{middle:.4g}"))
+    return tuple(replace(r, speed=common.get(r.speed, r.speed)) for r in runs)
+
+
+def _tachometers(
+    exports: Sequence[Export], channels: Mapping[str, ChannelGuess], runs: Sequence[RunGuess], line: float
+) -> dict[str, float]:
+    """Reading per hertz of speed channels in volts, where it is one in all running records."""
+    found = {}
+    for name, guess in channels.items():
+        if guess.quantity != "speed" or quantity_of_unit(guess.unit) or not math.isfinite(line):
+            continue
+        running = [e for e, r in zip(exports, runs, strict=True) if r.kind in ("dynamic", "locus")]
+        means = sorted(float(np.nanmedian(s.values)) / line for e in running for s in e.series if s.name == name)
+        if means and means[0] > 0 and means[-1] - means[0] <= _NEAR * means[-1]:
+            found[name] = means[len(means) // 2]
+    return found
+
+
 def _is_mains(frequency: float) -> bool:
     return any(abs(frequency - mains) < _MAINS_NEAR * mains for mains in (50.0, 60.0))
 
@@ -132,7 +175,9 @@ def _common_line(exports: Sequence[Export], quantities: dict[str, str], runs: Se
     for candidate in sorted({f for lines in running for f in lines}, key=lambda f: (_is_mains(f), f)):
         near = [f for lines in running for f in lines if abs(f - candidate) < _NEAR * candidate]
         if len(near) >= _MOST_OF * len(running):
-            return sorted(near)[len(near) // 2]
+            half = [f for lines in running for f in lines if abs(2 * f - candidate) < _NEAR * candidate]
+            found = half if 2 * len(half) >= len(near) else near  # an oval shaft shows twice its speed more often
+            return sorted(found)[len(found) // 2]
     return float("nan")
 
 
@@ -199,6 +244,9 @@ def channel_blocks(found: Survey) -> dict[str, list[str]]:
         open_still = guess.quantity in _EXAMPLE and quantity_of_unit(guess.unit) == ""
         model = first.setdefault(kind, name) if open_still else name
         blocks[name] = _channel_lines(name, guess, "" if model == name else model)
+        if name in found.per_hertz and guess.unit:
+            text = f'sensitivity = "{found.per_hertz[name]:.4g} {guess.unit}/Hz"   # (guess) the probes show the speed'
+            blocks[name] = [text if line.startswith("sensitivity") else line for line in blocks[name]]
     return blocks
 
 

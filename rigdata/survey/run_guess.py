@@ -17,6 +17,8 @@ from rigdata.survey.spectrum import SpectralPeak, amplitude_spectrum, strongest
 
 #: Share of slow movement above which a record is a quasi-static test, and of one direction for load steps.
 _SLOW, _STRAIGHT = 0.9, 0.97
+#: Above this share too, where no line carries that much of the movement: steps that follow each other quickly.
+_MOSTLY, _DRIVEN = 0.5, 0.05
 _BLOCK = 0.25
 #: How far a line may lie from the frequency that a file's name states, as a share.
 _CONFIRMS = 0.02
@@ -157,7 +159,8 @@ def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[Spectra
     if total <= 0:
         return "", ""
     share = sum(float(np.var(b)) for b in slow) / total
-    if share > _SLOW:
+    driven = bool(lines) and 0.5 * lines[0].amplitude ** 2 > _DRIVEN * total  # mains pick-up drives nothing
+    if share > _SLOW or (share > _MOSTLY and not driven):
         if len(slow) == 2 and len(slow[0]) == len(slow[1]) > 3:
             spread = np.linalg.eigvalsh(np.cov(np.stack(slow)))
             if spread[-1] < _STRAIGHT * spread.sum():

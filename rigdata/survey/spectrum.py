@@ -135,7 +135,7 @@ def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> tuple[
         around = amplitude[max(4, i - _NEIGHBOURS) : i + _NEIGHBOURS + 1]
         if amplitude[i] > _STANDS_OUT * np.median(around) and i + 1 < len(amplitude):
             found.append(SpectralPeak(_refined(frequency, amplitude, i), float(amplitude[i])))
-        left[max(0, i - 3) : i + 4] = 0.0
+        left[max(0, i - 2) : i + 3] = 0.0  # the window's main lobe
     return tuple(found)
 
 

@@ -155,6 +155,12 @@ def test_segments_of_a_labview_file_follow_each_other(tmp_path):
     assert x.values[-1] == pytest.approx(X[-1] + 2)
 
 
+def test_a_labview_file_whose_rows_end_before_the_column_of_comments(tmp_path):
+    lines = [line.removesuffix("\t") for line in lvm("One").replace("a remark", "").split("\r\n")]
+    (tmp_path / "a.lvm").write_text("\r\n".join(lines), newline="")
+    np.testing.assert_allclose(read_foreign(tmp_path / "a.lvm", "a.lvm")[1].values, -X, atol=1e-9)
+
+
 def test_what_is_no_labview_file_says_so(tmp_path):
     (tmp_path / "a.lvm").write_text("time,X1A\n0,1\n")
     with pytest.raises(RigDataError, match="does not begin with 'LabVIEW Measurement'"):

@@ -135,7 +135,11 @@ def _numbers(path: Path, segment: _Segment, separator: str, decimal: str) -> Flo
 
     width = len(segment.names)
     used = [i for i, n in enumerate(segment.names) if n and n != _COMMENT]
-    text = io.StringIO("\n".join(segment.rows))
+    if not segment.rows:
+        return np.empty((0, width))
+    # a blank comment at the end of every row may be left out altogether
+    first = segment.rows[0] + separator * max(0, width - 1 - segment.rows[0].count(separator))
+    text = io.StringIO("\n".join([first, *segment.rows[1:]]))
     try:
         frame = pd.read_csv(text, sep=separator, decimal=decimal, header=None, names=range(width), usecols=used,
                             index_col=False, dtype=float, skip_blank_lines=False, quoting=3)  # fmt: skip

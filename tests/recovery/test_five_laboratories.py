@@ -1,0 +1,27 @@
+"""Exports as six laboratories write them become coefficients with three commands and at most ten typed lines."""
+
+from __future__ import annotations
+
+import pytest
+
+from rigdata.campaign import load_campaign
+from tests.good_campaigns import rocker_rig, written
+from tests.studies.five_laboratories import LABORATORIES, MOST_LINES, through
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    return load_campaign(written(tmp_path_factory.mktemp("laboratories") / "campaign.h5", rocker_rig(3)))
+
+
+@pytest.mark.parametrize("laboratory", LABORATORIES, ids=lambda one: one.write.__name__)
+def test_from_records_to_coefficients_with_few_lines_by_hand(laboratory, campaign, tmp_path):
+    for module in {"tdms": "nptdms", "uff": "pyuff"}.get(laboratory.write.__name__, "numpy").split():
+        pytest.importorskip(module)
+    found = through(laboratory, campaign, tmp_path, report=False)
+    assert found["exit"] == 0
+    assert found["commands"] == 3
+    assert found["lines"] <= MOST_LINES
+    assert found["worst"] < 0.1
