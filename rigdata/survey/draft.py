@@ -176,8 +176,8 @@ def _common_line(exports: Sequence[Export], quantities: dict[str, str], runs: Se
         near = [f for lines in running for f in lines if abs(f - candidate) < _NEAR * candidate]
         if len(near) >= _MOST_OF * len(running):
             half = [f for lines in running for f in lines if abs(2 * f - candidate) < _NEAR * candidate]
-            found = half if 2 * len(half) >= len(near) else near  # an oval shaft shows twice its speed more often
-            return sorted(found)[len(found) // 2]
+            speeds = half if 2 * len(half) >= len(near) else near  # an oval shaft shows twice its speed more often
+            return sorted(speeds)[len(speeds) // 2]
     return float("nan")
 
 
