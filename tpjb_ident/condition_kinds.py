@@ -52,6 +52,8 @@ ERRORS = {
     "stiffness is still inside. Measure it there too.",
     "film-not-linear": "The film was shaken so hard that it answers at twice the excitation frequency: K and C of "
     "small motion cannot be had from this. Excite less.",
+    "records-contradicted": "Many records contradict the manifest, or what a film can do: swapped or inverted "
+    "channels, loads, clipping. `tpjb check` lists it all.",
     "runs-disagree": "The runs of the point do not belong to one dynamic stiffness: what it leaves of their forces is "
     "far more than load and noise explain. Look at the runs one by one.",
     "most-windows-lost": "More than half of the record's windows gave no phasors. Look at the records.",
@@ -121,6 +123,7 @@ WARNINGS = {
     "probe-gains-differ": "The sides of the clearance polygon stand at other angles to each other than the pads "
     "do, as where one probe reads more than the other. Check both sensitivities.",
     "record-damaged": "A record had to be mended when it was read, and part of it is lost. Copy it again from the rig.",
+    "records-doubtful": "A check of the records found something to look at; `tpjb check` lists it all.",
     "run-gain-off": "In one run a probe or cell reads some per cent more or less than in the others of this "
     "point. Check its amplifier, range and cable there; leave the run out or repeat it.",
     "run-left-out": "A run at this point cannot be used and takes no part; the others stand.",

@@ -10,7 +10,8 @@ from tests.studies.field.campaign_file import plans_of, write_campaign
 from tests.studies.field.conditions import Row, rows
 from tests.studies.field.judge import judge
 from tests.studies.field.rig import Device, Rig
-from tpjb_ident.dynamic.corrections.cell_zero import cell_zero, without_static_part
+from tpjb_ident.check.set_points import without_static_part
+from tpjb_ident.dynamic.corrections.cell_zero import cell_zero
 from tpjb_ident.dynamic.estimators.uncertainty import DirectionMeans, pooled_effect
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.plain import PlainSettings, plain_frame, plain_points, write_r_matrices

@@ -96,13 +96,15 @@ def _misfit(force: ComplexArray, readings: ComplexArray, matrix: ComplexArray) -
 def _common_matrix(group: Sequence[tuple[Observation, ComplexArray, ComplexArray]]) -> ComplexArray | None:
     """Matrix (2, 2) from cell force to readings with the least median misfit among all pairs of runs."""
     best: tuple[float, ComplexArray] | None = None
+    all_forces, all_readings = np.array([f for _, f, _ in group]), np.array([r for _, _, r in group])
+    sizes = np.linalg.norm(all_readings, axis=1)
     for first, second in combinations(group[:24], 2):
         forces = np.stack([first[1], second[1]], axis=1)
         scaled = forces / np.linalg.norm(forces, axis=0)
         if np.linalg.svd(scaled, compute_uv=False)[-1] < 0.3:
             continue
         matrix = np.asarray(np.linalg.solve(forces.T, np.stack([first[2], second[2]])).T, dtype=np.complex128)
-        misfit = float(np.median([_misfit(f, r, matrix) for _, f, r in group]))
+        misfit = float(np.median(np.linalg.norm(all_readings - all_forces @ matrix.T, axis=1) / sizes))
         if best is None or misfit < best[0]:
             best = (misfit, matrix)
     return None if best is None else best[1]

@@ -73,6 +73,17 @@ class Reporter:
         self.found.extend(Finding(p, f"{p.place} {p.what}") for p in problems)
 
 
+def is_shared(concerned: int, alike: int) -> bool:
+    """Whether a finding is one of the campaign: a third of the runs alike have it, three at least.
+
+    Parameters
+    ----------
+    concerned, alike : int
+        Runs that have it, and runs of the same kinds.
+    """
+    return concerned >= 3 and 3 * concerned >= alike
+
+
 def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[Problem]:
     """Tell a finding once that a third (three at least) of the runs of its kinds share.
 
@@ -98,7 +109,7 @@ def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[P
         concerned = list(dict.fromkeys(p.run for p in group if p.run))
         kinds = {kind_of[r] for r in concerned}
         alike = sum(run.kind in kinds for run in runs)
-        if len(concerned) < 3 or 3 * len(concerned) < alike:
+        if not is_shared(len(concerned), alike):
             merged.extend(group)
             continue
         first = group[0]
@@ -106,3 +117,46 @@ def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[P
         what = f"{first.what}; and so in {len(concerned)} runs ({listed})"
         merged.append(Problem(first.severity, file, first.place, what, first.cure))
     return merged
+
+
+@dataclass(frozen=True)
+class Verdicts:
+    """Findings by run.
+
+    Attributes
+    ----------
+    unusable : dict of str to Problem
+        Runs with an error of their own: they say nothing, the others stand.
+    shared : dict of str to list of Problem
+        Errors that a third of the runs or more have in common: what is wrong is wrong with the campaign.
+    doubtful : dict of str to list of Problem
+        Warnings.
+    """
+
+    unusable: dict[str, Problem] = field(default_factory=dict)
+    shared: dict[str, list[Problem]] = field(default_factory=dict)
+    doubtful: dict[str, list[Problem]] = field(default_factory=dict)
+
+
+def verdicts(reports: Sequence[Reporter]) -> Verdicts:
+    """Sort the findings of runs of one kind.
+
+    Parameters
+    ----------
+    reports : sequence of Reporter
+        As of the observations that `tpjb_ident.check.campaign.judged` gives.
+    """
+    groups: dict[tuple[str, Severity], dict[str, Problem]] = {}
+    for one in reports:
+        for finding in one.found:
+            groups.setdefault((finding.key, finding.problem.severity), {}).setdefault(one.run.id, finding.problem)
+    found = Verdicts()
+    for (_, severity), concerned in groups.items():
+        for run, problem in concerned.items():
+            if severity == "warning":
+                found.doubtful.setdefault(run, []).append(problem)
+            elif severity == "error" and is_shared(len(concerned), len(reports)):
+                found.shared.setdefault(run, []).append(problem)
+            elif severity == "error":
+                found.unusable.setdefault(run, problem)
+    return found

@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 from rigdata.campaign import Campaign
 from tpjb_ident.arrays import FloatArray
+from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change, gain_draws
 from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
@@ -28,6 +29,7 @@ from tpjb_ident.dynamic.results.probe_scale import with_probe_doubts
 from tpjb_ident.dynamic.results.run_gains import Pairs, channel_pairs, gain_doubts
 from tpjb_ident.dynamic.results.swept_probes import swept_probes
 from tpjb_ident.dynamic.runs.baseline import measured_baseline
+from tpjb_ident.dynamic.runs.checked_runs import check_conditions, check_finished
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 from tpjb_ident.dynamic.runs.left_out import named_runs
 from tpjb_ident.dynamic.runs.point_source import PointSource, point_sources
@@ -101,6 +103,7 @@ def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySetti
     tell : callable
         Called as tell(text, done, total).
     """
+    checked = check_finished(campaign, finished)
     digests = finished.digests
     findings, sources = look_at_instruments(point_sources(finished), delays_stated(campaign))
     baseline = measured_baseline(campaign, settings.phasors, own_method(settings.method))
@@ -121,6 +124,7 @@ def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySetti
         gain_draws(campaign.channels, settings.n_calibration, settings.seed),
         systematic_sources(campaign, settings.n_calibration, settings.seed + 1),
         force_pickup(in_cells),
+        checked,
     )
     points, changes = [], []
     for source, correction in zip(sources, corrections):
@@ -147,6 +151,7 @@ class _Points:
     draws: GainDraws
     sources: SystematicSources
     mains_force: FloatArray
+    checked: Verdicts
 
     def finish(self, source: PointSource, correction: Correction) -> tuple[PointResult, FloatArray]:
         """One point with all its uncertainties, and what the draws of the systematic ones do to it."""
@@ -175,7 +180,7 @@ class _Points:
         bent = change_conditions(film, uncertain, with_both[settings.method], figures.amplitude, settings.clearance)
         bent += () if none is None else none.conditions()
         found = (used.conditions, self.findings.conditions(data), source.baseline.missing(data), bent)
-        doubts = (gain_doubts(data, self.pairs), *found)
+        doubts = (gain_doubts(data, self.pairs), *found, check_conditions(self.checked, [run.run for run in data.runs]))
         completion = Completion(with_both, merged(*doubts), used.miss, {**used.budget(before), **systematic})
         finished = point_result(corrected, figures, completion, self.temperatures, settings)
         return finished, np.sum(list(changes.values()), axis=0)

@@ -20,8 +20,6 @@ CLEAR = 5.0
 #: and share of the smallest load that it must have.
 NOTABLE = 0.004
 MIN_RUNS = 4
-#: A mean force below this share of the set point is none, if it is not clearly there.
-NO_STATIC = (0.002, 0.02)
 
 
 @dataclass(frozen=True)
@@ -92,18 +90,3 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0
 
 def _one_direction(set_points: ComplexArray) -> bool:
     return bool(np.abs(set_points / np.abs(set_points) - set_points[0] / abs(set_points[0])).max() < MIN_RANGE)
-
-
-def without_static_part(ratios: ComplexArray) -> bool:
-    """Whether the cells show no static force at all, as piezo-electric ones: not a little of it, but none.
-
-    Parameters
-    ----------
-    ratios : (n,) complex ndarray
-        Mean force over set point of the runs.
-    """
-    if not len(ratios):
-        return False
-    mean = abs(complex(ratios.mean()))
-    error = float(np.sqrt(np.mean(np.abs(ratios - ratios.mean()) ** 2) / max(len(ratios) - 1, 1)))
-    return bool(mean < NO_STATIC[0] or (mean < NO_STATIC[1] and mean < 4 * error))

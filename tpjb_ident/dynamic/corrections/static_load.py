@@ -19,8 +19,9 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.check.set_points import without_static_part
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.corrections.cell_zero import CellZero, cell_zero, without_static_part
+from tpjb_ident.dynamic.corrections.cell_zero import CellZero, cell_zero
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.runs.point_data import PointData
 

@@ -8,8 +8,8 @@ stays in memory, the rest waits in the store of finished runs, or in a temporary
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
 
@@ -17,6 +17,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.line_means import LineMean, second_harmonics
 from tpjb_ident.dynamic.records.mains_line import mains_force, mains_line
@@ -56,6 +57,8 @@ class RunDigest:
         [Hz]
     mains_force : (2,) complex ndarray or None
         Oil force at the mains line, where it stands apart [N].
+    seen : Observation or None
+        What the checks need of the run.
     """
 
     run: str
@@ -68,6 +71,7 @@ class RunDigest:
     harmonics: tuple[tuple[LineMean, LineMean] | None, ...] = ()
     sample_rate: float = 0.0
     mains_force: ComplexArray | None = None
+    seen: Observation | None = field(default=None, repr=False)
 
 
 def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:
@@ -91,6 +95,7 @@ def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:
         second_harmonics(phasors),
         sample_rate,
         mains_force(phasors),
+        result.seen,
     )
 
 
@@ -211,6 +216,19 @@ class FinishedRuns:
                 cure = "Check sensor, cable and amplifier; repeat the run"
                 problem = Problem("error", run.file, "", dead_one.detail, cure, run.id)
                 self.leave_out(i, LeftOut(run.id, run.point, RigDataError(problem)))
+
+    def leave_out_unusable(self, errors: Mapping[str, Problem]) -> None:
+        """Leave out runs in which the checks found an error of their own.
+
+        Parameters
+        ----------
+        errors : mapping of str to Problem
+            By run.
+        """
+        for i in self.places:
+            run = self._runs[i]
+            if run.id in errors:
+                self.leave_out(i, LeftOut(run.id, run.point, RigDataError(errors[run.id])))
 
     def put(self, index: int, result: RunResult | None, mark: str = "") -> None:
         """Put a finished run away.

@@ -15,10 +15,13 @@ import numpy as np
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from rigdata.run import Run
+from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.records.kept_readings import beginning_of, with_kept_beginning
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.dynamic.runs.dead_channels import dead_accelerometers
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
+from tpjb_ident.dynamic.runs.kept_observation import of_run
 from tpjb_ident.dynamic.runs.left_out import LeftOut
 from tpjb_ident.dynamic.runs.run_result import RunResult
 from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
@@ -155,12 +158,22 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResul
     settings : PhasorSettings
     """
     with run.kept_open():
+        kept = with_kept_beginning(run)
         try:
-            phasors = run_phasors(run, housing_mass, settings)
+            phasors = run_phasors(kept, housing_mass, settings)
         except RecordTooShortError as error:
             raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
-        conditions = merged(phasors.conditions, dead_accelerometers(run, phasors), _mended(run))
-        return RunResult(replace(phasors, conditions=conditions), mean_temperatures(run))
+        conditions = merged(phasors.conditions, dead_accelerometers(kept, phasors), _mended(run))
+        result = replace(phasors, conditions=conditions)
+        return RunResult(result, mean_temperatures(kept), _seen(run, kept, settings))
+
+
+def _seen(run: Run, kept: Run, settings: PhasorSettings) -> Observation | None:
+    """What the checks make of the run's beginning; records that several lines were asked of are no case for them."""
+    beginning = beginning_of(kept)
+    if beginning is None or settings.excitation_lines:
+        return None
+    return of_run(observe(beginning), run)
 
 
 def _mended(run: Run) -> tuple[Condition, ...]:

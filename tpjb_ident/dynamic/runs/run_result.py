@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from tpjb_ident.check.observation import Observation
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 
 
@@ -16,7 +17,10 @@ class RunResult:
     phasors : RunPhasors
     temperatures : dict of int to float
         Mean per pad [K].
+    seen : Observation or None
+        What the checks need of it; None of what is not read from a file.
     """
 
     phasors: RunPhasors
     temperatures: dict[int, float]
+    seen: Observation | None = field(default=None, repr=False)

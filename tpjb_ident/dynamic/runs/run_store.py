@@ -25,6 +25,7 @@ from rigdata.run import Run
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.dynamic.runs.kept_observation import packed, unpacked
 from tpjb_ident.dynamic.runs.run_result import RunResult
 from tpjb_ident.dynamic.spectral_lines.lines import Line, LineSet
 from tpjb_ident.runtime.provenance import sha256, source_stamp
@@ -112,8 +113,9 @@ class RunStore:
             "run": phasors.run,
             "length": phasors.length,
             "lines": _packed_lines(phasors.lines),
-            "conditions": _packed(phasors.conditions),
+            "conditions": _packed_conditions(phasors.conditions),
             "temperatures": {str(pad): value for pad, value in result.temperatures.items()},
+            "seen": None if result.seen is None else packed(result.seen),
         }
         text = np.array(json.dumps(meta))
         with suppress(FileNotFoundError):  # another run into the same folder has ended and cleared it
@@ -152,9 +154,10 @@ class RunStore:
             blocks.get("acceleration"),
             housing_mass,
             arrays["speeds"],
-            _unpacked(meta["conditions"]),
+            _unpacked_conditions(meta["conditions"]),
         )
-        return RunResult(phasors, {int(pad): value for pad, value in meta["temperatures"].items()})
+        seen = None if meta["seen"] is None else unpacked(meta["seen"], run)
+        return RunResult(phasors, {int(pad): value for pad, value in meta["temperatures"].items()}, seen)
 
     def clear(self) -> None:
         """Forget everything; the folder that it lies in goes too if nothing else is there."""
@@ -163,11 +166,11 @@ class RunStore:
             self.folder.parent.rmdir()
 
 
-def _packed(conditions: tuple[Condition, ...]) -> list[list[str]]:
+def _packed_conditions(conditions: tuple[Condition, ...]) -> list[list[str]]:
     return [[str(c), c.detail] for c in conditions]
 
 
-def _unpacked(stored: list[list[str]]) -> tuple[Condition, ...]:
+def _unpacked_conditions(stored: list[list[str]]) -> tuple[Condition, ...]:
     return tuple(Condition(name, detail) for name, detail in stored)
 
 
@@ -175,7 +178,7 @@ def _packed_lines(lines: LineSet) -> dict[str, Any]:
     return {
         "excitation": [[line.name, line.frequency, line.wander] for line in lines.excitation],
         "nuisance": [[line.name, line.frequency, line.wander] for line in lines.nuisance],
-        "conditions": _packed(lines.conditions),
+        "conditions": _packed_conditions(lines.conditions),
         "speed": lines.speed,
     }
 
@@ -184,6 +187,6 @@ def _unpacked_lines(stored: dict[str, Any]) -> LineSet:
     return LineSet(
         tuple(Line(*line) for line in stored["excitation"]),
         tuple(Line(*line) for line in stored["nuisance"]),
-        _unpacked(stored["conditions"]),
+        _unpacked_conditions(stored["conditions"]),
         stored["speed"],
     )

@@ -1,0 +1,125 @@
+"""The beginning of a run's record, read once for all who look at it: phasors, channel by channel, checks, temperatures.
+
+Stands in the place of the run's reader. What is asked for beyond the beginning is read from the file as before, so
+that a short record is read once as a whole, and no sample of a long one twice by those who look at its beginning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rigdata.problem import RigDataError
+from rigdata.run import Run
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.dynamic.records.short_record import SHORT
+
+
+class KeptReadings:
+    """A run's reader that keeps the first samples of all channels.
+
+    Parameters
+    ----------
+    reader : RunReader
+        Reads the file; what is not answered here is asked there.
+    channels : sequence of str
+        Names of the channels to keep.
+    samples : int
+        From the start of the record.
+    """
+
+    def __init__(self, reader: Any, channels: Sequence[str], samples: int = SHORT) -> None:
+        self._reader, self._channels = reader, tuple(channels)
+        self._samples = min(samples, reader.length())
+        self._kept: dict[str, FloatArray] | None = None
+        self._time: FloatArray | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._reader, name)
+
+    def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings of `names`, (stop - start,) each; not to be written to.
+
+        Parameters
+        ----------
+        names : sequence of str
+        start, stop : int
+            First sample, and the one after the last.
+        """
+        kept = self._beginning() if stop <= self._samples else {}
+        if all(name in kept for name in names):
+            return [kept[name][start:stop] for name in names]
+        return list(self._reader.read(names, start, stop))
+
+    def time(self, start: int, stop: int) -> FloatArray:
+        """Seconds of samples start..stop-1.
+
+        Parameters
+        ----------
+        start, stop : int
+            First sample, and the one after the last.
+        """
+        if stop > self._samples:
+            return np.asarray(self._reader.time(start, stop))
+        if self._time is None:
+            self._time = np.asarray(self._reader.time(0, self._samples))
+        return self._time[start:stop].copy()
+
+    def _beginning(self) -> dict[str, FloatArray]:
+        if self._kept is None:
+            try:
+                values = self._reader.read(self._channels, 0, self._samples)
+            except RigDataError:  # told by whoever needs the channel that cannot be read
+                self._kept = {}
+            else:
+                self._kept = dict(zip(self._channels, values))
+                for one in values:
+                    one.flags.writeable = False
+        return self._kept
+
+
+class Beginning:
+    """A run's reader that ends where `KeptReadings` does.
+
+    Parameters
+    ----------
+    reader : KeptReadings
+    """
+
+    def __init__(self, reader: KeptReadings) -> None:
+        self._reader = reader
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._reader, name)
+
+    def length(self) -> int:
+        """Samples per channel."""
+        return self._reader._samples
+
+
+def with_kept_beginning(run: Run) -> Run:
+    """The run with its beginning kept; runs that are not read from a file stay as they are.
+
+    Parameters
+    ----------
+    run : rigdata.run.Run
+        Or what stands for one.
+    """
+    if not isinstance(run, Run):
+        return run
+    names = [name for name, channel in run.channels.items() if channel.quantity != "time"]
+    return replace(run, reader=KeptReadings(run.reader, names))
+
+
+def beginning_of(run: Run) -> Run | None:
+    """As much of the run as is kept, as a run of its own; None where nothing is.
+
+    Parameters
+    ----------
+    run : rigdata.run.Run
+    """
+    reader = getattr(run, "reader", None)
+    return replace(run, reader=Beginning(reader)) if isinstance(reader, KeptReadings) else None

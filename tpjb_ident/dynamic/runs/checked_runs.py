@@ -1,0 +1,60 @@
+"""What `tpjb check` knows of the dynamic runs, carried to the operating points that it touches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rigdata.campaign import Campaign
+from rigdata.problem import Problem
+from tpjb_ident.check.campaign import judged
+from tpjb_ident.check.findings import Verdicts, verdicts
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
+
+CONTRADICTED, DOUBTFUL = "records-contradicted", "records-doubtful"
+
+
+def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
+    """Judge all finished runs beside each other; those with an error of their own are left out.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    finished : FinishedRuns
+
+    Raises
+    ------
+    rigdata.problem.RigDataError
+        None of the runs can be used.
+    """
+    seen = [digest.seen for digest in finished.digests if digest.seen is not None]
+    if not seen:  # runs that are no files
+        return Verdicts()
+    found = verdicts([one.report for one in judged(campaign, seen)])
+    finished.leave_out_unusable(found.unusable)
+    if not finished.places:
+        raise finished.left_out[0].error
+    return found
+
+
+def check_conditions(found: Verdicts, runs: Iterable[str]) -> tuple[Condition, ...]:
+    """What the checks say of one point.
+
+    Parameters
+    ----------
+    found : Verdicts
+    runs : iterable of str
+        Of the point.
+    """
+    members = list(runs)
+    groups = ((CONTRADICTED, found.shared), (DOUBTFUL, found.doubtful))
+    told = ((name, [p for run in members for p in by_run.get(run, ())]) for name, by_run in groups)
+    return tuple(Condition(name, _sentence(problems)) for name, problems in told if problems)
+
+
+def _sentence(problems: list[Problem]) -> str:
+    """The first finding; how many more there are."""
+    different = list(dict.fromkeys(f"{p.place} {p.what}".strip() for p in problems))
+    first = f"{problems[0].run}: {different[0]}" if problems[0].run else different[0]
+    more = f"; and {len(different) - 1} more (see tpjb check)" if len(different) > 1 else ""
+    return f"{first}{more}. {problems[0].cure}"
