@@ -25,7 +25,7 @@ from tpjb_ident.dynamic.records.line_means import LineMean
 CHANGE = 4.5
 #: From so many runs on the harmonic is held against the squares of the motion,
 MIN_RUNS = 5
-#: and what goes with them must be this many times what does not, per degree of freedom.
+#: and what goes with them is beyond doubt where it is this many times what does not, per degree of freedom.
 DISTINCT = 6.0
 #: Changes below this share are not worth telling [share of h].
 NOTHING = 2e-4
@@ -106,7 +106,8 @@ def _quadratic_share(kept: Sequence[tuple[LineMean, LineMean]], doubled: Complex
     explained = float(np.sum(np.abs(fitted) ** 2)) / 3
     left = float(np.sum(np.abs(bent - fitted) ** 2)) / (len(kept) - 3)
     unseen = 3 * (DISTINCT - 1) * left / len(kept)
-    return (3 * (explained - left) / len(kept) if explained >= DISTINCT * left else 0.0), unseen
+    # what noise and mains leave by chance taken off: no threshold, below which a film would count as linear
+    return max(3 * (explained - left) / len(kept), 0.0), unseen
 
 
 def change_spread(change: float, est: DynamicStiffness) -> FloatArray:

@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.records.mains_line import complex_median
 from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: Phase between cells and accelerometers [rad] beyond which one of them is late; housings on bolted joints have 0.01.
@@ -34,6 +35,8 @@ MIN_RUNS = 3
 STIFFEST = 1e11
 #: Springs that a housing is taken to stand on [N/m] where its accelerometers cannot tell: those of soft cells.
 SOFT = 3e8
+#: Windows this many times farther from the middle of their run than half of them are left out.
+FAR = 4.0
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,10 @@ class BalanceRun:
         |m a| over |F_oil|.
     mass : float
         Of the housing [kg].
+    variance : float
+        Of a component of one window's acceleration about the run's mean [(m/s^2)^2].
+    windows : int
+        Behind the means.
     """
 
     frequency: float
@@ -57,6 +64,8 @@ class BalanceRun:
     acceleration: ComplexArray
     inertia: float
     mass: float = 0.0
+    variance: float = 0.0
+    windows: int = 1
 
 
 @dataclass(frozen=True)
@@ -104,17 +113,25 @@ def balance_runs(data: PointData) -> list[BalanceRun]:
         mine = (data.run_index == i) & whole
         if not mine.any():
             continue
-        F, A = _middle(data.F[mine], data.D[mine]), _middle(data.A[mine], data.D[mine])
+        both = _one_phase(np.concatenate([data.F[mine], data.A[mine]], axis=1), data.D[mine])
+        both = both[_ordinary(both[:, :2]) & _ordinary(both[:, 2:])]
+        F, A, n = both[:, :2].mean(axis=0), both[:, 2:].mean(axis=0), len(both)
         share = float(mass * np.linalg.norm(A) / max(float(np.linalg.norm(F)), 1e-300))
-        found.append(BalanceRun(run.lines.excitation[line].frequency, F - mass * A, A, share, mass))
+        variance = float(np.sum(np.abs(both[:, 2:] - A) ** 2)) / max(4 * (n - 1), 1)
+        found.append(BalanceRun(run.lines.excitation[line].frequency, F - mass * A, A, share, mass, variance, n))
     return found
 
 
-def _middle(z: ComplexArray, d: ComplexArray) -> ComplexArray:
-    """Median of the windows, each turned to the phase of the first one's displacement: the drive may wander."""
+def _one_phase(z: ComplexArray, d: ComplexArray) -> ComplexArray:
+    """Windows turned to the phase of the first one's displacement: the drive may wander."""
     turn = np.einsum("ni,i->n", d.conj(), d[0])
-    turned = z * np.where(np.abs(turn) > 0, turn / np.maximum(np.abs(turn), 1e-300), 1.0)[:, None]
-    return np.asarray(np.median(turned.real, axis=0) + 1j * np.median(turned.imag, axis=0))
+    return np.asarray(z * np.where(np.abs(turn) > 0, turn / np.maximum(np.abs(turn), 1e-300), 1.0)[:, None])
+
+
+def _ordinary(z: ComplexArray) -> BoolArray:
+    """Windows that are not far from the middle of them all."""
+    off = np.linalg.norm(z - complex_median(z), axis=1)
+    return np.asarray(off <= FAR * np.median(off))
 
 
 def balances(runs: Sequence[BalanceRun]) -> dict[float, Balance]:
@@ -162,7 +179,10 @@ def _judge(group: Sequence[BalanceRun]) -> Balance:
     size = np.linalg.norm(cells, axis=1, keepdims=True)
     if np.linalg.svd(cells / size, compute_uv=False)[-1] < 0.3:
         return Balance()
-    fit = _ratio(cells / size, accelerations / size)
+    # the accelerometers' noise is the same in all runs: a run counts by its force and its windows
+    usual = float(np.median([run.variance for run in group]))
+    root = np.sqrt([max(run.windows, 1) for run in group])[:, None]
+    fit = _ratio(cells * root, accelerations * root, usual)
     if fit is None:
         return Balance()
     G, error = fit
@@ -185,8 +205,8 @@ def _judge(group: Sequence[BalanceRun]) -> Balance:
     return Balance(float(np.sum(weight * phases) / weight.sum()), (), float(1 / np.sqrt(weight.sum())))
 
 
-def _ratio(cells: ComplexArray, accelerations: ComplexArray) -> tuple[ComplexArray, float] | None:
-    """Robust a = G F and the standard error of G's entries."""
+def _ratio(cells: ComplexArray, accelerations: ComplexArray, noise: float) -> tuple[ComplexArray, float] | None:
+    """Robust a = G F and the standard error of a component of G's entries; rows of one variance, `noise` at least."""
     weight = np.ones(len(cells))
     for _ in range(10):
         root = np.sqrt(weight)[:, None]
@@ -197,7 +217,7 @@ def _ratio(cells: ComplexArray, accelerations: ComplexArray) -> tuple[ComplexArr
     gram = (cells * weight[:, None]).conj().T @ cells
     if np.linalg.cond(gram) > 1e8:
         return None
-    spread = float(np.sum(weight * rest**2) / max(2 * (float(weight.sum()) - 2.0), 1.0))
+    spread = max(float(np.sum(weight * rest**2) / max(4 * (float(weight.sum()) - 2.0), 1.0)), noise)
     return G, float(np.sqrt(spread * np.linalg.inv(gram).real.diagonal().max()))
 
 
