@@ -6,7 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rigdata.problem import RigDataError
+from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
 from tpjb_ident.report.comparison_tables import point_label
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
@@ -150,22 +153,23 @@ def evidence_section(campaign: Campaign, result: Identification) -> Section | No
 
 
 def budget_table(result: Identification) -> Table:
-    """What the 95 % intervals of the direct coefficients are made of.
+    """What the 95 % intervals of all coefficients are made of, source by source, as in ``budget.csv``.
 
     Parameters
     ----------
     result : Identification
     """
+    sources = list(dict.fromkeys(name for p in result.points for name in p.budget))
     rows = []
     for p in result.points:
-        both, random = p.stiffness.half_width(), p.stiffness.half_width(systematic=False)
-        cells = []
-        for offset in (0, 4):
-            for j in (0, 3):
-                value = abs(p.stiffness.vector[offset + j])
-                systematic = math.sqrt(max(float(both[offset + j] ** 2 - random[offset + j] ** 2), 0.0))
-                cells += [fixed(100 * float(random[offset + j]) / value, 2), fixed(100 * systematic / value, 2)]
-        rows.append([point_label(p), *cells])
-    named = [f"{kind.symbol}{e}" for kind in (STIFFNESS, DAMPING) for e in ("xx", "yy")]
-    columns = ["point", *(f"{name}, {part} %" for name in named for part in ("random", "calibration"))]
-    return Table("Uncertainty budget: half of each part's 95 % interval, per cent of the value", columns, rows)
+        half = p.stiffness.half_width()
+        deviations = {name: np.sqrt(np.maximum(np.diag(part), 0.0)) for name, part in p.budget.items()}
+        for i in range(8):
+            kind, scale = (STIFFNESS, 1.0) if i < 4 else (DAMPING, 1 / p.stiffness.omega)
+            scale /= kind.display_scale
+            parts = [fixed(scale * float(deviations[n][i]), 3) if n in deviations else "–" for n in sources]
+            name = f"{kind.symbol}{ENTRIES[i % 4]}, {kind.display_unit}"
+            value, wide = fixed(scale * float(p.stiffness.vector[i]), 2), fixed(scale * float(half[i]), 3)
+            rows.append([point_label(p), name, value, wide, *parts])
+    columns = ["point", "coefficient", "value", "half of the 95 % interval", *sources]
+    return Table("Uncertainty budget: standard uncertainty by source", columns, rows, frozenset({0, 1}))

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import f as f_distribution
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
@@ -27,6 +28,8 @@ CHANGE = 4.5
 MIN_RUNS = 5
 #: and what goes with them is beyond doubt where it is this many times what does not, per degree of freedom.
 DISTINCT = 6.0
+#: A linear film's harmonics count as a little bent in one of so many points.
+CHANCE = 0.2
 #: Changes below this share are not worth telling [share of h].
 NOTHING = 2e-4
 #: From here on no interval can be answered for.
@@ -106,8 +109,9 @@ def _quadratic_share(kept: Sequence[tuple[LineMean, LineMean]], doubled: Complex
     explained = float(np.sum(np.abs(fitted) ** 2)) / 3
     left = float(np.sum(np.abs(bent - fitted) ** 2)) / (len(kept) - 3)
     unseen = 3 * (DISTINCT - 1) * left / len(kept)
-    # what noise and mains leave by chance taken off: no threshold, below which a film would count as linear
-    return max(3 * (explained - left) / len(kept), 0.0), unseen
+    # what noise and mains leave by chance is taken off; what is more counts, also where it is not beyond doubt
+    chance = left * float(f_distribution.isf(CHANCE, 6, 2 * (len(kept) - 3)))
+    return max(3 * (explained - chance) / len(kept), 0.0), unseen
 
 
 def change_spread(change: float, est: DynamicStiffness) -> FloatArray:
