@@ -32,6 +32,11 @@ def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
         return Verdicts()
     found = verdicts([one.report for one in judged(campaign, seen)])
     finished.leave_out_unusable(found.unusable)
+    # without accelerometers the inertia stays in the force: that is told, and no reason to refuse
+    optional = {f"channel {c.name}" for c in campaign.channels.values() if c.quantity == "acceleration"}
+    for run, problems in found.shared.items():
+        found.doubtful.setdefault(run, []).extend(p for p in problems if p.place in optional)
+        problems[:] = [p for p in problems if p.place not in optional]
     if not finished.places:
         raise finished.left_out[0].error
     return found

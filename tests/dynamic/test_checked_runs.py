@@ -1,0 +1,96 @@
+"""Identification asks the checks: on the same reading of the records, with consequences at the points they touch."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigdata import load_campaign
+from rigdata.readers.hdf5.reader import Hdf5Reader
+from tests.studies.field.campaign_file import plans_of, write_campaign
+from tests.studies.field.rig import Device, Rig
+from tpjb_ident.check.findings import Reporter, verdicts
+from tpjb_ident.check.observation import observe
+from tpjb_ident.dynamic.identify import identify
+from tpjb_ident.dynamic.records.kept_readings import beginning_of, with_kept_beginning
+from tpjb_ident.dynamic.runs.kept_observation import packed, unpacked
+from tpjb_ident.dynamic.settings import IdentifySettings
+
+QUICK = replace(Rig(), seconds=1.5, rate=1000.0)
+ONE_LOAD = plans_of(loads=(5000.0,))
+
+
+def written(path, rig, plans=ONE_LOAD, seed=3):
+    write_campaign(path, rig, plans, seed)
+    return load_campaign(path)
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    return written(tmp_path_factory.mktemp("field") / "field.h5", QUICK)
+
+
+def test_the_beginning_of_a_record_is_read_once(campaign, monkeypatch):
+    asked = []
+    plain = Hdf5Reader.read
+
+    def counted(self, names, start, stop):
+        asked.append((self.run, len(names), stop - start))
+        return plain(self, names, start, stop)
+
+    monkeypatch.setattr(Hdf5Reader, "read", counted)
+    result = identify(campaign, IdentifySettings(methods=()))
+    assert result.points[0].quality == ()
+    assert asked == [(run.id, 6, 1500) for run in campaign.of_kind("dynamic")]
+
+
+def test_kept_readings_are_those_of_the_file(campaign):
+    run = campaign.runs[0]
+    kept = with_kept_beginning(run)
+    for start, stop in ((0, 10), (700, 1500)):
+        np.testing.assert_array_equal(kept.vector("force", start, stop).values, run.vector("force", start, stop).values)
+        np.testing.assert_array_equal(kept.time(start, stop), run.time(start, stop))
+    short = replace(kept, reader=type(kept.reader)(run.reader, list(run.channels), 400))
+    assert beginning_of(short).length == 400
+    np.testing.assert_array_equal(short.record("F1").values, run.record("F1").values)
+    with pytest.raises(ValueError, match="read-only"):
+        kept.reader.read(["F1"], 0, 10)[0][0] = 1.0
+
+
+def test_an_observation_that_was_kept_is_the_same(campaign):
+    run = campaign.runs[2]
+    seen = observe(run)
+    seen.report.say("x", "warning", "here", "is odd", "Look")
+    again = unpacked(packed(seen), run)
+    assert packed(again) == packed(seen)
+    assert again.channels == seen.channels
+    assert again.report.found == seen.report.found
+    np.testing.assert_array_equal(again.lines.phasor, seen.lines.phasor)
+
+
+def test_a_third_of_the_runs_share_a_finding(campaign):
+    reports = [Reporter(run) for run in campaign.runs]
+    for report in reports[:2]:
+        report.say("two", "error", "", "wrong", "")
+    for report in reports[2:5]:
+        report.say("three", "error", "", "wrong", "")
+        report.say("odd", "warning", "", "odd", "")
+    found = verdicts(reports)
+    assert list(found.unusable) == [run.id for run in campaign.runs[:2]]
+    assert list(found.shared) == list(found.doubtful) == [run.id for run in campaign.runs[2:5]]
+
+
+@pytest.mark.slow
+def test_one_inverted_probe_costs_its_run_inverted_cells_all_points(tmp_path):
+    def inverted(values, run, rng):
+        return -values if "-25-2-" in run else values
+
+    one = replace(QUICK, devices={"D1": Device(reading=inverted)})
+    result = identify(written(tmp_path / "one.h5", one), IdentifySettings(methods=()))
+    assert "run-left-out" in result.points[0].quality
+    assert "records-contradicted" not in result.points[0].quality
+    truth = QUICK.bearing.h(2 * np.pi * 25, 5000.0)
+    assert np.abs(result.points[0].stiffness.h - truth).max() < 0.01 * np.abs(truth).max()
+    cells = replace(QUICK, devices={"F2": Device(gain=-1.0)})
+    result = identify(written(tmp_path / "cells.h5", cells), IdentifySettings(methods=()))
+    assert "records-contradicted" in result.points[0].quality
