@@ -36,17 +36,47 @@ class RunReader(Protocol):
         """Give the nominal sample rate [Hz]."""
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Read raw readings of `names` in samples start..stop-1, one (stop - start,) array each."""
+        """Read raw readings of `names` in samples start..stop-1, one (stop - start,) array each.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Of channels.
+        start : int
+            First sample.
+        stop : int
+            Sample after the last.
+        """
 
     def time(self, start: int, stop: int) -> FloatArray:
-        """Give the seconds of samples start..stop-1."""
+        """Give the seconds of samples start..stop-1.
+
+        Parameters
+        ----------
+        start : int
+            First sample.
+        stop : int
+            Sample after the last.
+        """
 
     def problems(self) -> tuple[Problem, ...]:
         """Tell what reading found that does not stop the run from being used."""
 
 
 def undescribed(names: Sequence[str], what: str, file: str, run: str) -> tuple[Problem, ...]:
-    """Note columns or datasets that the manifest does not describe."""
+    """Note columns or datasets that the manifest does not describe.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of channels.
+    what : str
+        What they are called in this kind of file.
+    file : str
+        Display name.
+    run : str
+        Run id, for messages.
+    """
     if not names:
         return ()
     listed = ", ".join(ascii(n)[1:-1][:40] for n in names[:6]) + (", ..." if len(names) > 6 else "")

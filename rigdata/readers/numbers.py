@@ -76,20 +76,46 @@ _NUMBER = {
 
 
 def is_missing(cell: str) -> bool:
-    """Whether `cell` (stripped) stands for no value."""
+    """Whether `cell` (stripped) stands for no value.
+
+    Parameters
+    ----------
+    cell : str
+        Stripped.
+    """
     return cell in _MISSING
 
 
 def is_number(cell: str, decimal: str) -> bool:
-    """Whether `cell` (stripped) is a number with that decimal mark."""
+    """Whether `cell` (stripped) is a number with that decimal mark.
+
+    Parameters
+    ----------
+    cell : str
+        Stripped.
+    decimal : str
+        Decimal mark, a point or a comma.
+    """
     return _NUMBER[decimal].fullmatch(cell) is not None
 
 
 def looks_like(cell: str) -> bool:
-    """Whether `cell` is a number with either decimal mark."""
+    """Whether `cell` is a number with either decimal mark.
+
+    Parameters
+    ----------
+    cell : str
+        Stripped.
+    """
     return is_number(cell, ".") or is_number(cell, ",")
 
 
 def number_pattern(decimal: str) -> str:
-    """Regular expression (RE2) of a number, for whole columns."""
+    """Regular expression (RE2) of a number, for whole columns.
+
+    Parameters
+    ----------
+    decimal : str
+        Decimal mark, a point or a comma.
+    """
     return f"^(?:{_NUMBER[decimal].pattern})$"

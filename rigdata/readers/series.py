@@ -73,12 +73,28 @@ class Columns:
 
 
 def equidistant(count: int, step: float, start: float = 0.0) -> FloatArray:
-    """Seconds of `count` samples, `step` apart."""
+    """Seconds of `count` samples, `step` apart.
+
+    Parameters
+    ----------
+    count : int
+        Samples.
+    step : float
+        Between two samples [s].
+    start : float, optional
+        Of the first sample [s].
+    """
     return start + step * np.arange(count, dtype=np.float64)
 
 
 def without_twins(series: Sequence[Series]) -> list[Series]:
-    """Give channels of one name in several groups the group's name as a prefix; number what is still alike."""
+    """Give channels of one name in several groups the group's name as a prefix; number what is still alike.
+
+    Parameters
+    ----------
+    series : sequence of Series
+        Of one file.
+    """
     counts: dict[str, int] = {}
     for one in series:
         counts[one.name] = counts.get(one.name, 0) + 1

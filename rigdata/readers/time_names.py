@@ -18,6 +18,11 @@ _FACTORS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, 
 def is_time(name: str) -> bool:
     """Whether a column of this name holds times.
 
+    Parameters
+    ----------
+    name : str
+        As the file has it.
+
     >>> [is_time(n) for n in ("Zeit", "Time  1 - default sample rate", "t", "T", "T1", "Temperature")]
     [True, True, True, False, False, False]
     """
@@ -25,5 +30,13 @@ def is_time(name: str) -> bool:
 
 
 def seconds(values: FloatArray, unit: str) -> FloatArray:
-    """Times in seconds; an unknown unit counts as seconds."""
+    """Times in seconds; an unknown unit counts as seconds.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        As read.
+    unit : str
+        As the file states it.
+    """
     return values * _FACTORS.get(unit.strip().strip("[]()"), 1.0)

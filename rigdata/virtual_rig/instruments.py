@@ -1,7 +1,6 @@
 """The instruments: what the manifest says of them, and what they really do.
 
-Every sensor carries both: its stated calibration (which goes into the manifest) and its `SensorError` (which
-goes into the readings and nowhere else).
+Every sensor carries both: its stated calibration (in the manifest) and its `SensorError` (in the readings alone).
 """
 
 from __future__ import annotations

@@ -105,7 +105,15 @@ class SteadyMotion:
     surface: ComplexArray
 
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
-        """See `Motion`."""
+        """See `Motion`.
+
+        Parameters
+        ----------
+        quantity : str
+            ``"displacement"``, ``"force"``, ..
+        time : (n,) ndarray
+            [s]
+        """
         mean = {"displacement": self.position, "force": self.load}.get(quantity, np.zeros(2))
         out = np.broadcast_to(mean, (len(time), 2)).copy()
         for line in self.lines:
@@ -115,7 +123,15 @@ class SteadyMotion:
         return out
 
     def runout(self, axis: float, time: FloatArray) -> FloatArray:
-        """See `Motion`. A point of the surface passes the probe at `axis` that much later."""
+        """See `Motion`. A point of the surface passes the probe at `axis` that much later.
+
+        Parameters
+        ----------
+        axis : float
+            Direction of the probe [rad].
+        time : (n,) ndarray
+            [s]
+        """
         out = np.zeros(len(time))
         for order, phasor in enumerate(self.surface, 1):
             out += (phasor * np.exp(1j * order * (self.speed * time - axis))).real
@@ -143,7 +159,15 @@ class SlowMotion:
     speed: float = 0.0
 
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
-        """See `Motion`."""
+        """See `Motion`.
+
+        Parameters
+        ----------
+        quantity : str
+            ``"displacement"``, ``"force"``, ..
+        time : (n,) ndarray
+            [s]
+        """
         if quantity == "acceleration":
             return np.zeros((len(time), 2))
         values = self.position if quantity == "displacement" else self.load
@@ -152,7 +176,15 @@ class SlowMotion:
         return np.stack([np.interp(time, self.time, column) for column in values.T], axis=1)
 
     def runout(self, axis: float, time: FloatArray) -> FloatArray:
-        """See `Motion`: the shaft stands still, its runout is part of the gap voltage."""
+        """See `Motion`: the shaft stands still, its runout is part of the gap voltage.
+
+        Parameters
+        ----------
+        axis : float
+            Direction of the probe [rad].
+        time : (n,) ndarray
+            [s]
+        """
         return np.zeros(len(time))
 
 

@@ -22,7 +22,7 @@ FULL_FOLDERS = {"model/effects"}
 #: Functions that may be long: the model's front door, every argument a name of the field.
 LONG_FUNCTIONS = {"model/predict.py:predict"}
 #: How many there may be: these numbers may only fall (today 1, 4 and 107).
-FILES_TOO_LONG, FUNCTIONS_WITH_MANY_PARAMETERS, WITHOUT_PARAMETERS = 1, 4, 107
+FILES_TOO_LONG, FUNCTIONS_WITH_MANY_PARAMETERS, WITHOUT_PARAMETERS = 0, 4, 71
 #: Functions that fill a contract, by folder or file and name: told once, where the contract stands.
 #: The commands tell theirs in the help of every option.
 CONTRACTS = {

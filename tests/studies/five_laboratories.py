@@ -188,11 +188,12 @@ def probes(first: str, second: str) -> dict[tuple[str, str], str]:
 
 def calibrated(probe: str, cell: str, accelerometer: str, thermometer: str) -> Edits:
     """What the certificates say, once per type of sensor."""
-    bridge = '2.0 mV/V"\nfull_scale = "20 kN"\nexcitation = "5 V'
     return {
         (probe, "sensitivity"): "7.78 mV/um",
         (probe, "polarity"): "-1",
-        (cell, "sensitivity"): bridge,
+        (cell, "sensitivity"): "2.0 mV/V",
+        (cell, "full_scale"): "20 kN",
+        (cell, "excitation"): "5 V",
         (accelerometer, "sensitivity"): "10 mV/g",
         (thermometer, "sensitivity"): "15 K/V",
     }
@@ -211,18 +212,24 @@ LABORATORIES = (
 
 
 def fill_in(text: str, edits: Edits) -> str:
-    """The manifest as a person leaves it: values at the marks, a comment sign taken off, lines added."""
+    """The manifest as a person leaves it: values at the marks, a comment sign taken off, lines added.
+
+    Parameters
+    ----------
+    text : str
+        The draft.
+    edits : mapping of (str, str) to str
+        By table and key.
+    """
     for (table, key), value in edits.items():
         header = re.compile(rf'^\[(?:channels\.)?"?{re.escape(table)}"?\]$', re.MULTILINE)
         start = header.search(text)
         assert start, f"no table {table} in the draft"
         end = text.find("\n[", start.end())
         block = text[start.start() : end]
-        quoted = value if value == "-1" else f'"{value}"'
-        new, count = re.subn(
-            rf"^(?:# )?{key} = .*$", lambda _, k=key, q=quoted: f"{k} = {q}", block, flags=re.MULTILINE
-        )
-        assert count == 1, f"{table} {key}: stands {count} times in the draft"
+        line = f"{key} = {value}" if value == "-1" else f'{key} = "{value}"'
+        new, count = re.subn(rf"^(?:# )?{key} = .*$", lambda _, put=line: put, block, flags=re.MULTILINE)
+        new = new if count else f"{block.rstrip()}\n{line}\n"
         text = text[: start.start()] + new + text[end:]
     return text
 

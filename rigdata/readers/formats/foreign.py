@@ -147,7 +147,17 @@ class ForeignReader:
         return self.stated_rate
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of `names`."""
+        """Raw readings of `names`.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Of channels.
+        start : int
+            First sample.
+        stop : int
+            Sample after the last.
+        """
         values = self._columns().values
         for name in names:
             if name not in values:
@@ -155,7 +165,15 @@ class ForeignReader:
         return [np.asarray(values[name][start:stop], dtype=float) for name in names]
 
     def time(self, start: int, stop: int) -> FloatArray:
-        """Seconds: the file's own, else counted from the rate."""
+        """Seconds: the file's own, else counted from the rate.
+
+        Parameters
+        ----------
+        start : int
+            First sample.
+        stop : int
+            Sample after the last.
+        """
         time = self._columns().time
         return np.arange(start, stop) / self.rate() if time is None else time[start:stop].copy()
 

@@ -103,7 +103,15 @@ def _limit_memory(path: Path) -> None:
 
 
 def main(module: str, path: Path) -> None:
-    """Read a file and write its channels to the standard output: one line of JSON, then the numbers."""
+    """Read a file and write its channels to the standard output: one line of JSON, then the numbers.
+
+    Parameters
+    ----------
+    module : str
+        Name of the reader's module.
+    path : Path
+        Of the file.
+    """
     reader = importlib.import_module(f"rigdata.readers.formats.{module}")
     _limit_memory(path)
     try:

@@ -53,6 +53,13 @@ def is_plain(attribute: Any, most: int) -> bool:
 
     A text elsewhere in the file is as long as its reference says, and a damaged one says gigabytes, for which the
     library makes room before it looks.
+
+    Parameters
+    ----------
+    attribute : h5py.AttributeManager
+        Whose values are looked at.
+    most : int
+        Longest text that counts [bytes].
     """
     kind = attribute.get_type()
     within = kind.get_class() in _PLAIN and not (kind.get_class() == TEXT and kind.is_variable_str())

@@ -62,5 +62,13 @@ def resolve(start: Any, path: str, file: str, run: str | None = None) -> Any:
 
 
 def has_link(group: Any, name: str) -> bool:
-    """Whether the group has such a link: a dangling or external one counts and is never followed."""
+    """Whether the group has such a link: a dangling or external one counts and is never followed.
+
+    Parameters
+    ----------
+    group : h5py.Group
+        In which to look.
+    name : str
+        As the file has it.
+    """
     return bool(group.id.links.exists(name.encode("utf-8", "surrogateescape")))

@@ -54,7 +54,13 @@ def text_encoding(path: Path, stated: str | None) -> str:
 
 
 def is_ascii_based(encoding: str) -> bool:
-    """Whether digits, delimiters and line ends are single ASCII bytes in `encoding`."""
+    """Whether digits, delimiters and line ends are single ASCII bytes in `encoding`.
+
+    Parameters
+    ----------
+    encoding : str
+        Python codec.
+    """
     if encoding in {"utf-8-sig", "utf-8"}:
         return True
     sample = '\t\r\n",.;|+-0123456789 eE'
@@ -62,7 +68,13 @@ def is_ascii_based(encoding: str) -> bool:
 
 
 def codec_of_bytes(encoding: str) -> str:
-    """Codec of the bytes that `open_ascii` gives for a file in `encoding`."""
+    """Codec of the bytes that `open_ascii` gives for a file in `encoding`.
+
+    Parameters
+    ----------
+    encoding : str
+        Python codec.
+    """
     return encoding if is_ascii_based(encoding) and encoding != "utf-8-sig" else "utf-8"
 
 
@@ -94,7 +106,15 @@ class _Transcoder(io.RawIOBase):
 
 
 def open_ascii(path: Path, encoding: str) -> BinaryIO:
-    """Open a text file for reading as bytes, transcoded to UTF-8 where needed, after its byte-order mark."""
+    """Open a text file for reading as bytes, transcoded to UTF-8 where needed, after its byte-order mark.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    encoding : str
+        Python codec.
+    """
     if not is_ascii_based(encoding):
         stream = io.BufferedReader(_Transcoder(path, encoding), 2**18)
         if stream.peek(3)[:3] == codecs.BOM_UTF8:
@@ -107,7 +127,15 @@ def open_ascii(path: Path, encoding: str) -> BinaryIO:
 
 
 def skip_to(stream: BinaryIO, offset: int) -> None:
-    """Move forward to byte `offset` of a stream from `open_ascii` (which may not be seekable)."""
+    """Move forward to byte `offset` of a stream from `open_ascii` (which may not be seekable).
+
+    Parameters
+    ----------
+    stream : BinaryIO
+        What `open_ascii` gave.
+    offset : int
+        Bytes from the beginning.
+    """
     while offset > 0:
         block = stream.read(min(offset, 2**20))
         if not block:
@@ -116,7 +144,15 @@ def skip_to(stream: BinaryIO, offset: int) -> None:
 
 
 def head_lines(path: Path, encoding: str) -> list[tuple[bytes, int]]:
-    """Lines of the head of a file, without their ends, each with the byte it starts at."""
+    """Lines of the head of a file, without their ends, each with the byte it starts at.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    encoding : str
+        Python codec.
+    """
     with open_ascii(path, encoding) as stream:
         head = stream.read(HEAD)
         complete = len(head) < HEAD
@@ -130,7 +166,17 @@ def head_lines(path: Path, encoding: str) -> list[tuple[bytes, int]]:
 
 
 def all_lines(path: Path, encoding: str, limit: int = 2**20) -> Iterator[bytes]:
-    """Every line of a file, without its end; lines beyond `limit` bytes come in pieces."""
+    """Every line of a file, without its end; lines beyond `limit` bytes come in pieces.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    encoding : str
+        Python codec.
+    limit : int
+        Bytes at most.
+    """
     with open_ascii(path, encoding) as stream:
         text = b""
         while block := stream.read(2**20):
@@ -165,12 +211,24 @@ class AsciiOnly(io.RawIOBase):
         return True
 
     def read(self, size: int = -1) -> bytes:
-        """Read up to `size` bytes."""
+        """Read up to `size` bytes.
+
+        Parameters
+        ----------
+        size : int
+            Bytes; -1: all.
+        """
         return self._stream.read(size).translate(self._TABLE)
 
 
 def squeeze_blanks(stream: BinaryIO) -> BinaryIO:
-    """Turn every run of blanks between cells into one tab, for files parted by white space."""
+    """Turn every run of blanks between cells into one tab, for files parted by white space.
+
+    Parameters
+    ----------
+    stream : BinaryIO
+        Of bytes.
+    """
     return io.BufferedReader(_Squeezer(stream), 2**18)  # type: ignore[return-value]
 
 

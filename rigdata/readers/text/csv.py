@@ -39,7 +39,13 @@ class TableCache:
         return TableCache, (self._limit,)  # a worker process starts with an empty one
 
     def get(self, key: tuple[object, ...]) -> Table | None:
-        """Give the table under `key`, None where it is not kept."""
+        """Give the table under `key`, None where it is not kept.
+
+        Parameters
+        ----------
+        key : tuple
+            State of a file, and what of it.
+        """
         with self._lock:
             table = self._tables.get(key)
             if table is not None:
@@ -47,7 +53,15 @@ class TableCache:
             return table
 
     def put(self, key: tuple[object, ...], table: Table) -> None:
-        """Keep `table`, letting go of the longest unused ones."""
+        """Keep `table`, letting go of the longest unused ones.
+
+        Parameters
+        ----------
+        key : tuple
+            State of a file, and what of it.
+        table : Table
+            Parsed columns.
+        """
         with self._lock:
             self._tables[key] = table
             self._tables.move_to_end(key)
@@ -57,7 +71,15 @@ class TableCache:
                 size -= old.nbytes
 
     def dialect(self, key: tuple[object, ...], find: Callable[[], Dialect]) -> Dialect:
-        """Give the dialect under `key`, found once."""
+        """Give the dialect under `key`, found once.
+
+        Parameters
+        ----------
+        key : tuple
+            State of a file, and what of it.
+        find : callable
+            Finds it where it is not known.
+        """
         known = self._dialects.get(key)
         if known is None:
             known = find()
@@ -151,7 +173,17 @@ class CsvReader:
         return self._table(()).length
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of `names`."""
+        """Raw readings of `names`.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Of channels.
+        start : int
+            First sample.
+        stop : int
+            Sample after the last.
+        """
         table = self._table(names)
         for name in names:
             if name not in table.columns:
@@ -180,7 +212,15 @@ class CsvReader:
         return self.stated_rate
 
     def time(self, start: int, stop: int) -> FloatArray:
-        """Seconds: the time column as it is, missing ones filled in between; else counted from the rate."""
+        """Seconds: the time column as it is, missing ones filled in between; else counted from the rate.
+
+        Parameters
+        ----------
+        start : int
+            First sample.
+        stop : int
+            Sample after the last.
+        """
         clock = self._clock()
         return np.arange(start, stop) / self.rate() if clock is None else self._times(clock)[start:stop].copy()
 

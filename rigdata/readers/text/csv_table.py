@@ -41,7 +41,19 @@ class Source:
     clock: str = ""
 
     def problem(self, severity: Any, place: str, what: str, cure: str) -> Problem:
-        """Make a finding about this file."""
+        """Make a finding about this file.
+
+        Parameters
+        ----------
+        severity : Severity
+            How grave it is.
+        place : str
+            Where in the file.
+        what : str
+            What is wrong.
+        cure : str
+            What to do.
+        """
         return Problem(severity, self.file, place, what, cure, self.run)
 
 

@@ -1,0 +1,100 @@
+"""The site: pages of the notebooks and pictures are those of today, equations are typeset, the tutorial works."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tests.command_line import tpjb
+from tests.studies.five_laboratories import fill_in
+from tpjb_ident.report import plots
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+
+
+def script(name: str):
+    """A script of the documentation as a module."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_gallery_shows_every_plot_and_the_call_that_makes_it():
+    text = (DOCS / "plots.md").read_text("utf-8")
+    shown = re.findall(
+        r"^## (\w+)\n.*?```python\nti\.plots\.(\w+)\(.*?!\[\w+\]\(gallery/(\w+)\.png\)", text, re.S | re.M
+    )
+    assert [a for a, _, _ in shown] == [b for _, b, _ in shown] == [c for _, _, c in shown]
+    assert sorted(a for a, _, _ in shown) == sorted(plots.__all__)
+    assert all((DOCS / "gallery" / f"{name}.png").stat().st_size > 3000 for name in plots.__all__)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted((ROOT / "notebooks").glob("*.ipynb")), ids=lambda p: p.stem)
+def test_the_page_of_a_notebook_is_no_older_than_the_notebook(path):
+    page = (DOCS / "notebooks" / f"{path.stem}.md").read_text("utf-8")
+    assert script("render_notebooks").stamp(path) in page.splitlines()[0], (
+        "python docs/render_notebooks.py " + path.stem
+    )
+    for name in re.findall(r"\]\((\d\d_\w+-\d+\.png)\)", page):
+        assert (DOCS / "notebooks" / name).exists()
+
+
+def test_equations_become_mathml_that_needs_no_network():
+    pytest.importorskip("latex2mathml", reason="the extra docs is not installed")
+    text = (DOCS / "theory.md").read_text("utf-8")
+    html = script("site_hooks").on_page_markdown(text)
+    assert html.count("<math") == text.count("```math") >= 14
+    assert "```math" not in html
+    assert "\\" not in "".join(re.findall(r"<math.*?</math>", html))  # no command that was not understood
+
+
+@pytest.mark.slow
+def test_the_tutorial_leads_to_a_report(tmp_path, monkeypatch):
+    text = (DOCS / "guide" / "tutorial.md").read_text("utf-8")
+    (tmp_path / "model").symlink_to(ROOT / "model", target_is_directory=True)
+    monkeypatch.chdir(tmp_path)
+    for language, block in re.findall(r"^```(sh|toml)\n(.*?)^```", text, re.S | re.M):
+        if language == "toml":
+            tables = tomllib.loads(block)
+            edits = {("housing", k): v for k, v in tables["housing"].items()}
+            edits |= {(c, k): str(v) for c, entries in tables["channels"].items() for k, v in entries.items()}
+            manifest = Path("records/campaign.toml")
+            manifest.write_text(fill_in(manifest.read_text("utf-8"), edits), "utf-8")
+            assert "??" not in re.sub(r"#.*", "", manifest.read_text("utf-8"))
+            continue
+        for line in block.splitlines():
+            words = line.split()
+            if words[0] == "cp":
+                source, target = Path(words[-2]), Path(words[-1])
+                (shutil.copytree if source.is_dir() else shutil.copy)(source, target)
+            else:
+                done = tpjb(*words[1:])
+                assert done.exit_code == 0, f"{line}\n{done.output}"
+    assert "</html>" in Path("report/report.html").read_text("utf-8")
+
+
+@pytest.mark.slow
+def test_the_site_shows_notebooks_pictures_and_equations(tmp_path):
+    for module in ("mkdocstrings", "latex2mathml"):
+        pytest.importorskip(module, reason="the extra docs is not installed")
+    site = tmp_path / "site"
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(site)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert "<math" in (site / "theory.html").read_text("utf-8")
+    for page in [*site.glob("notebooks/*.html"), site / "plots.html"]:
+        html = page.read_text("utf-8")
+        pictures = re.findall(r'<img [^>]*src="([^"]+)"', html)
+        assert pictures, page.name
+        assert all((page.parent / name).resolve().exists() for name in pictures)
+        assert not re.search(r'(?:src|href)="https?://[^"]+\.(?:js|css|woff2?)"', html)
