@@ -65,7 +65,8 @@ def predict(
         [rad/s]; default: synchronous.
     pivots : str, float, path or laws
         ``"rigid"``, ``"kirk"``, ``"kirk-secant"``, a constant stiffness [N/m], a ``pivots.toml``, or laws per pad.
-    thermal : {"isothermal", "adiabatic", "tehd"}
+    thermal : {"isothermal", "adiabatic", "tehd", "thd"}
+        Adiabatic films are the paper's; "tehd": pads deform too; "thd": all that heat does, see `model.setup.Setup`.
     effects : iterable of Effect
     mesh : Mesh or (int, int), optional
         Intervals along the arc and across half the width.
@@ -199,19 +200,23 @@ def _solve_as_it_runs(
     setup: Setup, force: FloatArray, speed: float, start: Equilibrium | None
 ) -> tuple[Setup, Equilibrium]:
     """Equilibrium with the clearances that belong to its own temperatures; returns the setup they make, too."""
-    growth = setup.options.growth
+    growth = setup.growth
     if growth is None:
         return setup, solve_equilibrium(setup, force, speed, start)
     journal = setup.inlet_temperature if growth.journal is None else growth.journal
-    settled = False
+    if growth.journal is None and start is not None and start.converged:
+        journal = start.mean_journal_temperature
+    settled, roughly = False, growth.journal is None
     for _ in range(MAX_GROWTH_STEPS):
         bearing = grown(setup.bearing, growth, setup.inlet_temperature, journal)
-        running = setup.change(bearing=bearing, options=replace(setup.options, growth=None))
-        equilibrium = start = solve_equilibrium(running, force, speed, start)
+        running = setup.change(bearing=bearing, grown=True)
+        found = running.change(accuracy=max(setup.accuracy, ROUGH_ACCURACY)) if roughly else running
+        equilibrium = start = solve_equilibrium(found, force, speed, start)
         felt = growth.journal if growth.journal is not None else equilibrium.mean_journal_temperature
-        settled = not equilibrium.converged or abs(felt - journal) < GROWTH_TOLERANCE
+        settled = not equilibrium.converged or (not roughly and abs(felt - journal) < GROWTH_TOLERANCE)
         if settled:
             break
+        roughly = roughly and abs(felt - journal) > ROUGH_GROWTH
         journal = felt
     if not settled:
         names = (*equilibrium.status, UNSETTLED_GROWTH, NOT_CONVERGED)
@@ -222,6 +227,9 @@ def _solve_as_it_runs(
 #: Journal temperature that is near enough for the clearances [K]: a few nanometres.
 GROWTH_TOLERANCE = 0.01
 MAX_GROWTH_STEPS = 20
+#: As long as the journal's temperature moves by more than this from one equilibrium to the next [K], they are found to
+#: this share of the load only.
+ROUGH_GROWTH, ROUGH_ACCURACY = 0.5, 1e-4
 
 
 def _check_point(load: float, direction: float, speed: float, omega: FloatArray) -> None:

@@ -124,9 +124,9 @@ class Prediction:
 
     @property
     def max_temperature(self) -> float:
-        """Hottest film of a pad that carries [degC]."""
+        """Hottest film of a pad that carries [degC], anywhere across it."""
         films = [f for f in self.equilibrium.films if not f.idle]
-        return max((float(f.work.temperature.max()) for f in films), default=self.setup.inlet_temperature)
+        return max((float(max(t.max() for t in f.heat_state)) for f in films), default=self.setup.inlet_temperature)
 
     @property
     def min_film(self) -> float:
@@ -137,12 +137,13 @@ class Prediction:
     def face_temperature(self) -> tuple[FloatArray, ...]:
         """Temperature of the pads' faces [degC], shapes as `temperature`.
 
-        The film's own, unless the journal takes part: then the parabola across the film that passes its heat, flat at
-        the pad, is hotter there by half of what the mean is hotter than the journal.
+        The film's own, unless it has temperatures across (`thd`), or the journal takes part: then the parabola across
+        the film that passes its heat, flat at the pad, is hotter there by half of what the mean is hotter than the
+        journal.
         """
         journal = self.equilibrium.journal_temperature
-        if not math.isfinite(journal):
-            return self.temperature
+        if not math.isfinite(journal) or self.setup.thermal == "thd":
+            return tuple(f.face_temperature for f in self.equilibrium.films)
         return tuple(t + 0.5 * (t - journal) for t in self.temperature)
 
     @functools.cached_property
@@ -189,6 +190,8 @@ class Prediction:
     def pad_temperature(self, fraction: float = 0.75) -> FloatArray:
         """Film temperature at mid-length, at a fraction of the arc from the leading edge, per pad [degC].
 
+        With temperatures across the film (`thd`) the pad's face, where thermocouples are.
+
         Parameters
         ----------
         fraction : float
@@ -203,7 +206,7 @@ class Prediction:
         for film in self.equilibrium.films:
             angle = film.pad.leading_edge + fraction * film.pad.arc
             middle = 0 if film.grid.first == 0 else len(film.grid.z) // 2
-            out.append(float(np.interp(angle, film.grid.angle, film.work.temperature[:, middle])))
+            out.append(float(np.interp(angle, film.grid.angle, film.face_temperature[:, middle])))
         return np.array(out)
 
     @property

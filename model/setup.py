@@ -10,12 +10,20 @@ import numpy as np
 
 from model.arrays import FloatArray
 from model.bearing import Bearing, BearingError, Pad
+from model.errors import OptionError
+from model.growth import Growth
 from model.instruments import Instruments
 from model.nearest import check_known
 from model.options import Options
 from model.pivots import PivotLaw
 
-THERMAL = ("isothermal", "adiabatic", "tehd")
+THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
+#: Those with pads that deform.
+BENDING = ("tehd", "thd")
+
+#: lambda of `thermal="thd"` where the effect `hot_oil_carryover` says nothing: the groove's flow balance alone, what a
+#: pad leaves is there for the next one and the supply makes up for the rest.
+GROOVE_MIXING = 1.0
 
 
 @dataclass(frozen=True)
@@ -43,7 +51,9 @@ class Setup:
     bearing : Bearing
     pivots : tuple of PivotLaw
         One per pad.
-    thermal : {"isothermal", "adiabatic", "tehd"}
+    thermal : {"isothermal", "adiabatic", "tehd", "thd"}
+        "tehd": pads deform. "thd": temperatures across the films, pads that conduct and deform, a journal that passes
+        heat on, grooves, clearances that grow with their temperatures; see `model.statics.cross_heat`.
     mesh : Mesh
     supply_change : float
         The oil enters this much hotter than the bearing file says [K].
@@ -82,6 +92,8 @@ class Setup:
         compared.
     clearance_change : float
         Change of Cb in running conditions only [m]: dry tests are cold.
+    grown : bool
+        The bearing's clearances are the running ones, and grow no more.
     """
 
     bearing: Bearing
@@ -107,9 +119,12 @@ class Setup:
     instruments: Instruments = field(default_factory=Instruments)
     clearance_change: float = 0.0
     accuracy: float = 1e-7
+    grown: bool = False
 
     def __post_init__(self) -> None:
         check_known("thermal", self.thermal, THERMAL)
+        if self.thermal == "thd" and (self.options.cavitation, self.options.turbulence) != ("swift-stieber", "none"):
+            raise OptionError('thermal "thd" is for laminar films that rupture by swift-stieber; take "adiabatic"')
         if not self.bearing.pads:
             raise BearingError("a bearing needs at least one pad")
         if len(self.pivots) != len(self.bearing.pads):
@@ -140,6 +155,11 @@ class Setup:
         return self.bearing.oil.supply_temperature + self.supply_change
 
     @property
+    def mixing(self) -> float:
+        """Share lambda of the oil leaving a pad that is there for the next: `carryover`, or all of it (`thd`)."""
+        return self.carryover or (GROOVE_MIXING if self.thermal == "thd" else 0.0)
+
+    @property
     def structure(self) -> FloatArray:
         """Compliance in series with the whole bearing, (2, 2) [m/N]."""
         xx, xy, yy = self.series_compliance
@@ -148,11 +168,18 @@ class Setup:
     @property
     def flexible_pads(self) -> bool:
         """Whether pads deform."""
-        return self.thermal == "tehd" or self.bending != 0.0
+        return self.thermal in BENDING or self.bending != 0.0
 
     @property
     def bending_factor(self) -> float:
-        """Factor on the computed deformation (1 for ``tehd`` with nothing else said)."""
+        """Factor on the computed deformation (1 for ``tehd`` and ``thd`` with nothing else said)."""
         if self.bending:
             return self.bending
-        return 1.0 if self.thermal == "tehd" else 0.0
+        return 1.0 if self.thermal in BENDING else 0.0
+
+    @property
+    def growth(self) -> Growth | None:
+        """What sets the running clearances: the option, or with ``thd`` its defaults."""
+        if self.grown:
+            return None
+        return self.options.growth or (Growth() if self.thermal == "thd" else None)

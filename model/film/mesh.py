@@ -62,6 +62,9 @@ class FilmWork(NamedTuple):
         [degC]
     viscosity, density : ndarray
         [Pa s], [kg/m^3], frozen for the pressure solution.
+    drag : ndarray
+        What the journal drags along over half the gap's flow U h / 2: 1, unless the viscosity changes across the film,
+        see `model.film.cross_film`.
     exchange : ndarray
         What a kelvin of film temperature loses to pad and journal, per station of length dx and control-volume
         height [W/K]; zero in the adiabatic baseline.
@@ -88,6 +91,7 @@ class FilmWork(NamedTuple):
     temperature: FloatArray
     viscosity: FloatArray
     density: FloatArray
+    drag: FloatArray
     exchange: FloatArray
     gained: FloatArray
     thickness: FloatArray
@@ -199,6 +203,7 @@ def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:
         temperature=np.full(shape, inlet_temperature),
         viscosity=np.zeros(shape),
         density=np.zeros(shape),
+        drag=np.ones(shape),
         exchange=np.zeros(shape),
         gained=np.zeros(shape),
         thickness=np.zeros(shape),

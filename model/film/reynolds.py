@@ -162,7 +162,8 @@ def _source(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float
         base = clearance - a * grid.cos_face[i] - b * grid.sin_face[i]
         for j in range(nz + 1):
             h = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
-            couette = 0.25 * speed * h * (work.density[i, j] + work.density[i + 1, j]) * grid.height[j]
+            dragged = work.density[i, j] * work.drag[i, j] + work.density[i + 1, j] * work.drag[i + 1, j]
+            couette = 0.25 * speed * h * dragged * grid.height[j]
             work.flow_x[i, j] = couette
             source[i, j] -= couette
             source[i + 1, j] += couette

@@ -226,14 +226,40 @@ def pressure_change(
     (2,) ndarray
         Change of the radial and tangential force [N].
     """
+    return change_by_oil(grid, work, speed, _fluidity(work, oil), change)
+
+
+@compiled
+def change_by_oil(
+    grid: FilmGrid,
+    work: FilmWork,
+    speed: float,
+    fluidity: tuple[FloatArray, FloatArray, FloatArray],
+    change: FloatArray,
+) -> FloatArray:
+    """`pressure_change` for given properties of the oil.
+
+    Parameters
+    ----------
+    grid, work, speed, change
+        As there.
+    fluidity : tuple of (nt + 1, nz + 1) ndarray
+        Density over viscosity, old and new; change of density times drag.
+
+    Returns
+    -------
+    (2,) ndarray
+        [N]
+    """
     h = work.thickness
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    old, new, denser = _fluidity(work, oil)
+    old, new, denser = fluidity
     along, across = np.empty((nt, nz + 1, 1)), np.empty((nt + 1, nz, 1))
     for i in range(nt):
         for j in range(nz + 1):
             couette = 0.25 * speed * 0.5 * (h[i, j] + h[i + 1, j]) * grid.height[j]
-            poiseuille = couette * (work.density[i, j] + work.density[i + 1, j]) - work.flow_x[i, j]
+            dragged = work.density[i, j] * work.drag[i, j] + work.density[i + 1, j] * work.drag[i + 1, j]
+            poiseuille = couette * dragged - work.flow_x[i, j]
             ratio = (new[i, j] + new[i + 1, j]) / (old[i, j] + old[i + 1, j]) - 1.0
             along[i, j, 0] = couette * (denser[i, j] + denser[i + 1, j]) - poiseuille * ratio
     for i in range(nt + 1):

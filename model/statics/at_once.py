@@ -11,7 +11,7 @@ from model.arrays import FloatArray, IntArray
 from model.film.loaded_attitude import Branch, LoadedAttitude
 from model.film.reynolds import FilmForces
 from model.options import Options
-from model.setup import Setup
+from model.setup import BENDING, Setup
 from model.statics import conditions
 from model.statics.carrying import attitude_of
 from model.statics.compiled.carrying import Case
@@ -29,7 +29,7 @@ from model.statics.tilt_hold import rolling_radius
 _KNOWN = frozenset({
     "bearing", "pivots", "thermal", "mesh", "supply_change", "options", "rotational_stiffness", "pivot_damping",
     "misalignment", "starvation", "rolling", "vibration", "heat_loss", "series_compliance", "added_mass",
-    "parallel_stiffness", "parallel_damping", "instruments", "clearance_change", "accuracy",
+    "parallel_stiffness", "parallel_damping", "instruments", "clearance_change", "accuracy", "grown",
 })  # fmt: skip
 _DEFAULTS = {
     f.name: f.default for f in dataclasses.fields(Setup) if f.name not in _KNOWN
@@ -44,7 +44,7 @@ def able(setup: Setup) -> bool:
     ----------
     setup : Setup
     """
-    if setup.thermal == "tehd" or _felt(setup) != _PLAIN:
+    if setup.thermal in BENDING or _felt(setup) != _PLAIN:
         return False
     if any(getattr(setup, name) != value for name, value in _DEFAULTS.items()):
         return False
@@ -52,10 +52,11 @@ def able(setup: Setup) -> bool:
 
 
 def _felt(setup: Setup) -> Options:
-    """Options without those that do nothing where films keep their inlet's temperature."""
+    """Options without those that do nothing where films keep their inlet's temperature, and those already done."""
+    options = dataclasses.replace(setup.options, growth=None) if setup.grown else setup.options
     if setup.thermal != "isothermal":
-        return setup.options
-    return dataclasses.replace(setup.options, conduction=False, isothermal_journal=False)
+        return options
+    return dataclasses.replace(options, conduction=False, isothermal_journal=False)
 
 
 def iterate_at_once(search: Search, cold: bool) -> Equilibrium:

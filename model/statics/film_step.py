@@ -7,6 +7,7 @@ import math
 from model.pad.bending import SolvedFilm, bending_step, wanted_shapes
 from model.statics.carrying import set_loaded
 from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP
+from model.statics.cross_heat import settle_cross_temperatures
 from model.statics.heat_paths import couples_heat, settle_temperatures
 from model.statics.pad_film import PadFilm
 from model.statics.search import Search
@@ -76,7 +77,8 @@ def _heat_films(search: Search) -> float:
         return max((f.temperature_change for f in carrying), default=0.0)
     for film in search.films:
         film.rest(search.position, search.surface_speed, oil)
-    change, search.limited, search.journal = settle_temperatures(
+    settle = settle_cross_temperatures if search.setup.thermal == "thd" else settle_temperatures
+    change, search.limited, search.journal = settle(
         search.setup, search.films, search.surface_speed, search.journal, limits
     )
     for film in carrying:
@@ -89,7 +91,7 @@ def _bend_pads(search: Search) -> float:
     setup, carrying = search.setup, search.carrying
     bodies = [f.deformation for f in carrying if f.deformation is not None]
     pressures = [f.corrected_pressure() for f in carrying]
-    rises = [f.work.temperature - setup.inlet_temperature for f in carrying]
+    rises = [f.face_temperature - setup.inlet_temperature for f in carrying]
     wanted = wanted_shapes(bodies, pressures, rises, setup.bending_factor)
     share = 0.0
     for film, body, shape in zip(carrying, bodies, wanted, strict=True):

@@ -17,8 +17,9 @@ heat goes round. What a pad conducts depends on all of its film; that is solved 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def couples_heat(setup: Setup) -> bool:
         Bearing with its options.
     """
     return setup.thermal != "isothermal" and bool(
-        setup.carryover or setup.options.conduction or setup.options.isothermal_journal
+        setup.thermal == "thd" or setup.mixing or setup.options.conduction or setup.options.isothermal_journal
     )
 
 
@@ -79,7 +80,8 @@ def settle_temperatures(
     order = sorted(films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
     heat = FilmHeat(setup, surface_speed, journal if math.isfinite(journal) else setup.inlet_temperature)
     parts = [heat.answers(film) for film in order]
-    inlets, journal = _balance(setup, order, parts)
+    answers = [None if p is None else _film_answer(setup, f, p) for f, p in zip(order, parts, strict=True)]
+    inlets, journal = balance_heat(setup, order, answers)
     change = 0.0
     for film, part, inlet in zip(order, parts, inlets.tolist(), strict=True):
         film.inlet = inlet
@@ -205,9 +207,11 @@ def minimal_residual(apply: Callable[[FloatArray], FloatArray], right: FloatArra
         if not np.abs(image).max() < BOUNDLESS:
             return np.full_like(right, math.nan)
         images.append(image)
-        columns = np.column_stack(images)
-        weights = np.linalg.lstsq(columns, right, rcond=None)[0]
-        if np.linalg.norm(columns @ weights - right) < tolerance * size:
+        columns = np.array(images)
+        gram = columns @ columns.T
+        gram[np.diag_indices_from(gram)] *= 1.0 + 1e-13  # images that hardly differ are of no use to each other
+        weights = np.linalg.solve(gram, columns @ right)
+        if np.linalg.norm(weights @ columns - right) < tolerance * size:
             break
         new = image.copy()
         for old in basis:
@@ -227,30 +231,67 @@ def _journal_exchange(setup: Setup, film: PadFilm) -> FloatArray:
     return np.asarray(NUSSELT * setup.bearing.oil.conductivity / film.work.thickness * station)
 
 
-def _balance(setup: Setup, order: list[PadFilm], parts: list[FloatArray | None]) -> tuple[FloatArray, float]:
-    """Inlet temperature of every pad, and the journal's that keeps no heat [degC]."""
+class FilmAnswer(NamedTuple):
+    """What a film passes on: with all else at zero, per kelvin of its inlet, per kelvin of the journal.
+
+    Attributes
+    ----------
+    outlet : (3,) sequence of float
+        Flow-weighted temperature at the trailing edge [degC].
+    taken : (3,) sequence of float
+        Heat that the journal takes up [W].
+    """
+
+    outlet: Sequence[float] | FloatArray
+    taken: Sequence[float] | FloatArray
+
+
+def _film_answer(setup: Setup, film: PadFilm, part: FloatArray) -> FilmAnswer:
+    """What a film of one temperature across passes on."""
+    if not setup.options.isothermal_journal:
+        return FilmAnswer(flow_weighted(film, part), (0.0, 0.0, 0.0))
+    weight = film.work.exchange.copy()  # all of it is the journal's, see `FilmHeat.answers`
+    weight[[0, -1]] *= 0.5
+    taken = np.tensordot(part, weight, 2)
+    return FilmAnswer(flow_weighted(film, part), (taken[0], taken[1], taken[2] - weight.sum()))
+
+
+def balance_heat(setup: Setup, order: list[PadFilm], parts: Sequence[FilmAnswer | None]) -> tuple[FloatArray, float]:
+    """Inlet temperature of every pad, and the journal's that keeps no heat.
+
+    Parameters
+    ----------
+    setup : Setup
+    order : list of PadFilm
+        In the order of rotation.
+    parts : sequence of FilmAnswer or None
+        None for a film that carries nothing.
+
+    Returns
+    -------
+    inlets : (n,) ndarray
+        [degC]
+    journal : float
+        [degC]
+    """
     n, supply = len(order), setup.inlet_temperature
-    shares = mixing_shares(order, setup.carryover)
+    shares = mixing_shares(order, setup.mixing)
     matrix, right = np.eye(n + 1), np.full(n + 1, supply)
     kept = np.zeros(3)  # what the journal takes up: by fresh oil, by its own temperature
     by_inlet = np.zeros(n)
     for k, (film, part) in enumerate(zip(order, parts, strict=True)):
-        rest = outlet_temperature(film) - film.inlet if film.forces is None else 0.0
-        outlet = [rest, 1.0, 0.0]  # an idle pad passes its inlet on, somewhat warmer
+        rest = outlet_temperature(film) - film.inlet if part is None else 0.0
+        outlet: Sequence[float] | FloatArray = [rest, 1.0, 0.0]  # an idle pad passes its inlet on, somewhat warmer
         if part is not None:
-            outlet = flow_weighted(film, part)
-            if setup.options.isothermal_journal:
-                weight = film.work.exchange.copy()  # all of it is the journal's, see `FilmHeat.answers`
-                weight[[0, -1]] *= 0.5
-                taken = np.tensordot(part, weight, 2)
-                kept += np.array([taken[0], 0.0, taken[2] - weight.sum()])
-                by_inlet[k] = taken[1]
+            outlet = part.outlet
+            kept += np.array([part.taken[0], 0.0, part.taken[2]])
+            by_inlet[k] = part.taken[1]
         after = (k + 1) % n
         share = shares[after]
         right[after] = supply * (1.0 - share) + share * outlet[0]
         matrix[after, k] -= share * outlet[1]
         matrix[after, n] -= share * outlet[2]
-    if setup.options.isothermal_journal and kept[2] != 0.0:
+    if kept[2] != 0.0:
         scale = -kept[2]
         matrix[n, :n], matrix[n, n], right[n] = -by_inlet / scale, 1.0, kept[0] / scale
     answer = np.linalg.solve(matrix, right)

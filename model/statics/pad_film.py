@@ -9,6 +9,7 @@ import numpy as np
 
 from model.arrays import FloatArray
 from model.bearing import Oil, Pad
+from model.film.cross_film import CrossFilm, cross_film, cross_pressure_change, set_cross_viscosity
 from model.film.energy import heat_step
 from model.film.loaded_attitude import Branch
 from model.film.mesh import FilmGrid, FilmWork, film_grid
@@ -70,6 +71,10 @@ class PadFilm:
         Solves the film's pressure, with or without its mass conserved.
     resting : RestingFilm or None
         What an idle pad's film does.
+    cross : CrossFilm or None
+        Temperatures across the film; None where there is one at each place.
+    outlet : float
+        Flow-weighted temperature at the trailing edge of a film with temperatures across [degC].
     """
 
     number: int
@@ -96,6 +101,18 @@ class PadFilm:
     kept: float = 1.0
     solver: FilmSolver = solve_film
     resting: RestingFilm | None = None
+    cross: CrossFilm | None = None
+    outlet: float = math.nan
+
+    @property
+    def heat_state(self) -> tuple[FloatArray, ...]:
+        """Temperatures that the iteration finds; whoever writes to them sets the film's."""
+        return (self.work.temperature,) if self.cross is None else (self.cross.temperature, self.cross.face)
+
+    @property
+    def face_temperature(self) -> FloatArray:
+        """Of the pad's face [degC], (nt + 1, nz + 1); the film's own where it has one across."""
+        return self.work.temperature if self.cross is None else self.cross.face
 
     @property
     def lost(self) -> bool:
@@ -144,7 +161,10 @@ class PadFilm:
         oil : Oil
         """
         a, b = self.approach(position)
-        set_viscosity(self.work, oil_constants(oil))
+        if self.cross is None:
+            set_viscosity(self.work, oil_constants(oil))
+        else:
+            set_cross_viscosity(self.cross, self.work, oil_constants(oil))
         wedge = (self.pad.pad_clearance, a, b)
         self.forces = self.corrected = self.solver(self.grid, self.work, wedge, surface_speed, False)
 
@@ -199,7 +219,11 @@ class PadFilm:
         oil : Oil
         """
         assert self.forces is not None
-        change = pressure_change(self.grid, self.work, surface_speed, oil_constants(oil), self.pressure_change)
+        given = oil_constants(oil)
+        if self.cross is None:
+            change = pressure_change(self.grid, self.work, surface_speed, given, self.pressure_change)
+        else:
+            change = cross_pressure_change(self.grid, self.work, self.cross, surface_speed, given, self.pressure_change)
         self.corrected = self.forces._replace(force=self.forces.force + change)
 
     def corrected_pressure(self) -> FloatArray:
@@ -228,7 +252,8 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FloatArray]:
     """
     bearing = setup.bearing
     symmetric = setup.misalignment[0] == 0.0
-    solid = setup.flexible_pads or setup.options.conduction
+    across = setup.thermal == "thd"
+    solid = setup.flexible_pads or setup.options.conduction or across
     angle, toward = setup.misalignment
     films = []
     laminar = setup.options.turbulence == "none"
@@ -257,6 +282,7 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FloatArray]:
                 deformation=pad_deformation(pad, bearing, grid) if solid else None,
                 kept=1.0 - setup.heat_loss,
                 solver=solver,
+                cross=cross_film(work, setup.inlet_temperature) if across else None,
             )
         )
     return films, works, shifts

@@ -118,6 +118,8 @@ def outlet_temperature(film: PadFilm) -> float:
         return film.resting.outlet
     if film.forces is None:
         return film.inlet
+    if film.cross is not None:
+        return film.outlet
     return flow_weighted(film, film.work.temperature[None])[0]
 
 

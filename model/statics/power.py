@@ -34,12 +34,14 @@ def power_loss(equilibrium: Equilibrium, surface_speed: float, turbulent: bool =
         work, grid = film.work, film.grid
         if not work.thickness.min() > 0:  # a lost film, of a prediction that did not converge
             return math.nan
-        couette = work.viscosity * surface_speed**2 / work.thickness
+        shearing = work.viscosity if film.cross is None else film.cross.shear
+        couette = shearing * surface_speed**2 / work.thickness
         if turbulent:
             couette = couette * shear_factor(work, surface_speed)
         total += float((grid.area * couette * striation(work)).sum())
         slope = (work.pressure[1:] - work.pressure[:-1]) / grid.dx
-        middle = 0.5 * (work.thickness[1:] + work.thickness[:-1])
+        dragged = work.thickness * work.drag
+        middle = 0.5 * (dragged[1:] + dragged[:-1])
         weight = 0.5 * (grid.area[1:] + grid.area[:-1])
         total += float((0.5 * surface_speed * middle * slope * weight).sum())
     return total

@@ -89,13 +89,15 @@ class Search:
             if film.work.pressure.shape != other.work.pressure.shape:
                 return False
             film.tilt, film.deflection, film.idle = other.tilt, other.deflection, other.idle
-            film.work.temperature[:] = other.work.temperature
+            film.work.temperature[:], film.inlet = other.work.temperature, other.inlet
+            for state, known in zip(film.heat_state, other.heat_state, strict=False):
+                state[:] = known
             film.work.ruptured[:] = other.work.ruptured
             film.work.pressure[:] = other.work.pressure
             if self.setup.flexible_pads:
                 film.bent[:] = other.bent
                 film.work.extra[:] += other.bent
-        self.position = start.position.copy()
+        self.position, self.journal = start.position.copy(), start.journal_temperature
         return True
 
     def start_cold(self) -> None:
@@ -103,7 +105,8 @@ class Search:
         hotter = 0.0 if self.setup.thermal == "isothermal" else FIRST_HEATING
         branches = []
         for film in self.films:
-            film.work.temperature[:] = film.inlet
+            for state in (film.work.temperature, *film.heat_state):
+                state[:] = film.inlet
             film.branch = find_branch(self.setup, film, self.surface_speed, hotter)
             branches.append(film.branch)
         normals = np.array([f.normal for f in self.films])
@@ -117,7 +120,7 @@ class Search:
         parts = [self.position / MICROMETRE]
         for film in self.films:
             parts.append(np.array([film.tilt * film.pivot_radius, film.deflection]) / MICROMETRE)
-            parts.append(film.work.temperature.ravel() * (0.0 if film.idle else 1.0))
+            parts += [state.ravel() * (0.0 if film.idle else 1.0) for state in film.heat_state]
             if self.setup.flexible_pads:
                 parts.append(film.bent.ravel() / MICROMETRE)
         return np.concatenate(parts)
@@ -136,10 +139,11 @@ class Search:
             film.tilt = float(state[at]) * MICROMETRE / film.pivot_radius
             film.deflection = float(state[at + 1]) * MICROMETRE
             at += 2
-            size = film.work.temperature.size
-            if not film.idle:
-                film.work.temperature.ravel()[:] = state[at : at + size]
-            at += size
+            for part in film.heat_state:
+                if not film.idle:
+                    part.ravel()[:] = state[at : at + part.size]
+                at += part.size
+            size = film.bent.size
             if self.setup.flexible_pads:
                 bent = state[at : at + size].reshape(film.bent.shape) * MICROMETRE
                 film.work.extra[:] += bent - film.bent

@@ -2,7 +2,7 @@
 theoretical thermoelastohydrodynamic results", ASME J. Tribology 114(3), 1992, 579-588.
 
 Four pads of 75 deg, load between pads, D 100 mm, L 70 mm, central pivots, preload 0.47, Cp 148 um, 10 kN. Peak pad
-temperature, digitised to about 1 K; target: 4 K to their TEHD results, 8 K to their measurements.
+temperature, digitised to about 1 K; target: 4 K to their TEHD results, 5 K to their measurements.
 """
 
 from __future__ import annotations
@@ -50,23 +50,34 @@ def test_adiabatic_film_heats_by_what_the_load_says():
     assert [p.min_film for p in runs] == sorted(p.min_film for p in runs)
 
 
+def peak(p: Prediction) -> float:
+    """Thermocouples sit in the pads: the faces count."""
+    assert p.converged
+    return max(float(t.max()) for t in p.face_temperature)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("rpm", [1000, *(pytest.param(rpm, marks=pytest.mark.slow) for rpm in (2000, 3000)), 4000])
-def test_peak_pad_temperatures_with_all_paths_of_heat(rpm):
-    # Thermocouples sit in the pads: the face counts, hotter than the mean film by the parabola that heats the journal.
-    # The reference gives neither the pads' convection (50 W/m^2/K, the default of a bearing file) nor the groove's
-    # lambda: 0.9 is ordinary for a flooded bearing, chosen once for all speeds. Clearances grow from 20 degC.
-    options = Options(conduction=True, isothermal_journal=True, growth=Growth(reference=20.0))
+@pytest.mark.parametrize("rpm", PEAK)
+def test_peak_pad_temperatures_without_a_chosen_constant(rpm):
+    # pads' backs as a bearing file has them (50 W/m^2/K; 100 takes off 0.2 to 0.3 K), grooves by their flow balance,
+    # clearances that hold at 20 degC
     measured, theirs = PEAK[rpm]
+    found = peak(run(rpm, "thd"))
+    assert found == pytest.approx(measured, abs=4.0)
+    # their theory is 6 K below their measurement at 1000 and 2000 rpm, where this one stands with the measurement
+    assert found == pytest.approx(theirs, abs=4.0 if rpm > 2000 else 6.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rpm", [1000, 4000])
+def test_peak_pad_temperatures_with_the_paths_of_heat_one_by_one(rpm):
+    # one temperature across the film, a parabola at the faces, and a lambda of 0.9 that is ours
+    options = Options(conduction=True, isothermal_journal=True, growth=Growth(reference=20.0))
     p = predict(
         bearing(), 10e3, speed=rpm * math.pi / 30, pivots="rigid", thermal="tehd",
         effects=[Effect("hot_oil_carryover", fraction=0.9)], options=options,
     )  # fmt: skip
-    assert p.converged
-    peak = max(float(t.max()) for t in p.face_temperature)
-    assert peak == pytest.approx(measured, abs=7.0 if rpm > 3000 else 4.0)
-    # their theory is 6 K below their measurement at 1000 and 2000 rpm, where ours stands with the measurement
-    assert peak == pytest.approx(theirs, abs=4.0 if rpm > 2000 else 7.0)
+    assert peak(p) == pytest.approx(PEAK[rpm][0], abs=7.0 if rpm > 3000 else 4.0)
 
 
 def test_without_those_paths_the_speed_does_not_show():

@@ -46,7 +46,7 @@ class CompareSettings:
     ----------
     variants : tuple of str
         Pivot models out of `VARIANTS`.
-    thermal : {"isothermal", "adiabatic", "tehd"}
+    thermal : {"isothermal", "adiabatic", "tehd", "thd"}
     effects : tuple of Effect
         Switched on with every pivot model.
     identify : IdentifySettings

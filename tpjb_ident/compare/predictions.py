@@ -36,7 +36,7 @@ class ModelSettings:
     ----------
     pivots : str, float, path or laws per pad
         As `model.predict.predict` takes them.
-    thermal : {"isothermal", "adiabatic", "tehd"}
+    thermal : {"isothermal", "adiabatic", "tehd", "thd"}
     effects : tuple of Effect
     options : Options
         Physics beyond the paper's model.

@@ -51,7 +51,7 @@ def diagnose(
         Default: the one that the campaign carries.
     pivots : object
         Where to start from: ``"kirk"``, ``"rigid"``, ``"measured"``, a path or laws.
-    thermal : {"isothermal", "adiabatic", "tehd"}
+    thermal : {"isothermal", "adiabatic", "tehd", "thd"}
     effects : sequence of Effect
         Already in the model.
     settings : DiagnoseSettings, optional

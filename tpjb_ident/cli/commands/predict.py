@@ -23,7 +23,7 @@ from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_table
 
 NAMED_PIVOTS = ("rigid", "kirk", "kirk-secant")
-THERMAL = ("isothermal", "adiabatic", "tehd")
+THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 
 
 @guarded
@@ -142,7 +142,7 @@ def model_settings(pivots: Any, thermal: str, effects: Path | None) -> Any:
     pivots : object
         As `pivot_choice` gives it.
     thermal : str
-        "isothermal", "adiabatic" or "tehd".
+        "isothermal", "adiabatic", "tehd" or "thd".
     effects : Path, optional
         An effects file.
 

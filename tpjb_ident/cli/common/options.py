@@ -37,8 +37,8 @@ Thermal = Annotated[
     str,
     typer.Option(
         "--thermal",
-        help="isothermal, adiabatic or tehd.",
-        autocompletion=one_of("isothermal", "adiabatic", "tehd"),
+        help="isothermal, adiabatic, tehd (pads bend) or thd (heat as it goes).",
+        autocompletion=one_of("isothermal", "adiabatic", "tehd", "thd"),
     ),
 ]
 EffectsFile = Annotated[

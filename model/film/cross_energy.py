@@ -1,0 +1,345 @@
+"""The energy equation with the temperature across the film, marched from the leading edge.
+
+    rho c (u T_x + v T_y + w T_z) = k (T_yy + T_zz) + mu (u_y^2 + w_y^2)
+
+in cells between surfaces eta = const, which follow the film's thickness. Heat balances of the cells between two
+stations; the flows of oil through their faces are those of the pressure solution, shared among the cells by the
+velocity across. Journal: one temperature. Pad: a heat flux that is given, and with it the face's temperature.
+
+Between two stations the exchange with the neighbours is taken half at either (second order), except where a cell
+near a wall exchanges more than it carries along: there as far at the later one as keeps the balance monotone. Oil that
+runs back near a leading edge carries no heat upstream (T. A. Reyhner, I. Flugge-Lotz, Int. J. Non-Linear Mech. 3
+(1968) 173).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from model.arrays import FloatArray
+from model.compilation import compiled
+from model.film.cross_film import CrossFilm
+from model.film.mesh import FilmGrid, FilmWork
+
+#: Least share of its Couette flow that a cell is taken to carry downstream.
+LEAST_FLOW = 1e-3
+#: Net flow over the leading edge, as a share of the Couette flow, below which the heat balance there is said to be off.
+LEAST_NET_FLOW = 0.2
+
+
+class CrossOperator(NamedTuple):
+    """The heat balances of one film, factorised; n = (nz + 1) * cells unknowns per station, cells fastest.
+
+    Attributes
+    ----------
+    factor : (nt, n, 2 cells + 1) ndarray
+        L and U of the balances at the later station [W/K].
+    before : (nt, n, 5) ndarray
+        What the earlier station adds: by the cell itself, the cells below and above, the lines before and after.
+    journal : (nt, nz + 1, 2) ndarray
+        Exchange with the journal at the earlier and the later station [W/K].
+    made : (nt, n) ndarray
+        Dissipation [W].
+    carried : (nz + 1, cells) ndarray
+        Heat carried over the trailing edge per kelvin [W/K].
+    """
+
+    factor: FloatArray
+    before: FloatArray
+    journal: FloatArray
+    made: FloatArray
+    carried: FloatArray
+
+
+@compiled
+def cross_operator(
+    grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float, heat: tuple[float, float, float, float]
+) -> tuple[CrossOperator, float]:
+    """Set up and factorise the heat balances of a film.
+
+    Parameters
+    ----------
+    grid, work
+        Mesh and the pressure solution.
+    cross : CrossFilm
+        Its fluidity and integrals are those that the pressure was solved with.
+    speed : float
+        Surface speed of the journal [m/s].
+    heat : tuple of float
+        Specific heat [J/kg/K] and conductivity [W/m/K] of the oil, share of the dissipation that stays in it, and 1 for
+        a journal that takes part, 0 for an insulated one.
+
+    Returns
+    -------
+    CrossOperator
+    float
+        How far the net flow over the leading edge is below `LEAST_NET_FLOW`, as a share of it; zero: not.
+    """
+    nt, lines, cells = work.flow_x.shape[0], work.flow_x.shape[1], len(cross.edges) - 1
+    n = lines * cells
+    factor, before = np.zeros((nt, n, 2 * cells + 1)), np.zeros((nt, n, 5))
+    journal, made = np.zeros((nt, lines, 2)), np.zeros((nt, n))
+    flows = np.zeros((nt, lines, cells))
+    for i in range(nt):
+        for j in range(lines):
+            _shared_flow(grid, work, cross, speed, i, j, flows[i, j])
+    back = 0.0
+    for j in range(lines):
+        dragged = 0.25 * speed * (work.thickness[0, j] * work.density[0, j] + work.thickness[1, j] * work.density[1, j])
+        back = max(back, 1.0 - work.flow_x[0, j] / (LEAST_NET_FLOW * dragged * grid.height[j]))
+    space = _space(lines, cells)
+    last = np.zeros(n)
+    _dissipation(grid, work, cross, speed, 0, last)
+    for i in range(nt):
+        _box(grid, work, cross, speed, heat, i, flows, space)
+        _set_rows(space, factor[i], before[i])
+        _factorise(factor[i], cells)
+        for j in range(lines):
+            exchange = space.high[j, cells - 1]
+            journal[i, j, 0] = (1.0 - space.theta[j, cells - 1]) * exchange
+            journal[i, j, 1] = space.theta[j, cells - 1] * exchange
+        for k in range(n):
+            made[i, k] = 0.5 * heat[2] * last[k]
+        _dissipation(grid, work, cross, speed, i + 1, last)
+        for k in range(n):
+            made[i, k] += 0.5 * heat[2] * last[k]
+    carried = np.empty((lines, cells))
+    for j in range(lines):
+        for m in range(cells):
+            carried[j, m] = heat[0] * max(flows[nt - 1, j, m], 0.0)
+    return CrossOperator(factor, before, journal, made, carried), back
+
+
+@compiled
+def _shared_flow(
+    grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float, i: int, j: int, flow: FloatArray
+) -> None:
+    """Mass flow of every cell through the face between stations i and i + 1 [kg/s]; their sum is the face's."""
+    edges, cells = cross.edges, len(cross.edges) - 1
+    f0, f1 = 0.0, 0.0
+    for m in range(cells):
+        light = 0.5 * (cross.fluidity[i, j, m] + cross.fluidity[i + 1, j, m]) * (edges[m + 1] - edges[m])
+        f0 += light
+        f1 += light * 0.5 * (edges[m + 1] + edges[m])
+    centre = f1 / f0
+    h = 0.5 * (work.thickness[i, j] + work.thickness[i + 1, j])
+    pull = (work.pressure[i + 1, j] - work.pressure[i, j]) / grid.dx * h * h
+    mass = 0.5 * (work.density[i, j] + work.density[i + 1, j]) * h * grid.height[j]
+    below, total, driven = 0.0, 0.0, 0.0
+    for m in range(cells):
+        light = 0.5 * (cross.fluidity[i, j, m] + cross.fluidity[i + 1, j, m])
+        a, b = edges[m], edges[m + 1]
+        wide = b - a
+        shear, slope = speed / f0 * light, pull * light
+        # velocity below + shear (eta - a) + slope [(eta^2 - a^2) / 2 - centre (eta - a)], integrated over the cell
+        inside = below * wide + 0.5 * shear * wide * wide
+        inside += slope * (((b**3 - a**3) / 3.0 - a * a * wide) * 0.5 - 0.5 * centre * wide * wide)
+        flow[m] = mass * inside
+        total += flow[m]
+        driven += wide * 0.5 * (a + b)
+        below += shear * wide + slope * (0.5 * (b * b - a * a) - centre * wide)
+    # averages over the face differ in the second order: what is left goes with the shear
+    missing = work.flow_x[i, j] - total
+    for m in range(cells):
+        flow[m] += missing * (edges[m + 1] - edges[m]) * 0.5 * (edges[m] + edges[m + 1]) / driven
+
+
+@compiled
+def _side_shares(cross: CrossFilm, i: int, j: int, shares: FloatArray) -> None:
+    """Share of every cell in a flow that pressure drives, between lines j and j + 1 and stations i and i + 1."""
+    edges, cells = cross.edges, len(cross.edges) - 1
+    centre = 0.25 * (cross.centre[i, j] + cross.centre[i + 1, j] + cross.centre[i, j + 1] + cross.centre[i + 1, j + 1])
+    below, total = 0.0, 0.0
+    for m in range(cells):
+        light = cross.fluidity[i, j, m] + cross.fluidity[i + 1, j, m]
+        light += cross.fluidity[i, j + 1, m] + cross.fluidity[i + 1, j + 1, m]
+        a, b = edges[m], edges[m + 1]
+        wide = b - a
+        inside = below * wide + light * (((b**3 - a**3) / 3.0 - a * a * wide) * 0.5 - 0.5 * centre * wide * wide)
+        below += light * (0.5 * (b * b - a * a) - centre * wide)
+        shares[m] = inside
+        total += inside
+    for m in range(cells):
+        shares[m] /= total
+
+
+class _Space(NamedTuple):
+    """Flows and couplings of the cells between two stations, (nz + 1, cells) unless said otherwise.
+
+    Over the upper face (one more cell), to line j (one more line) [kg/s]; to the cells below and above and the lines
+    before and after, carried along [W/K]; the later station's share in the exchange.
+    """
+
+    up: FloatArray
+    beside: FloatArray
+    low: FloatArray
+    high: FloatArray
+    first: FloatArray
+    last: FloatArray
+    carried: FloatArray
+    theta: FloatArray
+    shares: FloatArray
+
+
+@compiled
+def _space(lines: int, cells: int) -> _Space:
+    shape = (lines, cells)
+    return _Space(
+        np.zeros((lines, cells + 1)),
+        np.zeros((lines + 1, cells)),
+        np.zeros(shape),
+        np.zeros(shape),
+        np.zeros(shape),
+        np.zeros(shape),
+        np.zeros(shape),
+        np.zeros(shape),
+        np.zeros(cells),
+    )
+
+
+@compiled
+def _box(
+    grid: FilmGrid,
+    work: FilmWork,
+    cross: CrossFilm,
+    speed: float,
+    heat: tuple[float, float, float, float],
+    i: int,
+    flows: FloatArray,
+    space: _Space,
+) -> None:
+    """Flows and couplings of the cells between stations i and i + 1."""
+    lines, cells = space.theta.shape
+    edges, conductivity, specific = cross.edges, heat[1], heat[0]
+    up, beside, low, high, first, last, carried, theta, shares = space
+    for j in range(lines - 1):
+        _side_shares(cross, i, j, shares)
+        aside = 0.5 * (work.flow_z[i, j] + work.flow_z[i + 1, j])
+        for m in range(cells):
+            beside[j + 1, m] = aside * shares[m]
+    for j in range(lines):
+        h = 0.5 * (work.thickness[i, j] + work.thickness[i + 1, j])
+        station = conductivity * grid.dx * grid.height[j] / h
+        least = 0.25 * LEAST_FLOW * speed * h * (work.density[i, j] + work.density[i + 1, j]) * grid.height[j]
+        _upward(flows, beside, grid.first, i, j, up[j])
+        for m in range(cells):
+            wide, at = edges[m + 1] - edges[m], 0.5 * (edges[m + 1] + edges[m])
+            carried[j, m] = specific * max(flows[i, j, m], least * wide)
+            if m > 0:
+                pass_on = station / (at - 0.5 * (edges[m] + edges[m - 1]))
+                low[j, m] = max(pass_on + 0.5 * specific * up[j, m], max(0.0, specific * up[j, m]))
+            if m < cells - 1:
+                pass_on = station / (0.5 * (edges[m + 2] + edges[m + 1]) - at)
+                high[j, m] = max(pass_on - 0.5 * specific * up[j, m + 1], max(0.0, -specific * up[j, m + 1]))
+            else:
+                high[j, m] = heat[3] * station / (1.0 - at)
+            if j == lines - 1:  # the edge is upwind: what leaves takes its temperature along
+                first[j, m] = 0.5 * specific * max(beside[j, m], 0.0)
+            elif j > 0:
+                first[j, m] = conductivity * grid.dx / grid.dz[j - 1] * h * wide + 0.5 * specific * beside[j, m]
+            if j == 0 and grid.first == 1:
+                last[j, m] = 0.5 * specific * max(-beside[1, m], 0.0)
+            elif j < lines - 1:
+                last[j, m] = conductivity * grid.dx / grid.dz[j] * h * wide - 0.5 * specific * beside[j + 1, m]
+            whole = low[j, m] + high[j, m] + first[j, m] + last[j, m]
+            theta[j, m] = max(0.5, 1.0 - carried[j, m] / max(whole, 1e-300))
+
+
+@compiled
+def _upward(flows: FloatArray, beside: FloatArray, first: int, i: int, j: int, up: FloatArray) -> None:
+    """Oil that crosses the cells' upper faces between two stations, from what enters and leaves at their sides.
+
+    What reaches an edge leaves over it at the same height. What is left over all cells, in a ruptured film, is none:
+    there dissipation and flow shrink alike.
+    """
+    nt, cells = flows.shape[0], flows.shape[2]
+    edge = j == beside.shape[0] - 2 or (j == 0 and first == 1)
+    total, whole = 0.0, 0.0
+    for turn in range(2):
+        running = 0.0
+        for m in range(cells):
+            behind, ahead = flows[max(i - 1, 0), j, m], flows[min(i + 1, nt - 1), j, m]
+            gain = 0.5 * (behind - ahead) if 0 < i < nt - 1 else behind - ahead
+            if not edge:
+                gain += beside[j, m] - beside[j + 1, m]
+            if turn == 0:
+                total += gain
+                whole += abs(flows[i, j, m])
+            else:
+                running += gain - total * abs(flows[i, j, m]) / whole
+                up[m + 1] = running
+    up[cells] = 0.0
+
+
+@compiled
+def _set_rows(space: _Space, factor: FloatArray, before: FloatArray) -> None:
+    """Rows of the balances: later station into the band, earlier one beside it."""
+    low, high, first, last = space.low, space.high, space.first, space.last
+    theta, carried = space.theta, space.carried
+    lines, cells = theta.shape
+    for j in range(lines):
+        for m in range(cells):
+            k, own = j * cells + m, theta[j, m]
+            factor[k, cells] = carried[j, m]
+            before[k, 0] = carried[j, m]
+            if m > 0:
+                share = max(own, theta[j, m - 1])
+                factor[k, cells - 1] -= share * low[j, m]
+                factor[k, cells] += share * low[j, m]
+                before[k, 1] = (1.0 - share) * low[j, m]
+            share = own if m == cells - 1 else max(own, theta[j, m + 1])
+            factor[k, cells] += share * high[j, m]
+            if m < cells - 1:
+                factor[k, cells + 1] -= share * high[j, m]
+            before[k, 2] = (1.0 - share) * high[j, m]
+            if j > 0:
+                share = max(own, theta[j - 1, m])
+                factor[k, 0] -= share * first[j, m]
+                factor[k, cells] += share * first[j, m]
+                before[k, 3] = (1.0 - share) * first[j, m]
+            if j < lines - 1:
+                share = max(own, theta[j + 1, m])
+                factor[k, 2 * cells] -= share * last[j, m]
+                factor[k, cells] += share * last[j, m]
+                before[k, 4] = (1.0 - share) * last[j, m]
+            before[k, 0] -= before[k, 1] + before[k, 2] + before[k, 3] + before[k, 4]
+
+
+@compiled
+def _dissipation(grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float, i: int, made: FloatArray) -> None:
+    """Heat made in the cells of a station, per length dx and control-volume height [W], full film."""
+    p, edges = work.pressure, cross.edges
+    nt, nz, cells = work.flow_x.shape[0], work.flow_z.shape[1], len(cross.edges) - 1
+    behind, ahead = max(i - 1, 0), min(i + 1, nt)
+    for j in range(nz + 1):
+        h = work.thickness[i, j]
+        slope = (p[ahead, j] - p[behind, j]) / ((ahead - behind) * grid.dx) * h
+        if j == nz:
+            across = (p[i, nz] - p[i, nz - 1]) / grid.dz[nz - 1] * h
+        elif j == 0:
+            across = 0.0 if grid.first == 0 else (p[i, 1] - p[i, 0]) / grid.dz[0] * h
+        else:
+            across = (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1]) * h
+        drag, driven = speed * cross.shear[i, j] / h, slope * slope + across * across
+        station = h * grid.dx * grid.height[j]
+        for m in range(cells):
+            wide = edges[m + 1] - edges[m]
+            away = 0.5 * (edges[m + 1] + edges[m]) - cross.centre[i, j]
+            shear = drag + slope * away
+            squared = shear * shear + (across * away) ** 2 + driven * wide * wide / 12.0
+            made[j * cells + m] = squared * cross.fluidity[i, j, m] * wide * station
+
+
+@compiled
+def _factorise(band: FloatArray, width: int) -> None:
+    """L U in place without pivoting: the balances are diagonally dominant but for the flow across."""
+    n = band.shape[0]
+    for k in range(n):
+        for r in range(1, min(width, n - 1 - k) + 1):
+            if band[k + r, width - r] != 0.0:
+                scale = band[k + r, width - r] / band[k, width]
+                band[k + r, width - r] = scale
+                for s in range(1, width + 1):
+                    band[k + r, width - r + s] -= scale * band[k, width + s]

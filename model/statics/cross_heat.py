@@ -1,0 +1,205 @@
+"""Temperatures of films, pads, journal and grooves together, with the temperature across the films (`thermal="thd"`).
+
+- Film: `model.film.cross_energy`; its viscosity across the film acts on the pressure (`model.film.cross_film`).
+- Pads conduct, `model.pad.heat`: film temperature and heat flux are those of the face, free faces lose heat to the oil.
+- Journal: one temperature, at which it keeps no heat over a turn.
+- Grooves: the flow balance of `model.statics.heat_paths`, oil of one temperature enters.
+
+For given flows all of it is linear: a film's temperatures are those of fresh oil, plus what they answer to its inlet
+and to the journal, and inlets and journal follow from one small system. What a pad conducts hangs on all of its face;
+that is solved as a correction by a few Krylov steps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from model.arrays import FloatArray
+from model.film.cross_energy import CrossOperator, cross_operator
+from model.film.cross_march import face_temperature, march_cross, march_one
+from model.setup import Setup
+from model.statics.compiled.constants import BOUNDLESS
+from model.statics.heat_paths import FilmAnswer, balance_heat, minimal_residual
+from model.statics.pad_film import PadFilm
+
+#: What a pad conducts is solved to this share in every step; what is left contracts with the rest.
+CONDUCTION_TOLERANCE = 0.1
+
+
+@dataclass
+class CrossAnswer:
+    """What one film's temperatures are made of: with all else at zero, per kelvin of its inlet, of the journal.
+
+    Attributes
+    ----------
+    fields : (nt + 1, n, 3) ndarray
+        Of the cells [degC].
+    faces : (3, nt + 1, nz + 1) ndarray
+        Of the pad's face [degC].
+    outer : FilmAnswer
+        Outlet temperature and the heat that the journal takes.
+    """
+
+    fields: FloatArray
+    faces: FloatArray
+    outer: FilmAnswer
+
+
+def settle_cross_temperatures(
+    setup: Setup, films: list[PadFilm], surface_speed: float, journal: float, limits: tuple[float, float]
+) -> tuple[float, float, float]:
+    """Temperatures of all films, pads and the journal for the present flows; as `settle_temperatures` of `heat_paths`.
+
+    Parameters
+    ----------
+    setup : Setup
+    films : list of PadFilm
+        Solved for pressure.
+    surface_speed : float
+        [m/s]
+    journal : float
+        The journal's temperature so far [degC]; NaN for none.
+    limits : tuple of float
+        Relaxation, and the largest change of a temperature in one step [K].
+
+    Returns
+    -------
+    change : float
+        Largest change asked for [K].
+    back : float
+        Largest share of a film's oil that runs back at its leading edge.
+    journal : float
+        [degC]
+    """
+    order = sorted(films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
+    start = journal if math.isfinite(journal) else setup.inlet_temperature
+    answers: list[CrossAnswer | None] = []
+    back, around = 0.0, housing_oil(films)
+    for film in order:
+        answer, share = _answer(setup, film, surface_speed, (start, around))
+        answers.append(answer)
+        back = max(back, share)
+    inlets, journal = balance_heat(setup, order, [a.outer if a is not None else None for a in answers])
+    change = 0.0
+    for film, part, inlet in zip(order, answers, inlets.tolist(), strict=True):
+        film.inlet = inlet
+        film.temperature_change = 0.0
+        if part is None or film.cross is None:
+            continue
+        weights = np.array([1.0, inlet, journal])
+        asked = (part.fields @ weights).reshape(film.cross.temperature.shape) - film.cross.temperature
+        face = np.tensordot(weights, part.faces, 1) - film.cross.face
+        film.temperature_change = float(np.maximum(np.abs(asked).max(), np.abs(face).max()))
+        share = limits[0] * min(1.0, limits[1] / max(film.temperature_change, 1e-30))
+        film.cross.temperature[:] += share * asked
+        film.cross.face[:] += share * face
+        film.outlet = float(np.dot(part.outer.outlet, weights))
+        change = float(np.maximum(change, film.temperature_change))  # a NaN is not to be lost
+    return change, back, journal
+
+
+def housing_oil(films: Sequence[PadFilm]) -> float:
+    """Temperature of the oil that the pads stand in [degC]: what the grooves hold, on the mean.
+
+    Parameters
+    ----------
+    films : sequence of PadFilm
+    """
+    return sum(f.inlet for f in films) / len(films)
+
+
+def pad_heat(film: PadFilm, around: float) -> FloatArray:
+    """Heat flux density from the film into its pad, (nt + 1, nz + 1) [W/m^2].
+
+    Parameters
+    ----------
+    film : PadFilm
+        With temperatures across.
+    around : float
+        Temperature of the oil at the pad's free faces [degC].
+    """
+    assert film.cross is not None
+    return _into_pad(film, film.cross.face - around)
+
+
+def _into_pad(film: PadFilm, rise: FloatArray) -> FloatArray:
+    pad = film.deformation
+    assert pad is not None
+    return np.asarray(pad.flux @ (pad.to_coarse @ rise.ravel())).reshape(rise.shape)
+
+
+def _answer(
+    setup: Setup, film: PadFilm, surface_speed: float, temperatures: tuple[float, float]
+) -> tuple[CrossAnswer | None, float]:
+    """A film's answers, and which share of its oil runs back where it enters; None if the film carries nothing.
+
+    For the temperatures of the journal and of the oil around the pads so far.
+    """
+    journal, around = temperatures
+    cross = film.cross
+    if film.forces is None or cross is None:
+        return None, 0.0
+    oil = setup.bearing.oil
+    heat = (oil.specific_heat, oil.conductivity, film.kept, 1.0)
+    operator, back = cross_operator(film.grid, film.work, cross, surface_speed, heat)
+    taken = pad_heat(film, around)
+    rows, columns = film.work.temperature.shape
+    fields = np.zeros((rows, columns * (len(cross.edges) - 1), 3))
+    fields[0, :, 1] = 1.0
+    sources = np.zeros((rows - 1, fields.shape[1], 3))
+    sources[:, :, 0] = operator.made
+    sources[:, :: len(cross.edges) - 1, 0] -= _station_heat(film, taken)
+    kept = march_cross(operator, fields, sources, np.array([0.0, 0.0, 1.0]))
+    faces = np.empty((3, rows, columns))
+    nothing = np.zeros_like(taken)
+    for m in range(3):
+        given = taken if m == 0 else nothing
+        face_temperature(film.work, cross.edges, oil.conductivity, fields[:, :, m], given, faces[m])
+    if np.abs(fields).max() < BOUNDLESS:
+        missing = faces[0] + film.inlet * faces[1] + journal * faces[2] - cross.face
+        _correct_for_pad(setup, film, operator, missing, (fields, faces, kept))
+    weight = operator.carried / operator.carried.sum()
+    outlet = weight.ravel() @ fields[-1]
+    return CrossAnswer(fields, faces, FilmAnswer(outlet, kept)), back
+
+
+def _station_heat(film: PadFilm, flux: FloatArray) -> FloatArray:
+    """What a heat flux density into the pad takes between two stations, (nt, nz + 1) [W]."""
+    return np.asarray(0.5 * (flux[1:] + flux[:-1]) * film.grid.dx * film.grid.height[None, :])
+
+
+def _correct_for_pad(
+    setup: Setup,
+    film: PadFilm,
+    operator: CrossOperator,
+    missing: FloatArray,
+    parts: tuple[FloatArray, FloatArray, FloatArray],
+) -> None:
+    """Change the answers so that the pad takes what it conducts at its new temperature, not at its old one."""
+    if not missing.any():
+        return
+    fields, faces, kept = parts
+    cross = film.cross
+    assert cross is not None
+    conductivity, shape = setup.bearing.oil.conductivity, missing.shape
+    field = np.zeros(fields.shape[:2])
+
+    def cooled(face: FloatArray) -> tuple[FloatArray, float]:
+        """What a change of the face's temperature, through the pad, does to it and to the journal."""
+        flux = _into_pad(film, face.reshape(shape))
+        taken = march_one(operator, field, -_station_heat(film, flux))
+        answer = np.empty(shape)
+        face_temperature(film.work, cross.edges, conductivity, field, flux, answer)
+        return answer, taken
+
+    change = minimal_residual(lambda t: t - cooled(t)[0].ravel(), missing.ravel(), CONDUCTION_TOLERANCE)
+    if not np.isfinite(change).all():
+        return
+    answer, taken = cooled(change)
+    faces[0] += answer
+    fields[:, :, 0] += field
+    kept[0] += taken
