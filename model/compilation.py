@@ -28,6 +28,7 @@ KERNELS = (
     "film/cross_film.py",
     "film/cross_march.py",
     "film/energy.py",
+    "film/following_heat.py",
     "film/matrix.py",
     "film/oil_state.py",
     "film/reynolds.py",

@@ -32,6 +32,9 @@ class Options:
     turbulence : {"none", "ng-pan"}
         Resistance and shear of the film: laminar at every Reynolds number, or Ng and Pan's linearised theory, see
         `model.film.turbulence`. Films of idle pads stay laminar.
+    perturbed_heat : bool
+        In the dynamics the films' temperature and viscosity follow the motion (`adiabatic`, `tehd`) instead of staying
+        what they are at rest; see `model.film.following_heat`. What enters a pad keeps its temperature.
     """
 
     conduction: bool = False
@@ -39,11 +42,14 @@ class Options:
     growth: Growth | None = None
     cavitation: str = "swift-stieber"
     turbulence: str = "none"
+    perturbed_heat: bool = False
 
     def __post_init__(self) -> None:
         check_known("cavitation", self.cavitation, FILM_MODELS)
         check_known("turbulence", self.turbulence, TURBULENCE)
         if self.turbulence != "none" and self.cavitation != "swift-stieber":
             raise OptionError(f"a turbulent film ruptures by swift-stieber, not by {self.cavitation!r}")
+        if self.perturbed_heat and (self.cavitation, self.turbulence) != ("swift-stieber", "none"):
+            raise OptionError("perturbed_heat is for laminar films that rupture by swift-stieber")
         if not (self.growth is None or isinstance(self.growth, Growth)):
             raise OptionError(f"growth must be a Growth or None, got {self.growth!r}")

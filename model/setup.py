@@ -125,6 +125,8 @@ class Setup:
         check_known("thermal", self.thermal, THERMAL)
         if self.thermal == "thd" and (self.options.cavitation, self.options.turbulence) != ("swift-stieber", "none"):
             raise OptionError('thermal "thd" is for laminar films that rupture by swift-stieber; take "adiabatic"')
+        if self.thermal == "thd" and self.options.perturbed_heat:
+            raise OptionError('perturbed_heat is for films of one temperature across; take "adiabatic" or "tehd"')
         if not self.bearing.pads:
             raise BearingError("a bearing needs at least one pad")
         if len(self.pivots) != len(self.bearing.pads):

@@ -16,9 +16,10 @@ import numpy as np
 from model.arrays import ComplexArray, FloatArray
 from model.conditions import Condition
 from model.dynamics.pivot_friction import friction_impedance
+from model.film.following_heat import heat_impedance
 from model.setup import Setup
 from model.statics.equilibrium import Equilibrium
-from model.statics.pad_film import PadFilm
+from model.statics.pad_film import PadFilm, oil_constants
 from model.statics.tilt_hold import friction_limits, tilt_hold
 
 
@@ -64,19 +65,11 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
     if film.forces is None:
         return None
     pad, law = film.pad, setup.pivots[film.number - 1]
-    frame = np.array(
-        [
-            [film.normal[0], film.normal[1], 0.0, -1.0],
-            [film.tangent[0], film.tangent[1], film.pivot_radius, 0.0],
-        ]
-    )
     load = float(film.forces.force[0])
     smooth = setup.change(friction=0.0) if setup.friction else setup
     hold = tilt_hold(smooth, film.tilt, load)
     friction = friction_limits(setup, load) if setup.friction else (0.0, math.inf)
-    # where the contact rolls away from the pivot line, a change of the pad's load has a moment
-    moments = frame.copy()
-    moments[0, 2] = hold.arm
+    frame, moments = pad_frames(film, hold.arm)
     offset = mass_centre_offset(setup, film)
     coupling = -pad.mass * offset  # the centre moves outward by eta - b tilt
     return PadMatrices(
@@ -88,6 +81,26 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
         pad_stiffness=np.diag([hold.stiffness + friction[0], law.vibration_stiffness(load)]),
         friction=friction,
     )
+
+
+def pad_frames(film: PadFilm, arm: float) -> tuple[FloatArray, FloatArray]:
+    """J = d(a, b)/d(x, y, theta, eta), (2, 4), and what the film's forces do in these directions.
+
+    Parameters
+    ----------
+    film : PadFilm
+    arm : float
+        Where the contact rolls away from the pivot line, the arm with which the pad's load has a moment [m].
+    """
+    frame = np.array(
+        [
+            [film.normal[0], film.normal[1], 0.0, -1.0],
+            [film.tangent[0], film.tangent[1], film.pivot_radius, 0.0],
+        ]
+    )
+    moments = frame.copy()
+    moments[0, 2] = arm
+    return frame, moments
 
 
 def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
@@ -111,7 +124,9 @@ def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
     return centroid * math.sin(middle)
 
 
-def reduce_pads(pads: list[PadMatrices], omega: FloatArray, vibration: float = 0.0) -> ComplexArray:
+def reduce_pads(
+    pads: list[PadMatrices], omega: FloatArray, vibration: float = 0.0, beside: list[ComplexArray] | None = None
+) -> ComplexArray:
     """Eq. (10): the bearing's 2 x 2 impedance at every excitation frequency.
 
     Parameters
@@ -121,6 +136,8 @@ def reduce_pads(pads: list[PadMatrices], omega: FloatArray, vibration: float = 0
         [rad/s]
     vibration : float
         Amplitude of the journal [m], for pivots with friction.
+    beside : list of (n, 4, 4) complex ndarray, optional
+        What the films' impedances hold besides stiffness and damping, see `model.film.following_heat`.
 
     Returns
     -------
@@ -129,8 +146,10 @@ def reduce_pads(pads: list[PadMatrices], omega: FloatArray, vibration: float = 0
     """
     total = np.zeros((len(omega), 2, 2), dtype=complex)
     s = omega[:, None, None]
-    for pad in pads:
+    for k, pad in enumerate(pads):
         z = pad.stiffness + 1j * s * pad.damping
+        if beside is not None:
+            z = z + beside[k]
         rigid = math.isinf(pad.pad_stiffness[1, 1])  # a rigid pivot: eta takes no part
         keep = slice(2, 3) if rigid else slice(2, 4)
         inner = slice(0, 1) if keep.stop == 3 else slice(0, 2)
@@ -202,7 +221,22 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
         With added mass and series compliance, before any instrument.
     """
     pads = [m for film in equilibrium.films if (m := pad_matrices(setup, film)) is not None]
-    return with_structure(setup, reduce_pads(pads, omega, setup.vibration), omega)
+    beside = None
+    if setup.options.perturbed_heat and setup.thermal != "isothermal":
+        beside = [_heat_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
+    return with_structure(setup, reduce_pads(pads, omega, setup.vibration, beside), omega)
+
+
+def _heat_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
+    """What a temperature that follows the motion adds to a pad's film, (n, 4, 4)."""
+    assert film.forces is not None
+    smooth = setup.change(friction=0.0) if setup.friction else setup
+    frame, moments = pad_frames(film, tilt_hold(smooth, film.tilt, float(film.forces.force[0])).arm)
+    oil, wedge = setup.bearing.oil, (film.pad.pad_clearance, *film.approach(equilibrium.position))
+    heat, given = (oil.specific_heat / film.kept, oil.conductivity / film.kept), oil_constants(oil)
+    speed = equilibrium.surface_speed
+    films = [heat_impedance(film.grid, film.work, wedge, speed, given, heat, float(w)) for w in omega]
+    return np.asarray(moments.T @ np.array(films) @ frame, dtype=np.complex128)
 
 
 def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexArray:

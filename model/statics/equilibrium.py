@@ -29,6 +29,8 @@ class Equilibrium:
         [degC]; NaN where the journal takes no heat.
     status : tuple of Condition
         Named conditions; empty when all is well.
+    surface_speed : float
+        Of the journal [m/s].
     """
 
     position: FloatArray
@@ -38,6 +40,7 @@ class Equilibrium:
     temperature_residual: float
     journal_temperature: float
     status: tuple[Condition, ...]
+    surface_speed: float = math.nan
 
     @property
     def converged(self) -> bool:

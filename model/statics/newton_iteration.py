@@ -164,4 +164,6 @@ def ended(search: Search, figures: tuple[int, float, float], status: tuple[Condi
     if search.limited > 0:
         names.append(conditions.FLOW_BACK)
     names += conditions.regimes(search.setup, search.films, search.surface_speed)
-    return Equilibrium(search.position.copy(), tuple(search.films), *figures, search.journal, tuple(names))
+    return Equilibrium(
+        search.position.copy(), tuple(search.films), *figures, search.journal, tuple(names), search.surface_speed
+    )

@@ -12,7 +12,9 @@ from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.dynamics.reduction import bearing_impedance, mass_centre_offset, pad_matrices, reduce_pads
 from model.effects import Effect
-from model.predict import predict
+from model.options import Options
+from model.pivots import pivot_laws
+from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
 
@@ -129,3 +131,34 @@ def test_default_excitation_is_synchronous(rocker):
     p = predict(rocker, 5000.0, DOWN, SPEED)
     assert p.excitation == SPEED
     assert p.cyy == pytest.approx(p.h[1, 1].imag / SPEED)
+
+
+@pytest.mark.slow
+class TestPerturbedHeat:
+    def test_the_slope_of_a_hot_film_s_locus_is_its_stiffness(self, rocker):
+        # frozen viscosity is 3 to 7 % off it
+        for load, close in ((5000.0, 2e-4), (8750.0, 3e-3)):
+            setup = Setup(rocker, pivot_laws("rigid", rocker), "adiabatic", accuracy=1e-11)
+            setup = setup.change(options=Options(perturbed_heat=True))
+            points = [predict_setup(setup, w, -math.pi / 2, 138.0, 1e-4) for w in (load, 0.999 * load, 1.001 * load)]
+            slope = (points[2].position - points[1].position) / (0.002 * load)
+            moved = np.linalg.solve(points[0].h.real, [0.0, -1.0])
+            assert moved[1] == pytest.approx(slope[1], rel=close)
+            frozen = predict_setup(setup.change(options=Options()), load, -math.pi / 2, 138.0, 1e-4)
+            assert abs(np.linalg.solve(frozen.h.real, [0.0, -1.0])[1] / slope[1] - 1.0) > 0.02
+
+    def test_far_above_the_oil_s_passage_it_is_frozen(self, rocker):
+        # 5 kHz: a hundred times faster than oil passes a pad
+        fast = np.array([2 * math.pi * 5e3])
+        both = [
+            predict(rocker, 5000.0, speed=138.0, excitation=fast, pivots="rigid", options=Options(perturbed_heat=on)).h
+            for on in (False, True)
+        ]
+        assert np.abs(both[1] - both[0]).max() < 2e-3 * np.abs(both[0]).max()
+
+    def test_isothermal_films_have_nothing_to_follow(self, rocker):
+        both = [
+            predict(rocker, 5000.0, speed=138.0, thermal="isothermal", options=Options(perturbed_heat=on)).h
+            for on in (False, True)
+        ]
+        np.testing.assert_array_equal(both[0], both[1])

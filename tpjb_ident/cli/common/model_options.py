@@ -16,6 +16,7 @@ PHYSICS = {
     "journal": "the journal passes heat from hot films to cold ones",
     "growth": "clearances follow the temperatures of journal, housing and pads",
     "jfo": "mass-conserving cavitation",
+    "perturbed-heat": "in the dynamics the films' temperature and viscosity follow the motion",
     "turbulence": "films turn turbulent above a local Reynolds number of 500 to 1,000 (Ng and Pan)",
 }
 Physics = Annotated[
@@ -72,4 +73,5 @@ def parse_physics(names: str | None, housing: str | None) -> Any:
         growth=growth,
         cavitation="jfo" if "jfo" in chosen else "swift-stieber",
         turbulence="ng-pan" if "turbulence" in chosen else "none",
+        perturbed_heat="perturbed-heat" in chosen,
     )

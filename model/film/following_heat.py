@@ -1,0 +1,329 @@
+"""A film's impedance with a temperature and viscosity that follow the motion.
+
+The perturbation of the baseline freezes the viscosity. Here the energy equation is perturbed too, at the excitation
+frequency omega: with h = h0 + h' exp(i omega t), the same for p and T, and mu' = -kappa mu T', rho' = -alpha rho_40 T',
+
+    rho c h (i omega T') + c (m . grad T)' = k (h dT/dz)'_z + made',    div m' + i omega (rho h)' = 0,
+
+m the mass flows, made the dissipation. p' and T' follow from each other; they are found in turn, which contracts as
+the heat does in an equilibrium. The oil enters at its own temperature, and journal and pads keep theirs: they are too
+heavy to follow. At omega = 0 this is the slope of the static locus; far above one turn of oil it is the frozen film.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from model.arrays import ComplexArray, FloatArray
+from model.compilation import compiled
+from model.film.matrix import substitute
+from model.film.mesh import FilmGrid, FilmWork
+from model.film.reynolds import conductances
+from model.film.slopes import keep_ruptured, net_inflow
+
+#: Turns of pressure and heat, and the change of temperature at which they end, as a share of the temperature.
+MOST_TURNS, SETTLED = 60, 1e-7
+
+
+@compiled
+def heat_impedance(
+    grid: FilmGrid,
+    work: FilmWork,
+    wedge: tuple[float, float, float],
+    speed: float,
+    oil: tuple[float, float, float, float],
+    heat: tuple[float, float],
+    omega: float,
+) -> ComplexArray:
+    """What the temperature that follows adds to a film's impedance.
+
+    Parameters
+    ----------
+    grid, work
+        As `model.film.reynolds.solve_film` left them, with a temperature that belongs to the pressure.
+    wedge : tuple of float
+        Cp, a, b [m].
+    speed : float
+        Surface speed of the journal [m/s].
+    oil : tuple of float
+        See `model.statics.pad_film.oil_constants`.
+    heat : tuple of float
+        Specific heat [J/kg/K] and conductivity [W/m/K] of the oil.
+    omega : float
+        [rad/s]
+
+    Returns
+    -------
+    (2, 2) complex ndarray
+        By (a, b) [N/m]; NaN if pressure and heat do not settle.
+    """
+    gx, gz = conductances(grid, work, wedge[0], wedge[1], wedge[2])
+    nt, nz = gx.shape[0], gz.shape[1]
+    out = np.zeros((2, 2), dtype=np.complex128)
+    loss = _local_loss(grid, work, speed, oil, heat, omega)
+    for axis in range(2):
+        thicker = -grid.cos if axis == 0 else -grid.sin
+        warmer = np.zeros((nt + 1, nz + 1), dtype=np.complex128)
+        settled = False
+        answer = np.zeros(work.unknown.shape[0], dtype=np.complex128)
+        for _ in range(MOST_TURNS):
+            pressure = np.zeros((nt + 1, nz + 1), dtype=np.complex128)
+            for i in range(1, nt):
+                for j in range(grid.first, nz):
+                    k = (i - 1) * (nz - grid.first) + j - grid.first
+                    frozen = work.slopes[k, axis] + 1j * omega * work.slopes[k, 2 + axis]
+                    pressure[i, j] = frozen + answer[k]
+            new = _temperature(grid, work, speed, oil, heat, (gx, gz), thicker, warmer, pressure, loss)
+            change, size = 0.0, 1e-300
+            for i in range(nt + 1):
+                for j in range(nz + 1):
+                    change = max(change, abs(new[i, j] - warmer[i, j]))
+                    size = max(size, abs(new[i, j]))
+            warmer = new
+            _pressure(grid, work, speed, oil, omega, warmer, answer)
+            if change < SETTLED * size:
+                settled = True
+                break
+        for i in range(1, nt):
+            total = 0.0 + 0.0j
+            for j in range(grid.first, nz):
+                total += grid.area[i, j] * answer[(i - 1) * (nz - grid.first) + j - grid.first]
+            out[0, axis] += grid.cos[i] * total
+            out[1, axis] += grid.sin[i] * total
+        if not settled:
+            out[:, axis] = np.nan
+    return out
+
+
+@compiled
+def _lighter(work: FilmWork, oil: tuple[float, float, float, float], i: int, j: int) -> tuple[float, float]:
+    """Relative change of the density, and of density over viscosity, per kelvin."""
+    density = -oil[2] * oil[3] / work.density[i, j]
+    return density, density + oil[1]
+
+
+@compiled
+def _pressure(
+    grid: FilmGrid,
+    work: FilmWork,
+    speed: float,
+    oil: tuple[float, float, float, float],
+    omega: float,
+    warmer: ComplexArray,
+    answer: ComplexArray,
+) -> None:
+    """Change of pressure by a change of temperature, into `answer` (unknowns,)."""
+    h = work.thickness
+    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
+    along = np.empty((nt, nz + 1, 1), dtype=np.complex128)
+    across = np.empty((nt + 1, nz, 1), dtype=np.complex128)
+    for i in range(nt):
+        for j in range(nz + 1):
+            couette, denser, ratio = _face(grid, work, speed, oil, warmer, i, j)
+            along[i, j, 0] = couette * denser - (couette - work.flow_x[i, j]) * ratio
+    for i in range(nt + 1):
+        for j in range(nz):
+            across[i, j, 0] = work.flow_z[i, j] * _side(work, oil, warmer, i, j)
+    given: Any = answer  # the loops of the real ones are compiled for complex numbers too
+    rhs = given.reshape((answer.shape[0], 1))
+    net_inflow(along, across, grid.first, rhs)
+    for i in range(1, nt):
+        for j in range(grid.first, nz):
+            k = (i - 1) * (nz - grid.first) + j - grid.first
+            stored = work.density[i, j] * _lighter(work, oil, i, j)[0] * warmer[i, j] * h[i, j]
+            rhs[k, 0] -= 1j * omega * stored * grid.dx * grid.height[j]
+    keep_ruptured(work, grid.first, rhs)
+    substitute(work.band, given)
+
+
+@compiled
+def _face(
+    grid: FilmGrid,
+    work: FilmWork,
+    speed: float,
+    oil: tuple[float, float, float, float],
+    warmer: ComplexArray,
+    i: int,
+    j: int,
+) -> tuple[float, complex, complex]:
+    """Couette flow of a face along [kg/s], relative change of its density and of its density over viscosity."""
+    one, two = work.density[i, j], work.density[i + 1, j]
+    light, other = one / work.viscosity[i, j], two / work.viscosity[i + 1, j]
+    couette = 0.125 * speed * (work.thickness[i, j] + work.thickness[i + 1, j]) * (one + two) * grid.height[j]
+    here, there = _lighter(work, oil, i, j), _lighter(work, oil, i + 1, j)
+    denser = (one * here[0] * warmer[i, j] + two * there[0] * warmer[i + 1, j]) / (one + two)
+    ratio = (light * here[1] * warmer[i, j] + other * there[1] * warmer[i + 1, j]) / (light + other)
+    return couette, denser, ratio
+
+
+@compiled
+def _side(work: FilmWork, oil: tuple[float, float, float, float], warmer: ComplexArray, i: int, j: int) -> complex:
+    """Relative change of density over viscosity at a face across."""
+    light = work.density[i, j] / work.viscosity[i, j]
+    other = work.density[i, j + 1] / work.viscosity[i, j + 1]
+    here, there = _lighter(work, oil, i, j)[1], _lighter(work, oil, i, j + 1)[1]
+    return complex((light * here * warmer[i, j] + other * there * warmer[i, j + 1]) / (light + other))
+
+
+@compiled
+def _local_loss(
+    grid: FilmGrid,
+    work: FilmWork,
+    speed: float,
+    oil: tuple[float, float, float, float],
+    heat: tuple[float, float],
+    omega: float,
+) -> ComplexArray:
+    """What a kelvin at a node stores and makes less, per station [W/K]."""
+    p, h, mu = work.pressure, work.thickness, work.viscosity
+    out = np.empty(p.shape, dtype=np.complex128)
+    for i in range(p.shape[0]):
+        for j in range(p.shape[1]):
+            station = grid.dx * grid.height[j]
+            steep = _steepness(grid, p, p, i, j)
+            shear, pressed = mu[i, j] * speed**2 / h[i, j], h[i, j] ** 3 / (12.0 * mu[i, j]) * steep
+            stored = 1j * omega * work.density[i, j] * heat[0] * h[i, j]
+            out[i, j] = (stored + oil[1] * (shear - pressed)) * station + work.exchange[i, j]
+    return out
+
+
+@compiled
+def _steepness(grid, p, q, i, j):  # type: ignore[no-untyped-def]
+    """Product of the gradients of p and q at a node, as `model.film.energy.dissipation` takes them."""
+    nt, nz = p.shape[0] - 1, p.shape[1] - 1
+    total, sides = 0.0 * q[i, j], 0
+    if i > 0:
+        total += (p[i, j] - p[i - 1, j]) * (q[i, j] - q[i - 1, j])
+        sides += 1
+    if i < nt:
+        total += (p[i + 1, j] - p[i, j]) * (q[i + 1, j] - q[i, j])
+        sides += 1
+    total /= sides * grid.dx * grid.dx
+    if j == nz:
+        total += (p[i, nz] - p[i, nz - 1]) * (q[i, nz] - q[i, nz - 1]) / grid.dz[nz - 1] ** 2
+    elif j > 0:
+        wide = grid.dz[j] + grid.dz[j - 1]
+        total += (p[i, j + 1] - p[i, j - 1]) * (q[i, j + 1] - q[i, j - 1]) / wide**2
+    elif grid.first == 1:
+        total += (p[i, 1] - p[i, 0]) * (q[i, 1] - q[i, 0]) / grid.dz[0] ** 2
+    return total
+
+
+@compiled
+def _temperature(
+    grid: FilmGrid,
+    work: FilmWork,
+    speed: float,
+    oil: tuple[float, float, float, float],
+    heat: tuple[float, float],
+    conductance: tuple[FloatArray, FloatArray],
+    thicker: FloatArray,
+    warmer: ComplexArray,
+    pressure: ComplexArray,
+    loss: ComplexArray,
+) -> ComplexArray:
+    """March the change of temperature for changes of thickness and pressure, (nt + 1, nz + 1) [K/m]."""
+    gx, gz = conductance
+    t, h = work.temperature, work.thickness
+    nt, nz = gx.shape[0], gz.shape[1]
+    out = np.zeros((nt + 1, nz + 1), dtype=np.complex128)
+    made = np.empty((2, nz + 1), dtype=np.complex128)
+    lower, main = np.zeros(nz + 1, dtype=np.complex128), np.zeros(nz + 1, dtype=np.complex128)
+    upper, right = np.zeros(nz + 1, dtype=np.complex128), np.zeros(nz + 1, dtype=np.complex128)
+    sides = np.zeros((2, nz), dtype=np.complex128)
+    _made(grid, work, speed, thicker, pressure, 0, made[1])
+    _sides(work, oil, gz, thicker, warmer, pressure, 0, sides[1])
+    for i in range(nt):
+        made[0], sides[0] = made[1], sides[1]
+        _made(grid, work, speed, thicker, pressure, i + 1, made[1])
+        _sides(work, oil, gz, thicker, warmer, pressure, i + 1, sides[1])
+        thick = 0.5 * (thicker[i] + thicker[i + 1])
+        for j in range(nz + 1):
+            couette, denser, ratio = _face(grid, work, speed, oil, warmer, i, j)
+            share = thick / (0.5 * (h[i, j] + h[i + 1, j]))
+            driven = couette - work.flow_x[i, j]
+            flow = couette * (share + denser) - driven * (3.0 * share + ratio)
+            flow -= gx[i, j] * (pressure[i + 1, j] - pressure[i, j])
+            advect = heat[0] * work.flow_x[i, j]
+            value = 0.5 * (made[0, j] + made[1, j]) - heat[0] * flow * (t[i + 1, j] - t[i, j])
+            low, high = 0.0, 0.0
+            if j > 0:
+                south, more = (
+                    0.5 * (work.flow_z[i, j - 1] + work.flow_z[i + 1, j - 1]),
+                    0.5 * (sides[0, j - 1] + sides[1, j - 1]),
+                )
+                film = 0.25 * (h[i, j] + h[i, j - 1] + h[i + 1, j] + h[i + 1, j - 1])
+                pass_on = heat[1] * grid.dx / grid.dz[j - 1]
+                low, changed = -0.5 * (0.5 * heat[0] * south + pass_on * film), -0.25 * heat[0] * more
+                if j == nz:
+                    low = -0.25 * heat[0] * max(south, 0.0)
+                    changed = changed if south > 0.0 else 0.0 * changed
+                else:
+                    changed -= 0.5 * pass_on * thick
+                value -= changed * (t[i + 1, j - 1] - t[i + 1, j] + t[i, j - 1] - t[i, j])
+                value -= low * (out[i, j - 1] - out[i, j])
+            if j < nz:
+                north, more = 0.5 * (work.flow_z[i, j] + work.flow_z[i + 1, j]), 0.5 * (sides[0, j] + sides[1, j])
+                film = 0.25 * (h[i, j] + h[i, j + 1] + h[i + 1, j] + h[i + 1, j + 1])
+                pass_on = heat[1] * grid.dx / grid.dz[j]
+                high, changed = -0.5 * (-0.5 * heat[0] * north + pass_on * film), 0.25 * heat[0] * more
+                if j == 0 and grid.first == 1:
+                    high = -0.25 * heat[0] * max(-north, 0.0)
+                    changed = changed if north < 0.0 else 0.0 * changed
+                else:
+                    changed -= 0.5 * pass_on * thick
+                value -= changed * (t[i + 1, j + 1] - t[i + 1, j] + t[i, j + 1] - t[i, j])
+                value -= high * (out[i, j + 1] - out[i, j])
+            right[j] = value + (advect - 0.5 * loss[i, j]) * out[i, j]
+            lower[j], main[j], upper[j] = low, advect - low - high + 0.5 * loss[i + 1, j], high
+        for j in range(1, nz + 1):
+            scale = lower[j] / main[j - 1]
+            main[j] -= scale * upper[j - 1]
+            right[j] -= scale * right[j - 1]
+        right[nz] /= main[nz]
+        for j in range(nz - 1, -1, -1):
+            right[j] = (right[j] - upper[j] * right[j + 1]) / main[j]
+        out[i + 1] = right
+    return out
+
+
+@compiled
+def _made(
+    grid: FilmGrid,
+    work: FilmWork,
+    speed: float,
+    thicker: FloatArray,
+    pressure: ComplexArray,
+    i: int,
+    made: ComplexArray,
+) -> None:
+    """Change of the heat made at a station, at the old temperature [W/m]."""
+    for j in range(made.shape[0]):
+        h, mu = work.thickness[i, j], work.viscosity[i, j]
+        share, wide = thicker[i] / h, h**3 / (12.0 * mu)
+        steep, turned = (
+            _steepness(grid, work.pressure, work.pressure, i, j),
+            _steepness(grid, work.pressure, pressure, i, j),
+        )
+        density = -mu * speed**2 / h * share + wide * (3.0 * share * steep + 2.0 * turned)
+        made[j] = density * grid.dx * grid.height[j]
+
+
+@compiled
+def _sides(
+    work: FilmWork,
+    oil: tuple[float, float, float, float],
+    gz: FloatArray,
+    thicker: FloatArray,
+    warmer: ComplexArray,
+    pressure: ComplexArray,
+    i: int,
+    sides: ComplexArray,
+) -> None:
+    """Change of the flows across at a station [kg/s/m]."""
+    for j in range(sides.shape[0]):
+        share = 2.0 * thicker[i] / (work.thickness[i, j] + work.thickness[i, j + 1])
+        changed = work.flow_z[i, j] * (3.0 * share + _side(work, oil, warmer, i, j))
+        sides[j] = changed - gz[i, j] * (pressure[i, j + 1] - pressure[i, j])
