@@ -52,8 +52,10 @@ def able(setup: Setup) -> bool:
 
 
 def _felt(setup: Setup) -> Options:
-    """Options without those that do nothing where films keep their inlet's temperature, and those already done."""
-    options = dataclasses.replace(setup.options, growth=None) if setup.grown else setup.options
+    """Options without those that do nothing in the statics, or where films keep their inlet's temperature."""
+    options = dataclasses.replace(setup.options, perturbed_heat=False)
+    if setup.grown:
+        options = dataclasses.replace(options, growth=None)
     if setup.thermal != "isothermal":
         return options
     return dataclasses.replace(options, conduction=False, isothermal_journal=False)

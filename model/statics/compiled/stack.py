@@ -219,6 +219,6 @@ def work_of(works: FilmWork, m: int) -> FilmWork:
     """
     return FilmWork(
         works.pressure[m], works.ruptured[m], works.temperature[m], works.viscosity[m], works.density[m],
-        works.drag[m], works.exchange[m], works.gained[m], works.thickness[m], works.extra[m], works.flow_x[m], works.flow_z[m],
-        works.band[m], works.unknown[m], works.slopes[m],
+        works.drag[m], works.exchange[m], works.gained[m], works.thickness[m], works.extra[m], works.flow_x[m],
+        works.flow_z[m], works.band[m], works.unknown[m], works.slopes[m],
     )  # fmt: skip
