@@ -14,6 +14,10 @@ from tpjb_ident.dynamic.spectral_lines.windows import line_design
 
 #: A line whose amplitude may change needs this distance from all others [1 / record length].
 _PARTED = 2.5
+#: Where the noise beside a line is looked at [half of 1 / record length].
+_BESIDE = (5, 7, 9, 11, 15)
+#: Samples that tell the scale of what a fit leaves.
+_SCALED = 4096
 
 
 @dataclass(frozen=True)
@@ -92,11 +96,11 @@ def _robust(design: FloatArray, values: FloatArray) -> tuple[FloatArray, BoolArr
     """
     complete = np.isfinite(values).all(axis=0)
     coefficients, used = np.zeros((design.shape[1], values.shape[1])), np.isfinite(values)
-    gram = np.einsum("nk,nl->kl", design, design)  # einsum starts no threads
-    right = np.einsum("nk,nm->km", design, np.where(used, values, 0.0))
-    coefficients = np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ right
-    size = np.abs(values - np.einsum("nk,km->nm", design, coefficients))
-    scale = 1.4826 * np.median(size, axis=0)
+    right = design.T @ np.where(used, values, 0.0)
+    coefficients = np.linalg.pinv(design.T @ design, rcond=1e-12, hermitian=True) @ right
+    size = np.abs(values - design @ coefficients)
+    # a few thousand samples tell the scale
+    scale = 1.4826 * np.median(size[:: max(1, len(size) // _SCALED)], axis=0)
     clean = size.max(axis=0) <= np.maximum(GLITCH_LIMIT * scale, 1e-10 * np.abs(coefficients).sum(axis=0))
     for k in np.flatnonzero(~(complete & clean)):
         found = fit_without_glitches(design, values[:, k : k + 1], np.array([np.inf]))
@@ -106,11 +110,15 @@ def _robust(design: FloatArray, values: FloatArray) -> tuple[FloatArray, BoolArr
 
 def _floor(time: FloatArray, rest: FloatArray, frequency: float, span: float) -> FloatArray:
     """Median amplitude of what is left, at frequencies around the wanted one, per column."""
-    offsets = np.array([-7.5, -5.5, -4.5, -3.5, -2.5, 2.5, 3.5, 4.5, 5.5, 7.5]) / span
-    near = frequency + offsets
-    angles = 2 * math.pi * np.outer(near[near > 0], time)
-    real, imaginary = (np.einsum("fn,nm->fm", f(angles), rest) for f in (np.cos, np.sin))
-    return np.asarray(np.median(np.hypot(real, imaginary), axis=0) * 2.0 / len(time))
+    line, half = (np.exp(2j * math.pi * f * (time - time[0])) for f in (frequency, 0.5 / span))
+    step, beside = half * half, half
+    waves = []
+    for halves in range(3, 17, 2):  # 2.5, 3.5, .. of a line's width beside it
+        beside = beside * step
+        if halves in _BESIDE:
+            waves += [line * beside] + ([line * beside.conj()] if frequency > 0.5 * halves / span else [])
+    both = np.array(waves)
+    return np.asarray(np.median(np.hypot(both.real @ rest, both.imag @ rest), axis=0) * 2.0 / len(time))
 
 
 def strongest_line(time: FloatArray, values: FloatArray, apart_from: Sequence[float]) -> float:

@@ -24,6 +24,8 @@ from tpjb_ident.check.signals import check_signal, needed
 BLOCK = 2**19
 _FITTED = 2**16
 _DECIMATED = 4000
+#: Samples that tell the quantiles of a channel, and whether it has noise.
+_SPREAD = 8192
 
 
 @dataclass(frozen=True)
@@ -182,7 +184,7 @@ def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: R
     if not main:
         return run.kind != "dynamic"
     for index in main:
-        column = used[:_FITTED, index]
+        column = used[:_SPREAD, index]
         column = column[np.isfinite(column)]
         if len(column) < 10:
             return False
@@ -208,7 +210,7 @@ def _lines(run: Run, channels: Sequence[Channel], time: FloatArray, values: Floa
 def _spread(values: FloatArray) -> FloatArray:
     """Quantiles column by column; NaN where a column has no value."""
     spread = np.full((3, values.shape[1]), np.nan)
-    for index, column in enumerate(values.T):
+    for index, column in enumerate(values[:: max(1, len(values) // _SPREAD)].T):
         known = column[np.isfinite(column)]
         if len(known):
             spread[:, index] = np.quantile(known, [0.02, 0.5, 0.98])

@@ -17,6 +17,9 @@ from rigdata.run import Run
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.dynamic.records.short_record import SHORT
 
+#: What the checks look at: so many samples, or so many seconds if that is more, of those that are kept.
+LOOK, SECONDS = 2**14, 2.0
+
 
 class KeptReadings:
     """A run's reader that keeps the first samples of all channels.
@@ -33,7 +36,7 @@ class KeptReadings:
 
     def __init__(self, reader: Any, channels: Sequence[str], samples: int = SHORT) -> None:
         self._reader, self._channels = reader, tuple(channels)
-        self._samples = min(samples, reader.length())
+        self.samples = min(samples, reader.length())
         self._kept: dict[str, FloatArray] | None = None
         self._time: FloatArray | None = None
 
@@ -49,7 +52,7 @@ class KeptReadings:
         start, stop : int
             First sample, and the one after the last.
         """
-        kept = self._beginning() if stop <= self._samples else {}
+        kept = self._beginning() if stop <= self.samples else {}
         if all(name in kept for name in names):
             return [kept[name][start:stop] for name in names]
         return list(self._reader.read(names, start, stop))
@@ -62,16 +65,16 @@ class KeptReadings:
         start, stop : int
             First sample, and the one after the last.
         """
-        if stop > self._samples:
+        if stop > self.samples:
             return np.asarray(self._reader.time(start, stop))
         if self._time is None:
-            self._time = np.asarray(self._reader.time(0, self._samples))
+            self._time = np.asarray(self._reader.time(0, self.samples))
         return self._time[start:stop].copy()
 
     def _beginning(self) -> dict[str, FloatArray]:
         if self._kept is None:
             try:
-                values = self._reader.read(self._channels, 0, self._samples)
+                values = self._reader.read(self._channels, 0, self.samples)
             except RigDataError:  # told by whoever needs the channel that cannot be read
                 self._kept = {}
             else:
@@ -82,22 +85,24 @@ class KeptReadings:
 
 
 class Beginning:
-    """A run's reader that ends where `KeptReadings` does.
+    """A run's reader that ends after the first samples.
 
     Parameters
     ----------
     reader : KeptReadings
+    samples : int
+        How many; those kept at most.
     """
 
-    def __init__(self, reader: KeptReadings) -> None:
-        self._reader = reader
+    def __init__(self, reader: KeptReadings, samples: int) -> None:
+        self._reader, self._length = reader, min(samples, reader.samples)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._reader, name)
 
     def length(self) -> int:
         """Samples per channel."""
-        return self._reader._samples
+        return self._length
 
 
 def with_kept_beginning(run: Run) -> Run:
@@ -115,11 +120,13 @@ def with_kept_beginning(run: Run) -> Run:
 
 
 def beginning_of(run: Run) -> Run | None:
-    """As much of the run as is kept, as a run of its own; None where nothing is.
+    """The first seconds of a run whose readings are kept, as a run of its own; None where they are not.
 
     Parameters
     ----------
     run : rigdata.run.Run
     """
     reader = getattr(run, "reader", None)
-    return replace(run, reader=Beginning(reader)) if isinstance(reader, KeptReadings) else None
+    if not isinstance(reader, KeptReadings):
+        return None
+    return replace(run, reader=Beginning(reader, max(LOOK, round(SECONDS * run.sample_rate))))

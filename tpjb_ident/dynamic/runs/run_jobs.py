@@ -18,6 +18,7 @@ from rigdata.run import Run
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.records.kept_readings import beginning_of, with_kept_beginning
+from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.dynamic.runs.dead_channels import dead_accelerometers
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
@@ -165,15 +166,19 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResul
             raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
         conditions = merged(phasors.conditions, dead_accelerometers(kept, phasors), _mended(run))
         result = replace(phasors, conditions=conditions)
-        return RunResult(result, mean_temperatures(kept), _seen(run, kept, settings))
+        return RunResult(result, mean_temperatures(kept), _seen(run, kept, phasors))
 
 
-def _seen(run: Run, kept: Run, settings: PhasorSettings) -> Observation | None:
-    """What the checks make of the run's beginning; records that several lines were asked of are no case for them."""
+def _seen(run: Run, kept: Run, phasors: RunPhasors) -> Observation | None:
+    """What the checks make of the run's beginning, at the excitation frequency that was found in it.
+
+    Records that hold several excitations are no case for them.
+    """
     beginning = beginning_of(kept)
-    if beginning is None or settings.excitation_lines:
+    if beginning is None or len(phasors.lines.excitation) != 1:
         return None
-    return of_run(observe(beginning), run)
+    omega = 2 * np.pi * phasors.lines.excitation[0].frequency
+    return of_run(observe(replace(beginning, point=replace(run.point, excitation=omega))), run)
 
 
 def _mended(run: Run) -> tuple[Condition, ...]:
