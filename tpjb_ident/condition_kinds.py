@@ -148,6 +148,8 @@ NOTES = {
     "drive-not-locked": "The excitation's phase wandered between windows; they were turned to one phase first.",
     "excitation off set point": "The excitation was found at another frequency than the manifest says; the found "
     "one was used to fit.",
+    "inertia-negligible": "There are no accelerometers; by its mass the housing's inertia is a small part of the "
+    "force, also on soft cells.",
     "give-extrapolated": "The sweep pushes with less than the dry tests did: what the pivots give is "
     "extrapolated, and the sweep itself corrects it.",
     "give-from-sweep": "There are no pivot curves: what the pivots give under the push load was extrapolated.",

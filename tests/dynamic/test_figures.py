@@ -25,11 +25,12 @@ from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.dynamic.settings import IdentifySettings
 
 
-def run(name, direction=0.5, n=4, lost=None, acceleration="yes"):
+def run(name, direction=0.5, n=4, lost=None, acceleration="yes", mass=30.0):
     lost_d, lost_f = lost or (np.zeros(n), np.zeros(n))
     mean = np.tile([3.0, -4.0], (n, 1))
     return SimpleNamespace(
         run=name, direction=direction, start=10.0 + 0.5 * np.arange(n), acceleration=acceleration, conditions=(),
+        housing_mass=mass,
         displacement=SimpleNamespace(lost=lost_d, mean=mean), cell_force=SimpleNamespace(lost=lost_f, mean=2 * mean),
     )  # fmt: skip
 
@@ -126,6 +127,8 @@ def test_flags_are_raised_beyond_their_limits_only():
     lost = stiff(np.full((2, 2), np.nan))
     bare = data_of(np.ones((8, 2)), (run("a", acceleration=None), run("b", acceleration=None)))
     assert flagged(bare) == ("inertia-not-corrected",)
+    light = data_of(np.ones((8, 2)), (run("a", acceleration=None, mass=1.0), run("b", acceleration=None)))
+    assert flagged(light) == ("inertia-negligible",)
     assert flagged(bare, lost, figure=math.nan) == ()
 
 

@@ -13,7 +13,7 @@ from scipy.stats import t as student_t
 
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import apparent_change, gain_draws
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.results.amplitude import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
+from tpjb_ident.dynamic.instruments.amplitude import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
 from tpjb_ident.dynamic.results.frequency_fit import REFUSED, fit_over_frequency, fits_per_load
 from tpjb_ident.dynamic.spectral_lines.lines import Line, LineSet, LineSettings, known_lines
 from tpjb_ident.dynamic.spectral_lines.windows import WindowSettings, line_design, plan_windows, variance_inflation

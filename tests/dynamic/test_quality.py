@@ -11,9 +11,9 @@ from rigdata.operating_point import OperatingPoint
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import apparent_change, gain_draws
 from tpjb_ident.dynamic.corrections.static_load import load_misses, load_slopes, to_set_point, widened
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
+from tpjb_ident.dynamic.instruments.amplitude import amplitude_slope
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import RunPhasors
-from tpjb_ident.dynamic.results.amplitude import amplitude_slope
 from tpjb_ident.dynamic.results.frequency_fit import fit_over_frequency
 from tpjb_ident.dynamic.results.quality import amplitude, coherence, directional_pattern, flags, rejected_windows
 from tpjb_ident.dynamic.runs.point_data import PointData, gather

@@ -13,7 +13,7 @@ from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_tab
 from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
 from tpjb_ident.dynamic.estimators.rlm import RlmSettings
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.results.amplitude import AmplitudeSlope, amplitude_slope
+from tpjb_ident.dynamic.instruments.amplitude import AmplitudeSlope, amplitude_slope
 from tpjb_ident.dynamic.results.point_result import PointResult, WindowVerdict
 from tpjb_ident.dynamic.results.quality import (
     amplitude,

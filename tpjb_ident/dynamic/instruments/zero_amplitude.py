@@ -14,8 +14,8 @@ import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.instruments.amplitude import amplitude_slope
 from tpjb_ident.dynamic.records.mains_line import complex_median
-from tpjb_ident.dynamic.results.amplitude import amplitude_slope
 from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: G is expected to be below this many times what the second harmonic lets expect, one standard deviation:

@@ -9,7 +9,7 @@ from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.results.amplitude import AmplitudeSlope
+from tpjb_ident.dynamic.instruments.amplitude import AmplitudeSlope
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.instruments.housing_balance import HARMLESS, SOFT
 from tpjb_ident.dynamic.results.point_result import WindowVerdict
 from tpjb_ident.dynamic.runs.point_data import PointData
 
@@ -119,7 +120,7 @@ def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> tup
         found.append(Condition("low-coherence", f"coherence {coherence:.3f} < {MIN_COHERENCE}"))
     found += _missing(data)
     if len(data.runs) and data.runs[0].acceleration is None and np.isfinite(stiffness.h).all():
-        found.append(Condition("inertia-not-corrected", "no accelerometers: the housing's inertia stays in F"))
+        found.append(_inertia_left(data.runs[0].housing_mass, stiffness.omega))
     if _feeds_motion(stiffness):
         found.append(
             Condition(
@@ -128,6 +129,13 @@ def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> tup
             )
         )
     return tuple(found)
+
+
+def _inertia_left(mass: float, omega: float) -> Condition:
+    """What the housing's inertia may come to where nothing measures it: on soft cells."""
+    share = mass * omega**2 / SOFT
+    told = f"no accelerometers: the housing's inertia stays in F, {100 * share:.2g} % of it on soft cells"
+    return Condition("inertia-not-corrected" if share > HARMLESS else "inertia-negligible", told)
 
 
 def _complete(data: PointData) -> BoolArray:
