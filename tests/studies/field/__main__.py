@@ -1,10 +1,11 @@
 """Prints the battery's table.
 
-    python -m tests.studies.field [--seeds 20] [--first-seed N] [--only WORDS] [--rows FILE] [--table FILE ..]
+    python -m tests.studies.field [--seeds 20] [--first-seed N] [--only WORDS] [--rows FILE] [--table FILE ..] [--docs]
 
 With ``--rows`` every campaign's outcome is added to a file of JSON lines as it comes, and what the file holds already
 is not run again: a study that was stopped goes on, and more seeds join the former ones. ``--table`` only prints what
-such files hold. Limits of the product were once set while looking at seeds 1000 to 1002; figures are from others.
+such files hold, ``--docs`` in the form of docs/robustness.md. Limits of the product were once set while looking at
+seeds 1000 to 1002; figures are from others.
 """
 
 from __future__ import annotations
@@ -66,6 +67,17 @@ def line(row: Row, outcomes: Sequence[Outcome], seconds: float) -> str:
     )
 
 
+def docs_line(row: Row, outcomes: Sequence[Outcome], seconds: float) -> str:
+    """One row of the table in the documentation."""
+    words = Counter(o.word for o in outcomes)
+    entries = sum(o.entries for o in outcomes)
+    inside = f"{100 * sum(o.inside for o in outcomes) / entries:.0f}" if entries else ""
+    widths = sorted(w for o in outcomes for w in o.width)
+    width = f"{100 * widths[len(widths) // 2]:.2g}" if widths else ""
+    counts = " / ".join(str(words[w]) for w in ("right", "told", "silent", "crash"))
+    return f"| {row.name} | {row.wish} | {counts} | {inside} | {width} |"
+
+
 def options() -> argparse.Namespace:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -73,6 +85,7 @@ def options() -> argparse.Namespace:
     parser.add_argument("--first-seed", type=int, default=1000)
     parser.add_argument("--only", default="", help="rows whose names hold one of these words, apart by |")
     parser.add_argument("--rows", type=Path, help="file of JSON lines that outcomes are added to and taken from")
+    parser.add_argument("--docs", action="store_true", help="lines of a Markdown table")
     parser.add_argument("--table", type=Path, nargs="+", help="print what these files hold, run nothing")
     return parser.parse_args()
 
@@ -81,14 +94,16 @@ def main() -> None:
     """Run or print the battery."""
     given = options()
     wanted = [row for row in rows() if any(w in row.name.lower() for w in given.only.lower().split("|"))]
-    print(f"{'condition':74s} wish  right told silent crash in% width% flag%  s  named")
+    shown = docs_line if given.docs else line
+    if not given.docs:
+        print(f"{'condition':74s} wish  right told silent crash in% width% flag%  s  named")
     total: Counter[str] = Counter()
     for row in wanted:
         found = table_outcomes(given.table, row) if given.table else row_outcomes(given, row)
         if found:
             outcomes = [o for o, _ in found]
             total.update(o.word for o in outcomes)
-            print(line(row, outcomes, sum(s for _, s in found) / len(found)), flush=True)
+            print(shown(row, outcomes, sum(s for _, s in found) / len(found)), flush=True)
     print(", ".join(f"{word} {total[word]}" for word in ("right", "told", "silent", "crash")))
 
 
