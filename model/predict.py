@@ -229,7 +229,7 @@ GROWTH_TOLERANCE = 0.01
 MAX_GROWTH_STEPS = 20
 #: As long as the journal's temperature moves by more than this from one equilibrium to the next [K], they are found to
 #: this share of the load only.
-ROUGH_GROWTH, ROUGH_ACCURACY = 0.5, 1e-4
+ROUGH_GROWTH, ROUGH_ACCURACY = 0.5, 1e-3
 
 
 def _check_point(load: float, direction: float, speed: float, omega: FloatArray) -> None:

@@ -27,11 +27,11 @@ from tests.studies.robustness_model import Case, draw
 
 
 def turbulence(case: Case, rng: np.random.Generator) -> Prediction:
-    """Oil up to twenty times thinner: Reynolds numbers to some ten thousand."""
+    """Oil up to twenty times thinner, as far as the Sommerfeld number is one of a running bearing."""
     from dataclasses import replace
 
-    oil = case.bearing.oil
-    thin = replace(case.bearing, oil=replace(oil, viscosity_40=oil.viscosity_40 * 20.0 ** -rng.random()))
+    oil, most = case.bearing.oil, min(20.0, case.sommerfeld / 0.03)
+    thin = replace(case.bearing, oil=replace(oil, viscosity_40=oil.viscosity_40 * most ** -rng.random()))
     options = Options(turbulence="ng-pan")
     return predict(thin, case.load, case.direction, case.speed, pivots=case.stiffness, options=options)
 
@@ -104,7 +104,7 @@ def study(kind: str, cases: list[Case], first: int) -> tuple[Counter[str], int, 
             continue
         converged += p.converged
         if not p.converged:
-            names[" | ".join(s for s in p.status if "idle" not in s)] += 1
+            names[" and ".join(s for s in p.status if "idle" not in s)] += 1
             print(kind, k, p.status, f"S {case.sommerfeld:.3g}", flush=True)
         if said := fault(p):
             faults.append(f"{kind} {k}: {said}")
