@@ -61,6 +61,8 @@ ERRORS = {
     "or a load in quite another direction; the coefficients are then off by as much. Check sensitivity, "
     "full_scale, excitation, polarity and axes of the cells.",
     "contact-never-complete": "The shaft never came into full contact: this curve is not the pivot's stiffness.",
+    "excitation-too-weak": "At most lines of the band the displacements do not stand clear of their noise: intervals "
+    "there cannot hold. Excite harder, record longer, or narrow the band.",
     "fewer-than-two-directions": "All displacements lie along one line; a 2x2 matrix needs two directions. Excite "
     "in another direction too.",
     "ill-conditioned": "The displacement directions are almost parallel, so errors are strongly amplified. Excite "
@@ -114,6 +116,9 @@ WARNINGS = {
     "moves-aside": "The shaft slides far across the pad while it is pressed: only the part along the pad counts, "
     "but look at the pad's fit and at the probes.",
     "no-holds": "The load never stood still, so drift cannot be told from deflection.",
+    "no-instrument": "Neither a command channel nor repeats tell signal from noise over the band: noise on the "
+    "displacements lowers H1, noise on the force raises H2, and the intervals reach from one to the other. Record the "
+    "command, or excite periodically.",
     "no-reference": "The runs do not state two excitation directions, so they cannot serve as instruments.",
     "no-repeats": "Too few repeats per direction to measure the noise: displacement noise is not corrected for. "
     "Record longer.",
@@ -153,6 +158,7 @@ NOTES = {
     "give-extrapolated": "The sweep pushes with less than the dry tests did: what the pivots give is "
     "extrapolated, and the sweep itself corrects it.",
     "give-from-sweep": "There are no pivot curves: what the pivots give under the push load was extrapolated.",
+    "lines-left-out": "Lines of the shaft or the mains stand in the band; the bins next to them are left out.",
     "law-undecided": "Several laws fit about equally well; the band holds their difference.",
     "load-off-pad": "The load is off the pad's direction; it was projected.",
     "mains corrected": "Pick-up on the mains frequency was estimated from the other runs and taken off.",

@@ -115,6 +115,7 @@ ENDINGS = {
     "_se_systematic": "standard error from the calibration",
     "_random95": "half of the random part's 95 % interval",
     "_systematic95": "half of the calibration's 95 % interval",
+    "_dof": "degrees of freedom of `_se`",
     "_predicted": "what the model gives",
     "_difference": "predicted - measured",
     "_ratio": "predicted / measured; empty where the measured interval holds zero",
@@ -172,6 +173,25 @@ _ESTIMATES = (
     *_position(("_se",)),
     Column("temperature_N_K", "temperature", "K", "mean film temperature of pad N"),
 )
+_BAND = (
+    *STATIC,
+    Column("excitation", "text", "", "multisine, sweep, random or impact, as the manifest states it"),
+)
+_FRF = (
+    *_BAND,
+    Column("excitation_Hz", "frequency", "Hz", "middle of the line"),
+    Column("h{e}_real_N_per_m", "stiffness", "N/m", "Re h", ("_lo", "_hi", "_se", "_se_systematic")),
+    Column("h{e}_imag_N_per_m", "stiffness", "N/m", "Im h", ("_lo", "_hi", "_se", "_se_systematic")),
+    Column("coherence_x", "share", "", "multiple coherence of the force along x with the displacements"),
+    Column("coherence_y", "share", "", "the same along y"),
+    Column("method", "text", "", "periods, iv (command as instrument), h1, h2 or hv"),
+    Column("dof", "number", "", "degrees of freedom of the random part, the least of the entries"),
+    Column("n_records", "count", "", "runs that took part"),
+    Column("n_averages", "count", "", "periods, or bins of a transform, that the line was averaged from"),
+    Column("resolution_Hz", "frequency", "Hz", "width of the line"),
+    Column("condition_number", "number", "", "of the displacement directions"),
+    QUALITY,
+)
 _CLEARANCE = (
     PAD,
     Column("clearance_m", "length", "m", "assembled clearance at zero push load", ("_se",)),
@@ -216,6 +236,23 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("probability", "share", "", "of a chi-square as large by chance"),
         Column("largest_misfit", "share", "", "of h: what using the model costs"),
         *_coefficients(("_se",), STIFFNESS, DAMPING, MASS),
+    ),
+    "frf": _FRF,
+    "frf_estimators": _FRF,
+    "frf_models": (
+        *_BAND,
+        Column("model", "text", "", "K-C or K-C-M"),
+        Column("supported", "text", "", "the simplest model that the lines do not refuse"),
+        Column("method", "text", "", "as in `frf`"),
+        Column("n_frequencies", "count", "", "lines"),
+        Column("excitation_lowest_Hz", "frequency", "Hz", "lowest of them"),
+        Column("excitation_highest_Hz", "frequency", "Hz", "highest of them"),
+        Column("chi_square", "number", "", "of the model against h in eight parts of the band"),
+        Column("dof", "count", "", "degrees of freedom of it"),
+        Column("probability", "share", "", "of a chi-square as large by chance"),
+        Column("largest_misfit", "share", "", "of h, noise taken off: what using the model costs"),
+        *_coefficients(("_lo", "_hi", "_se", "_dof"), STIFFNESS, DAMPING, MASS),
+        QUALITY,
     ),
     "budget": (
         *POINT,

@@ -137,6 +137,20 @@ def comparison(softer: float = 1.0) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def band() -> pd.DataFrame:
+    """Lines of a multi-sine: K-C with wider intervals where the coherence falls."""
+    f = np.arange(10.0, 111.0, 5.0)
+    table = pd.DataFrame({"static_load_N": 5000.0, "static_load_direction_deg": -90.0, "shaft_speed_Hz": 22.0,
+                          "excitation": "multisine", "excitation_Hz": f})  # fmt: skip
+    table["coherence_x"], table["coherence_y"] = 1 - 1e-5 * f, 1 - 4e-6 * f**2 / 2
+    for entry, k, c in (("xx", 1.6e8, 4.2e5), ("yy", 2.4e8, 5.5e5)):
+        for part, value in (("real", k + 0 * f), ("imag", 2 * np.pi * f * c)):
+            half, name = 1e6 + 1e5 * f, f"h{entry}_{part}_N_per_m"
+            wavy = value + 0.5 * half * np.sin(f)
+            table[name], table[f"{name}_lo"], table[f"{name}_hi"] = wavy, wavy - half, wavy + half
+    return table
+
+
 @dataclass
 class Shaken:
     """A dynamic run: a 25 Hz line and noise, forces that follow the displacement."""
@@ -208,6 +222,7 @@ CASES = {
     "residual_series": lambda: plots.residual_series(comparison(), "frequency"),
     "coherence": lambda: plots.coherence(comparison()[:9]),
     "coherence_spectrum": lambda: plots.coherence_spectrum(Shaken()),
+    "frf": lambda: plots.frf(band()),
     "orbit": lambda: plots.orbit(Shaken()),
     "window_weights": lambda: plots.window_weights(windows()),
     "isolability": lambda: plots.isolability(SEPARATION, EFFECTS),

@@ -50,7 +50,7 @@ def _check_length(report: Reporter, samples: int, rate: float) -> None:
     elif report.run.kind == "dynamic" and rate < 2.2 * excitation:
         what = f"{rate:g} samples per second cannot show an excitation of {excitation:g} Hz"
         report.say("nyquist", "error", "time", what, "Check sample_rate and excitation_frequency")
-    elif report.run.kind == "dynamic" and samples < _MIN_CYCLES * rate / excitation:
+    elif report.run.kind == "dynamic" and excitation > 0 and samples < _MIN_CYCLES * rate / excitation:
         what = f"the record holds only {samples * excitation / rate:.1f} cycles of the excitation"
         report.say("short", "warning", "time", what, f"Record at least {_MIN_CYCLES:g} cycles")
 

@@ -11,6 +11,9 @@ from rigdata.campaign import Campaign
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.broadband.band_result import BandResult
+from tpjb_ident.dynamic.broadband.band_runs import is_broadband
+from tpjb_ident.dynamic.broadband.identify_bands import BandSettings, identify_bands
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change, gain_draws
 from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
 from tpjb_ident.dynamic.corrections.mains import MAINS_ON_LINE, force_pickup, force_pickup_spread
@@ -80,8 +83,21 @@ def identify(
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     tell = progress or (lambda text, done, total: None)
     settings = _with_mains(settings, campaign)
-    with all_runs(campaign, settings.phasors, tell, workers, store) as finished:
-        return assemble(campaign, finished, settings, tell)
+    sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
+    bands: tuple[BandResult, ...] = ()
+    if any(is_broadband(run) for run in runs):
+        rig = measured_baseline(campaign, settings.phasors, own_method(settings.method))
+        bands = identify_bands(campaign, _band_settings(settings), tell, rig)
+    if not sines.of_kind("dynamic"):
+        empty = np.zeros((settings.n_calibration, 0))
+        return Identification(campaign.id, settings.method, (), empty, bands=bands)
+    with all_runs(sines, settings.phasors, tell, workers, store) as finished:
+        return replace(assemble(sines, finished, settings, tell), bands=bands)
+
+
+def _band_settings(settings: IdentifySettings) -> BandSettings:
+    phasors = settings.phasors
+    return BandSettings(phasors.lines.mains, phasors.delays, settings.correct, settings.n_calibration, settings.seed)
 
 
 def _with_mains(settings: IdentifySettings, campaign: Campaign) -> IdentifySettings:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tpjb_ident.cli.common.band_display import refused_bands, show_bands
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.identification_display import (
     show_coefficients,
@@ -78,7 +79,8 @@ def identify(
 
     One row per operating point, in tables: writes coefficients (chosen method), estimators (every method,
     statsmodels RLM among them), windows (rejected ones, with reasons) and frequency_fits (K-C and K-C-M over
-    frequency, per load), each as .csv and .parquet. Exit code 3 if a point is not to be trusted.
+    frequency, per load), each as .csv and .parquet. Runs excited over a band (multi-sine, noise, sweep, impact) give
+    frf, frf_estimators and frf_models. Exit code 3 if a point is not to be trusted.
     """
     source = open_campaign(campaign)
     phasors = phasor_settings(lines, delay or ())
@@ -100,11 +102,14 @@ def identify(
             write_plain(folder, source, plain_settings(window, norm), keep_r)
         options = {"campaign": campaign, "method": method, "norm": norm, "lines": lines, "delay": delay}
         write_record(folder, target, "identify", options, source.fingerprint(), result.remarks())
-    show_summary(result)
-    show_coefficients(result)
-    show_frequency_fits(result)
+    if result.points or not result.bands:
+        show_summary(result)
+        show_coefficients(result)
+        show_frequency_fits(result)
+    show_bands(result)
     show_remarks(result)
-    command_line(f"tpjb {'compare' if source.bearing_text else 'export --to ross'} {campaign}")
+    if result.points:
+        command_line(f"tpjb {'compare' if source.bearing_text else 'export --to ross'} {campaign}")
     print_line(f"Results: {target}")
     refuse_untrusted(result)
 
@@ -234,7 +239,7 @@ def _clearance(campaign: Campaign) -> float | None:
 
 
 def write_identification(folder: Path, result: Identification) -> None:
-    """Write coefficients, estimators, windows and the models over frequency.
+    """Write coefficients, estimators, windows and the models over frequency; h over the band where one was excited.
 
     Parameters
     ----------
@@ -242,6 +247,14 @@ def write_identification(folder: Path, result: Identification) -> None:
         Existing.
     result : Identification
     """
+    from tpjb_ident.dynamic.broadband.band_result import frf_frame, models_frame
+
+    if result.bands:
+        write_table(folder, "frf", frf_frame(result.bands))
+        write_table(folder, "frf_estimators", frf_frame(result.bands, every_method=True))
+        write_table(folder, "frf_models", models_frame(result.bands))
+    if result.bands and not result.points:
+        return
     write_table(folder, "coefficients", result.to_frame())
     write_table(folder, "estimators", result.estimators_frame())
     write_table(folder, "windows", result.windows_frame())
@@ -292,7 +305,7 @@ def refuse_untrusted(result: Identification) -> None:
     """
     import numpy as np
 
-    bad = []
+    bad = refused_bands(result.bands)
     for p in result.points:
         serious = sentences(untrusted(p.quality))
         if serious or not np.isfinite(p.stiffness.h).all():
@@ -302,4 +315,6 @@ def refuse_untrusted(result: Identification) -> None:
         raise NotTrustedError("; ".join(lost))
     if bad:
         more = f"\n... and {len(bad) - 5} more" if len(bad) > 5 else ""
-        raise NotTrustedError(f"{len(bad)} of {len(result.points)} points:\n" + "\n".join([*bad[:5], *lost]) + more)
+        raise NotTrustedError(
+            f"{len(bad)} of {len(result.points) + len(result.bands)} points:\n" + "\n".join([*bad[:5], *lost]) + more
+        )

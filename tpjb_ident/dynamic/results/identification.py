@@ -28,6 +28,8 @@ from tpjb_ident.schema import DAMPING, STIFFNESS
 if TYPE_CHECKING:
     import pandas as pd
 
+    from tpjb_ident.dynamic.broadband.band_result import BandResult
+
 
 @dataclass(frozen=True, repr=False)
 class Identification(Presented):
@@ -44,6 +46,8 @@ class Identification(Presented):
         What n draws of the calibration do to the entries of all P points, in their order [N/m].
     conditions : tuple of Condition
         About the campaign as a whole.
+    bands : tuple of BandResult
+        Of runs that were excited over a band.
     """
 
     campaign: str
@@ -51,6 +55,7 @@ class Identification(Presented):
     points: tuple[PointResult, ...]
     calibration_changes: FloatArray = field(repr=False)
     conditions: tuple[Condition, ...] = ()
+    bands: tuple[BandResult, ...] = ()
 
     @property
     def systematic(self) -> FloatArray:
@@ -145,6 +150,10 @@ class Identification(Presented):
         for p in self.points:
             for condition in p.quality:
                 place = f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz"
+                places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
+        for band in self.bands:
+            for condition in band.quality:
+                place = f"{band.point.static_load / 1e3:g} kN, {band.kind}"
                 places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
         for name, found in places.items():
             others = len(found) - 1

@@ -18,6 +18,7 @@ from tpjb_ident.report.plots.coefficient import coefficient
 from tpjb_ident.report.plots.coherence import coherence
 from tpjb_ident.report.plots.coherence_spectrum import coherence_spectrum
 from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
+from tpjb_ident.report.plots.frf import frf
 from tpjb_ident.report.plots.gap import gap
 from tpjb_ident.report.plots.gap_controls import gap_controls
 from tpjb_ident.report.plots.isolability import isolability
@@ -37,6 +38,7 @@ __all__ = [
     "coherence",
     "coherence_spectrum",
     "direct_coefficients",
+    "frf",
     "gap",
     "gap_controls",
     "isolability",

@@ -1,0 +1,242 @@
+"""Excitation over a band: exact where nothing disturbs, unbiased where displacements are noisy, honest where not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigdata import load_campaign
+from tests.command_line import tpjb
+from tests.studies.field.band_campaign import write_band_campaign
+from tests.studies.field.band_rig import BandRig, band_plans, stiffness
+from tests.studies.field.broadband import true_parameters
+from tpjb_ident.dynamic.broadband.band_equations import line_sums
+from tpjb_ident.dynamic.broadband.band_models import Shared, fit_band
+from tpjb_ident.dynamic.broadband.classic import h1_fit, h2_fit, hv_fit
+from tpjb_ident.dynamic.broadband.line_rows import LineRows
+from tpjb_ident.dynamic.broadband.local_regression import local_fit
+from tpjb_ident.dynamic.broadband.period import find_period, resampled
+from tpjb_ident.dynamic.broadband.repeated_periods import periods_fit
+from tpjb_ident.dynamic.broadband.samples import Samples
+from tpjb_ident.dynamic.identify import identify
+
+H = np.array([[1.6e8 + 6e7j, 1.5e7 + 2e6j], [-1.2e7 - 3e6j, 2.4e8 + 9e7j]])
+SILENT = BandRig(noise=(0.0, 0.0, 0.0), runout=0.0, shaft=0.0, seconds=6.0)
+
+
+def bins(n: int, noise: float, seed: int, slope: float = 0.0) -> LineRows:
+    """One line of two runs, n bins each: displacement noise as a share of the signal, force noise a fifth of that."""
+    rng = np.random.default_rng(seed)
+    place = np.tile(np.linspace(-1, 1, n), 2)
+    run = np.repeat([0, 1], n)
+    command = np.where(run[:, None] == 0, [1.0, 0.3], [-0.3, 1.0]) * _complex(rng, 2 * n)[:, None]
+    D = command @ np.array([[2e-6, 3e-7j], [1e-7, 1.4e-6]])
+    F = D @ H.T + slope * place[:, None] * D * 1e7
+    size = noise * np.sqrt(np.mean(np.abs(D) ** 2))
+    D = D + size * _complex(rng, (2 * n, 2))
+    F = F + 0.2 * size * 2e8 * _complex(rng, (2 * n, 2))
+    return LineRows(2 * np.pi * 50, D, F, np.zeros_like(D), command, run, place, repeated=False, ends=True)
+
+
+def _complex(rng, shape):
+    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
+
+
+def campaign(tmp_path, rig: BandRig, seed: int = 1, **plans):
+    path = tmp_path / "band.h5"
+    write_band_campaign(path, rig, band_plans(**plans), seed)
+    return path
+
+
+def band_of(tmp_path, rig: BandRig, seed: int = 1, **plans):
+    (result,) = identify(load_campaign(campaign(tmp_path, rig, seed, **plans))).bands
+    return result
+
+
+def truth(rig: BandRig, result) -> np.ndarray:
+    return stiffness(rig.bearing, 2 * np.pi * result.frequencies, result.point.static_load)
+
+
+@pytest.mark.slow
+def test_a_quiet_multisine_gives_h_to_nine_digits(tmp_path):
+    rig = replace(SILENT, kind="multisine", mains=0.0)
+    result = band_of(tmp_path, rig)
+    h = truth(rig, result)
+    assert result.period == pytest.approx(1.0, abs=1e-12)
+    assert result.method == "periods"
+    assert np.abs(result.h - h).max() < 1e-9 * np.abs(h).max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["random", "sweep"])
+def test_a_quiet_record_that_begins_and_ends_in_motion_leaks_next_to_nothing(tmp_path, kind):
+    """The ends of the record are exact for K, C and M; what is left is the sampled second derivative."""
+    rig = replace(SILENT, kind=kind, seconds=16.0)
+    result = band_of(tmp_path, rig)
+    h = truth(rig, result)
+    assert np.median(np.abs(result.h - h)) < 2e-4 * np.abs(h).max()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_h_over_the_bins_of_a_line_may_slope(seed):
+    rows = bins(24, 0.0, seed, slope=3.0)
+    fit = local_fit(rows, rows.command)
+    assert np.abs(fit.h - H).max() < 1e-9 * np.abs(H).max()
+    assert np.abs(fit.slopes[0] - 3e7 * np.eye(2)).max() < 1e-6 * np.abs(H).max()
+
+
+def test_noise_on_the_displacements_pulls_h1_down_and_leaves_the_command_s_estimate_alone():
+    found = {"iv": [], "h1": [], "h2": []}
+    for seed in range(25):
+        rows = bins(40, 0.3, seed)
+        found["iv"].append(local_fit(rows, rows.command).h[1, 1].real)
+        found["h1"].append(h1_fit(rows).h[1, 1].real)
+        found["h2"].append(h2_fit(rows).h[1, 1].real)
+    ratio = {name: np.mean(values) / H[1, 1].real - 1 for name, values in found.items()}
+    error = {name: np.std(values) / H[1, 1].real / np.sqrt(25) for name, values in found.items()}
+    assert ratio["h1"] < -0.08
+    assert abs(ratio["iv"]) < 3.5 * error["iv"]
+    assert ratio["h2"] > ratio["iv"]
+
+
+def test_intervals_of_a_line_hold():
+    inside = []
+    for seed in range(60):
+        rows = bins(20, 0.1, 500 + seed)
+        fit = local_fit(rows, rows.command)
+        away = np.concatenate([(fit.h - H).real.ravel(), (fit.h - H).imag.ravel()])
+        inside.append(np.abs(away) <= 2.03 * np.sqrt(np.diag(fit.covariance())))
+    assert 0.90 <= np.mean(inside) <= 0.98
+
+
+def test_hv_lies_between_h1_and_h2():
+    rows = bins(60, 0.3, 4)
+    h1, h2 = h1_fit(rows), h2_fit(rows)
+    hv = hv_fit(rows, h1)
+    assert h1.h[1, 1].real < hv.h[1, 1].real < h2.h[1, 1].real
+
+
+@pytest.mark.parametrize("runs", [2, 3])
+def test_periods_without_noise_give_h_from_two_runs_or_more(runs):
+    rng = np.random.default_rng(runs)
+    D = np.repeat(1e-6 * _complex(rng, (runs, 2)), 4, axis=0)
+    none = np.zeros(4 * runs)
+    rows = LineRows(
+        300.0, D, D @ H.T, np.zeros_like(D), None, np.repeat(np.arange(runs), 4), none, repeated=True, ends=False
+    )
+    assert np.abs(periods_fit(rows).h - H).max() < 1e-9 * np.abs(H).max()
+
+
+@pytest.mark.slow
+def test_runs_along_one_line_have_no_h(tmp_path):
+    path = campaign(tmp_path, BandRig(kind="multisine", seconds=6.0), directions=(30.0, 30.0))
+    (result,) = identify(load_campaign(path)).bands
+    assert not result.lines or "fewer-than-two-directions" in result.quality or "excitation-too-weak" in result.quality
+
+
+def test_a_model_over_the_band_is_free_of_the_lines_bias():
+    """A hundred weak lines: the mean of their own h is off by many standard errors, the model is not."""
+    rng = np.random.default_rng(8)
+    lines = []
+    for k in range(100):
+        D = np.repeat(1e-6 * _complex(rng, (2, 2)), 6, axis=0)
+        F = D @ H.T
+        noisy = D + 4e-7 * _complex(rng, D.shape)
+        run = np.repeat([0, 1], 6)
+        lines.append(
+            LineRows(300.0 + k, noisy, F + 20.0 * _complex(rng, F.shape), 0 * D, None, run, np.zeros(12), True, False)
+        )
+    none = Shared(np.zeros((100, 2, 8)), np.zeros((2, 2, 2)))
+    constant = fit_band([replace(line, omega=300.0 + 1e-3 * k) for k, line in enumerate(lines)], "K-C", "periods", none)
+    z = (constant.parameters[:4] - H.real.ravel()) / constant.standard_error[:4]
+    assert np.abs(z).max() < 4
+    assert np.sum(line_sums(lines[0], 300.0, lambda w: np.ones((len(w), 1)), "periods")[0].dof) == 5
+
+
+@pytest.mark.parametrize("true", [500.0, 500.37])
+def test_a_period_need_not_hold_a_whole_number_of_samples(true):
+    rng = np.random.default_rng(3)
+    n, rate = 4200, 1000.0
+    k = np.arange(5, 60)
+    phases = rng.uniform(0, 2 * np.pi, len(k))
+    t = np.arange(n)
+    wave = np.sum(np.cos(2 * np.pi * np.outer(t, k) / true + phases), axis=1)
+    rows = np.stack([wave, 0.5 * wave]) + 0.1 * rng.standard_normal((2, n))
+    samples = Samples(rate, {"displacement": rows, "force": rows.copy()}, None, None)
+    found = find_period(samples, (9.0, 121.0), np.zeros(n // 2 + 1, dtype=bool))
+    assert found is not None
+    assert found.samples == pytest.approx(true, abs=0.01)
+    whole = resampled(samples, found.samples, 121.0)
+    folded = whole.values["displacement"][0].reshape(-1, 500)
+    assert np.std(folded[2] - folded[3]) < 0.2
+
+
+def test_noise_that_does_not_repeat_has_no_period():
+    rng = np.random.default_rng(5)
+    rows = rng.standard_normal((2, 4000))
+    samples = Samples(1000.0, {"displacement": rows, "force": rows}, None, None)
+    assert find_period(samples, (10.0, 120.0), np.zeros(2001, dtype=bool)) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["multisine", "periodic random", "random", "sweep", "impact"])
+def test_intervals_hold_for_every_kind_of_excitation(tmp_path, kind):
+    """Coverage over many seeds is in docs/broadband.md; here one campaign of every kind must not fall out of it."""
+    rig = BandRig(kind=kind)
+    result = band_of(tmp_path, rig, seed=11)
+    h = truth(rig, result)
+    away = np.concatenate([(result.h - h).real.reshape(-1, 4), (result.h - h).imag.reshape(-1, 4)], axis=1)
+    assert 0.88 <= np.mean(np.abs(away) <= result.half_width()) <= 0.995
+    model = result.models["K-C-M"]
+    z = (model.parameters - true_parameters(rig, 5000.0)) / model.half_width()
+    assert np.abs(z).max() < 2.0
+    assert (result.period is not None) == (kind in ("multisine", "periodic random"))
+
+
+@pytest.mark.slow
+def test_without_command_or_period_the_intervals_reach_from_h1_to_h2_and_it_is_said(tmp_path):
+    rig = BandRig(kind="random", command=0)
+    result = band_of(tmp_path, rig, seed=2)
+    assert "no-instrument" in result.quality
+    assert result.method == "hv"
+    for line in result.lines:
+        half = line.stiffness.half_width()
+        for name in ("h1", "h2"):
+            assert (np.abs(line.by_method[name].vector - line.stiffness.vector) <= half).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["multisine", "random"])
+def test_cells_on_a_clock_of_another_rate_are_found_and_put_right(tmp_path, kind):
+    rig = BandRig(kind=kind, rate=500.0, seconds=8.0, band=(10.0, 80.0), cells=100e-6)
+    result = band_of(tmp_path, rig, seed=3)
+    assert "clocks-differ" in result.quality
+    h = truth(rig, result)
+    assert abs(np.median(np.angle(result.h[:, 0, 0] / h[:, 0, 0]))) < 0.01
+    same = band_of(tmp_path, replace(rig, cells=0.0), seed=3)
+    assert "clocks-differ" not in same.quality
+
+
+@pytest.mark.slow
+def test_the_command_writes_h_over_the_band_whole(tmp_path):
+    path = campaign(tmp_path, BandRig(kind="multisine", seconds=6.0))
+    result = tpjb("identify", path, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    written = {p.name for p in (tmp_path / "out").iterdir()}
+    assert {"frf.csv", "frf.parquet", "frf_estimators.csv", "frf_models.csv", "run.json"} <= written
+    assert "coefficients.csv" not in written
+    assert "models over the band" in result.output
+    again = tpjb("compare", path, "--out", tmp_path / "compared")
+    assert again.exit_code == 2
+    assert "band only" in again.output
+    assert tpjb("check", path, "--out", tmp_path / "checked").exit_code == 0
+
+
+@pytest.mark.slow
+def test_a_band_that_the_record_cannot_resolve_is_refused(tmp_path):
+    path = campaign(tmp_path, BandRig(kind="random", seconds=0.4))
+    result = tpjb("identify", path, "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "record" in result.output

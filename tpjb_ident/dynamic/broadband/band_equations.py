@@ -1,0 +1,174 @@
+"""Normal equations of a model over a band, line by line, free of the bias that noise on the displacements brings.
+
+F = Theta phi with phi = D times powers of i omega, and Theta real. Averaging the lines' own h would weight those up
+whose displacement noise came out large; so the model is fitted to the rows themselves, with an instrument zeta in place
+of phi on one side: other periods of the same excitation, or what the command explains of the displacements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.broadband.line_rows import LineRows
+from tpjb_ident.dynamic.broadband.local_regression import ends_columns, remainder
+
+#: What multiplies the displacements: (n, m) from the rows' angular frequencies (n,) in units of the band's middle.
+Basis = Callable[[FloatArray], ComplexArray]
+
+
+def k_c(w: FloatArray) -> ComplexArray:
+    """Stiffness and damping.
+
+    Parameters
+    ----------
+    w : (n,) ndarray
+        Angular frequencies of the rows, in units of the band's middle.
+    """
+    return np.stack([np.ones_like(w), 1j * w], axis=1)
+
+
+def k_c_m(w: FloatArray) -> ComplexArray:
+    """Stiffness, damping and mass.
+
+    Parameters
+    ----------
+    w : (n,) ndarray
+        Angular frequencies of the rows, in units of the band's middle.
+    """
+    return np.stack([np.ones_like(w), 1j * w, -(w**2)], axis=1)
+
+
+def complex_h(w: FloatArray) -> ComplexArray:
+    """One complex h for all rows: its real and its imaginary part.
+
+    Parameters
+    ----------
+    w : (n,) ndarray
+        Angular frequencies of the rows, in units of the band's middle.
+    """
+    return np.stack([np.ones_like(w), 1j * np.ones_like(w)], axis=1)
+
+
+@dataclass(frozen=True)
+class RunSums:
+    """One run at one line, summed over its rows; q = 2 m columns of phi, the two displacements of each power together.
+
+    Attributes
+    ----------
+    A : (q, q) complex ndarray
+        Sum of zeta* phi^T.
+    B : (2, q) complex ndarray
+        Sum of F zeta^H.
+    A0 : (q, 2) complex ndarray
+        Sum of zeta* D^T: what a change of h does to B.
+    Z : (q, q) complex ndarray
+        Sum of zeta* zeta^T, in the weight that the noise of one row has.
+    residual : callable
+        Covariance of the equation noise of one row, (2, 2), from Theta (2, q).
+    dof : float
+        Complex degrees of freedom of that.
+    """
+
+    A: ComplexArray
+    B: ComplexArray
+    A0: ComplexArray
+    Z: ComplexArray
+    residual: Callable[[FloatArray], ComplexArray]
+    dof: float
+
+
+def line_sums(rows: LineRows, middle: float, basis: Basis, instrument: str) -> list[RunSums]:
+    """Sums of every run at one line.
+
+    Parameters
+    ----------
+    rows : LineRows
+    middle : float
+        Angular frequency in whose units the basis is taken [rad/s].
+    basis : callable
+    instrument : {"periods", "command", "given"}
+        Other periods, what the rows' command explains, or the command itself.
+    """
+    phi = _phi(rows, rows.D, middle, basis)
+    if instrument == "periods":
+        return [_repeated(rows.F[rows.run == r], phi[rows.run == r], rows.D[rows.run == r]) for r in range(rows.n_runs)]
+    flat = [_flat(rows, r) for r in range(rows.n_runs)]
+    source = _explained(rows, flat) if instrument == "command" else rows.command
+    assert source is not None
+    zeta = _phi(rows, source, middle, basis)
+    found = []
+    for r, q in enumerate(flat):
+        mine = rows.run == r
+        spare = len(q) - (np.linalg.matrix_rank(ends_columns(rows.one_run(r))) if rows.ends else 0)
+        found.append(_of_rows(q @ rows.F[mine], q @ phi[mine], q @ rows.D[mine], q @ zeta[mine], float(spare)))
+    return found
+
+
+def _phi(rows: LineRows, source: ComplexArray, middle: float, basis: Basis) -> ComplexArray:
+    powers = basis((rows.omega + rows.step * rows.place) / middle)
+    return np.asarray((powers[:, :, None] * source[:, None, :]).reshape(len(source), -1))
+
+
+def _flat(rows: LineRows, r: int) -> ComplexArray:
+    """What takes off the ends of a run's record from its rows."""
+    one = rows.one_run(r)
+    return remainder(ends_columns(one)) if rows.ends else np.eye(len(one.D), dtype=complex)
+
+
+def _explained(rows: LineRows, flat: list[ComplexArray]) -> ComplexArray:
+    """Displacements as the command explains them; each row by the rows of other parity, so not by its own noise."""
+    assert rows.command is not None
+    D = np.concatenate([q @ rows.D[rows.run == r] for r, q in enumerate(flat)])
+    u = np.concatenate([q @ rows.command[rows.run == r] for r, q in enumerate(flat)])
+    raw = np.concatenate([rows.command[rows.run == r] for r in range(rows.n_runs)])
+    order = np.concatenate([np.flatnonzero(rows.run == r) for r in range(rows.n_runs)])
+    parity = np.arange(len(D)) % 2
+    out = np.empty_like(D)
+    for half in (0, 1):
+        gain = np.linalg.lstsq(u[parity != half], D[parity != half], rcond=None)[0]
+        out[order[parity == half]] = raw[parity == half] @ gain
+    return out
+
+
+def _of_rows(F: ComplexArray, phi: ComplexArray, D: ComplexArray, zeta: ComplexArray, spare: float) -> RunSums:
+    def residual(theta: FloatArray) -> ComplexArray:
+        left = F - phi @ theta.T
+        return np.einsum("ni,nk->ik", left, left.conj()) / max(spare, 1.0)
+
+    return RunSums(
+        np.einsum("na,nb->ab", zeta.conj(), phi),
+        np.einsum("ni,na->ia", F, zeta.conj()),
+        np.einsum("na,nj->aj", zeta.conj(), D),
+        np.einsum("na,nb->ab", zeta.conj(), zeta),
+        residual,
+        spare,
+    )
+
+
+def _repeated(F: ComplexArray, phi: ComplexArray, D: ComplexArray) -> RunSums:
+    """Products of different periods only: their noise has nothing in common."""
+    n = len(F)
+    pairs = n * (n - 1)
+
+    def crossed(left: ComplexArray, right: ComplexArray) -> ComplexArray:
+        every = np.outer(left.sum(axis=0), right.sum(axis=0))
+        return np.asarray((every - np.einsum("na,nb->ab", left, right)) / pairs)
+
+    mean_phi, centred_phi, centred_F = phi.mean(axis=0), phi - phi.mean(axis=0), F - F.mean(axis=0)
+
+    def residual(theta: FloatArray) -> ComplexArray:
+        left = centred_F - centred_phi @ theta.T
+        return np.einsum("ni,nk->ik", left, left.conj()) / (n - 1)
+
+    return RunSums(
+        crossed(phi.conj(), phi),
+        crossed(F, phi.conj()),
+        crossed(phi.conj(), D),
+        np.asarray(np.outer(mean_phi.conj(), mean_phi) / n, dtype=complex),
+        residual,
+        float(n - 1),
+    )

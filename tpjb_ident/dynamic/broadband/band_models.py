@@ -1,0 +1,309 @@
+"""K-C (h = K + i omega C) and K-C-M (h = K - omega^2 M + i omega C) over a band, with intervals.
+
+Weighted instrumental least squares over the lines (`band_equations`). The weights take the noise of each line from its
+neighbours too, so that they do not depend on what the line itself happens to show; the covariance is the sandwich with
+each line's own. Lines of one record share no bin, so their errors are independent; what they share comes as draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.stats import f as f_distribution
+from scipy.stats import t as student_t
+
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.broadband.band_equations import Basis, RunSums, complex_h, k_c, k_c_m, line_sums
+from tpjb_ident.dynamic.broadband.line_fit import outer_matrix, satterthwaite
+from tpjb_ident.dynamic.broadband.line_rows import LineRows
+
+MODELS: dict[str, Basis] = {"K-C": k_c, "K-C-M": k_c_m}
+#: Lines to either side whose noise goes into a line's weight.
+NEIGHBOURS = 4
+#: Parts of the band in which a model is held against h.
+PARTS = 8
+#: A model is refused below this probability of its chi-square.
+REFUSED = 0.01
+ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class BandModel:
+    """One model over the lines of a band.
+
+    Attributes
+    ----------
+    model : {"K-C", "K-C-M"}
+    parameters : (p,) ndarray
+        kxx, kxy, kyx, kyy [N/m], cxx .. [N s/m], mxx .. [kg].
+    covariance : (p, p) ndarray
+        Random part.
+    dof : (p,) ndarray
+        Degrees of freedom of its variances.
+    systematic : (p, p) ndarray
+        What all lines share.
+    chi_square, spare, probability : float, int, float
+        Of the model against h in parts of the band, its real degrees of freedom, and how probable a larger one is.
+    misfit : float
+        Largest ||h_model - h|| / ||h|| over the parts of the band, noise taken off: what using the model costs.
+    band : (float, float)
+        Lowest and highest line [Hz].
+    n_lines : int
+    """
+
+    model: str
+    parameters: FloatArray
+    covariance: FloatArray = field(repr=False)
+    dof: FloatArray = field(repr=False)
+    systematic: FloatArray = field(repr=False)
+    chi_square: float
+    spare: int
+    probability: float
+    misfit: float
+    band: tuple[float, float]
+    n_lines: int
+
+    @property
+    def refused(self) -> bool:
+        """Whether the lines refuse the model."""
+        return self.spare > 0 and self.probability < REFUSED
+
+    @property
+    def standard_error(self) -> FloatArray:
+        """Random standard errors; inflated by the reduced chi-square where the lines refuse the model."""
+        inflation = max(self.chi_square / self.spare, 1.0) if self.refused else 1.0
+        return np.sqrt(inflation * np.diag(self.covariance))
+
+    def half_width(self, level: float = 0.95) -> FloatArray:
+        """Half the interval of every parameter: Student's t of the random part and normal of the shared one.
+
+        Parameters
+        ----------
+        level : float
+            Probability content.
+        """
+        quantile = 0.5 + 0.5 * level
+        random = student_t.ppf(quantile, self.dof) * self.standard_error
+        return np.hypot(random, student_t.ppf(quantile, np.inf) * np.sqrt(np.diag(self.systematic)))
+
+    def h(self, omega: FloatArray) -> ComplexArray:
+        """Dynamic stiffness of the model, (n, 2, 2) [N/m].
+
+        Parameters
+        ----------
+        omega : (n,) ndarray
+            [rad/s]
+        """
+        K, C, M = (*self.parameters.reshape(-1, 2, 2), np.zeros((2, 2)))[:3]
+        w = np.asarray(omega, dtype=float)[:, None, None]
+        return np.asarray(K - w**2 * M + 1j * w * C)
+
+
+@dataclass(frozen=True)
+class Shared:
+    """What lines share, as draws.
+
+    Attributes
+    ----------
+    lines : (n_lines, n, 8) ndarray
+        Change of Re and Im of h at every line [N/m].
+    runs : (n, n_runs, 2) ndarray
+        Relative change of every run's force along X and Y.
+    """
+
+    lines: FloatArray
+    runs: FloatArray
+
+
+@dataclass(frozen=True)
+class _Solution:
+    """Theta (2, q), the inverse of the normal equations, the noise and its weights of every line and run."""
+
+    theta: FloatArray
+    inverse: FloatArray
+    weights: list[list[ComplexArray]]
+    noise: list[list[ComplexArray]]
+
+
+def fit_band(rows: Sequence[LineRows], model: str, instrument: str, shared: Shared) -> BandModel | None:
+    """Fit one model to the lines of a band; None where they are too few.
+
+    Parameters
+    ----------
+    rows : sequence of LineRows
+        Of all lines, rising in frequency.
+    model : {"K-C", "K-C-M"}
+    instrument : {"periods", "command", "displacement", "force"}
+        What has no part in the displacements' noise; the last two are what H1 and H2 take.
+    shared : Shared
+    """
+    if instrument in ("displacement", "force"):
+        rows = [replace(line, command=line.D if instrument == "displacement" else line.F) for line in rows]
+        instrument = "given"
+    basis = MODELS[model]
+    omegas = np.array([line.omega for line in rows])
+    middle = float(np.sqrt(omegas.min() * omegas.max()))
+    m = basis(np.ones(1)).shape[1]
+    if len(rows) < 2 * m:
+        return None
+    sums = [line_sums(line, middle, basis, instrument) for line in rows]
+    found = _solve(sums)
+    if found is None:
+        return None
+    covariance, dof = _covariance(sums, found)
+    moved = _moved(sums, found, shared)
+    chi_square, spare, probability, misfit = _held_against(rows, found, middle, basis, instrument)
+    scale = np.repeat(1 / middle ** np.arange(m), 4)
+    outer = np.outer(scale, scale)
+    order = _by_kind(m)
+    return BandModel(
+        model,
+        found.theta.ravel()[order] * scale,
+        covariance[np.ix_(order, order)] * outer,
+        dof[order],
+        (moved.T @ moved / len(moved))[np.ix_(order, order)] * outer,
+        chi_square,
+        spare,
+        probability,
+        misfit,
+        (float(omegas.min()) / (2 * np.pi), float(omegas.max()) / (2 * np.pi)),
+        len(rows),
+    )
+
+
+def _by_kind(m: int) -> list[int]:
+    """Places in Theta (2, 2 m), row by row, of kxx, kxy, kyx, kyy, cxx, ..."""
+    return [i * 2 * m + 2 * s + j for s in range(m) for i in range(2) for j in range(2)]
+
+
+def _solve(sums: list[list[RunSums]]) -> _Solution | None:
+    """Theta with weights from its own residuals, a few times over."""
+    n_runs, q = len(sums[0]), len(sums[0][0].A)
+    weights = [[np.eye(2, dtype=complex)] * n_runs for _ in sums]
+    theta: FloatArray = np.zeros((2, q))
+    inverse: FloatArray = np.zeros((2 * q, 2 * q))
+    noise: list[list[ComplexArray]] = []
+    for _ in range(ROUNDS):
+        normal, right = np.zeros((2 * q, 2 * q)), np.zeros(2 * q)
+        for line, own in zip(sums, weights):
+            for run, w in zip(line, own):
+                normal += outer_matrix(w, run.A).real
+                right += (w @ run.B).real.ravel()
+        if not np.linalg.cond(normal) < 1e12:
+            return None
+        inverse = np.asarray(np.linalg.inv(normal), dtype=float)
+        theta = (inverse @ right).reshape(2, q)
+        noise = [[run.residual(theta) for run in line] for line in sums]
+        weights = _weights(sums, noise)
+    return _Solution(theta, inverse, weights, noise)
+
+
+def _weights(sums: list[list[RunSums]], noise: list[list[ComplexArray]]) -> list[list[ComplexArray]]:
+    """Inverse noise of every line and run, averaged over its neighbours."""
+    spreads = np.array(noise)
+    dof = np.array([[run.dof for run in line] for line in sums])
+    floor = 1e-20 * float(np.mean([np.abs(run.B).mean() for line in sums for run in line])) ** 2 + 1e-300
+    out = []
+    for k in range(len(sums)):
+        near = slice(max(k - NEIGHBOURS, 0), k + NEIGHBOURS + 1)
+        share = dof[near] / dof[near].sum(axis=0)
+        pooled = np.einsum("lr,lrik->rik", share, spreads[near])
+        out.append([np.linalg.inv(each + floor * np.eye(2)) for each in pooled])
+    size = np.mean([np.abs(w) for line in out for w in line])
+    return [[w / size for w in line] for line in out]
+
+
+def _covariance(sums: list[list[RunSums]], found: _Solution) -> tuple[FloatArray, FloatArray]:
+    """Covariance of Theta row by row, and the degrees of freedom of its variances."""
+    parts, dof = [], []
+    for line, own, spreads in zip(sums, found.weights, found.noise):
+        for run, w, spread in zip(line, own, spreads):
+            score = 0.5 * outer_matrix(w @ spread @ w.conj().T, run.Z).real
+            parts.append(found.inverse @ score @ found.inverse.T)
+            dof.append(2 * run.dof)
+    each = np.einsum("kpp->kp", np.array(parts))
+    return np.sum(parts, axis=0), satterthwaite(each, np.array(dof)[:, None])
+
+
+def _moved(sums: list[list[RunSums]], found: _Solution, shared: Shared) -> FloatArray:
+    """Change of Theta, row by row, in every draw of what lines share, (n, 2 q)."""
+    q = len(sums[0][0].A)
+    right = np.zeros((len(shared.runs), 2 * q))
+    for k, (line, own) in enumerate(zip(sums, found.weights)):
+        change = (shared.lines[k, :, :4] + 1j * shared.lines[k, :, 4:]).reshape(-1, 2, 2)
+        for r, (run, w) in enumerate(zip(line, own)):
+            total = np.einsum("nij,aj->nia", change, run.A0)
+            if shared.runs[:, r].any():
+                total = total + shared.runs[:, r, :, None] * (found.theta @ run.A.T)
+            right += np.einsum("ik,nka->nia", w, total).real.reshape(len(right), -1)
+    return np.asarray(right @ found.inverse.T)
+
+
+def _held_against(
+    rows: Sequence[LineRows], found: _Solution, middle: float, basis: Basis, instrument: str
+) -> tuple[float, int, float, float]:
+    """Chi-square, degrees of freedom, probability and misfit of the model in parts of the band."""
+    parts = [p for p in np.array_split(np.arange(len(rows)), min(PARTS, len(rows) // 2)) if len(p)]
+    q = found.theta.shape[1]
+    spare = 8 * len(parts) - 2 * q
+    total, squares, noise_dof = 0.0, [], 0.0
+    for part in parts:
+        left = [_left(rows[k], found.theta, middle, basis) for k in part]
+        sums = [line_sums(line, middle, complex_h, instrument) for line in left]
+        alone = _solve(sums)
+        if alone is None:
+            return float("nan"), 0, 1.0, float("nan")
+        covariance, dof = _covariance(sums, alone)
+        x = alone.theta.ravel()
+        nu = float(np.median(dof))
+        # a measured covariance of nu degrees of freedom, inverted, is too large by nu / (nu - p - 1) on average
+        total += float(x @ np.linalg.solve(covariance, x)) * max(1 - (len(x) + 1) / nu, 0.1)
+        mean = float(np.mean([rows[k].omega for k in part])) / middle
+        h = np.einsum("s,isj->ij", basis(np.array([mean]))[0], found.theta.reshape(2, -1, 2))
+        squares.append((float(x @ x) - float(np.trace(covariance))) / float(np.sum(np.abs(h) ** 2)))
+        noise_dof += nu
+    if spare <= 0:
+        return total, 0, 1.0, float(np.sqrt(max(*squares, 0.0)))
+    probability = float(f_distribution.sf(total / spare, spare, noise_dof))
+    return total, spare, probability, float(np.sqrt(max(*squares, 0.0)))
+
+
+def _left(line: LineRows, theta: FloatArray, middle: float, basis: Basis) -> LineRows:
+    """The line's rows with the force that the model leaves."""
+    powers = basis((line.omega + line.step * line.place) / middle)
+    phi = (powers[:, :, None] * line.D[:, None, :]).reshape(len(line.D), -1)
+    return line.with_force(line.F - phi @ theta.T)
+
+
+def between(low: BandModel, high: BandModel) -> BandModel:
+    """The middle of two estimates between which the truth lies, with an interval over both.
+
+    Parameters
+    ----------
+    low, high : BandModel
+        By H1 and H2.
+    """
+    half = 0.5 * (high.parameters - low.parameters)
+    unjudged = float("nan")  # the bias of either looks like a misfit
+    # a rectangle's standard deviation is half its width by the root of three
+    return replace(
+        low,
+        parameters=low.parameters + half,
+        systematic=low.systematic + np.diag(half**2) / 3,
+        covariance=np.diag(np.maximum(np.diag(low.covariance), np.diag(high.covariance))),
+        chi_square=unjudged,
+        probability=unjudged,
+        misfit=unjudged,
+    )
+
+
+def supported(models: dict[str, BandModel]) -> str:
+    """The simplest model that the lines do not refuse; ``"raw H"`` when they refuse all.
+
+    Parameters
+    ----------
+    models : dict of str to BandModel
+    """
+    return next((name for name, model in models.items() if not model.refused), "raw H")

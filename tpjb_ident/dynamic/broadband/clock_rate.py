@@ -1,0 +1,134 @@
+"""Cells or accelerometers on a clock of another rate than the probes', seen in phases that drift over the record.
+
+A difference e turns the force's phase at f by 2 pi f e t: over 16 s at 100 Hz, 10 ppm are 0.1 rad. Pieces of the record
+tell it from anything that the film does, which answers alike in all of them. All runs share it. A single sweep tells
+nothing: it passes each frequency once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.broadband.disturbing_lines import Disturbance, bins_taken
+from tpjb_ident.dynamic.broadband.samples import Samples, interpolated
+
+#: Pieces of a record,
+PIECES = 8
+#: bins of a piece next to a disturbing line that tell nothing,
+BESIDE = 3.0
+#: standard errors beyond which a difference is one,
+CLEAR = 6.0
+#: and phase [rad] over the record at the top of the band that it must come to.
+NOTABLE = 5e-3
+
+
+@dataclass(frozen=True)
+class ClockRate:
+    """How much faster than the probes' clock another runs (relative), and its standard error."""
+
+    rate: float
+    error: float
+
+
+def common_rates(seen: Sequence[dict[str, ClockRate]], reach: float) -> dict[str, ClockRate]:
+    """Differences that runs share, by quantity; those that are clear, and matter.
+
+    Parameters
+    ----------
+    seen : sequence of dict of str to ClockRate
+        Of every run.
+    reach : float
+        Phase at the top of the band over the longest record [rad] per unit of difference.
+    """
+    found = {}
+    for quantity in sorted({q for one in seen for q in one}):
+        known = [one[quantity] for one in seen if quantity in one and np.isfinite(one[quantity].error)]
+        if not known:
+            continue
+        weight = np.array([max(each.error, 1e-12) ** -2.0 for each in known])
+        rate = float(np.sum(weight * [each.rate for each in known]) / weight.sum())
+        pooled = ClockRate(rate, float(weight.sum() ** -0.5))
+        if abs(rate) > CLEAR * pooled.error and abs(rate) * reach > NOTABLE:
+            found[quantity] = pooled
+    return found
+
+
+def with_one_clock(samples: Samples, clocks: dict[str, ClockRate]) -> Samples:
+    """The record as if one clock had sampled all of it.
+
+    Parameters
+    ----------
+    samples : Samples
+    clocks : dict of str to ClockRate
+        By quantity.
+    """
+    values = dict(samples.values)
+    for quantity in set(clocks) & set(values):
+        at = np.asarray(np.arange(samples.length) / (1 + clocks[quantity].rate), dtype=float)
+        mean = values[quantity].mean(axis=1, keepdims=True)
+        values[quantity] = interpolated(values[quantity] - mean, at) + mean
+    return replace(samples, values=values)
+
+
+def clock_rates(samples: Samples, band: tuple[float, float], lines: tuple[Disturbance, ...]) -> dict[str, ClockRate]:
+    """Rates of the clocks of force and acceleration against the probes', as one run shows them.
+
+    Parameters
+    ----------
+    samples : Samples
+    band : (float, float)
+        [Hz]
+    lines : tuple of Disturbance
+        Those that are in the record.
+    """
+    present = [q for q in ("force", "acceleration") if q in samples.values]
+    return {q: clock_rate(samples, q, band, lines) for q in present}
+
+
+def clock_rate(samples: Samples, quantity: str, band: tuple[float, float], lines: tuple[Disturbance, ...]) -> ClockRate:
+    """Rate of a quantity's clock against the probes'.
+
+    Parameters
+    ----------
+    samples : Samples
+    quantity : str
+        ``"force"`` or ``"acceleration"``.
+    band : (float, float)
+        [Hz]
+    lines : tuple of Disturbance
+        Those that are in the record.
+    """
+    length = samples.length // PIECES
+    frequency = np.asarray(np.fft.rfftfreq(length, 1 / samples.rate), dtype=float)
+    seconds = length / samples.rate
+    used = (frequency >= band[0]) & (frequency <= band[1]) & ~bins_taken(frequency, lines, seconds, BESIDE)
+    if used.sum() < PIECES:
+        return ClockRate(0.0, np.inf)
+    D, z = (_pieces(samples.values[q], length)[:, :, used] for q in ("displacement", quantity))
+    cross = np.sum(z * D.conj(), axis=0)
+    first, second = np.triu_indices(PIECES, 1)
+    apart = (second - first)[:, None] * seconds
+    turn = cross[second] * cross[first].conj()
+    weight = np.sqrt(np.abs(turn))
+    weight = np.minimum(weight, 3 * np.median(weight) + 1e-300)
+    lever = 2 * np.pi * frequency[used] * apart
+    rate = 0.0
+    for step in (1, 3, PIECES - 1):  # from near pieces to far ones: turns wrap, and are counted from what is known
+        near = (second - first) <= step
+        left = np.angle(turn * np.exp(-1j * rate * lever))[near]
+        rate += float(np.sum((weight * lever)[near] * left) / np.sum((weight * lever**2)[near]))
+    left = np.angle(turn * np.exp(-1j * rate * lever))
+    # bins err apart from each other, pairs of pieces do not
+    scores = np.sum(weight * lever * left, axis=0)
+    return ClockRate(rate, float(np.sqrt(np.sum(scores**2)) / np.sum(weight * lever**2)))
+
+
+def _pieces(rows: FloatArray, length: int) -> ComplexArray:
+    """Spectra (2, PIECES, n) of equal pieces under a Hann window."""
+    folded = rows[:, : PIECES * length].reshape(2, PIECES, length)
+    folded = folded - folded.mean(axis=2, keepdims=True)
+    return np.asarray(np.fft.rfft(folded * np.hanning(length), axis=2))

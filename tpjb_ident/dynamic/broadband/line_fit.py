@@ -1,0 +1,171 @@
+"""What an estimate of one line says: h, and the covariance that its equation noise leaves.
+
+Every estimator here is linear in the noise e = n_F - h n_D of its rows, to first order: the error of h is the sum of
+e g^T over the rows, with g the row's leverage. Noise of the displacements is in e as well, so that one covariance of e
+per run, taken from the fit's own residuals, is all that the intervals need.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class LineFit:
+    """Estimate of h at one line.
+
+    Attributes
+    ----------
+    h : (2, 2) complex ndarray
+        [N/m]; NaN where it could not be found.
+    leverage : (n_runs, 2, 2) complex ndarray
+        Sum of g g^H over the rows of each run [1/m^2].
+    noise : (n_runs, 2, 2) complex ndarray
+        Covariance of the equation noise in one row of each run [N^2].
+    dof : (n_runs,) ndarray
+        Complex degrees of freedom behind each.
+    condition : float
+        Condition number of the displacement directions.
+    slopes : (k, 2, 2) complex ndarray
+        Change of h over the bins of the line, by powers of their place, where that was fitted.
+    strength : float
+        By how much the excitation stands above the noise in the weaker direction of motion, as an F ratio of what
+        explains the displacements; infinite where nothing is explained by anything.
+    share : (n_runs, 2, 2) complex ndarray
+        Sum of D g^T over the rows of each run: what h takes of that run. They sum to the unit matrix.
+    apart : (n_runs, 3) complex ndarray
+        Of every run: its residual force along the force that h gives, that force squared, and the variance of the first
+        by the line's noise [N^2, N^2, N^4].
+    """
+
+    h: ComplexArray
+    leverage: ComplexArray = field(repr=False)
+    noise: ComplexArray = field(repr=False)
+    dof: FloatArray = field(repr=False)
+    condition: float
+    slopes: ComplexArray = field(repr=False)
+    strength: float = np.inf
+    share: ComplexArray = field(default_factory=lambda: np.empty((0, 2, 2), complex), repr=False)
+    apart: ComplexArray = field(default_factory=lambda: np.empty((0, 3), complex), repr=False)
+
+    @property
+    def found(self) -> bool:
+        """Whether there is an answer with an interval."""
+        return bool(np.isfinite(self.h).all() and np.isfinite(self.noise).all() and (self.dof > 0).all())
+
+    def covariance(self, noise: ComplexArray | None = None) -> FloatArray:
+        """Random covariance (8, 8) of [Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...] [N^2/m^2].
+
+        Parameters
+        ----------
+        noise : (n_runs, 2, 2) complex ndarray, optional
+            In place of the line's own.
+        """
+        return np.asarray(np.sum(self.by_run(noise), axis=0))
+
+    def by_run(self, noise: ComplexArray | None = None) -> FloatArray:
+        """What every run's noise adds to the covariance, (n_runs, 8, 8) [N^2/m^2].
+
+        Parameters
+        ----------
+        noise : (n_runs, 2, 2) complex ndarray, optional
+            In place of the line's own.
+        """
+        sigma = self.noise if noise is None else noise
+        return np.array([real_covariance(outer_matrix(s, a)) for s, a in zip(sigma, self.leverage)])
+
+    @property
+    def real_dof(self) -> FloatArray:
+        """Degrees of freedom of the variances of the eight entries, (8,): runs put together as Satterthwaite does."""
+        parts = np.einsum("rii->ri", self.by_run())
+        return satterthwaite(parts, 2.0 * self.dof[:, None])
+
+
+def by_runs(D: ComplexArray, g: ComplexArray, run: IntArray, n_runs: int) -> tuple[ComplexArray, ComplexArray]:
+    """Leverage and share of every run, (n_runs, 2, 2) each, from the rows' displacements and leverages (n, 2).
+
+    Parameters
+    ----------
+    D, g : (n, 2) complex ndarray
+    run : (n,) ndarray of int
+    n_runs : int
+    """
+    leverage = np.empty((n_runs, 2, 2), dtype=complex)
+    share = np.empty((n_runs, 2, 2), dtype=complex)
+    for r in range(n_runs):
+        mine = run == r
+        leverage[r] = np.einsum("nj,nl->jl", g[mine], g[mine].conj())
+        share[r] = np.einsum("ni,nj->ij", D[mine], g[mine])
+    return leverage, share
+
+
+def runs_apart(given: ComplexArray, left: ComplexArray, noise: ComplexArray, run: IntArray) -> ComplexArray:
+    """How far every run's force is from what h gives, along that force; see `LineFit.apart`.
+
+    Parameters
+    ----------
+    given, left : (n, 2) complex ndarray
+        Force of the rows by h, and what it leaves [N].
+    noise : (n_runs, 2, 2) complex ndarray
+        Of one row [N^2].
+    run : (n,) ndarray of int
+    """
+    out = np.empty((len(noise), 3), dtype=complex)
+    for r, spread in enumerate(noise):
+        mine = run == r
+        f = given[mine]
+        variance = np.einsum("ni,ik,nk->", f.conj(), spread, f)
+        out[r] = np.sum(f.conj() * left[mine]), np.sum(np.abs(f) ** 2), variance
+    return out
+
+
+def no_fit(n_runs: int) -> LineFit:
+    """Answer where there is none.
+
+    Parameters
+    ----------
+    n_runs : int
+    """
+    gap = np.full((n_runs, 2, 2), np.nan + 0j)
+    return LineFit(np.full((2, 2), np.nan + 0j), gap, gap, np.zeros(n_runs), np.inf, np.empty((0, 2, 2), complex), 0.0)
+
+
+def outer_matrix(a: ComplexArray, b: ComplexArray) -> ComplexArray:
+    """Kronecker product of two square matrices, for small ones some times quicker than numpy's.
+
+    Parameters
+    ----------
+    a, b : (n, n) and (m, m) ndarray
+    """
+    return (a[:, None, :, None] * b[None, :, None, :]).reshape(len(a) * len(b), -1)
+
+
+def real_covariance(gamma: ComplexArray) -> FloatArray:
+    """Covariance of real and imaginary parts, (2 m, 2 m), of circular complex errors.
+
+    Parameters
+    ----------
+    gamma : (m, m) complex ndarray
+        E[x x^H].
+    """
+    half = 0.5 * gamma
+    return np.block([[half.real, -half.imag], [half.imag, half.real]])
+
+
+def satterthwaite(variances: FloatArray, dof: FloatArray) -> FloatArray:
+    """Effective degrees of freedom of sums of variances over the first axis (Satterthwaite 1946).
+
+    Parameters
+    ----------
+    variances : (k, ...) ndarray
+    dof : (k, ...) ndarray
+        Of each.
+    """
+    total = variances.sum(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):  # no variance at all is known exactly
+        found = total**2 / (variances**2 / dof).sum(axis=0)
+    return np.asarray(np.where(total > 0, found, np.inf))

@@ -1,0 +1,251 @@
+"""One broadband run as phasors: of every period of a periodic excitation, or of the whole record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rigdata.problem import Problem, RigDataError
+from rigdata.run import Run
+from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.broadband.clock_rate import ClockRate, clock_rates, with_one_clock
+from tpjb_ident.dynamic.broadband.disturbing_lines import (
+    LEFT_OUT,
+    LEFT_OUT_OF_PERIOD,
+    Disturbance,
+    bins_taken,
+    find_disturbances,
+    without_disturbances,
+)
+from tpjb_ident.dynamic.broadband.period import Period, find_period, resampled
+from tpjb_ident.dynamic.broadband.samples import Samples, read_samples
+from tpjb_ident.dynamic.instruments.findings import START
+from tpjb_ident.dynamic.records.compensation import compensated
+from tpjb_ident.dynamic.records.oil_force import oil_force
+from tpjb_ident.dynamic.records.phasors import PhasorBlock
+from tpjb_ident.dynamic.records.raw_look import look_at_readings
+from tpjb_ident.dynamic.records.run_data import RunPhasors
+from tpjb_ident.dynamic.spectral_lines.lines import Line, LineSet
+
+#: Kinds that may repeat themselves; those that never do are not asked.
+MAY_REPEAT = ("multisine", "random", "sweep")
+#: Kinds whose records may begin and end in motion; a hammer waits for rest.
+OPEN_ENDS = ("multisine", "random", "sweep")
+
+
+@dataclass(frozen=True)
+class RunSpectra:
+    """Phasors of one run over the band.
+
+    Attributes
+    ----------
+    phasors : RunPhasors
+        Windows are periods, or there is one, the whole record; excitation lines are the bins of the band.
+    D, F, A : (n_windows, n_bins, 2) complex ndarray
+        Displacement [m], oil force [N], housing acceleration [m/s^2] (zero where not measured).
+    command : (n_windows, n_bins, 2) complex ndarray or None
+    frequencies : (n_bins,) ndarray
+        [Hz]
+    taken : (n_bins,) ndarray of bool
+        Bins that lines of shaft or mains may have spoiled.
+    disturbances : tuple of Disturbance
+    period : float or None
+        [s]; None where nothing repeats.
+    mean_load : (2,) ndarray
+        Mean cell force [N].
+    start : float
+        Standard deviation of the cells' start against the probes' [s], where their clocks differ.
+    """
+
+    phasors: RunPhasors
+    D: ComplexArray
+    F: ComplexArray
+    A: ComplexArray
+    command: ComplexArray | None
+    frequencies: FloatArray
+    taken: BoolArray
+    disturbances: tuple[Disturbance, ...]
+    period: float | None
+    mean_load: FloatArray
+    start: float = 0.0
+
+
+@dataclass(frozen=True)
+class SpectraSettings:
+    """How runs become spectra.
+
+    Attributes
+    ----------
+    band : (float, float)
+        [Hz]
+    seconds : float or None
+        How much of a record is taken, so that all runs of a point have the same bins; None for all.
+    mains : float
+        [Hz]
+    delays : dict
+        Seconds by which a quantity's channels are recorded late, besides what the manifest says.
+    clocks : dict of str to ClockRate
+        By how much a quantity's clock is faster than the probes'.
+    """
+
+    band: tuple[float, float]
+    seconds: float | None
+    mains: float
+    delays: dict[str, float]
+    clocks: dict[str, ClockRate] = field(default_factory=dict)
+
+
+def run_clocks(run: Run, settings: SpectraSettings) -> dict[str, ClockRate]:
+    """What one run shows of the rates of its clocks.
+
+    Parameters
+    ----------
+    run : rigdata.run.Run
+    settings : SpectraSettings
+    """
+    with run.kept_open():
+        samples = read_samples(run, settings.seconds)
+    lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.mains, settings.band[1])
+    return clock_rates(samples, settings.band, lines)
+
+
+def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> RunSpectra:
+    """Read one run and transform it.
+
+    Parameters
+    ----------
+    run : rigdata.run.Run
+    housing_mass : float
+        [kg]
+    settings : SpectraSettings
+
+    Raises
+    ------
+    RigDataError
+        The file cannot give what the manifest promises, or a multi-sine does not repeat.
+    """
+    with run.kept_open():
+        slower, told = look_at_readings(run)
+        samples = read_samples(run, settings.seconds)
+    if settings.band[1] >= 0.45 * samples.rate:
+        what = f"the band reaches {settings.band[1]:g} Hz, more than 0.45 of the sample rate of {samples.rate:g} Hz"
+        raise _error(run, "excitation_band", what, "Sample faster, or excite lower frequencies")
+    mean_load = samples.values["force"].mean(axis=1)
+    lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.mains, settings.band[1])
+    samples, clocks = with_one_clock(samples, settings.clocks), settings.clocks
+    period = _period(run, samples, settings.band, lines)
+    if period is None:
+        clean, length = without_disturbances(samples, lines), samples.length
+    else:
+        cut = resampled(samples, period.samples, settings.band[1])
+        length = round(period.samples)
+        clean = without_disturbances(cut, lines, length)
+    result = _transformed(run, clean, length, housing_mass, settings)
+    phasors = compensated(result, run, slower)
+    phasors = replace(phasors, conditions=merged(samples.conditions, told, clock_conditions(clocks)))
+    frequencies = phasors.lines.frequencies
+    phasors = _undelayed(phasors, settings.delays)
+    a = None if phasors.acceleration is None else phasors.acceleration.phasors
+    F = oil_force(phasors.cell_force.phasors, a, housing_mass)
+    D = phasors.displacement.phasors
+    command = None if clean.command is None else _bins(clean.command, length, _places(clean.rate, length, settings))
+    return RunSpectra(
+        phasors,
+        D,
+        F,
+        np.zeros_like(D) if a is None else a,
+        command,
+        frequencies,
+        bins_taken(frequencies, lines, length / clean.rate, LEFT_OUT if period is None else LEFT_OUT_OF_PERIOD),
+        lines,
+        None if period is None else length / clean.rate,
+        mean_load,
+        START / samples.rate if "force" in clocks else 0.0,
+    )
+
+
+def clock_conditions(clocks: dict[str, ClockRate]) -> tuple[Condition, ...]:
+    """What to say of clocks that differ.
+
+    Parameters
+    ----------
+    clocks : dict of str to ClockRate
+        By quantity.
+    """
+    if not clocks:
+        return ()
+    told = ", ".join(f"{q} {1e6 * c.rate:+.1f} ppm (standard error {1e6 * c.error:.1f})" for q, c in clocks.items())
+    return (Condition("clocks-differ", f"against the probes' clock: {told}; put right from the start of each record"),)
+
+
+def _error(run: Run, place: str, what: str, cure: str) -> RigDataError:
+    return RigDataError(Problem("error", run.file, place, what, cure, run.id))
+
+
+def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Disturbance, ...]) -> Period | None:
+    if run.excitation_kind not in MAY_REPEAT:
+        return None
+    frequency = np.asarray(np.fft.rfftfreq(samples.length, 1 / samples.rate), dtype=float)
+    found = find_period(samples, band, bins_taken(frequency, lines, samples.length / samples.rate))
+    if found is None and run.excitation_kind == "multisine":
+        what = "a multi-sine, but no period is found that the record holds three times"
+        raise _error(run, "excitation", what, 'Record longer; or state excitation = "random" if it does not repeat')
+    return found
+
+
+def _places(rate: float, length: int, settings: SpectraSettings) -> IntArray:
+    """Numbers of the bins of the band."""
+    frequency = np.fft.rfftfreq(length, 1 / rate)
+    low, high = settings.band
+    edge = 1e-6 * rate / length
+    return np.flatnonzero((frequency >= low - edge) & (frequency <= high + edge) & (frequency > 0))
+
+
+def _bins(rows: FloatArray, length: int, places: IntArray) -> ComplexArray:
+    """Phasors (n_windows, n_bins, 2) of rows (2, n) in stretches of `length` samples."""
+    folded = rows.reshape(2, -1, length)
+    spectra = np.fft.rfft(folded, axis=2)[:, :, places] * (2.0 / length)
+    return np.asarray(spectra.transpose(1, 2, 0))
+
+
+def _transformed(run: Run, samples: Samples, length: int, housing_mass: float, settings: SpectraSettings) -> RunPhasors:
+    """Phasors as recorded."""
+    places = _places(samples.rate, length, settings)
+    frequency = np.fft.rfftfreq(length, 1 / samples.rate)[places]
+    blocks = {q: _block(_bins(rows, length, places)) for q, rows in samples.values.items()}
+    windows = samples.length // length
+    lines = LineSet(tuple(Line("excitation", float(f)) for f in frequency), (), (), run.point.shaft_speed_hz)
+    return RunPhasors(
+        run.id,
+        run.point,
+        run.excitation_direction,
+        lines,
+        np.arange(windows) * length / samples.rate,
+        length / samples.rate,
+        blocks["displacement"],
+        blocks["force"],
+        blocks.get("acceleration"),
+        housing_mass,
+        np.full(windows, np.nan),
+    )
+
+
+def _block(phasors: ComplexArray) -> PhasorBlock:
+    n = len(phasors)
+    return PhasorBlock(phasors, np.zeros((n, 2)), np.full((n, 2), np.nan), np.zeros(n))
+
+
+def _undelayed(phasors: RunPhasors, delays: dict[str, float]) -> RunPhasors:
+    def moved(block: PhasorBlock, quantity: str) -> PhasorBlock:
+        ahead = np.exp(2j * np.pi * phasors.lines.frequencies * delays.get(quantity, 0.0))
+        return replace(block, phasors=block.phasors * ahead[None, :, None])
+
+    acceleration = phasors.acceleration
+    return replace(
+        phasors,
+        displacement=moved(phasors.displacement, "displacement"),
+        cell_force=moved(phasors.cell_force, "force"),
+        acceleration=None if acceleration is None else moved(acceleration, "acceleration"),
+    )
