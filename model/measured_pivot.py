@@ -9,6 +9,7 @@ import numpy as np
 
 from model.arrays import FloatArray
 from model.errors import ModelError
+from model.interpolation import monotone_cubics
 
 
 class PivotCurveError(ModelError):
@@ -60,11 +61,9 @@ class MeasuredPivot:
             load, points = np.concatenate([[0.0], load]), np.concatenate([[0.0], points])
             if load[1] <= 0 or points[1] <= 0:
                 raise PivotCurveError("a pivot curve must start at or above zero load and deflection")
-        from scipy.interpolate import PchipInterpolator
-
         object.__setattr__(self, "load", load)
         object.__setattr__(self, "deflection_points", points)
-        object.__setattr__(self, "_coefficients", PchipInterpolator(load, points).c)
+        object.__setattr__(self, "_coefficients", monotone_cubics(load, points))
 
     @property
     def coefficients(self) -> FloatArray:

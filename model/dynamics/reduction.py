@@ -145,25 +145,35 @@ def reduce_pads(
         h = k + i omega c [N/m].
     """
     total = np.zeros((len(omega), 2, 2), dtype=complex)
-    s = omega[:, None, None]
-    for k, pad in enumerate(pads):
-        z = pad.stiffness + 1j * s * pad.damping
-        if beside is not None:
-            z = z + beside[k]
-        rigid = math.isinf(pad.pad_stiffness[1, 1])  # a rigid pivot: eta takes no part
-        keep = slice(2, 3) if rigid else slice(2, 4)
-        inner = slice(0, 1) if keep.stop == 3 else slice(0, 2)
-        own = (
-            -(s**2) * pad.pad_mass[inner, inner]
-            + 1j * s * pad.pad_damping[inner, inner]
-            + pad.pad_stiffness[inner, inner]
-        )
-        film = np.asarray(z[:, keep, keep] + own, dtype=np.complex128)
-        if pad.friction[0]:
-            total = total + _reduce_with_friction(pad, z, film, vibration)
-        else:
-            total += z[:, :2, :2] - z[:, :2, keep] @ np.linalg.solve(film, z[:, keep, :2])
-    return total
+    for rigid in (False, True):  # a rigid pivot: eta takes no part
+        alike = [k for k, pad in enumerate(pads) if math.isinf(pad.pad_stiffness[1, 1]) == rigid]
+        if not alike:
+            continue
+        keep = slice(2, 3 if rigid else 4)
+        more = None if beside is None else np.array([beside[k] for k in alike])
+        z, film = _impedances([pads[k] for k in alike], omega, keep, more)
+        smooth = [m for m, k in enumerate(alike) if not pads[k].friction[0]]
+        if len(smooth) < len(alike):
+            rough = [(m, pads[k]) for m, k in enumerate(alike) if pads[k].friction[0]]
+            total = total + sum(_reduce_with_friction(pad, z[m], film[m], vibration) for m, pad in rough)
+            z, film = z[smooth], film[smooth]
+        total = total + (z[..., :2, :2] - z[..., :2, keep] @ np.linalg.solve(film, z[..., keep, :2])).sum(axis=0)
+    return np.asarray(total, dtype=np.complex128)
+
+
+def _impedances(
+    pads: list[PadMatrices], omega: FloatArray, keep: slice, more: ComplexArray | None
+) -> tuple[ComplexArray, ComplexArray]:
+    """Film impedance (pads, n, 4, 4), with more beside it, and that of tilt and deflection with pad and pivot."""
+    s, inner = omega[:, None, None], slice(0, keep.stop - 2)
+    z = np.array([p.stiffness for p in pads])[:, None] + 1j * s * np.array([p.damping for p in pads])[:, None]
+    if more is not None:
+        z = z + more
+    mass, damping, stiffness = (
+        np.array([table[inner, inner] for table in tables])[:, None]
+        for tables in zip(*((p.pad_mass, p.pad_damping, p.pad_stiffness) for p in pads), strict=True)
+    )
+    return z, z[..., keep, keep] - s**2 * mass + 1j * s * damping + stiffness
 
 
 def _reduce_with_friction(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:

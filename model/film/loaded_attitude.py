@@ -18,6 +18,7 @@ import numpy as np
 from model.arrays import FloatArray
 from model.film.mesh import film_grid, film_work
 from model.film.reynolds import solve_film
+from model.interpolation import bracketed_root, evaluated, monotone_cubics
 
 _TABLE_MESH = (32, 4)
 #: (A, B) -> tilting force and load over mu U R^2 L; the tilting force is infinite where the film is gone.
@@ -160,11 +161,9 @@ def loaded_attitude(start: float, end: float, radius: float, length: float) -> L
 
 def _refined(rows: FloatArray) -> FloatArray:
     """Four times as many rows, between them smooth in the wedge."""
-    from scipy.interpolate import PchipInterpolator
-
     at = np.arange(len(rows))
     fine = np.interp(np.arange(4 * len(rows) - 3) / 4.0, at, rows[:, 1])
-    return np.asarray(PchipInterpolator(rows[:, 1], rows)(fine))
+    return evaluated(rows[:, 1], monotone_cubics(rows[:, 1], rows), fine)
 
 
 _CURVATURES = (0.2, 0.35, 0.6, 1.0, 1.6, 2.5, 4.0, 6.5, 10.0, 16.0, 25.0, 40.0, 65.0, 100.0)
@@ -176,14 +175,12 @@ _LEAST_CURVATURE = -0.8
 
 def _free_curvature(force: _Force, wedge: float) -> float:
     """A at which a pad with this B tilts freely: more A takes the pressure upstream."""
-    from scipy.optimize import brentq
-
     if not force(_LEAST_CURVATURE, wedge)[0] > 0.0:
         return _LEAST_CURVATURE
     low, high = _LEAST_CURVATURE, _CURVATURES[0]
     while math.isinf(force(low, wedge)[0]):  # the film is gone at the trailing edge
         low = 0.5 * (low + high)
-    return float(brentq(lambda c: force(c, wedge)[0], low, high, xtol=1e-5))
+    return bracketed_root(lambda c: force(c, wedge)[0], low, high, 1e-5)
 
 
 def _free_wedge(force: _Force, curvature: float, end: float) -> float | None:
@@ -199,6 +196,4 @@ def _free_wedge(force: _Force, curvature: float, end: float) -> float | None:
         upper, lower = lower, 0.7 * lower
         if lower < 1e-3 * curvature * touch:
             return None
-    from scipy.optimize import brentq
-
-    return float(brentq(lambda w: force(curvature, w)[0], lower, upper, xtol=1e-6 * upper, rtol=1e-6))
+    return bracketed_root(lambda w: force(curvature, w)[0], lower, upper, 1e-6 * upper)

@@ -20,7 +20,6 @@ from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, conductances
 from model.film.slopes import shape_slopes
 from model.pad.mesh import PadGeometry
-from model.pad.solid import solid_of
 
 #: Stations on the dry arc ahead of a film that starts late.
 DRY_STATIONS = 8
@@ -125,6 +124,8 @@ def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid) -> PadDeformatio
 
 @lru_cache(maxsize=8)
 def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes) -> PadDeformation:
+    from model.pad.solid import solid_of  # rigid pads need no solid, and need not wait for its algebra
+
     angle, z, area = (np.frombuffer(raw, dtype=float) for raw in (angles, zs, areas))
     ahead = 0
     if angle[0] - geometry.leading > 1e-9:  # a starved film: the dry arc ahead of it carries nothing

@@ -14,6 +14,9 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+#: What numba keeps of the search for an equilibrium, the last that is compiled; beside its source.
+COMPILED = "statics/compiled/__pycache__/iteration.iterate-*.nbi"
+
 
 @contextlib.contextmanager
 def warming_up(bearing_text: str) -> Iterator[Callable[[], object]]:
@@ -48,7 +51,7 @@ def _compiled_before() -> bool:
     """Whether numba's files lie beside the model's; where they cannot, they are looked for in vain and made again."""
     import model
 
-    return any(Path(model.__path__[0], "__pycache__").glob("*.nbi"))
+    return any(Path(model.__path__[0]).glob(COMPILED))
 
 
 def main(path: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -10,9 +11,14 @@ from typing import Any
 from tpjb_ident.diagnose.forward.forward import ForwardModel
 from tpjb_ident.runtime.executors import cores, in_order, local_workers
 
+#: What the workers of this process share: they are forked from it and have it from there. Sent with every job it would
+#: be megabytes of equilibria each time.
+_shared: dict[int, tuple[ForwardModel, Any]] = {}
+_numbers = itertools.count()
 
-def _run(shared: tuple[ForwardModel, Any], task: Callable[..., Any], *arguments: Any) -> Any:
-    forward, problem = shared
+
+def _run(number: int, task: Callable[..., Any], *arguments: Any) -> Any:
+    forward, problem = _shared[number]
     # every job starts from the baseline's equilibria: its answer depends on nothing that ran before it
     return task(forward.fresh(), problem, *arguments)
 
@@ -37,9 +43,12 @@ def workers(forward: ForwardModel, problem: Any, count: int | None = None) -> It
     callable
         ``run(task, [(argument, ..), ..])`` yields ``task(forward, problem, argument, ..)`` in order.
     """
-    # fork: effects that the user registered are known in the workers too
-    able = "fork" in multiprocessing.get_all_start_methods()
-    with local_workers((count or cores()) if able else 1, start="fork") as opened:
-        yield lambda task, jobs: in_order(
-            opened, _run, [(task, *arguments) for arguments in jobs], shared=(forward, problem)
-        )
+    number = next(_numbers)
+    _shared[number] = (forward, problem)
+    try:
+        # fork: effects that the user registered are known in the workers too
+        able = "fork" in multiprocessing.get_all_start_methods()
+        with local_workers((count or cores()) if able else 1, start="fork") as opened:
+            yield lambda task, jobs: in_order(opened, _run, [(number, task, *arguments) for arguments in jobs])
+    finally:
+        del _shared[number]

@@ -1,0 +1,129 @@
+"""Monotone cubics and bracketed roots: what little of scipy the model's first answer would wait for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from model.arrays import FloatArray
+
+#: Steps of `bracketed_root`; each halves the bracket at least every third time.
+MOST_STEPS = 200
+
+
+def monotone_cubics(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Cubics through points that rise or fall where the points do, with a continuous tangent.
+
+    Parameters
+    ----------
+    x : (n,) ndarray
+        Rising; n is two or more.
+    y : (n,) or (n, m) ndarray
+        Values, a column per curve.
+
+    Returns
+    -------
+    (4, n - 1) or (4, n - 1, m) ndarray
+        Coefficients by powers of x - x[i], the highest first.
+
+    Notes
+    -----
+    F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300; ends by three points, held to the same shape.
+    """
+    h = np.diff(x).reshape(-1, *([1] * (y.ndim - 1)))
+    rise = np.diff(y, axis=0) / h
+    slope = np.empty_like(y, dtype=float)
+    if len(x) == 2:
+        slope[:] = rise[0]
+    else:
+        w1, w2 = 2.0 * h[1:] + h[:-1], h[1:] + 2.0 * h[:-1]
+        turns = (np.sign(rise[1:]) != np.sign(rise[:-1])) | (rise[1:] == 0.0) | (rise[:-1] == 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = (w1 / rise[:-1] + w2 / rise[1:]) / (w1 + w2)
+            slope[1:-1] = np.where(turns, 0.0, 1.0 / mean)
+        slope[0] = _end(h[0], h[1], rise[0], rise[1])
+        slope[-1] = _end(h[-1], h[-2], rise[-1], rise[-2])
+    bend = (slope[:-1] + slope[1:] - 2.0 * rise) / h
+    return np.stack([bend / h, (rise - slope[:-1]) / h - bend, slope[:-1], y[:-1]])
+
+
+def _end(h0: FloatArray, h1: FloatArray, rise0: FloatArray, rise1: FloatArray) -> FloatArray:
+    slope = ((2.0 * h0 + h1) * rise0 - h0 * rise1) / (h0 + h1)
+    other = np.sign(slope) != np.sign(rise0)
+    steep = (np.sign(rise0) != np.sign(rise1)) & (np.abs(slope) > 3.0 * np.abs(rise0))
+    return np.asarray(np.where(other, 0.0, np.where(steep, 3.0 * rise0, slope)))
+
+
+def evaluated(x: FloatArray, coefficients: FloatArray, at: FloatArray) -> FloatArray:
+    """Values of `monotone_cubics`.
+
+    Parameters
+    ----------
+    x : (n,) ndarray
+        The points.
+    coefficients : (4, n - 1) or (4, n - 1, m) ndarray
+    at : (k,) ndarray
+        Within the points.
+
+    Returns
+    -------
+    (k,) or (k, m) ndarray
+    """
+    i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
+    s = (at - x[i]).reshape(-1, *([1] * (coefficients.ndim - 2)))
+    c = coefficients[:, i]
+    return np.asarray(((c[0] * s + c[1]) * s + c[2]) * s + c[3])
+
+
+def bracketed_root(function: Callable[[float], float], low: float, high: float, tolerance: float) -> float:
+    """Root of a function that changes its sign between two places.
+
+    Parameters
+    ----------
+    function : callable
+        May be infinite at an end.
+    low, high : float
+        The places.
+    tolerance : float
+        Of the root.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        The function has the same sign at both.
+
+    Notes
+    -----
+    C. J. F. Ridders, IEEE Trans. Circuits Syst. 26 (1979) 979, and halving where a value is infinite.
+    """
+    at_low, at_high = function(low), function(high)
+    if at_low == 0.0 or at_high == 0.0:
+        return low if at_low == 0.0 else high
+    if at_low * at_high > 0.0:
+        raise ValueError(f"no change of sign between {low:g} and {high:g}")
+    last = low
+    for _ in range(MOST_STEPS):
+        middle = 0.5 * (low + high)
+        value = function(middle)
+        scale = max(abs(value), abs(at_low), abs(at_high))
+        place, found = middle, value
+        if np.isfinite(scale) and value != 0.0:
+            f, g, m = at_low / scale, at_high / scale, value / scale
+            place = middle + (middle - low) * (1.0 if f > g else -1.0) * m / (m * m - f * g) ** 0.5
+            found = function(place)
+        if found == 0.0 or abs(place - last) < tolerance or abs(high - low) < tolerance:
+            return float(place)
+        last = place
+        for x, y in sorted(((middle, value), (place, found))):
+            if low < x < high:
+                if y * at_low > 0.0:
+                    low, at_low = x, y
+                else:
+                    high, at_high = x, y
+                    break
+    return float(place)
