@@ -22,6 +22,9 @@ MAX_STEPS = 4
 TIGHT = 0.2
 #: A fit is settled when a step would move every amplitude by less than this share of its standard error.
 SETTLED = 0.1
+#: A step that loses less than this [nats] is not tried shorter: it loses by its derivative, which is better known after
+#: it, and not by its length.
+HARDLY = 0.3
 #: How often a fit takes derivatives of its own.
 ROUNDS = 3
 #: Derivatives that are taken in one job, which first solves the model where they are taken: the same for any number of
@@ -235,6 +238,8 @@ def _improved(
         told = assess(problem.basis, linear(problem, trial, y, slack), found.scales, fixed=True)
         if told.evidence > found.evidence:
             return _Place(trial, y)
+        if found.evidence - told.evidence < HARDLY:
+            break
     return None
 
 
