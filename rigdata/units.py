@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rigdata.errors import RigError
+from rigdata.unit_table import COMMON
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _TOKEN = re.compile(r"\s*(?:([A-Za-z_Ω%]{1,24})(?:(?:\^|\*\*)?([+-]?[1-6]))?(?![0-9])|([*/()])|(1)(?![0-9]))")
@@ -105,7 +106,22 @@ def _registry() -> Any:
 
 @functools.lru_cache(maxsize=512)
 def _base(name: str) -> Unit:
-    """One unit name, without powers or quotients, from pint."""
+    """One unit name, without powers or quotients: of the table, else from pint."""
+    return Unit(*COMMON[name]) if name in COMMON else from_pint(name)
+
+
+def from_pint(name: str) -> Unit:
+    """One unit name as pint knows it.
+
+    Parameters
+    ----------
+    name : str
+
+    Raises
+    ------
+    UnitError
+        Pint does not know it.
+    """
     registry = _registry()
     try:
         magnitude, units = registry.get_base_units(name)

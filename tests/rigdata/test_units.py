@@ -8,7 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigdata.units import SI_UNITS, UnitError, is_signal, parse_quantity, parse_unit, sensitivity_gain, unit_factor
+from rigdata.unit_table import COMMON
+from rigdata.units import (
+    SI_UNITS,
+    Unit,
+    UnitError,
+    from_pint,
+    is_signal,
+    parse_quantity,
+    parse_unit,
+    sensitivity_gain,
+    unit_factor,
+)
 
 TWO_PI = 2 * math.pi
 
@@ -154,3 +165,8 @@ def test_si_units_are_their_own_unit():
     for dimension, unit in SI_UNITS.items():
         if unit and dimension not in {"frequency"}:
             assert unit_factor(unit, dimension) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("name", COMMON)
+def test_units_of_the_table_are_those_of_pint(name):
+    assert Unit(*COMMON[name]) == from_pint(name)

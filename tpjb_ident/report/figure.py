@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import functools
 import io
+import itertools
+import multiprocessing
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,6 +20,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.hover import mark_lines, with_titles
+from tpjb_ident.runtime.executors import cores, in_order, local_workers
 from tpjb_ident.runtime.tables import write_atomic, write_text
 
 PNG_DPI = 160
@@ -55,6 +58,13 @@ def is_wide(figure: Figure) -> bool:
     """
     width, height = figure.get_size_inches()
     return bool(width > 1.35 * height and width > 6.5)
+
+
+#: Panels from which on a second process draws too, and how many processes do at most.
+TOGETHER, MOST_HANDS = 6, 4
+#: What is being drawn, for processes that are forked from this one.
+_drawn: dict[int, tuple[Panel, ...]] = {}
+_numbers = itertools.count()
 
 
 def panel(name: str, title: str, figure: Figure, group: str) -> Panel:
@@ -137,11 +147,26 @@ def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:
         Made if need be.
     """
     folder.mkdir(exist_ok=True)
-    texts = {panel.name: svg_text(panel.figure, panel.name) for panel in panels}
-    for panel in panels:
-        write_text(folder / f"{panel.name}.svg", _on_white(texts[panel.name]))
-        write_atomic(folder / f"{panel.name}.png", functools.partial(_save_png, panel.figure))
-    return texts
+    number = next(_numbers)
+    _drawn[number] = tuple(panels)
+    try:
+        # forked: the figures are there already, and a few of them are not worth a second process
+        alone = len(panels) < TOGETHER or "fork" not in multiprocessing.get_all_start_methods()
+        with local_workers(1 if alone else min(cores(), MOST_HANDS), start="fork") as opened:
+            jobs = [(number, index, folder) for index in range(len(panels))]
+            texts = list(in_order(opened, _save_panel, jobs))
+    finally:
+        del _drawn[number]
+    return {panel.name: text for panel, text in zip(panels, texts, strict=True)}
+
+
+def _save_panel(number: int, index: int, folder: Path) -> str:
+    """Write one panel; its text as SVG."""
+    panel = _drawn[number][index]
+    text = svg_text(panel.figure, panel.name)
+    write_text(folder / f"{panel.name}.svg", _on_white(text))
+    write_atomic(folder / f"{panel.name}.png", functools.partial(_save_png, panel.figure))
+    return text
 
 
 def _on_white(svg: str) -> str:
