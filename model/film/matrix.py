@@ -45,11 +45,8 @@ def assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArr
                 band[k, width] -= gx[i, j]
 
 
-def _unrolled(width: int) -> tuple[Any, Any, Any]:
-    """`factorise`, `substitute` and `substitute_four` for one width: what the compiler knows, it keeps in registers.
-
-    Every unknown is finished before the next one needs it, the nearest neighbour last: nothing waits for memory.
-    """
+def _factoriser(width: int) -> Any:
+    """`factorise` for one width: what the compiler knows, it keeps in registers."""
 
     @compiled
     def factorise_unrolled(band: FloatArray) -> None:
@@ -68,6 +65,12 @@ def _unrolled(width: int) -> tuple[Any, Any, Any]:
                         band[k + r, s - r] -= factor * band[k, s]
             for r in range(1, width + 1):
                 band[k, r] *= inverse
+
+    return factorise_unrolled
+
+
+def _substitution(width: int) -> Any:
+    """`substitute` for one width: an unknown's nearest neighbour comes last, so that nothing waits for memory."""
 
     @compiled
     def substitute_unrolled(band: FloatArray, x: FloatArray) -> None:
@@ -93,6 +96,12 @@ def _unrolled(width: int) -> tuple[Any, Any, Any]:
                     total -= band[k, r] * x[k + r]
             x[k] = total
 
+    return substitute_unrolled
+
+
+def _substitution_of_four(width: int) -> Any:
+    """`substitute_four` for one width, see `_substitution`."""
+
     @compiled
     def substitute_four_unrolled(band: FloatArray, x: FloatArray) -> None:
         n = band.shape[0]
@@ -114,12 +123,12 @@ def _unrolled(width: int) -> tuple[Any, Any, Any]:
                     c, d = c - f * x[k + r, 2], d - f * x[k + r, 3]
             x[k, 0], x[k, 1], x[k, 2], x[k, 3] = a, b, c, d
 
-    return factorise_unrolled, substitute_unrolled, substitute_four_unrolled
+    return substitute_four_unrolled
 
 
 #: Of the default mesh, half a film of 6 intervals, and of the coarser one where many models are compared.
-_factorise_6, _substitute_6, _substitute_four_6 = _unrolled(6)
-_factorise_4, _substitute_4, _substitute_four_4 = _unrolled(4)
+_factorise_6, _substitute_6, _substitute_four_6 = _factoriser(6), _substitution(6), _substitution_of_four(6)
+_factorise_4, _substitute_4, _substitute_four_4 = _factoriser(4), _substitution(4), _substitution_of_four(4)
 
 
 @compiled
