@@ -27,9 +27,6 @@ SETTLED = 0.1
 HARDLY = 0.3
 #: How often a fit takes derivatives of its own.
 ROUNDS = 3
-#: Derivatives that are taken in one job, which first solves the model where they are taken: the same for any number of
-#: workers, so that answers do not depend on that.
-TOGETHER = 8
 
 
 @dataclass(frozen=True)
@@ -312,18 +309,11 @@ def _moved(start: Start, free: FloatArray) -> Start:
 
 def _renewed(run: Map, problem: Problem, start: Start, y: FloatArray) -> Start:
     count = start.jacobian.shape[1]
-    every = range(count + len(problem.nuisances))
-    jobs = [(start, every[k : k + TOGETHER]) for k in range(0, len(every), TOGETHER)]
-    columns = [column for part in run(_columns, jobs) for column in part]
+    jobs = [(start, y, i) for i in range(count + len(problem.nuisances))]
+    columns = list(run(_column, jobs))
     nothing = np.zeros((len(y), 0))
     jacobian = np.column_stack(columns[:count]) if count else nothing
     return replace(start, jacobian=jacobian, columns=np.column_stack([nothing, *columns[count:]]))
-
-
-def _columns(forward: ForwardModel, problem: Problem, start: Start, indices: Sequence[int]) -> list[FloatArray]:
-    """Some columns; the model is solved where they are taken first, so that all of them start from there."""
-    y = predict(forward, build(start.candidates, start.amplitudes), problem.nuisances, start.nuisance)
-    return [_column(forward, problem, start, y, index) for index in indices]
 
 
 def _column(forward: ForwardModel, problem: Problem, start: Start, y: FloatArray, index: int) -> FloatArray:
