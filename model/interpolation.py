@@ -39,7 +39,7 @@ def monotone_cubics(x: FloatArray, y: FloatArray) -> FloatArray:
     else:
         w1, w2 = 2.0 * h[1:] + h[:-1], h[1:] + 2.0 * h[:-1]
         turns = (np.sign(rise[1:]) != np.sign(rise[:-1])) | (rise[1:] == 0.0) | (rise[:-1] == 0.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):  # where the curve turns, its slope is zero
             mean = (w1 / rise[:-1] + w2 / rise[1:]) / (w1 + w2)
             slope[1:-1] = np.where(turns, 0.0, 1.0 / mean)
         slope[0] = _end(h[0], h[1], rise[0], rise[1])
