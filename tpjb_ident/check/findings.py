@@ -131,11 +131,14 @@ class Verdicts:
         Errors that a third of the runs or more have in common: what is wrong is wrong with the campaign.
     doubtful : dict of str to list of Problem
         Warnings.
+    gains : dict of str to float
+        What differences between channels that should agree add to the uncertainty of their gains.
     """
 
     unusable: dict[str, Problem] = field(default_factory=dict)
     shared: dict[str, list[Problem]] = field(default_factory=dict)
     doubtful: dict[str, list[Problem]] = field(default_factory=dict)
+    gains: dict[str, float] = field(default_factory=dict)
 
 
 def verdicts(reports: Sequence[Reporter]) -> Verdicts:

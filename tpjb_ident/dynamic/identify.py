@@ -10,6 +10,7 @@ from scipy.stats import chi2
 from rigdata.campaign import Campaign
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.findings import Verdicts
+from tpjb_ident.check.redundant_channels import widened
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.broadband.band_result import BandResult
 from tpjb_ident.dynamic.broadband.band_runs import is_broadband
@@ -137,7 +138,7 @@ def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySetti
         {digest.run: digest.temperatures for digest in digests},
         directions_differ(first),
         channel_pairs(campaign, sweeps),
-        gain_draws(campaign.channels, settings.n_calibration, settings.seed),
+        gain_draws(widened(campaign.channels, checked.gains), settings.n_calibration, settings.seed),
         systematic_sources(campaign, settings.n_calibration, settings.seed + 1),
         force_pickup(in_cells),
         checked,

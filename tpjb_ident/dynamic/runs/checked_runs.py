@@ -8,6 +8,7 @@ from rigdata.campaign import Campaign
 from rigdata.problem import Problem
 from tpjb_ident.check.campaign import judged
 from tpjb_ident.check.findings import Verdicts, verdicts
+from tpjb_ident.check.redundant_channels import channels_apart
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 
@@ -31,6 +32,8 @@ def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
     if not seen:  # runs that are no files
         return Verdicts()
     found = verdicts([one.report for one in judged(campaign, seen)])
+    for apart in channels_apart(seen):
+        found.gains.update(apart.uncertainty())
     finished.leave_out_unusable(found.unusable)
     # without accelerometers the inertia stays in the force: that is told, and no reason to refuse
     optional = {f"channel {c.name}" for c in campaign.channels.values() if c.quantity == "acceleration"}

@@ -1,0 +1,96 @@
+"""Four probes tell one vector: what one of them adds is seen, and stands in the uncertainty of their mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from rigdata.calibration import Channel
+from tpjb_ident.check import redundant_channels
+from tpjb_ident.check.redundant_channels import channels_apart, widened
+
+AXES = {"PXA": 45.0, "PYA": 135.0, "PXB": 45.0, "PYB": 135.0}
+
+
+@dataclass(frozen=True)
+class Lines:
+    phasor: np.ndarray
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A run as the check leaves it, as far as is asked here."""
+
+    lines: Lines
+    channels: tuple[Channel, ...] = field(default=())
+
+    def pick(self, quantity):
+        return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
+
+
+def channel(name, axis, uncertainty):
+    return Channel(name=name, quantity="displacement", unit="um", axis=np.radians(axis), uncertainty=uncertainty)
+
+
+def runs(gains=(1.0, 1.0, 1.0, 1.0), noise=1e-9, n=8, uncertainty=0.005, seed=0, axes=None):
+    axes = AXES if axes is None else axes
+    rng = np.random.default_rng(seed)
+    channels = tuple(channel(name, a, uncertainty) for name, a in axes.items())
+    turned = np.radians(list(axes.values()))
+    directions = np.stack([np.cos(turned), np.sin(turned)], axis=1)
+    made = []
+    for _ in range(n):
+        vector = 5e-6 * (rng.standard_normal(2) + 1j * rng.standard_normal(2))
+        shown = directions @ vector * np.asarray(gains[: len(axes)])
+        made.append(Seen(Lines(shown + noise * (rng.standard_normal(len(axes)) + 0j)), channels))
+    return made
+
+
+@pytest.fixture(autouse=True)
+def every_run_is_excited(monkeypatch):
+    monkeypatch.setattr(redundant_channels, "excited", lambda seen: True)
+
+
+def test_probes_that_agree_are_not_apart():
+    assert channels_apart(runs()) == ()
+
+
+def test_stated_uncertainties_may_differ_by_what_they_state():
+    assert channels_apart(runs((1.008, 1.0, 0.995, 1.0))) == ()
+
+
+def test_a_difference_is_halved_between_the_two_planes():
+    (apart,) = channels_apart(runs((1.05, 1.0, 1.0, 1.0), noise=0.0))
+    assert -apart.gains == pytest.approx([0.025, 0.0, -0.025, 0.0], abs=1e-3)
+    assert apart.sentence().startswith("PXA reads 4.9% more at the excitation than PXB")
+
+
+def test_two_pairs_are_told_apart():
+    (apart,) = channels_apart(runs((1.05, 1.0, 1.0, 0.92), noise=0.0))
+    assert -apart.gains == pytest.approx([0.025, 0.04, -0.025, -0.04], abs=3e-3)
+
+
+def test_the_widened_interval_of_the_mean_holds_either_end():
+    """The mean is off by half the difference where one probe alone is wrong."""
+    (apart,) = channels_apart(runs((1.05, 1.0, 1.0, 1.0), noise=0.0))
+    channels = {c.name: c for c in runs()[0].channels}
+    wide = widened(channels, apart.uncertainty())
+    of_the_mean = 0.5 * np.hypot(wide["PXA"].uncertainty, wide["PXB"].uncertainty)
+    assert 1.96 * of_the_mean > 0.025
+    assert 1.96 * of_the_mean < 0.035
+    assert wide["PYA"].uncertainty == pytest.approx(0.005, abs=1e-3)
+
+
+def test_scatter_is_no_gain():
+    assert channels_apart(runs((1.03, 1.0, 1.0, 1.0), noise=1e-6, n=4)) == ()
+
+
+def test_two_probes_have_nothing_to_be_held_against():
+    assert channels_apart(runs((1.5, 1.0), axes={"X": 0.0, "Y": 90.0})) == ()
+
+
+def test_three_probes_are_held_against_each_other():
+    (apart,) = channels_apart(runs((1.1, 1.0, 1.0), axes={"A": 0.0, "B": 120.0, "C": 240.0}))
+    assert apart.sentence().startswith("A reads")

@@ -1,0 +1,148 @@
+"""Channels beyond the two that a plane needs, held against each other at the excitation line.
+
+Probes in two planes, or four load cells: their readings are the projections of one vector, so m channels leave m - 2
+conditions that no motion of a rigid shaft breaks. What is left is a gain of one channel, or a shaft that tilts between
+the planes; the records do not tell which. The mean of the planes may be off by as much as each differs from it, so
+half of a difference is taken as the half-width of a rectangle (GUM 4.3.7) in the uncertainty of the channels' gains.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rigdata.calibration import Channel
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.check.observation import Observation
+from tpjb_ident.check.set_points import excited
+
+#: Gain uncertainty of a channel for which the manifest states none, as `[tolerances] probe_gain` has it.
+USUAL_GAIN = 0.005
+#: Differences of so many standard deviations of the stated uncertainties are told.
+CLEAR = 3.0
+#: A difference that stands this many standard errors above the scatter of the runs is no noise.
+SEEN = 4.0
+MIN_RUNS = 3
+#: From a rectangle's half-width, shared by the two channels of a pair, to the standard deviation of each.
+RECTANGLE = math.sqrt(2.0 / 3.0)
+
+
+@dataclass(frozen=True)
+class ApartChannels:
+    """Channels of one quantity that do not tell the same vector.
+
+    Attributes
+    ----------
+    quantity : str
+    names : tuple of str
+        All channels of the quantity.
+    gains : (m,) ndarray
+        Least changes of their gains that make them agree.
+    """
+
+    quantity: str
+    names: tuple[str, ...]
+    gains: FloatArray = field(repr=False)
+
+    def uncertainty(self) -> dict[str, float]:
+        """Standard deviation of every channel's gain that comes from the difference."""
+        return {n: RECTANGLE * abs(float(g)) for n, g in zip(self.names, self.gains, strict=True) if g}
+
+    def sentence(self) -> str:
+        """Say which channel reads more than the others, and by how much."""
+        order = np.argsort(self.gains)
+        high, low = self.names[order[0]], self.names[order[-1]]
+        apart = float(self.gains[order[-1]] - self.gains[order[0]])
+        return (
+            f"{high} reads {apart:.1%} more at the excitation than {low} and the others foretell, in all runs: a gain, "
+            "or a shaft that tilts"
+        )
+
+
+def channels_apart(runs: Sequence[Observation]) -> tuple[ApartChannels, ...]:
+    """Find the quantities whose channels contradict each other in all runs alike.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+        Dynamic ones.
+
+    Returns
+    -------
+    tuple of ApartChannels
+        Empty where no quantity has more than two channels, or where these agree within their uncertainties.
+    """
+    found = []
+    for quantity in ("displacement", "force"):
+        groups: dict[tuple[str, ...], list[ComplexArray]] = {}
+        kept: dict[tuple[str, ...], list[Channel]] = {}
+        for seen in runs:
+            where = seen.pick(quantity)
+            if seen.lines is None or len(where) < 3 or not excited(seen):
+                continue
+            phasors = np.asarray(seen.lines.phasor[where], dtype=np.complex128)
+            if np.isfinite(phasors).all():
+                names = tuple(seen.channels[i].name for i in where)
+                groups.setdefault(names, []).append(phasors)
+                kept[names] = [seen.channels[i] for i in where]
+        found += [a for names, z in groups.items() if (a := _apart(quantity, kept[names], np.array(z))) is not None]
+    return tuple(found)
+
+
+def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) -> ApartChannels | None:
+    """Judge the phasors (runs, m) of one set of channels."""
+    axes = np.array([float(c.axis or 0.0) for c in channels])
+    directions = np.stack([np.cos(axes), np.sin(axes)], axis=1)
+    if len(phasors) < MIN_RUNS or np.linalg.matrix_rank(directions) < 2:
+        return None
+    beyond = np.linalg.svd(directions)[0][:, 2:]  # (m, m - 2): what no vector of the plane does
+    vectors = phasors @ np.linalg.pinv(directions).T
+    seen = vectors @ directions.T
+    # every run is one vote of its own size: beyond^T (gain * seen) = beyond^T phasor
+    size = np.linalg.norm(seen, axis=1)
+    design = np.concatenate([(beyond.T * (s / n)) for s, n in zip(seen, size)])
+    left = (phasors / size[:, None] @ beyond).ravel()
+    real, rest = np.concatenate([design.real, design.imag]), np.concatenate([left.real, left.imag])
+    inverse = np.linalg.pinv(real, rcond=1e-6)
+    gains = inverse @ rest
+    spread = float(np.sum((rest - real @ gains) ** 2)) / max(len(rest) - np.linalg.matrix_rank(real), 1)
+    noise = np.sqrt(np.diag(inverse @ inverse.T) * spread)
+    stated = np.array([USUAL_GAIN if c.uncertainty is None else c.uncertainty for c in channels])
+    allowed = np.sqrt(np.diag((inverse @ real) @ np.diag(stated**2) @ (inverse @ real).T))
+    if not (np.abs(gains) > np.maximum(CLEAR * allowed, SEEN * noise)).any():
+        return None
+    return ApartChannels(quantity, tuple(c.name for c in channels), -np.asarray(gains))
+
+
+def report_apart(runs: Sequence[Observation]) -> None:
+    """Warn of channels that contradict each other.
+
+    Parameters
+    ----------
+    runs : sequence of Observation
+        Dynamic ones.
+    """
+    cure = "Calibrate them against each other, or state the `uncertainty` of their gains"
+    for apart in channels_apart(runs):
+        for seen in runs:
+            if seen.pick(apart.quantity):
+                place = f"channels {', '.join(apart.names)}"
+                seen.report.say(f"apart {apart.quantity}", "warning", place, apart.sentence(), cure)
+
+
+def widened(channels: Mapping[str, Channel], more: Mapping[str, float]) -> dict[str, Channel]:
+    """Channels with the uncertainty that their differences add to what the manifest states.
+
+    Parameters
+    ----------
+    channels : mapping of str to Channel
+    more : mapping of str to float
+        Standard deviation of gains, by channel, as `ApartChannels.uncertainty` gives it.
+    """
+    return {
+        n: replace(c, uncertainty=math.hypot(c.uncertainty or 0.0, more[n])) if n in more else c
+        for n, c in channels.items()
+    }
