@@ -14,6 +14,7 @@ from model.statics.carrying import find_branch, set_loaded
 from model.statics.compiled.constants import FIRST_HEATING, MICROMETRE, RELAXATION
 from model.statics.compiled.first_position import first_position
 from model.statics.equilibrium import Equilibrium
+from model.statics.heat_paths import couples_heat
 from model.statics.pad_film import PadFilm, pad_films
 
 
@@ -85,11 +86,14 @@ class Search:
         """
         if len(start.films) != len(self.films) or not start.converged:
             return False
+        coupled = couples_heat(self.setup)
         for film, other in zip(self.films, start.films, strict=True):
             if film.work.pressure.shape != other.work.pressure.shape:
                 return False
             film.tilt, film.deflection, film.idle = other.tilt, other.deflection, other.idle
-            film.work.temperature[:], film.inlet = other.work.temperature, other.inlet
+            film.work.temperature[:] = other.work.temperature
+            if coupled:  # elsewhere the inlet is the supply of this set-up, whatever the neighbour drank
+                film.inlet = other.inlet
             for state, known in zip(film.heat_state, other.heat_state, strict=False):
                 state[:] = known
             film.work.ruptured[:] = other.work.ruptured
@@ -97,7 +101,9 @@ class Search:
             if self.setup.flexible_pads:
                 film.bent[:] = other.bent
                 film.work.extra[:] += other.bent
-        self.position, self.journal = start.position.copy(), start.journal_temperature
+        self.position = start.position.copy()
+        if coupled:
+            self.journal = start.journal_temperature
         return True
 
     def start_cold(self) -> None:

@@ -66,6 +66,35 @@ def neutral(name: str) -> Effect:
     return Effect(name, **{k: (2 if k == "pad" else 0.3) if math.isnan(v) else v for k, v in values.items()})
 
 
+def typical(name: str) -> Effect:
+    """The effect at a size one would not be surprised by, all else neutral."""
+    values = dict(neutral(name).parameters)
+    first = next(p for p in known_effects()[name].parameters_of(5) if math.isfinite(p.typical))
+    values[first.name] = first.typical if math.isinf(first.neutral) else first.neutral + first.typical
+    if not first.low <= values[first.name] <= first.high:
+        values[first.name] = first.neutral - first.typical
+    return Effect(name, **values)
+
+
+#: Those that solve the pads' conduction or bending are as slow as their first solution; they are left to the whole run.
+SLOW = {"pad_bending", "pad_conduction"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if n in SLOW else []) for n in sorted(NAMES)]
+)
+def test_an_effect_is_the_same_from_a_start_without_it(rocker, base, name):
+    """What a diagnosis and a sweep rely on: nothing of the neighbour's set-up comes along with its state."""
+    if known_effects()[name].missing(rocker):
+        pytest.skip("the bearing cannot have it")
+    effect = typical(name)
+    cold = predict(rocker, LOAD, DOWN, SPEED, OMEGA, effects=[effect])
+    warm = predict(rocker, LOAD, DOWN, SPEED, OMEGA, effects=[effect], start=base)
+    assert cold.converged
+    assert warm.converged
+    same(warm, cold, 2e-6)
+
+
 def test_library_has_every_name_that_users_know():
     assert set(known_effects()) >= NAMES
     for kind in known_effects().values():
