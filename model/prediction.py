@@ -20,7 +20,7 @@ from model.statics.pad_flow import PadFlow, pad_flow
 from model.statics.power import power_loss
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Prediction:
     """What the model says about one operating point, as the records would show it.
 
@@ -73,6 +73,30 @@ class Prediction:
             f"shaft at ({x:.4g}, {y:.4g}) um, thinnest film {1e6 * self.min_film:.3g} um, "
             f"hottest {self.max_temperature:.4g} degC; {', '.join(self.status) or 'all well'}"
         )
+
+    def __repr__(self) -> str:
+        return f"<Prediction {self.summary()}>"
+
+    def summary(self) -> str:
+        """Operating point, direct coefficients in MN/m and kN s/m, position and extremes, in one line."""
+        lines = np.atleast_1d(np.asarray(self.excitation, float)) / (2 * math.pi)
+        h = self.h.reshape(-1, 2, 2)[0]
+        found = [h[0, 0].real / 1e6, h[1, 1].real / 1e6, *(h.imag[[0, 1], [0, 1]] / (2e3 * math.pi * lines[0]))]
+        more = f" and at {len(lines) - 1} more" if len(lines) > 1 else ""
+        return (
+            f"{self}; at {lines[0]:.4g} Hz{more}: kxx {found[0]:.4g}, kyy {found[1]:.4g} MN/m, "
+            f"cxx {found[2]:.4g}, cyy {found[3]:.4g} kN s/m"
+        )
+
+    def _repr_html_(self) -> str:
+        """Coefficients over the excitation frequency, for a notebook."""
+        names = ("kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy")
+        lines = np.atleast_1d(np.asarray(self.excitation, float)) / (2 * math.pi)
+        cells = np.concatenate([self.k.reshape(-1, 4) / 1e6, self.c.reshape(-1, 4) / 1e3], axis=1)
+        heads = ["excitation, Hz", *(f"{n}, {'MN/m' if n[0] == 'k' else 'kN s/m'}" for n in names)]
+        rows = [[f"{line:.4g}", *(f"{v:.4g}" for v in row)] for line, row in zip(lines, cells, strict=True)]
+        table = "".join("<tr>" + "".join(f"<td>{c}</td>" for c in row) + "</tr>" for row in rows)
+        return f"<p>{self}</p><table><tr>{''.join(f'<th>{n}</th>' for n in heads)}</tr>{table}</table>"
 
     @property
     def converged(self) -> bool:

@@ -139,3 +139,11 @@ def test_a_sweep_over_a_change_of_regime_finds_what_single_points_find(rocker_fi
         single = predict_setup(setup, w, -math.pi / 2, speed, line)
         assert p.idle_pads == single.idle_pads
         np.testing.assert_allclose(p.h, single.h, rtol=1e-4)
+
+
+def test_a_prediction_prints_in_the_units_of_its_readers(rocker_file):
+    found = predict(load_bearing(rocker_file), load=5000.0, speed=138.0, excitation=np.array([100.0, 157.0]))
+    assert len(repr(found)) < 300
+    assert repr(found).startswith("<Prediction 5000 N at -90 deg, 21.96 Hz: shaft at")
+    assert f"kxx {found.kxx[0] / 1e6:.4g}, kyy {found.kyy[0] / 1e6:.4g} MN/m" in found.summary()
+    assert found._repr_html_().count("<tr>") == 3

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from rigdata.near_names import unknown_name
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arguments import as_campaign
 from tpjb_ident.diagnose.campaign import Baseline, CampaignDiagnosis, diagnose_campaign
@@ -26,11 +30,14 @@ from model.bearing_file import load_bearing  # noqa: E402
 from model.effects import Effect  # noqa: E402
 from model.pivots import pivot_laws  # noqa: E402
 from model.setup import Setup  # noqa: E402
+from model.units import to_si  # noqa: E402
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
 
 Progress = Callable[[str, int, int], None]
+#: Set points of a plan and what they must be.
+_POINT = {"load": "force", "load_direction": "angle", "speed": "angular speed", "excitation": "angular speed"}
 
 
 def diagnose(
@@ -76,12 +83,12 @@ def diagnose(
 
 def plan(
     bearing: Bearing | str | Path,
-    points: Sequence[OperatingPoint],
+    points: Sequence[OperatingPoint] | Mapping[str, Any],
     *,
     pivots: Any = "kirk",
     locus: int = 20,
     dry_tests: bool = True,
-    push: float = 200.0,
+    push: Any = 200.0,
     temperatures: bool = True,
 ) -> CampaignPlan:
     """Tell which effects a planned campaign could see, from which size on, and which it would mix up.
@@ -89,15 +96,16 @@ def plan(
     Parameters
     ----------
     bearing : Bearing, str or Path
-    points : sequence of OperatingPoint
-        Of the dynamic runs.
+    points : sequence of OperatingPoint, or mapping
+        Of the dynamic runs; or ``{"load": .., "speed": .., "excitation": .., "load_direction": ..}``, single values or
+        lists, SI or pint quantities: every combination is a point. The direction is straight down where none is given.
     pivots : object
         As of `diagnose`.
     locus : int
         Load directions of the shaft locus; 0: none.
     dry_tests : bool
         Dry load-deflection tests on all pads.
-    push : float
+    push : float or pint quantity
         Push load of the clearance sweep [N]; 0: none.
     temperatures : bool
         A temperature sensor in every pad.
@@ -112,9 +120,41 @@ def plan(
         No dynamic runs.
     """
     drawn = _bearing(bearing)
-    return work_out(
-        Setup(drawn, pivot_laws(pivots, drawn)), planned_layout(drawn, points, (locus, dry_tests, push, temperatures))
-    )
+    tests = points_of(points) if isinstance(points, Mapping) else points
+    static = (locus, dry_tests, float(to_si(push, "force", "push")), temperatures)
+    return work_out(Setup(drawn, pivot_laws(pivots, drawn)), planned_layout(drawn, tests, static))
+
+
+def points_of(given: Mapping[str, Any]) -> list[OperatingPoint]:
+    """Every combination of loads, directions, speeds and excitation frequencies.
+
+    Parameters
+    ----------
+    given : mapping of str to float, sequence or pint quantity
+        ``load`` [N], ``speed`` and ``excitation`` [rad/s], ``load_direction`` [rad] by default straight down.
+
+    Raises
+    ------
+    ArgumentError
+        One is lacking, or unknown: says the nearest.
+    UnitError
+        A quantity of another dimension, by its name.
+    """
+    for name in given:
+        if name not in _POINT:
+            raise ArgumentError(f"points: {unknown_name('set point', name, _POINT)}")
+    lists = {}
+    for name, dimension in _POINT.items():
+        if name not in given and name != "load_direction":
+            raise ArgumentError(f"points: {name} is missing. Give load, speed and excitation.")
+        value = given.get(name, -math.pi / 2)
+        lists[name] = np.atleast_1d(np.asarray(to_si(value, dimension, f"points: {name}"), dtype=float))
+    return [
+        OperatingPoint(float(w), float(a), float(n), float(f))
+        for w, a, n, f in itertools.product(
+            *(lists[name] for name in ("load", "load_direction", "speed", "excitation"))
+        )
+    ]
 
 
 def planned_layout(bearing: Bearing, points: Sequence[OperatingPoint], static: tuple[int, bool, float, bool]) -> Layout:

@@ -48,7 +48,32 @@ def points_tab(found: Identification) -> Any:
 
     pick.on_change("value", lambda attr, old, new: update())
     update()
-    return column(pick, table, plot, sizing_mode="stretch_width")
+    return column(pick, table, plot, stiffness_plot(found), sizing_mode="stretch_width")
+
+
+def stiffness_plot(found: Identification) -> Any:
+    """Direct stiffness of all points over load, with 95 % intervals as bars.
+
+    Parameters
+    ----------
+    found : Identification
+    """
+    from bokeh.models import ColumnDataSource, Whisker
+
+    plot = new_plot("direct stiffness, 95 % intervals", "static load, kN", "stiffness, MN/m", name="stiffness-plot")
+    good = [p for p in found.points if np.isfinite(p.stiffness.h).all()]
+    for index, name, colour, marker in ((0, "kxx", BLUE, "square"), (3, "kyy", RED, "circle")):
+        value = [p.stiffness.vector[index] / 1e6 for p in good]
+        half = [p.stiffness.half_width()[index] / 1e6 for p in good]
+        source = ColumnDataSource({"x": [p.point.static_load / 1e3 for p in good], "y": value,
+                                   "low": [v - h for v, h in zip(value, half, strict=True)],
+                                   "high": [v + h for v, h in zip(value, half, strict=True)]})  # fmt: skip
+        plot.scatter("x", "y", source=source, color=colour, marker=marker, size=7, legend_label=name)
+        plot.add_layout(Whisker(base="x", upper="high", lower="low", source=source, line_color=colour))
+    if plot.legend:
+        plot.add_layout(plot.legend[0], "below")
+        plot.legend.orientation = "horizontal"
+    return plot
 
 
 def label(p: PointResult) -> str:

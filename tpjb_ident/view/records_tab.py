@@ -1,4 +1,4 @@
-"""Records: pick a run, see its channels over time, a spectrum, and the orbit of the shaft."""
+"""Records: pick a run, see its channels over time, their spectra, a waterfall, and the orbit of the shaft."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ import numpy as np
 
 from rigdata.problem import RigDataError
 from rigdata.survey.spectrum import amplitude_spectrum, strongest
-from tpjb_ident.view.style import BLUE, INK, RED, new_plot
+from tpjb_ident.view.style import BLUE, COLOURS, INK, RED, new_plot
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rigdata.campaign import Campaign
     from rigdata.record import Record
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 MOST_POINTS = 6000
 #: Of the running speed, taken off the orbit together: unbalance and runout.
 HARMONICS = 2
+#: Stretches of a waterfall that do not overlap, and samples of one at most.
+STRETCHES, MOST_LINES = 12, 2048
 _UNITS = {
     "displacement": ("µm", 1e6),
     "force": ("N", 1.0),
@@ -36,18 +40,26 @@ def records_tab(campaign: Campaign) -> Any:
     campaign : Campaign
     """
     from bokeh.layouts import column, row
-    from bokeh.models import ColumnDataSource, Div, Select
+    from bokeh.models import ColumnDataSource, Div, MultiSelect, Select
 
     runs = {run.id: run for run in campaign.runs}
     first = campaign.runs[0]
     pick = Select(title="run", options=list(runs), value=first.id, name="run", width=240)
     channel = Select(title="channel", options=list(first.channels), value=next(iter(first.channels)), name="channel")
+    others = MultiSelect(
+        title="beside it (same quantity)", options=list(first.channels), value=[], name="others", width=320
+    )
     facts = Div(name="run-facts", sizing_mode="stretch_width")
-    data = {name: ColumnDataSource({"x": [], "y": []}) for name in ("time", "spectrum", "orbit", "without")}
-    time = new_plot("channel over time", "time, s", "", name="time-plot")
-    time.line("x", "y", source=data["time"], color=INK)
+    data = {name: ColumnDataSource({"x": [], "y": []}) for name in ("orbit", "without")}
+    data |= {name: ColumnDataSource({"x": [], "y": [], "colour": [], "name": []}) for name in ("time", "spectrum")}
+    data["waterfall"] = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
+    time = new_plot("channels over time", "time, s", "", name="time-plot")
     spectrum = new_plot("amplitude spectrum", "frequency, Hz", "amplitude", y_axis_type="log", name="spectrum-plot")
-    spectrum.line("x", "y", source=data["spectrum"], color=BLUE)
+    for plot, name in ((time, "time"), (spectrum, "spectrum")):
+        plot.multi_line("x", "y", source=data[name], color="colour", legend_field="name")
+        plot.add_layout(plot.legend[0], "below")  # covers nothing
+        plot.legend.orientation = "horizontal"
+    fall = waterfall_plot(data["waterfall"])
     orbit = new_plot("shaft in the housing", "x, µm", "y, µm", match_aspect=True, height=420, name="orbit-plot")
     orbit.line("x", "y", source=data["orbit"], color=BLUE, line_width=0.7, legend_label="as measured")
     orbit.line("x", "y", source=data["without"], color=RED, line_width=0.7, legend_label="without running speed")
@@ -60,34 +72,95 @@ def records_tab(campaign: Campaign) -> Any:
         text = f"{run.kind}, {p.static_load / 1e3:g} kN at {p.static_load_direction_deg:g} deg, {p.shaft_speed_hz:g} Hz"
         text += f", excitation {p.excitation_hz:g} Hz" if p.excitation else ""
         try:
-            record = run.record(channel.value)
-            said = _show_channel(record, (time, spectrum), data)
+            records = [run.record(channel.value), *(run.record(n) for n in others.value if n != channel.value)]
+            said = show_channels(records, (time, spectrum), data)
+            fall.title.text = f"waterfall of {records[0].name}"
+            data["waterfall"].data = waterfall(records[0])
             data["orbit"].data, data["without"].data = _orbits(run)
             facts.text = _escaped(f"{text}. {said}")
         except RigDataError as error:
             for source in data.values():
-                source.data = {"x": [], "y": []}
+                source.data = {name: [] for name in source.data}
             facts.text = _escaped(f"{text}. {error}")
 
     pick.on_change("value", lambda attr, old, new: update())
     channel.on_change("value", lambda attr, old, new: update())
+    others.on_change("value", lambda attr, old, new: update())
     update()
-    return column(row(pick, channel), facts, row(column(time, spectrum, sizing_mode="stretch_width"), orbit,
-                  sizing_mode="stretch_width"), sizing_mode="stretch_width")  # fmt: skip
+    left, right = column(time, spectrum, sizing_mode="stretch_width"), column(orbit, fall, sizing_mode="stretch_width")
+    return column(row(pick, channel, others), facts, row(left, right, sizing_mode="stretch_width"),
+                  sizing_mode="stretch_width")  # fmt: skip
 
 
-def _show_channel(record: Record, plots: tuple[Any, Any], data: dict[str, Any]) -> str:
-    unit, scale = _UNITS.get(record.quantity, ("", 1.0))
-    values = scale * record.values
-    plots[0].yaxis.axis_label = f"{record.name}, {unit}"
-    plots[1].yaxis.axis_label = f"amplitude, {unit}"
-    x, y = thinned(record.time, values)
-    data["time"].data = {"x": x, "y": y}
-    frequency, amplitude = amplitude_spectrum(values, record.rate)
-    data["spectrum"].data = {"x": frequency[4:], "y": np.maximum(amplitude[4:], 1e-12)}
-    lines = ", ".join(f"{x.frequency:.4g} Hz ({x.amplitude:.3g} {unit})" for x in strongest(frequency, amplitude, 3))
-    missing = int(np.isnan(values).sum())
-    return f"{record.name}: {len(values)} samples at {record.rate:g} Hz, {missing} missing; lines: {lines or 'none'}"
+def show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict[str, Any]) -> str:
+    """Draw channels of one quantity over time and frequency; what is to be said of them.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        The first decides the unit; those of other quantities are left out and named.
+    plots : tuple of figure
+        Over time, over frequency.
+    data : dict of str to ColumnDataSource
+    """
+    first = records[0]
+    unit, scale = _UNITS.get(first.quantity, ("", 1.0))
+    drawn = [r for r in records if r.quantity == first.quantity][: len(COLOURS)]
+    label = first.name if len(drawn) == 1 else first.quantity
+    plots[0].yaxis.axis_label, plots[1].yaxis.axis_label = f"{label}, {unit}", f"amplitude, {unit}"
+    paths = [thinned(r.time, scale * r.values) for r in drawn]
+    spectra = [amplitude_spectrum(scale * r.values, r.rate) for r in drawn]
+    look = {"colour": [INK, *COLOURS][: len(drawn)], "name": [r.name for r in drawn]}
+    data["time"].data = {"x": [x for x, _ in paths], "y": [y for _, y in paths], **look}
+    data["spectrum"].data = {
+        "x": [f[4:] for f, _ in spectra],
+        "y": [np.maximum(a[4:], 1e-12) for _, a in spectra],
+        **look,
+    }
+    lines = ", ".join(f"{x.frequency:.4g} Hz ({x.amplitude:.3g} {unit})" for x in strongest(*spectra[0], 3))
+    missing = int(np.isnan(first.values).sum())
+    apart = ", ".join(r.name for r in records if r not in drawn)
+    said = (
+        f"{first.name}: {len(first.values)} samples at {first.rate:g} Hz, {missing} missing; lines: {lines or 'none'}"
+    )
+    return said + (f"; of another quantity, not drawn: {apart}" if apart else "")
+
+
+def waterfall_plot(source: Any) -> Any:
+    """An empty waterfall: amplitude over frequency and time.
+
+    Parameters
+    ----------
+    source : ColumnDataSource
+        With what `waterfall` gives.
+    """
+    from bokeh.models import ColorBar, LinearColorMapper
+
+    plot = new_plot("waterfall", "frequency, Hz", "time, s", name="waterfall-plot")
+    mapper = LinearColorMapper(palette="Viridis256", low=-60.0, high=0.0)
+    plot.image("image", x="x", y="y", dw="dw", dh="dh", source=source, color_mapper=mapper)
+    plot.add_layout(ColorBar(color_mapper=mapper, title="dB", width=12), "right")
+    plot.x_range.range_padding = plot.y_range.range_padding = 0.0
+    return plot
+
+
+def waterfall(record: Record) -> dict[str, Any]:
+    """Spectra of short stretches one above the other, in dB below the strongest line.
+
+    Parameters
+    ----------
+    record : Record
+        Of at least a few hundred samples; else nothing is drawn.
+    """
+    values = np.nan_to_num(record.values - np.nanmean(record.values))
+    length = min(MOST_LINES, len(values) // STRETCHES * 2)
+    if length < 64:
+        return {"image": [], "x": [], "y": [], "dw": [], "dh": []}
+    starts = np.linspace(0, len(values) - length, 2 * STRETCHES).astype(int)
+    spectra = np.stack([amplitude_spectrum(values[i : i + length], record.rate)[1] for i in starts])
+    level = 20.0 * np.log10(np.maximum(spectra / max(float(spectra[:, 2:].max()), 1e-300), 1e-6))
+    seconds = float(record.time[-1] - record.time[0])
+    return {"image": [level], "x": [0.0], "y": [0.0], "dw": [0.5 * record.rate], "dh": [seconds]}
 
 
 def _orbits(run: Any) -> tuple[dict[str, Any], dict[str, Any]]:

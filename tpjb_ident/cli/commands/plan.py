@@ -11,7 +11,7 @@ import typer
 from tpjb_ident.cli.commands.predict import operating_points, pivot_choice
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import refuse_special
-from tpjb_ident.cli.common.options import BearingPath, Out, out_folder
+from tpjb_ident.cli.common.options import BearingPath, LoadDirections, Loads, Out, PivotChoice, Speeds, out_folder
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress, table
 from tpjb_ident.runtime.output_folder import output_folder
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 @guarded
 def plan(
     bearing: BearingPath,
-    pivots: Annotated[str, typer.Option(help="kirk, rigid or a pivots.toml.")] = "kirk",
-    load: Annotated[str, typer.Option(help="Static loads of the dynamic runs.")] = "2.5, 3.75, 5, 6.25, 7.5, 8.75 kN",
-    load_direction: Annotated[str, typer.Option(help="Where the load pushes the shaft.")] = "-90 deg",
-    speed: Annotated[str, typer.Option(help="Shaft speeds.")] = "22 Hz",
+    pivots: PivotChoice = "kirk",
+    load: Loads = "2.5, 3.75, 5, 6.25, 7.5, 8.75 kN",
+    load_direction: LoadDirections = "-90 deg",
+    speed: Speeds = "22 Hz",
     excitation: Annotated[str, typer.Option(help="Excitation frequencies, each at every load.")] = "10, 25, 40 Hz",
     locus: Annotated[int, typer.Option(min=0, max=360, help="Load directions of the shaft locus; 0: none.")] = 20,
     dry: Annotated[bool, typer.Option(help="Dry load-deflection tests on all pads.")] = True,

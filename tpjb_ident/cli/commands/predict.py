@@ -13,7 +13,18 @@ from rigdata.near_names import nearest_name
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import refuse_special
 from tpjb_ident.cli.common.model_options import HousingTemperature, Physics, parse_physics
-from tpjb_ident.cli.common.options import BearingPath, EffectsFile, Out, Thermal, out_folder, refuse_unknown
+from tpjb_ident.cli.common.options import (
+    BearingPath,
+    EffectsFile,
+    LoadDirections,
+    Loads,
+    Out,
+    PivotChoice,
+    Speeds,
+    Thermal,
+    out_folder,
+    refuse_unknown,
+)
 from tpjb_ident.cli.common.quantities import MAX_VALUES, parse_value, parse_values
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress, table
@@ -29,15 +40,13 @@ THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 @guarded
 def predict(
     bearing: BearingPath,
-    load: Annotated[str, typer.Option(help='Static load per bearing: "2.5 kN, 5 kN" or "2.5..8.75:1.25 kN".')] = "5 kN",
-    load_direction: Annotated[str, typer.Option(help="Where the load pushes the shaft, from +X.")] = "-90 deg",
-    speed: Annotated[str, typer.Option(help='Shaft speed: "22 Hz" or "1320 rpm".')] = "22 Hz",
+    load: Loads = "5 kN",
+    load_direction: LoadDirections = "-90 deg",
+    speed: Speeds = "22 Hz",
     excitation: Annotated[
         str | None, typer.Option(help='Excitation frequencies: "10..50:10 Hz" [default: synchronous].')
     ] = None,
-    pivots: Annotated[
-        str, typer.Option(help='rigid, kirk, kirk-secant, a pivots.toml, or a stiffness ("5e8 N/m").')
-    ] = "kirk",
+    pivots: PivotChoice = "kirk",
     thermal: Thermal = "adiabatic",
     effects: EffectsFile = None,
     physics: Physics = None,

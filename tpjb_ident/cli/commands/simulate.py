@@ -12,7 +12,7 @@ from rigdata.near_names import nearest_name
 from tpjb_ident.cli.commands.predict import model_settings, operating_points, pivot_choice
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import refuse_special
-from tpjb_ident.cli.common.options import BearingPath, EffectsFile, Out, Thermal, out_folder
+from tpjb_ident.cli.common.options import BearingPath, EffectsFile, Out, PivotChoice, Speeds, Thermal, out_folder
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress
 from tpjb_ident.errors import BadInputError
@@ -25,9 +25,7 @@ PLANS = ("paper", "short")
 @guarded
 def simulate(
     bearing: BearingPath,
-    pivots: Annotated[
-        str, typer.Option(help='rigid, kirk, kirk-secant, a pivots.toml, or a stiffness ("5e8 N/m").')
-    ] = "kirk",
+    pivots: PivotChoice = "kirk",
     thermal: Thermal = "adiabatic",
     effects: EffectsFile = None,
     plan: Annotated[str, typer.Option(help="paper (92 runs, as in the reference paper) or short (34 runs).")] = "paper",
@@ -35,7 +33,7 @@ def simulate(
     excitation: Annotated[
         str | None, typer.Option(help="Excitation frequencies, each at every --load [default: 25 Hz].")
     ] = None,
-    speed: Annotated[str, typer.Option(help="Shaft speed of the dynamic runs given by --load.")] = "22 Hz",
+    speed: Speeds = "22 Hz",
     repeats: Annotated[int, typer.Option(min=1, max=100, help="Records per point and direction.")] = 1,
     noise: Annotated[
         float, typer.Option(min=0.0, max=1000.0, help="Channel noise: 1 as on a real rig, 0 no disturbance at all.")

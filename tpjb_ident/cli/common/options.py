@@ -41,6 +41,12 @@ Thermal = Annotated[
         autocompletion=one_of("isothermal", "adiabatic", "tehd", "thd"),
     ),
 ]
+PivotChoice = Annotated[
+    str, typer.Option("--pivots", help='rigid, kirk, kirk-secant, a pivots.toml, or a stiffness ("5e8 N/m").')
+]
+Loads = Annotated[str, typer.Option("--load", help='Static loads per bearing: "2.5 kN, 5 kN" or "2.5..8.75:1.25 kN".')]
+LoadDirections = Annotated[str, typer.Option("--load-direction", help="Where the load pushes the shaft, from +X.")]
+Speeds = Annotated[str, typer.Option("--speed", help='Shaft speeds: "22 Hz" or "1320 rpm".')]
 EffectsFile = Annotated[
     Path | None, typer.Option("--effects", metavar="FILE", help="Effects file: what the baseline model lacks.")
 ]
