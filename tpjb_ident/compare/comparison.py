@@ -7,7 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from rigdata.campaign import Campaign
+from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.measured_pivots import measured_laws
+from tpjb_ident.compare.pivot_effects import beside_measured, counted_twice
 from tpjb_ident.compare.predictions import ModelSettings, PointPrediction, Progress, predict_points
 from tpjb_ident.compare.static_tests import measure_static
 from tpjb_ident.dynamic.identify import identify
@@ -48,7 +50,9 @@ class CompareSettings:
         Pivot models out of `VARIANTS`.
     thermal : {"isothermal", "adiabatic", "tehd", "thd"}
     effects : tuple of Effect
-        Switched on with every pivot model.
+        Switched on with every pivot model; with measured pivots, those that these hold already are left out.
+    from_measured : bool
+        The effects are sizes beside measured pivots: none of them is left out.
     identify : IdentifySettings
     """
 
@@ -56,6 +60,17 @@ class CompareSettings:
     thermal: str = "adiabatic"
     effects: tuple[Effect, ...] = ()
     identify: IdentifySettings = field(default_factory=IdentifySettings)
+    from_measured: bool = False
+
+    def effects_with(self, pivots: str) -> tuple[Effect, ...]:
+        """Effects that are switched on with a pivot model.
+
+        Parameters
+        ----------
+        pivots : str
+            Out of `VARIANTS`.
+        """
+        return self.effects if pivots != "measured" or self.from_measured else beside_measured(self.effects)
 
 
 @dataclass(frozen=True)
@@ -83,7 +98,8 @@ class Comparison(Presented):
 
     Attributes
     ----------
-    campaign : Campaign
+    campaign : Campaign or TableSource
+        What was measured: records, or a table of coefficients.
     bearing : Bearing
     settings : CompareSettings
     identification : Identification
@@ -96,7 +112,7 @@ class Comparison(Presented):
         What the campaign lacks, and what was left out for it.
     """
 
-    campaign: Campaign
+    campaign: Campaign | TableSource
     bearing: Bearing = field(repr=False)
     settings: CompareSettings
     identification: Identification = field(repr=False)
@@ -180,8 +196,14 @@ def compare_campaign(
     tell("fitting pivot curves, clearance and locus", 0, 1)
     static = measure_static(campaign, bearing, "measured" in settings.variants)
     curves, clearance, locus = static.curves, static.clearance, static.locus
-    names, remarks = _possible(settings, curves, bearing)
+    names, remarks = possible_variants(settings, curves, bearing)
     remarks += [condition.sentence() for condition in static.left_out]
+    twice = counted_twice(settings.effects)
+    if "measured" in names and twice and not settings.from_measured:
+        remarks.append(
+            f"Measured pivots are predicted without {' and '.join(twice)}: their dry tests hold that already, and it "
+            "would count twice."
+        )
     if before_predicting is not None:
         tell("compiling the film solver (once on a machine)", 0, 1)
         before_predicting()
@@ -194,7 +216,7 @@ def compare_campaign(
     variants = []
     for name in names:
         pivots = measured_laws(curves, len(bearing.pads), campaign.id) if name == "measured" else name
-        model = ModelSettings(pivots, settings.thermal, settings.effects)
+        model = ModelSettings(pivots, settings.thermal, settings.effects_with(name))
         both = predict_points(bearing, [*points, *stations], model, _labelled(tell, f"predicting with {name} pivots"))
         variants.append(Variant(name, both[: len(points)], both[len(points) :]))
     return Comparison(
@@ -218,10 +240,18 @@ def _labelled(progress: Progress, label: str) -> Progress:
     return lambda text, done, total: progress(f"{label}, {text}", done, total)
 
 
-def _possible(
+def possible_variants(
     settings: CompareSettings, curves: tuple[PivotCurve, ...], bearing: Bearing
 ) -> tuple[list[str], list[str]]:
-    """Pivot models that this campaign and bearing allow, and remarks about the others."""
+    """Pivot models that a campaign and a bearing allow, and remarks about the others.
+
+    Parameters
+    ----------
+    settings : CompareSettings
+    curves : tuple of PivotCurve
+        From its dry tests.
+    bearing : Bearing
+    """
     names, remarks = list(settings.variants), []
     missing = sorted(set(range(1, len(bearing.pads) + 1)) - {c.pad for c in curves})
     if "measured" in names and missing:

@@ -22,7 +22,7 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.presentation import Presented, shown_by
 
 from model.effects import Effect, apply_effects  # isort: skip
-from model.pivots import pivot_laws  # isort: skip
+from model.pivots import NAMED_LAWS, pivot_laws  # isort: skip
 from model.instruments import Instruments  # isort: skip
 from model.setup import Setup  # isort: skip
 
@@ -58,6 +58,11 @@ class Baseline:
     thermal: str = "adiabatic"
     effects: tuple[Effect, ...] = ()
 
+    @property
+    def from_measured(self) -> bool:
+        """Whether the pivots were measured: what is found on them counts from there."""
+        return not isinstance(self.pivots, float) and self.pivots not in NAMED_LAWS
+
 
 @dataclass(frozen=True, repr=False)
 class CampaignDiagnosis(Presented):
@@ -90,14 +95,6 @@ class CampaignDiagnosis(Presented):
             ``logarithmic``, ``title``.
         """
         return shown_by("report.plots", "gap")(self.diagnosis, **options)
-
-
-@dataclass(frozen=True)
-class TableSource:
-    """A table of coefficients in the place of a campaign: what pages call it."""
-
-    id: str
-    description: str = "K and C from a table"
 
 
 @dataclass(frozen=True)

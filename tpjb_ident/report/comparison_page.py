@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.pivot_formula import printed_formula
 from tpjb_ident.compare.positions import predicted_locus
 from tpjb_ident.compare.summary import Deviation, deviations, summary_sentences
@@ -81,6 +82,7 @@ def comparison_page(
     frame = comparison_frame(comparison)
     answer, *more = summary_sentences(comparison, frame)
     campaign, bearing = comparison.campaign, comparison.bearing
+    own = {} if isinstance(campaign, TableSource) else campaign.fingerprint()
     described = f": {campaign.description}" if campaign.description else ""
     return Page(
         title=f"{campaign.id}: predicted and measured dynamic coefficients",
@@ -90,7 +92,7 @@ def comparison_page(
         key_table=_key_table(deviations(comparison, frame)),
         sections=_sections(comparison, frame),
         settings={name: _setting(value) for name, value in (settings or _own_settings(comparison)).items()},
-        inputs=dict(campaign.fingerprint() if inputs is None else inputs),
+        inputs=dict(own if inputs is None else inputs),
     )
 
 
@@ -133,7 +135,9 @@ def _sections(comparison: Comparison, frame: pd.DataFrame) -> list[Section]:
         groups.setdefault(panel.group, []).append(panel)
     sections = [Section(heading, panels=group) for heading, group in groups.items()]
     sections += _pivot_sections(comparison) + _position_sections(comparison)
-    evidence = evidence_section(comparison.campaign, comparison.identification)
+    campaign = comparison.campaign
+    table = isinstance(campaign, TableSource)
+    evidence = None if isinstance(campaign, TableSource) else evidence_section(campaign, comparison.identification)
     sections += [] if evidence is None else [evidence]
     sections.append(
         Section(
@@ -144,7 +148,7 @@ def _sections(comparison: Comparison, frame: pd.DataFrame) -> list[Section]:
             ],
             tables=[
                 measured_table(comparison.identification),
-                budget_table(comparison.identification),
+                *([] if table else [budget_table(comparison.identification)]),
                 predicted_table(frame),
             ],
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigdata.problem import RigDataError
+from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
 from tpjb_ident.report.comparison_tables import point_label
 from tpjb_ident.report.figure import Panel, panel
@@ -46,6 +47,8 @@ def set_up_section(comparison: Comparison) -> Section:
     comparison : Comparison
     """
     campaign = comparison.campaign
+    if isinstance(campaign, TableSource):
+        return Section("Set-up", notes=[f"{comparison.bearing}."], tables=[bearing_table(comparison)])
     return Section(
         "Set-up",
         notes=[f"{comparison.bearing}."],

@@ -2,11 +2,13 @@
 
     python -m tests.studies.diagnosis.mixtures [--bearing rocker] [--count 40] [--seed 0] [--rows FILE]
 
-Campaigns of the paper's plan are drawn from the model itself on a finer film mesh: everything that may be off is drawn
-from its stated tolerance (cut off at two standard deviations), the model differs smoothly by 0.05 %, noise is what the
-sample campaigns have. Kinds: ``scatter`` (nothing hidden), ``one``, ``two`` (effects of the library), ``outside`` (an
-effect that is taken out of the library, a cross-coupled stiffness, or growth in proportion to the load), ``beside``
-(an effect of the library and one outside it). Rows go to a JSON-lines file; the tables are made from it.
+Campaigns of the paper's plan are drawn from an emulator of the model (`emulated`): everything that may be off is drawn
+from its stated tolerance (cut off at two standard deviations), the model differs smoothly by 0.05 to 0.2 % (two
+programs that solve the same equations differ by that), noise is what the sample campaigns have. Kinds: ``scatter``
+(nothing hidden), ``clean`` (one effect of twelve standard deviations on a bearing as drawn), ``one``, ``two``,
+``three`` (effects of the library), ``outside`` (an effect that is taken out of the library, a cross-coupled stiffness, or growth
+in proportion to the load), ``beside`` (an effect of the library and one outside it). Rows go to a JSON-lines file;
+rows that are there are not drawn again; the tables are made from it.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ import numpy as np
 from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.pivots import pivot_laws
-from model.setup import Mesh, Setup
+from model.setup import Setup
+from tests.studies.diagnosis.emulated import emulate
 from tests.studies.diagnosis.tables import tables
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.diagnose import ACCURACY, MESH, pose, solve
@@ -42,50 +45,67 @@ from tpjb_ident.diagnose.search.search import baseline_fit
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 
 BEARINGS = Path(__file__).parents[3] / "model" / "bearings"
-SPEED = 2 * math.pi * 22
-#: Mesh of the truth.
-FINER = Mesh(64, 6)
-#: Effects whose columns take seconds each, and those that need an experimenter's mistake; left out of the library here.
+HZ = 2 * math.pi
+SPEED = HZ * 22
+#: What the emulator does not hold.
 SKIPPED = frozenset({"pad_conduction", "pad_bending", "pivot_friction"})
-KINDS = ("scatter", "one", "two", "one", "outside", "beside")
+#: One campaign after the other; every kind comes early and often.
+KINDS = (
+    "scatter", "one", "two", "clean", "outside", "scatter", "one", "three", "clean", "beside",
+    "scatter", "one", "two", "clean", "outside", "scatter", "one", "two", "clean", "outside",
+)  # fmt: skip
+HIDDEN = {"scatter": 0, "clean": 1, "one": 1, "two": 2, "three": 3, "outside": 0, "beside": 1}
 #: Sizes are drawn between these, in typical ones; at least this many standard deviations of everything else.
-SIZES, SEEN = (0.8, 2.5), 10.0
-SMOOTH = 0.0005
+SIZES, SEEN, CLEAN = (0.8, 2.5), 10.0, 12.0
+#: Smooth difference of the models, share of a coefficient.
+SMOOTH = (0.0005, 0.002)
 
 
 @dataclass(frozen=True)
 class Bench:
-    """One bearing with all that does not change from campaign to campaign."""
+    """One bearing with all that does not change from campaign to campaign.
+
+    Attributes
+    ----------
+    problem : Problem
+        Its measured values are replaced by every campaign's.
+    forward, elsewhere : Forward
+        The emulated model, at the plan's points and at points that no campaign holds.
+    seen : dict of str to float
+        Size of a typical step of every candidate, in standard deviations of everything else.
+    """
 
     problem: Problem
     forward: Forward
-    finer: Forward
+    elsewhere: Forward
     seen: dict[str, float]
 
 
-def bench(name: str) -> Bench:
-    """Pose the paper's plan for a bundled bearing, and solve what every campaign asks first."""
+def bench(name: str, folder: Path) -> Bench:
+    """Pose the paper's plan for a bundled bearing; the emulator's table is kept in a folder."""
     bearing = load_bearing(BEARINGS / f"{name}.toml")
     setup = Setup(bearing, pivot_laws("kirk", bearing), mesh=MESH, accuracy=ACCURACY)
-    hz = 2 * math.pi
-    sweep = dynamic([5000.0], [hz * f for f in (10, 20, 25, 30, 40, 50)], SPEED, -math.pi / 2, 5)
-    loads = dynamic([2500.0, 3750.0, 6250.0, 7500.0, 8750.0], [hz * 25], SPEED, -math.pi / 2, 5)
+    sweep = dynamic([5000.0], [HZ * f for f in (10, 20, 25, 30, 40, 50)], SPEED, -math.pi / 2, 5)
+    loads = dynamic([2500.0, 3750.0, 6250.0, 7500.0, 8750.0], [HZ * 25], SPEED, -math.pi / 2, 5)
     layout = Layout((*sweep, *loads), around(5000.0, 10, SPEED), dry(range(1, 6)), 200.0)
+    new = Layout(dynamic([4375.0, 10000.0], [HZ * 25, HZ * 60], SPEED, -math.pi / 2, 0))
     observations = planned_observations(setup, layout)
-    forward = Forward(setup, layout, observations.elements)
+    model = Forward(setup, layout, observations.elements)
+    model()
+    folder.mkdir(parents=True, exist_ok=True)
+    memory = emulate(model, new, folder / f"{name}.table")
+    forward = Forward(setup, layout, observations.elements, 0, memory)
+    elsewhere = Forward(setup, new, planned_observations(setup, new).elements, 0, memory)
     problem = pose(observations, forward, DiagnoseSettings(workers=1, skip=SKIPPED))
     base = baseline_fit(problem)
     seen = {}
     for c in problem.pool:
         columns = [_slope(forward, problem.base, c, i) for i in range(len(c.steps))]
         seen[c.label] = visible(problem, base, c, np.column_stack(columns))
-    finer = Forward(setup.change(mesh=FINER), layout, observations.elements)
-    finer()
-    return Bench(problem, forward, finer, seen)
+    return Bench(problem, forward, elsewhere, seen)
 
 
 def _slope(forward: Forward, base: FloatArray, c: Candidate, i: int) -> FloatArray:
-    """As the search asks for it; the model keeps the answer in its memory."""
     low, high = c.limits
     for share in (0.5, -0.5):
         moved = c.origin.copy()
@@ -100,11 +120,30 @@ def _slope(forward: Forward, base: FloatArray, c: Candidate, i: int) -> FloatArr
 
 @dataclass(frozen=True)
 class Drawn:
-    """One campaign: what is hidden, the pool it is diagnosed with, and what was measured."""
+    """One campaign.
+
+    Attributes
+    ----------
+    truth : tuple of Effect
+        Hidden effects that the library holds.
+    outside : str
+        What is hidden beyond it.
+    problem : Problem
+        With the pool it is diagnosed with, and what was measured.
+    shares : tuple of float
+        Squared change in sigma that every effect of `truth` makes beside the others.
+    size : (m,) ndarray
+        What is off, in standard deviations.
+    hidden : tuple of Effect
+        Everything that is hidden.
+    """
 
     truth: tuple[Effect, ...]
     outside: str
     problem: Problem
+    shares: tuple[float, ...]
+    size: FloatArray
+    hidden: tuple[Effect, ...]
 
 
 def draw(one: Bench, kind: str, rng: np.random.Generator) -> Drawn | None:
@@ -113,68 +152,83 @@ def draw(one: Bench, kind: str, rng: np.random.Generator) -> Drawn | None:
         c for c in one.problem.pool
         if c.name not in TERMS and len(c.steps) == 1 and SIZES[1] * one.seen[c.label] >= SEEN
     ]  # fmt: skip
-    count = {"scatter": 0, "one": 1, "two": 2, "outside": 0, "beside": 1}[kind]
-    chosen = [library[i] for i in rng.choice(len(library), count, replace=False)]
-    if len({c.name for c in chosen}) < count:
-        return None
-    truth = tuple(_sized(one, c, rng) for c in chosen)
-    outside, hidden, pool, grown = "", truth, one.problem.pool, False
+    names = sorted({c.name for c in library})
+    chosen = [_of(library, str(n), rng) for n in rng.choice(names, HIDDEN[kind], replace=False)]
+    truth = tuple(_sized(one, c, rng, kind == "clean") for c in chosen)
+    outside, hidden, pool, growth = "", truth, one.problem.pool, 0.0
     if kind in {"outside", "beside"}:
         outside = str(rng.choice(["left out", "cross-coupled", "growth with the load"]))
         if outside == "left out":
-            gone = library[rng.integers(len(library))]
-            if gone.name in {c.name for c in chosen}:
-                return None
-            hidden, outside = (*truth, _sized(one, gone, rng)), f"left out: {gone.label}"
+            gone = _of(library, str(rng.choice([n for n in names if n not in {c.name for c in chosen}])), rng)
+            hidden, outside = (*truth, _sized(one, gone, rng, False)), f"left out: {gone.label}"
             pool = tuple(c for c in pool if c.name != gone.name)
         elif outside == "cross-coupled":
             size = float(rng.choice([-1, 1]) * rng.uniform(1e7, 4e7))
             hidden = (*truth, Effect("parallel_stiffness", xx=0.0, xy=size, yx=-size, yy=0.0))
         else:
-            grown = True
+            growth = float(rng.uniform(6e-6, 1.4e-5))
+    size = np.clip(rng.standard_normal(len(one.problem.nuisances)), -2.0, 2.0) * (kind != "clean")
     try:
-        value = _measured(one, hidden, rng, float(rng.uniform(6e-6, 1.4e-5)) if grown else 0.0)
+        value = _measured(one, hidden, size, growth)
+        shares = []
+        for e in truth:
+            without = _measured(one, [h for h in hidden if h is not e], size, growth)
+            shares.append(float(np.sum(((value - without) / one.problem.sigma) ** 2)))
     except NoEquilibriumError:
         return None
-    observations = replace(one.problem.observations, value=value)
-    return Drawn(truth, outside, replace(one.problem, observations=observations, pool=pool))
+    noisy = value + _noise(one.problem.observations, value, rng)
+    observations = replace(one.problem.observations, value=noisy)
+    return Drawn(truth, outside, replace(one.problem, observations=observations, pool=pool), tuple(shares), size,
+                 tuple(hidden))  # fmt: skip
 
 
-def _sized(one: Bench, c: Candidate, rng: np.random.Generator) -> Effect:
+def _of(library: Sequence[Candidate], name: str, rng: np.random.Generator) -> Candidate:
+    mine = [c for c in library if c.name == name]
+    return mine[rng.integers(len(mine))]
+
+
+def _sized(one: Bench, c: Candidate, rng: np.random.Generator, clean: bool) -> Effect:
+    """An effect of a size that one would not be surprised by; its direction, where it has one, is anywhere."""
     low, high = c.bounds
     sign = float(rng.choice([-1.0, 1.0]))
-    size = max(float(rng.uniform(*SIZES)), SEEN / max(one.seen[c.label], 1e-6)) * c.step
+    least = SEEN / max(one.seen[c.label], 1e-6)
+    size = (CLEAN / one.seen[c.label] if clean else max(float(rng.uniform(*SIZES)), least)) * c.step
     if not low <= c.neutral + sign * size <= high:
         sign = -sign
-    return c.effect(min(max(c.neutral + sign * size, 0.8 * low + 0.2 * c.neutral), 0.8 * high + 0.2 * c.neutral)
-                    if math.isfinite(low) and math.isfinite(high) else c.neutral + sign * size)  # fmt: skip
+    amplitude = c.neutral + sign * size
+    if math.isfinite(low) and math.isfinite(high):
+        amplitude = min(max(amplitude, 0.8 * low + 0.2 * c.neutral), 0.8 * high + 0.2 * c.neutral)
+    parameters = c.values(np.array([amplitude]))
+    if "direction" in parameters:
+        parameters["direction"] = float(rng.uniform(0.0, math.pi))
+    return Effect(c.name, **parameters)
 
 
-def _measured(one: Bench, hidden: Sequence[Effect], rng: np.random.Generator, growth: float) -> FloatArray:
-    """Records of a bearing that is off its drawing, with hidden effects."""
+def _measured(one: Bench, hidden: Sequence[Effect], size: FloatArray, growth: float) -> FloatArray:
+    """What a bearing that is off its drawing shows, with hidden effects."""
     known = one.problem.nuisances
-    size = np.clip(rng.standard_normal(len(known)), -2.0, 2.0)
-    value = predict(one.finer.fresh(), hidden, known, size)
+    value = predict(one.forward, hidden, known, size)
     if growth:  # the clearance grows in proportion to the load: no effect of the library
         elements = one.problem.observations.elements
         for load in sorted({e.place("load") for e in elements if e.family == "h"}):
             mine = np.array([e.family in {"h", "temperature"} and e.place("load") == load for e in elements])
             more = (*hidden, Effect("thermal_growth", clearance_change=growth * load / 8750.0))
-            value = np.where(mine, predict(one.finer.fresh(), more, known, size), value)
+            value = np.where(mine, predict(one.forward, more, known, size), value)
         mine = np.array([e.family in {"locus", "load"} for e in elements])
         more = (*hidden, Effect("thermal_growth", clearance_change=growth * 5000.0 / 8750.0))
-        value = np.where(mine, predict(one.finer.fresh(), more, known, size), value)
-    return value + _noise(one.problem.observations, value, rng)
+        value = np.where(mine, predict(one.forward, more, known, size), value)
+    return value
 
 
 def _noise(observations: Observations, value: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Noise of identification, and a smooth difference of the models."""
     scale = direct_scale(observations.elements, value)
     smooth = np.zeros(len(value))
+    size = rng.uniform(*SMOOTH)
     for name in dict.fromkeys(e.observable for e in observations.elements if e.family == "h"):
         mine = np.array([e.observable == name for e in observations.elements])
         a, b = rng.standard_normal(2)
-        smooth += np.where(mine, SMOOTH * scale * (a + b * coordinate(observations.elements, "load")), 0.0)
+        smooth += np.where(mine, size * scale * (a + b * coordinate(observations.elements, "load")), 0.0)
     factor = np.sqrt(np.diag(observations.covariance))
     return np.asarray(smooth + factor * rng.standard_normal(len(value)))
 
@@ -188,18 +242,36 @@ def run(one: Bench, kind: str, seed: int, settings: DiagnoseSettings) -> dict[st
     began = time.process_time()
     verdict, found = solve(drawn.problem, one.forward, settings)
     named = [
-        {"name": e.name, "label": e.label, "parameters": {k: (p.value, p.lo, p.hi) for k, p in e.parameters.items()}}
+        {"name": e.name, "parameters": {k: (p.value, p.lo, p.hi) for k, p in e.parameters.items()}}
         for e in verdict.effects
     ]
     return {
         "kind": kind, "seed": seed, "truth": [{"name": e.name, **e.parameters} for e in drawn.truth],
-        "outside": drawn.outside, "verdict": verdict.verdict, "named": named,
+        "shares": drawn.shares, "outside": drawn.outside, "verdict": verdict.verdict, "named": named,
         "alike": [list(g) for g in verdict.indistinguishable], "behaves_like": [b.words for b in verdict.behaves_like],
         "drift": [f"{d.effect}: {d.words}" for d in verdict.drift], "gap": verdict.gap,
-        "remainder": verdict.remainder.sigma, "reasons": list(verdict.reasons),
+        "remainder": verdict.remainder.sigma, "p": verdict.remainder.p, "reasons": list(verdict.reasons),
         "worth": [(c.label, w.unseen, w.beside) for c, w in zip(found.model.candidates, found.worth, strict=True)],
+        "singles": [(f.label, f.evidence - found.baseline.evidence) for f in found.singles[:5]],
+        "elsewhere": _elsewhere(one, drawn, found.effects.effects if verdict.effects else ()),
         "seconds": time.process_time() - began,
     }  # fmt: skip
+
+
+def _elsewhere(one: Bench, drawn: Drawn, named: Sequence[Effect]) -> dict[str, float]:
+    """Relative rms error of K and of C at loads and frequencies that no campaign holds, before and after."""
+    known = tuple(n for n in one.problem.nuisances if n.column is None)
+    size = np.array([s for s, n in zip(drawn.size, one.problem.nuisances, strict=True) if n.column is None])
+    try:
+        true = predict(one.elsewhere, drawn.hidden, known, size)
+        told = {"before": one.elsewhere(), "after": one.elsewhere(named)}
+    except NoEquilibriumError:
+        return {}
+    elements = one.elsewhere.elements
+    scale = direct_scale(elements, true)
+    parts = {p: np.array([e.family == "h" and e.observable[0] == p for e in elements]) for p in "kc"}
+    return {f"{p}_{when}": float(np.sqrt(np.mean(((y - true) / scale)[mine] ** 2)))
+            for p, mine in parts.items() for when, y in told.items()}  # fmt: skip
 
 
 def main() -> None:
@@ -210,10 +282,15 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rows", type=Path, default=Path("mixtures.jsonl"))
     asked = parser.parse_args()
-    one = bench(asked.bearing)
+    done = set()
+    if asked.rows.exists():
+        kept = [json.loads(line) for line in asked.rows.read_text(encoding="utf-8").splitlines()]
+        done = {(row["bearing"], row["seed"]) for row in kept}
+    one = bench(asked.bearing, asked.rows.parent)
     settings = DiagnoseSettings(workers=1, skip=SKIPPED)
     for number in range(asked.count):
-        row = run(one, KINDS[number % len(KINDS)], asked.seed + number, settings)
+        seed = asked.seed + number
+        row = None if (asked.bearing, seed) in done else run(one, KINDS[number % len(KINDS)], seed, settings)
         if row is not None:
             with asked.rows.open("a", encoding="utf-8") as out:
                 out.write(json.dumps({"bearing": asked.bearing, **row}, default=float) + "\n")

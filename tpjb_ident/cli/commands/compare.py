@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,14 +11,16 @@ import typer
 from tpjb_ident.cli.commands.identify import identify_settings, refuse_untrusted, write_identification
 from tpjb_ident.cli.commands.predict import model_settings
 from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
+from tpjb_ident.cli.common.inputs import open_bearing, open_campaign, table_inputs
 from tpjb_ident.cli.common.options import (
     BearingOption,
-    CampaignPath,
+    Coefficients,
     EffectsFile,
+    MaybeCampaign,
     Method,
     Norm,
     Out,
+    ReadingError,
     Thermal,
     out_folder,
     refuse_unknown,
@@ -30,7 +33,7 @@ from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_table
 
 if TYPE_CHECKING:
-    from tpjb_ident.compare.comparison import Comparison
+    from tpjb_ident.compare.comparison import CompareSettings, Comparison
 
 Pivots = Annotated[
     str, typer.Option("--pivots", help='Pivot models to compare: some of "rigid, kirk, kirk-secant, measured".')
@@ -39,11 +42,13 @@ Pivots = Annotated[
 
 @guarded
 def compare(
-    campaign: CampaignPath,
+    campaign: MaybeCampaign = None,
     bearing: BearingOption = None,
     pivots: Pivots = "rigid, kirk, measured",
     thermal: Thermal = "adiabatic",
     effects: EffectsFile = None,
+    coefficients: Coefficients = None,
+    reading_error: ReadingError = None,
     method: Method = "mm-eiv",
     norm: Norm = None,
     out: Out = None,
@@ -53,24 +58,63 @@ def compare(
     With rigid, Kirk and measured pivots: writes report.html, comparison, coefficients, estimators, windows,
     pivot_curves, locus and clearance tables, pivots.toml, and the figures as SVG and PNG.
     """
-    source = open_campaign(campaign)
     variants = _variants(pivots)
     model = model_settings("kirk", thermal, effects)
-    estimator = identify_settings(source, method, norm)
-    drawn, given = open_bearing(source, bearing)
-    from tpjb_ident.compare.comparison import CompareSettings, compare_campaign
+    from tpjb_ident.compare.comparison import CompareSettings
+    from tpjb_ident.compare.pivot_effects import counts_from_measured
 
-    settings = CompareSettings(variants, thermal, model.effects, estimator)
-    inputs = source.fingerprint() | given | ({effects.name: sha256(effects)} if effects else {})
-    options = {"campaign": campaign, "bearing": bearing or source.bearing_name, "pivots": list(variants),
-               "thermal": thermal, "effects": effects, "method": method, "norm": norm}  # fmt: skip
+    settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
+    options = {"campaign": campaign, "bearing": bearing, "pivots": list(variants), "thermal": thermal,
+               "effects": effects, "coefficients": coefficients, "reading_error": reading_error, "method": method,
+               "norm": norm}  # fmt: skip
+    files = {effects.name: sha256(effects)} if effects else {}
     target = out_folder(out, "compare")
+    if (campaign is None) == (coefficients is None):
+        raise BadInputError("compare: give a campaign, or --coefficients TABLE.csv with --bearing FILE; one of them.")
+    if coefficients is not None:
+        _from_table(coefficients, bearing, settings, options, files, target)
+    elif campaign is not None:
+        _from_campaign(campaign, bearing, settings, options, files, target)
+
+
+def _from_campaign(
+    campaign: Path, bearing: Path | None, settings: CompareSettings, options: dict[str, Any], files: dict[str, str],
+    target: Path,
+) -> None:  # fmt: skip
+    from tpjb_ident.compare.comparison import compare_campaign
+
+    source = open_campaign(campaign)
+    settings = replace(settings, identify=identify_settings(source, options["method"], options["norm"]))
+    drawn, given = open_bearing(source, bearing)
+    options = {**options, "bearing": bearing or source.bearing_name}
+    inputs = source.fingerprint() | given | files
     with output_folder(target, "compare", (campaign,)) as folder:
         with progress("comparing") as show:
             result = compare_campaign(source, drawn, settings, show)
             write_comparison(folder, result, options, inputs, show)
         write_record(folder, target, "compare", options, inputs)
-    show_comparison(result, next_command(result, campaign, bearing))
+    show_comparison(result, next_command(result, str(campaign), bearing))
+    print_line(f"Report: {target / 'report.html'}")
+    refuse_comparison(result)
+
+
+def _from_table(
+    path: Path, bearing: Path | None, settings: CompareSettings, options: dict[str, Any], files: dict[str, str],
+    target: Path,
+) -> None:  # fmt: skip
+    from tpjb_ident.compare.from_table import compare_table
+    from tpjb_ident.compare.tables import comparison_frame
+    from tpjb_ident.report.comparison_page import write_comparison_report
+
+    drawn, error, inputs = table_inputs("compare", path, bearing, options["reading_error"])
+    inputs |= files
+    with output_folder(target, "compare", (path,)) as folder:
+        with progress("comparing") as show:
+            result = compare_table(path, drawn, settings, error, show)
+        write_table(folder, "comparison", comparison_frame(result))
+        write_comparison_report(folder, result, options, inputs)
+        write_record(folder, target, "compare", options, inputs)
+    show_comparison(result, next_command(result, f"--coefficients {path}", bearing))
     print_line(f"Report: {target / 'report.html'}")
     refuse_comparison(result)
 
@@ -151,20 +195,21 @@ def show_comparison(result: Comparison, then: str = "") -> None:
         print_line(sentence)
 
 
-def next_command(result: Comparison, campaign: Path, bearing: Path | None) -> str:
+def next_command(result: Comparison, source: str, bearing: Path | None) -> str:
     """Command that comes next: a diagnosis where the model is off, an export where it is not.
 
     Parameters
     ----------
     result : Comparison
-    campaign, bearing : Path
-        As the command was given them.
+    source : str
+        What was compared, as the command was given it.
+    bearing : Path
     """
     from tpjb_ident.compare.summary import deviations, worth_a_diagnosis
 
     if worth_a_diagnosis(deviations(result)):
-        return f"tpjb diagnose {campaign}" + (f" --bearing {bearing}" if bearing else "")
-    return f"tpjb export {campaign} --to ross"
+        return f"tpjb diagnose {source}" + (f" --bearing {bearing}" if bearing else "")
+    return f"tpjb export {source} --to ross" if not source.startswith("--") else ""
 
 
 def refuse_comparison(result: Comparison) -> None:
@@ -178,7 +223,10 @@ def refuse_comparison(result: Comparison) -> None:
     ------
     NotTrustedError
     """
-    refuse_untrusted(result.identification)
+    from tpjb_ident.compare.coefficient_table import TableSource
+
+    if not isinstance(result.campaign, TableSource):
+        refuse_untrusted(result.identification)
     bad = [
         f"{v.name}, {p.point.static_load / 1e3:g} kN" for v in result.variants for p in v.points
         if not p.prediction.converged

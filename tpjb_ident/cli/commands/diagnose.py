@@ -11,8 +11,17 @@ import typer
 from tpjb_ident.cli.commands.identify import refuse_untrusted, write_identification
 from tpjb_ident.cli.commands.predict import model_settings, pivot_choice
 from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
-from tpjb_ident.cli.common.options import BearingOption, EffectsFile, Out, Thermal, out_folder
+from tpjb_ident.cli.common.inputs import open_bearing, open_campaign, table_inputs
+from tpjb_ident.cli.common.options import (
+    BearingOption,
+    Coefficients,
+    EffectsFile,
+    MaybeCampaign,
+    Out,
+    ReadingError,
+    Thermal,
+    out_folder,
+)
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import command_line, print_line, progress, table
 from tpjb_ident.errors import BadInputError
@@ -29,16 +38,6 @@ Pivots = Annotated[str, typer.Option("--pivots", help="Where to start from: kirk
 ModelTolerance = Annotated[
     float | None,
     typer.Option("--model-tolerance", help="What the model is trusted to, share of the direct coefficients [1.5 %]."),
-]
-MaybeCampaign = Annotated[
-    Path | None, typer.Argument(metavar="[CAMPAIGN]", help="Campaign: a folder with campaign.toml, or one HDF5 file.")
-]
-Coefficients = Annotated[
-    Path | None,
-    typer.Option("--coefficients", metavar="TABLE.csv", help="Instead of a campaign: K, C as in coefficients.csv."),
-]
-ReadingError = Annotated[
-    str | None, typer.Option("--reading-error", metavar="SHARE", help="How far values of the table hold, such as 5%.")
 ]
 ToleranceOptions = Annotated[
     list[str] | None,
@@ -84,8 +83,10 @@ def diagnose(
     start = pivots if pivots == "measured" else pivot_choice(pivots)
     model = model_settings("kirk", thermal, effects)
     files = {f.name: sha256(f) for f in (effects, library, start if isinstance(start, Path) else None) if f}
+    from tpjb_ident.compare.pivot_effects import refuse_counted_twice
     from tpjb_ident.diagnose.campaign import Baseline
 
+    refuse_counted_twice(start, model.effects, effects)
     baseline = Baseline(start, thermal, model.effects)
     target = out_folder(out, "diagnose")
     if coefficients is not None:
@@ -143,15 +144,11 @@ def _identified(result: CampaignDiagnosis) -> Identification:
 
 
 def _from_table(asked: _Asked, path: Path, bearing: Path | None, reading_error: str | None) -> None:
-    from model.bearing_file import load_bearing
-    from model.units import parse_quantity
-    from tpjb_ident.diagnose.campaign import TableSource, diagnose_table
+    from tpjb_ident.compare.coefficient_table import TableSource
+    from tpjb_ident.diagnose.campaign import diagnose_table
 
-    if bearing is None:
-        raise BadInputError("diagnose --coefficients: a table names no bearing. Add --bearing FILE.")
-    error = None if reading_error is None else float(parse_quantity(reading_error, "ratio", "--reading-error"))
-    drawn = load_bearing(bearing)
-    inputs = {path.name: sha256(path), bearing.name: sha256(bearing)} | asked.files
+    drawn, error, inputs = table_inputs("diagnose", path, bearing, reading_error)
+    inputs |= asked.files
     source = TableSource(path.stem)
     with output_folder(asked.target, "diagnose", (path,)) as folder:
         with progress("diagnosing") as show:
@@ -168,9 +165,10 @@ def _write(  # type: ignore[no-untyped-def]
 
     verdict = result.diagnosis.verdict
     write_text(folder / "diagnosis.json", verdict.to_json())
-    write_text(folder / "updated.effects.toml", verdict.effects_toml(asked.baseline.effects))
+    before, measured = asked.baseline.effects, asked.baseline.from_measured
+    write_text(folder / "updated.effects.toml", verdict.effects_toml(before, measured))
     if verdict.behaves_like:
-        write_text(folder / "with-terms.effects.toml", verdict.terms_toml(asked.baseline.effects))
+        write_text(folder / "with-terms.effects.toml", verdict.terms_toml(before, measured))
     named = {name: getattr(value, "name", value) for name, value in asked.options.items()}
     write_diagnosis_report(folder, source, result, named, inputs)
 

@@ -63,8 +63,10 @@ def predict(
     settings = replace(model_settings(choice, thermal, effects), options=parse_physics(physics, housing_temperature))
     refuse_special(bearing)
     from model.bearing_file import load_bearing
+    from tpjb_ident.compare.pivot_effects import refuse_counted_twice
     from tpjb_ident.compare.predictions import predict_points, prediction_frame
 
+    refuse_counted_twice(choice, settings.effects, effects)
     loaded = load_bearing(bearing)
     target = out_folder(out, "predict")
     inputs = {p.name: sha256(p) for p in (bearing, effects, choice) if isinstance(p, Path)}

@@ -91,3 +91,36 @@ def open_bearing(campaign: Campaign, given: Path | None) -> tuple[Bearing, dict[
             "Give one with --bearing FILE."
         )
     return parse_bearing(campaign.bearing_text, campaign.bearing_name), {}
+
+
+def table_inputs(
+    command: str, path: Path, bearing: Path | None, reading_error: str | None
+) -> tuple[Bearing, float | None, dict[str, str]]:
+    """What stands beside a table of coefficients: its bearing, how far its values hold, and what both were made of.
+
+    Parameters
+    ----------
+    command : str
+        Its name, for messages.
+    path : Path
+        Option --coefficients.
+    bearing : Path, optional
+        Option --bearing.
+    reading_error : str, optional
+        Option --reading-error.
+
+    Raises
+    ------
+    BadInputError
+        No bearing, or a share that is none.
+    """
+    from model.bearing_file import load_bearing
+    from model.units import parse_quantity
+
+    refuse_special(path, bearing)
+    if not path.is_file():
+        raise BadInputError(f"{path}: no such file. Give the table of coefficients as CSV.")
+    if bearing is None:
+        raise BadInputError(f"{command} --coefficients: a table names no bearing. Add --bearing FILE.")
+    error = None if reading_error is None else float(parse_quantity(reading_error, "ratio", "--reading-error"))
+    return load_bearing(bearing), error, {path.name: sha256(path), bearing.name: sha256(bearing)}

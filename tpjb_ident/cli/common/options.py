@@ -24,6 +24,16 @@ def one_of(*names: str) -> Callable[[str], list[str]]:
 CampaignPath = Annotated[
     Path, typer.Argument(metavar="CAMPAIGN", help="Campaign: a folder with campaign.toml, or one HDF5 file.")
 ]
+MaybeCampaign = Annotated[
+    Path | None, typer.Argument(metavar="[CAMPAIGN]", help="Campaign: a folder with campaign.toml, or one HDF5 file.")
+]
+Coefficients = Annotated[
+    Path | None,
+    typer.Option("--coefficients", metavar="TABLE.csv", help="Instead of a campaign: K, C as in coefficients.csv."),
+]
+ReadingError = Annotated[
+    str | None, typer.Option("--reading-error", metavar="SHARE", help="How far values of the table hold, such as 5%.")
+]
 BearingPath = Annotated[Path, typer.Argument(metavar="BEARING.toml", help="Bearing file (tpjb-bearing/1).")]
 Out = Annotated[
     Path | None,

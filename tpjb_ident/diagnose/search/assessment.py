@@ -11,6 +11,7 @@ Every fold is then predicted from all others, in closed form.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -51,10 +52,15 @@ class Basis:
 
     def covariance(self, scales: FloatArray) -> FloatArray:
         """Noise and model error at scales t_k, (n, n)."""
-        total = self.noise.copy()
-        for one, t in zip(self.components, scales, strict=True):
-            total[np.ix_(one.rows, one.rows)] += t * one.matrix
-        return total
+        return np.asarray(self.noise + np.tensordot(scales, self._whole, 1))
+
+    @functools.cached_property
+    def _whole(self) -> FloatArray:
+        """The components' matrices over all elements, (c, n, n)."""
+        out = np.zeros((len(self.components), *self.noise.shape))
+        for one, matrix in zip(self.components, out, strict=True):
+            matrix[np.ix_(one.rows, one.rows)] = one.matrix
+        return out
 
 
 @dataclass(frozen=True)

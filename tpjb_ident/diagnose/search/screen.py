@@ -13,11 +13,13 @@ from tpjb_ident.diagnose.forward.candidates import Candidate
 from tpjb_ident.diagnose.forward.forward import ForwardModel
 from tpjb_ident.diagnose.forward.workers import Map
 from tpjb_ident.diagnose.search.assessment import Linear, assess
-from tpjb_ident.diagnose.search.fit import Fit, Start, slope
+from tpjb_ident.diagnose.search.fit import Fit, Start, attempt, slope
 from tpjb_ident.diagnose.search.problem import Problem
 
 #: Shares of a model's own error scales at which candidates are scored: with the right effect added they fall.
 SHARES = (1.0, 0.1, 0.01, 0.001)
+#: Amplitudes at which curvature is told, in typical sizes.
+WIDE = 0.8
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,57 @@ class Score:
 Columns = Mapping[Candidate, FloatArray]
 
 
+def bends(run: Map, model: Fit, pool: Sequence[Candidate], table: Columns) -> tuple[Columns, Columns]:
+    """Slope and curvature of the prediction over the amplitude of every candidate that has one; (n, 1) each.
+
+    A clearance that grows by a third of itself does not do three times what a ninth does: to first order a large
+    effect explains little, and others would be fitted in its place.
+
+    Parameters
+    ----------
+    run : Map
+        See `workers`.
+    model : Fit
+    pool : sequence of Candidate
+    table : mapping of Candidate to (n, k) ndarray
+        Slopes, for those that have several amplitudes.
+
+    Returns
+    -------
+    tuple of mapping
+        Slopes, and half the second derivatives (none for a candidate of several amplitudes).
+    """
+    slim = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
+    single = [c for c in pool if len(c.steps) == 1]
+    found = run(_bend, [(slim, model.prediction, c) for c in single])
+    slopes, curved = dict(table), {}
+    for c, (slope_, bend) in zip(single, found, strict=True):
+        if np.any(bend):
+            slopes[c], curved[c] = slope_[:, None], bend[:, None]
+    return slopes, curved
+
+
+def _bend(
+    forward: ForwardModel, problem: Problem, model: Start, y: FloatArray, candidate: Candidate
+) -> tuple[FloatArray, FloatArray]:
+    """A parabola through two amplitudes beside the neutral one; zeros where the model has no equilibrium there."""
+    low, high = (float(v[0]) for v in candidate.limits)
+    around, step = candidate.neutral, WIDE * candidate.step
+    shares = [s for s in (1.0, -1.0, 2.0, -2.0) if low <= around + s * step <= high][:2]
+    rows = []
+    for share in shares:
+        start = replace(model, candidates=(*model.candidates, candidate),
+                        amplitudes=(*model.amplitudes, np.array([around + share * step])))  # fmt: skip
+        other = attempt(forward, problem, start)
+        if other is None:
+            return np.zeros_like(y), np.zeros_like(y)
+        rows.append((other - y) / (share * step))
+    if len(rows) < 2:
+        return np.zeros_like(y), np.zeros_like(y)
+    bend = (rows[0] - rows[1]) / ((shares[0] - shares[1]) * step)
+    return rows[0] - bend * shares[0] * step, bend
+
+
 def columns(run: Map, model: Fit, pool: Sequence[Candidate]) -> dict[Candidate, FloatArray]:
     """Change of the prediction per unit of every amplitude of every candidate, at a model; (n, k) each."""
     slim = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
@@ -60,7 +113,7 @@ def _column(
 
 
 def scores(
-    problem: Problem, model: Fit, table: Columns, pairs: bool = False
+    problem: Problem, model: Fit, table: Columns, pairs: bool = False, curved: Columns | None = None
 ) -> list[Score]:  # fmt: skip
     """Score candidates, or all pairs of them, beside a model; best first.
 
@@ -70,8 +123,10 @@ def scores(
     model : Fit
     table : mapping of Candidate to (n, k) ndarray
     pairs : bool
+    curved : mapping of Candidate to (n, 1) ndarray, optional
+        See `bends`.
     """
-    levels = [_Level(problem, model, table, share) for share in SHARES]
+    levels = [_Level(problem, model, table, share, curved or {}) for share in SHARES]
     pool = list(table)
     chosen: list[tuple[Candidate, ...]] = [(c,) for c in pool]
     if pairs:
@@ -83,7 +138,7 @@ def scores(
 class _Level:
     """Scores at one level of the error scales."""
 
-    def __init__(self, problem: Problem, model: Fit, table: Columns, share: float) -> None:
+    def __init__(self, problem: Problem, model: Fit, table: Columns, share: float, curved: Columns) -> None:
         scales = model.assessment.scales * share
         found = assess(problem.basis, model.assessment.linear, np.maximum(scales, 1e-5), fixed=True)
         self.offset = found.evidence - model.evidence
@@ -99,8 +154,29 @@ class _Level:
         weighted = found.inverse @ unit
         self.gram, self.toward = unit.T @ weighted, weighted.T @ residual
         self.width = np.concatenate(width)
+        self.bent: dict[Candidate, tuple[float, float, float]] = {}
+        for c in table.keys() & curved.keys():
+            bend = problem.scaled(curved[c])[:, 0] * float(c.width[0]) ** 2
+            heavy = found.inverse @ bend
+            slope_ = unit[:, self.at[c].start]
+            self.bent[c] = float(heavy @ residual), float(heavy @ slope_), float(heavy @ bend)
+
+    def _curved(self, c: Candidate) -> Score:
+        """Score of one amplitude along its parabola: the best of a grid, and the Gaussian there."""
+        at = self.at[c].start
+        low, high = ((float(v[0]) - c.neutral) / self.width[at] for v in c.limits)
+        t = np.linspace(max(low, -1.0), min(high, 1.0), 81)
+        toward, cross, square = self.bent[c]
+        inner = 1.0 + self.gram[at, at] + 4.0 * t * cross + 4.0 * t**2 * square
+        gain = t * self.toward[at] + t**2 * toward
+        gain -= 0.5 * (t**2 * (1.0 + self.gram[at, at]) + 2.0 * t**3 * cross + t**4 * square)
+        gain -= 0.5 * np.log(np.maximum(inner, 1.0))
+        best = int(np.argmax(gain))
+        return Score((c,), float(gain[best]) + self.offset, (np.array([c.neutral + t[best] * self.width[at]]),))
 
     def score(self, chosen: tuple[Candidate, ...]) -> Score:
+        if len(chosen) == 1 and chosen[0] in self.bent:
+            return self._curved(chosen[0])
         rows = np.concatenate([np.arange(self.at[c].start, self.at[c].stop) for c in chosen])
         inner = self.gram[np.ix_(rows, rows)] + np.eye(len(rows))
         moved = np.linalg.solve(inner, self.toward[rows])
@@ -119,9 +195,13 @@ class _Level:
         return Score(chosen, gain + self.offset, tuple(amplitudes))
 
 
-def with_model(model: Fit, score: Score, table: Columns) -> Start:
+def with_model(model: Fit, score: Score, table: Columns, curved: Columns | None = None) -> Start:
     """Start of a fit of a model with what was scored."""
-    jacobian = np.column_stack([model.jacobian, *(table[c] for c in score.candidates)])
+    parts = []
+    for c, amplitudes in zip(score.candidates, score.amplitudes, strict=True):
+        bend = (curved or {}).get(c)
+        parts.append(table[c] if bend is None else table[c] + 2.0 * bend * (amplitudes[0] - c.neutral))
+    jacobian = np.column_stack([model.jacobian, *parts])
     return Start((*model.candidates, *score.candidates), (*model.amplitudes, *score.amplitudes), jacobian,
                  model.nuisance, model.columns)  # fmt: skip
 
@@ -132,7 +212,7 @@ def visible(problem: Problem, model: Fit, candidate: Candidate, column: FloatArr
     return math.sqrt(max(float(one @ model.assessment.inverse @ one), 0.0))
 
 
-def without_twins(problem: Problem, model: Fit, candidate: Candidate) -> Linear:
-    """A model's linear form without the nuisances that do what a candidate does."""
+def without(model: Fit, gone: Sequence[int]) -> Linear:
+    """A model's linear form without some nuisances, by their numbers."""
     count = model.jacobian.shape[1]
-    return model.assessment.linear.without([count + i for i in problem.twins(candidate)])
+    return model.assessment.linear.without([count + i for i in gone])

@@ -13,7 +13,7 @@ from tpjb_ident.diagnose.forward.workers import Map
 from tpjb_ident.diagnose.search.assessment import assess
 from tpjb_ident.diagnose.search.fit import Fit, Start, fit, fitted, settle
 from tpjb_ident.diagnose.search.problem import Problem
-from tpjb_ident.diagnose.search.screen import Columns, Score, columns, scores, with_model, without_twins
+from tpjb_ident.diagnose.search.screen import Columns, Score, bends, columns, scores, with_model, without
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 
 Progress = Callable[[str, float], None]
@@ -25,6 +25,8 @@ ROUNDS_ON_THE_WAY = 2
 FIRST = 3
 #: Pairs of candidates that are fitted from the baseline: forward selection can begin with a compromise.
 PAIRS = 2
+#: Standard deviations from which something that is off is more than its tolerance: a chance of 1 in 370 each.
+STAND_IN = 3.0
 #: Candidates that are fitted in the place of every effect of the model.
 RIVALS = 3
 
@@ -52,7 +54,7 @@ class Search:
     Attributes
     ----------
     baseline : Fit
-        The model with nothing added.
+        The model with nothing added, everything that may be off at its likeliest.
     model : Fit
         The model with all that unseen points want; `baseline` if nothing.
     effects : Fit
@@ -80,12 +82,17 @@ class Search:
 
 
 def worth(problem: Problem, model: Fit, less: Fit, candidate: Candidate) -> Worth:
-    """What a candidate is worth in a model, beside the same model without it."""
+    """What a candidate is worth in a model, beside the same model without it.
+
+    Where the model without it needs something to be off by more than is stated, that stands in for the candidate, and
+    predicts unseen points just as well: it is set aside, as are nuisances that are the candidate under another name.
+    """
+    at = [f.assessment.free[f.jacobian.shape[1] :] for f in (model, less)]
+    stand_in = np.flatnonzero((np.abs(at[1]) > STAND_IN) & (np.abs(at[1]) > np.abs(at[0]) + 1.0))
+    gone = sorted({*problem.twins(candidate), *(int(i) for i in stand_in)})
     unseen = []
     for one in (model, less):
-        told = one.assessment
-        if problem.twins(candidate):
-            told = assess(problem.basis, without_twins(problem, one, candidate), told.scales)
+        told = assess(problem.basis, without(one, gone), one.assessment.scales) if gone else one.assessment
         unseen.append(float(np.sum(told.scores())))
     return Worth(unseen[0] - unseen[1], model.evidence - less.evidence)
 
@@ -102,10 +109,13 @@ def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Pro
     progress : callable, optional
     """
     say = progress or (lambda what, share: None)
-    baseline = baseline_fit(problem)
+    drawn = baseline_fit(problem)
     say("every effect of the library", 0.1)
-    first = columns(run, baseline, problem.pool)
-    hunt = _Hunt(run, problem, settings, baseline, first)
+    first = columns(run, drawn, problem.pool)
+    # what is off by two tolerances at once acts no longer to first order: a bearing that is merely off must not need
+    # an effect for that
+    baseline = settle(run, problem, drawn)
+    hunt = _Hunt(run, problem, settings, drawn, baseline, *bends(run, drawn, problem.pool, first))
     model, singles = hunt.forward(say)
     say("rivals", 0.8)
     rivals: tuple[tuple[Fit, ...], ...] = ()
@@ -137,8 +147,11 @@ class _Hunt:
     run: Map
     problem: Problem
     settings: DiagnoseSettings
+    drawn: Fit
     baseline: Fit
     first: Columns
+    curved: Columns
+    _known: dict[tuple[int, int], tuple[Fit, Worth]] = field(default_factory=dict, repr=False)
 
     def forward(self, say: Progress) -> tuple[Fit, tuple[Fit, ...]]:
         """Add what unseen points want, one at a time or two at once; drop what they do not want any more."""
@@ -147,16 +160,19 @@ class _Hunt:
         for count in range(self.settings.most_effects):
             say(f"fits, effect {count + 1}", 0.2 + 0.2 * count)
             tried = self.extended(model, table)
-            singles = singles or tuple(tried)
+            if not count and self.baseline is not self.drawn:
+                tried = self.best([*tried, *self.extended(self.drawn, table)])
             if count == 1:
                 tried = sorted([*tried, *self.pairs(singles)], key=lambda f: -f.evidence)
-            # what may be off acts otherwise beside a large effect: the likeliest are told with derivatives of their own
-            near = FIRST if not count else 1
-            tried = [settle(self.run, self.problem, f, ROUNDS_ON_THE_WAY) for f in tried[:near]] + tried[near:]
+            # what may be off acts otherwise beside a large effect, and a direction between those of the grid does not
+            # show its worth: the likeliest are told with derivatives and directions of their own
+            near = [self.refined(f) for f in tried[: FIRST if not count else 1]]
+            tried = [*near, *tried[len(near) :]]
+            singles = singles or tuple(self.best(tried))
             chosen = self.chosen(model, tried)
             if chosen is None:
                 break
-            model = self.backward(self.refined(chosen))
+            model = self.backward(chosen if any(chosen is f for f in near) else self.refined(chosen))
             if len(model.candidates) <= count:
                 break
             table = self.renewed(model)
@@ -164,21 +180,27 @@ class _Hunt:
 
     def chosen(self, model: Fit, tried: Sequence[Fit]) -> Fit | None:
         """The best that unseen points want; an effect of the library before a generic term that does no better."""
-        wanted = [f for f in tried if self.all_wanted(f, model)]
-        if not wanted:
-            return None
-        best = max(wanted, key=lambda f: f.evidence)
-        if best.names & set(TERMS):
-            near = [f for f in wanted if f.evidence > best.evidence - self.settings.alike]
-            named = [f for f in near if not f.names & set(TERMS)]
-            best = max(named, key=lambda f: f.evidence, default=best)
+        best: Fit | None = None
+        for f in sorted(tried, key=lambda f: -f.evidence):
+            if best is not None:
+                # three free numbers of a term take up part of what a second effect does
+                least = max(self.settings.alike, self.settings.spare * (best.evidence - model.evidence))
+                if f.evidence < best.evidence - least:
+                    break
+            generic = bool(f.names & set(TERMS))
+            if (best is None or not generic) and self.all_wanted(f, model):
+                if not generic:
+                    return f
+                best = f
         return best
 
     def all_wanted(self, found: Fit, model: Fit) -> bool:
         """Whether unseen points want every candidate that is new in a fit."""
         new = [c for c in found.candidates if c not in model.candidates]
         if len(new) == 1 and set(found.candidates) - set(new) == set(model.candidates):
-            return self.enough(worth(self.problem, found, model, new[0]))
+            if not self.enough(worth(self.problem, found, model, new[0])):
+                return False
+            return self.enough(self.worth_in(found, found.candidates.index(new[0])))
         return all(self.enough(self.worth_in(found, i)) for i in range(len(found.candidates)))
 
     def enough(self, value: Worth) -> bool:
@@ -187,19 +209,34 @@ class _Hunt:
 
     def worth_in(self, model: Fit, index: int) -> Worth:
         """What one candidate of a model is worth: the others are fitted again without it."""
+        known = self._known.get((id(model), index))
+        if known is None:
+            # the model is kept with the answer: its number must not be given to another one
+            known = self._known[(id(model), index)] = model, self._worth_in(model, index)
+        return known[1]
+
+    def _worth_in(self, model: Fit, index: int) -> Worth:
         less = self.without(model, index)
-        return worth(self.problem, model, less, model.candidates[index]) if less is not None else Worth(np.inf, np.inf)
+        if less is None:
+            return Worth(np.inf, np.inf)
+        value = worth(self.problem, model, less, model.candidates[index])
+        if self.enough(value):
+            # what may be off does without the effect all that it can, not to first order only, and from where it
+            # stands beside the effect too: else an effect is named for what a tolerance does
+            less = settle(self.run, self.problem, less, ROUNDS_ON_THE_WAY)
+            value = worth(self.problem, model, less, model.candidates[index])
+        return value
 
     def without(self, model: Fit, index: int) -> Fit | None:
         """A model without one of its candidates, the others fitted again."""
-        if len(model.candidates) == 1:
-            return self.baseline
         keep = [i for i in range(len(model.candidates)) if i != index]
         start = Start(
             tuple(model.candidates[i] for i in keep), tuple(model.amplitudes[i] for i in keep),
-            np.column_stack([model.jacobian[:, model.slices[i]] for i in keep]), model.nuisance, model.columns,
+            np.column_stack([model.jacobian[:, :0], *(model.jacobian[:, model.slices[i]] for i in keep)]),
+            model.nuisance, model.columns,
         )  # fmt: skip
-        return next(iter(self.run(fit, [(start,)])))
+        less = next(iter(self.run(fit, [(start,)])))
+        return less if keep else self.best([self.baseline, *([less] if less is not None else [])])[0]
 
     def kept(self, model: Fit) -> Fit:
         """The model itself, or less of it where its last derivatives take an effect's worth away."""
@@ -235,8 +272,15 @@ class _Hunt:
     def extended(self, model: Fit, table: Columns) -> list[Fit]:
         """Fits of a model with one candidate more, best first."""
         free = {c: v for c, v in table.items() if c.label not in {o.label for o in model.candidates}}
-        ranked = self.promising(scores(self.problem, model, free))
-        return self.fits([with_model(model, s, free) for s in ranked])
+        ranked = self.promising(scores(self.problem, model, free, curved=self.curved))
+        return self.fits([with_model(model, s, free, self.curved) for s in ranked])
+
+    def best(self, fits: Sequence[Fit]) -> list[Fit]:
+        """The better fit of every set of candidates, best first."""
+        kept: dict[str, Fit] = {}
+        for f in sorted(fits, key=lambda f: -f.evidence):
+            kept.setdefault(f.label, f)
+        return list(kept.values())
 
     def promising(self, ranked: Sequence[Score]) -> list[Score]:
         """The best, and the best of every other effect that promises a fair share: a first step can mislead."""
@@ -254,9 +298,10 @@ class _Hunt:
         for f in singles:  # the secant of a fit tells more than the derivative at the baseline
             (c,), (a,) = f.candidates, f.amplitudes
             if len(a) == 1 and abs(a[0] - c.neutral) > 1e-3 * c.step:
-                table[c] = (f.prediction - self.problem.base)[:, None] / (a[0] - c.neutral)
-        ranked = scores(self.problem, self.baseline, table, pairs=True)[:PAIRS]
-        return self.fits([with_model(self.baseline, s, table) for s in ranked])
+                alone = f.prediction - f.columns @ f.nuisance - self.problem.base
+                table[c] = alone[:, None] / (a[0] - c.neutral)
+        ranked = scores(self.problem, self.drawn, table, pairs=True)[:PAIRS]
+        return self.fits([with_model(self.drawn, s, table) for s in ranked])
 
     def fits(self, starts: Sequence[Start]) -> list[Fit]:
         """Fits from their starts, best first."""
@@ -281,7 +326,9 @@ class _Hunt:
         """Derivatives at a model: new ones for the candidates that rank best by those of the baseline."""
         labels = {c.label for c in model.candidates}
         table = {c: v for c, v in self.first.items() if c.label not in labels}
-        best = [s.candidates[0] for s in scores(self.problem, model, table)[: 2 * self.settings.tried]]
+        best = [
+            s.candidates[0] for s in scores(self.problem, model, table, curved=self.curved)[: 2 * self.settings.tried]
+        ]
         return table | columns(self.run, model, best)
 
     def rivals(self, model: Fit, singles: Sequence[Fit]) -> tuple[tuple[Fit, ...], ...]:
@@ -296,6 +343,6 @@ class _Hunt:
                 continue
             used = {gone.label, *(o.label for o in rest.candidates)}
             table = {c: v for c, v in self.first.items() if c.label not in used}
-            best = [s for s in scores(self.problem, rest, table) if s.gain > 0.0][:RIVALS]
-            out.append(tuple(self.fits([with_model(rest, s, table) for s in best])))
+            best = [s for s in scores(self.problem, rest, table, curved=self.curved) if s.gain > 0.0][:RIVALS]
+            out.append(tuple(self.fits([with_model(rest, s, table, self.curved) for s in best])))
         return tuple(out)

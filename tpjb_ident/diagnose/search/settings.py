@@ -27,8 +27,9 @@ class DiagnoseSettings:
         Log evidence below which another explanation counts as one that these data cannot tell apart: 3 is odds of 20.
     most : float
         Share of the squared gap on unseen points that effects must close to be named at all.
-    part : float
-        Share of it that every one of them must close.
+    spare : float
+        Share of the log evidence of a generic term that an effect of the library may lack to be taken before it: a
+        second effect, of which three free numbers take up a part, costs the right one that much.
     alarm : float
         p-value, all patterns considered, below which a residual is more than noise and stated tolerances.
     tried : int
@@ -47,7 +48,7 @@ class DiagnoseSettings:
     exceeds: float = 1.6
     alike: float = 3.0
     most: float = 0.8
-    part: float = 0.02
+    spare: float = 0.1
     alarm: float = 0.005
     tried: int = 5
     most_effects: int = 3

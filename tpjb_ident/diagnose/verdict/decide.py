@@ -82,13 +82,13 @@ def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Judged
             "of the library"
         )
         return Judged("unexplained", baseline, closed, before, (), (told,))
-    reasons = _refusals(found, closed, settings)
+    left = excess(problem, effects)
+    reasons = _refusals(found, closed, left, settings)
     if reasons and before.p >= settings.alarm:
         told = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"
         return Judged("consistent", baseline, closed, before, (), (told,))
     if reasons:
         return Judged("unexplained", baseline, closed, before, (), reasons)
-    left = excess(problem, effects)
     alike = _alike(found, settings)
     share = f"{100 * closed.closed:.0f} % of the squared gap on unseen points is closed"
     if left.p < settings.alarm or found.model.candidates != effects.candidates:
@@ -100,7 +100,7 @@ def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Judged
     return Judged("ambiguous" if alike else "named", effects, closed, left, alike, (told,))
 
 
-def _refusals(found: Search, closed: Closure, settings: DiagnoseSettings) -> tuple[str, ...]:
+def _refusals(found: Search, closed: Closure, left: Excess, settings: DiagnoseSettings) -> tuple[str, ...]:
     """Why the effects of a search are not named; empty if they are."""
     effects = found.effects
     if not effects.candidates:
@@ -108,7 +108,7 @@ def _refusals(found: Search, closed: Closure, settings: DiagnoseSettings) -> tup
     out = []
     if effects.at_bound:
         out.append(f"the best fit ({effects.label}) runs into a physical bound")
-    if not closed.closed >= settings.most:
+    if left.p < settings.alarm and not closed.closed >= settings.most:
         out.append(
             f"the best fit ({effects.label}) closes {100 * closed.closed:.0f} % of the squared gap on unseen points, "
             f"less than the {100 * settings.most:.0f} % that a name takes"

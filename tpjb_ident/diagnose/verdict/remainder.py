@@ -11,6 +11,9 @@ from tpjb_ident.diagnose.search.assessment import assess
 from tpjb_ident.diagnose.search.fit import Fit
 from tpjb_ident.diagnose.search.problem import Problem
 
+#: Share of its prior variance that the data take from something that may be off, before they say anything about it.
+TOLD = 0.05
+
 
 @dataclass(frozen=True)
 class Excess:
@@ -29,14 +32,16 @@ class Excess:
 
 
 def excess(problem: Problem, fitted: Fit) -> Excess:
-    """Test every observable, and every fold, against noise, stated tolerances and all that is free.
+    """Test every observable, every fold, and everything that may be off, against noise and stated tolerances.
+
+    A posterior mean m of something with prior variance 1 and posterior variance v scatters with 1 - v.
 
     Parameters
     ----------
     problem : Problem
     fitted : Fit
     """
-    from scipy.stats import chi2
+    from scipy.stats import chi2, norm
 
     # every kind of observable as wrong as stated, nothing beyond, no more scatter than stated
     stated = problem.basis.stated
@@ -44,9 +49,14 @@ def excess(problem: Problem, fitted: Fit) -> Excess:
     total = problem.basis.covariance(stated) + fitted.assessment.linear.spread
     residual = told.linear.residual
     rows = _groups(problem)
-    values = [float(chi2.sf(_square(total, residual, at), len(at))) for _, at in rows]
-    least = int(np.argmin(values))
-    return Excess(min(1.0, values[least] * len(values)), rows[least][0])
+    tests = [(float(chi2.sf(_square(total, residual, at), len(at))), name) for name, at in rows]
+    first = len(fitted.errors)
+    left = 1.0 - np.diag(told.covariance)[first:]
+    for one, m, spread in zip(problem.nuisances, told.free[first:], left, strict=True):
+        if spread > TOLD:
+            tests.append((2.0 * float(norm.sf(abs(m) / np.sqrt(spread))), f"{one.name} {one.place}".strip()))
+    p, where = min(tests)
+    return Excess(min(1.0, p * len(tests)), where)
 
 
 def _square(total: FloatArray, residual: FloatArray, at: IntArray) -> float:

@@ -187,15 +187,18 @@ class Verdict:
         """Serialise as JSON text; not-a-number becomes null, as JSON knows no other."""
         return json.dumps(_plain(self.to_dict()), indent=2, allow_nan=False) + "\n"
 
-    def effects_toml(self, before: tuple[Effect, ...] = ()) -> str:
+    def effects_toml(self, before: tuple[Effect, ...] = (), from_measured: bool = False) -> str:
         """Serialise as ``updated.effects.toml``, which ``predict --effects`` reads.
 
         Parameters
         ----------
         before : tuple of Effect
             Effects that the baseline had already; they stay in the model.
+        from_measured : bool
+            The baseline had measured pivots: what is found on pivots is meant beside these, and the file says so.
         """
-        lines = ['schema = "tpjb-effects/1"', ""]
+        counted = ['counted_from = "measured pivots"'] if from_measured else []
+        lines = ['schema = "tpjb-effects/1"', *counted, ""]
         for known in before:
             values = [f"{k} = {v!r}" for k, v in known.parameters.items()]
             lines += ["[[effects]]", f'name = "{known.name}"', *values, ""]
@@ -207,15 +210,15 @@ class Verdict:
             lines += [f"# {kind.source}", *([f"# {e.stands_in}"] if e.stands_in else []), ""]
         return "\n".join(lines)
 
-    def terms_toml(self, before: tuple[Effect, ...] = ()) -> str:
+    def terms_toml(self, before: tuple[Effect, ...] = (), from_measured: bool = False) -> str:
         """Serialise the effects with what the rest behaves like, in the same form.
 
         Parameters
         ----------
-        before : tuple of Effect
+        before, from_measured
             As of `effects_toml`.
         """
-        lines = [self.effects_toml(before)]
+        lines = [self.effects_toml(before, from_measured)]
         for b in self.behaves_like:
             values = [f"{k} = {v!r}" for k, v in b.parameters.items()]
             lines += ["[[effects]]", f'name = "{b.effect}"', *values, f"# {b.words}", ""]

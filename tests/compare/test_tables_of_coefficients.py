@@ -1,0 +1,69 @@
+"""`tpjb compare --coefficients`: prediction beside K and C of a table, read as `diagnose` reads them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from model.bearing_file import load_bearing
+from tests.command_line import tpjb
+from tpjb_ident.compare.comparison import CompareSettings
+from tpjb_ident.compare.from_table import compare_table
+from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
+from tpjb_ident.compare.tables import comparison_frame
+from tpjb_ident.diagnose.observations.from_table import observe_table
+
+HEAD = "static_load_N,shaft_speed_Hz,excitation_Hz,kxx_N_per_m,kyy_N_per_m,cyy_Ns_per_m,cyy_Ns_per_m_se"
+
+
+@pytest.fixture
+def table(tmp_path):
+    path = tmp_path / "read_off.csv"
+    path.write_text("\n".join([HEAD, "5000,22,25,1.2e8,2e8,1e6,2e4", "8750,22,25,,4e8,1.4e6,"]), encoding="utf-8")
+    return path
+
+
+def test_the_table_is_read_as_the_diagnosis_reads_it_and_gaps_stay_gaps(table, rocker_file):
+    result = compare_table(table, load_bearing(rocker_file), CompareSettings(("kirk",), "isothermal"), 0.05)
+    frame, seen = comparison_frame(result), observe_table(table, 0.05)
+    told = dict(zip(((e.observable, e.place("load")) for e in seen.elements), seen.value, strict=True))
+    assert frame["kyy_N_per_m"].tolist() == [told["kyy", 5000.0], told["kyy", 8750.0]]
+    assert frame["cyy_Ns_per_m"][0] == pytest.approx(told["cyy", 5000.0] / (2 * math.pi * 25))
+    assert frame["kyy_N_per_m_hi"][0] == pytest.approx(2e8 * (1 + 1.96 * 0.05), rel=1e-4)
+    assert np.isnan(frame["kxx_N_per_m"][1])
+    assert frame["kxy_N_per_m"].isna().all()
+
+
+def test_predictions_are_those_of_predict_and_measured_pivots_are_no_choice(table, rocker_file):
+    bearing = load_bearing(rocker_file)
+    result = compare_table(table, bearing, CompareSettings(thermal="isothermal"), 0.05)
+    assert [v.name for v in result.variants] == ["rigid", "kirk"]
+    assert any("no dry tests" in remark for remark in result.remarks)
+    points = [p.point for p in result.identification.points]
+    own = prediction_frame(predict_points(bearing, points, ModelSettings("kirk", "isothermal")), mesh_error=False)
+    frame = comparison_frame(result)
+    assert frame[frame["pivots"] == "kirk"]["kyy_N_per_m_predicted"].tolist() == own["kyy_N_per_m"].tolist()
+
+
+@pytest.mark.slow
+def test_the_command_writes_table_and_page(table, rocker_file, tmp_path):
+    out = tmp_path / "out"
+    result = tpjb("compare", "--coefficients", table, "--bearing", rocker_file, "--reading-error", "5%",
+                  "--thermal", "isothermal", "--out", out)  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert len(pd.read_csv(out / "comparison.csv")) == 4
+    assert "predicted and measured" in (out / "report.html").read_text(encoding="utf-8")
+    assert "tpjb diagnose --coefficients" in " ".join(result.output.split())
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [((), "one of them"), (("--coefficients", "none.csv"), "no such file"), (("--coefficients", "T"), "Add --bearing")],
+)
+def test_what_is_missing_is_said(table, more, said):
+    result = tpjb("compare", *(table if m == "T" else m for m in more))
+    assert result.exit_code == 2
+    assert said in " ".join(result.output.split())

@@ -1,0 +1,303 @@
+"""An emulator of the bearing model, so that a thousand campaigns can be diagnosed in an hour.
+
+What a bearing does at a static point is a smooth function of some 25 numbers (oil, clearances and pivots pad by pad,
+misalignment, starvation, ..), which are read off the `Setup`: effects and nuisances that move the same number add up
+as in the model. Every number by itself is followed by a spline through solved points; every pair by its bilinear
+term, solved at two corners (a cut expansion to second order: Rabitz, Alis, J. Math. Chem. 25 (1999) 197); what all
+pads do together, beyond that, by a spline of its own. Structure and instruments, dry tests and polygon are computed
+exactly. Truth and fits use the same emulator: what is tested is the decision, not the solver; raw records of another
+program test the rest.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+import pickle
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from model.effects import Effect, apply_effects
+from model.pivots import PivotLaw, ScaledPivot
+from model.setup import Setup
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.diagnose.forward.forward import SENSOR, Forward
+from tpjb_ident.diagnose.forward.memory import _PLAIN, Memory, NoEquilibriumError, Reading, Solved, StaticPoint
+from tpjb_ident.diagnose.observations.layout import Layout
+
+#: Coordinates: name, where its spline is solved, and the step of its bilinear terms.
+_BOTH = (-1.0, -0.6, -0.3, 0.3, 0.6, 1.0)
+_UP = (0.1, 0.25, 0.5, 0.75, 1.0)
+AXES: dict[str, tuple[tuple[float, ...], float, float]] = {
+    "viscosity": (_BOTH, 0.5, 0.15),
+    "exponent": (_BOTH, 0.4, 0.1),
+    "heat": (_BOTH, 0.7, 0.15),
+    "supply": (_BOTH, 12.0, 3.0),
+    "bore": (_BOTH, 40e-6, 10e-6),
+    "damping": (_UP, 2e6, 4e5),
+    "rotation": (_UP, 5e4, 5e3),
+    "rolling": (_UP, 5.0, 1.0),
+    "lean x": (_BOTH, 1.1e-3, 4e-4),
+    "lean y": (_BOTH, 1.1e-3, 4e-4),
+    "starvation": (_UP, 0.5, 0.15),
+    "carryover": (_UP, 0.98, 0.4),
+    **{f"offset {k}": (_BOTH, 30e-6, 6e-6) for k in range(5)},
+    **{f"pivot {k}": (_BOTH, 1.6, 0.4) for k in range(5)},
+}
+NAMES = tuple(AXES)
+#: What all pads do together: which coordinates, and where it is solved.
+TOGETHER = {"offset": (_BOTH, 30e-6), "pivot": (_BOTH, 1.6)}
+#: Beyond this multiple of its range a number has no equilibrium, as in the model something would give out.
+REACH = 1.5
+
+
+def coordinates(setup: Setup, base: Setup) -> FloatArray:
+    """The numbers of a `Setup`, counted from its baseline, in the order of `NAMES`."""
+    oil, first = setup.bearing.oil, base.bearing.oil
+    pads = list(zip(setup.bearing.pads, base.bearing.pads, strict=True))
+    offsets = np.array([a.assembled_clearance - b.assembled_clearance for a, b in pads])
+    softer = np.array([-math.log(_factor(law)) for law in setup.pivots])
+    angle, direction = setup.misalignment
+    # what leaves the film at once and what warms it less are nearly one
+    heat = -math.log(oil.specific_heat / first.specific_heat) + math.log(1.0 - setup.heat_loss)
+    whole = [
+        math.log(oil.viscosity_40 / first.viscosity_40), math.log(oil.viscosity_exponent / first.viscosity_exponent),
+        heat, setup.supply_change, float(np.mean([a.pad_clearance - b.pad_clearance for a, b in pads])),
+        setup.pivot_damping, setup.rotational_stiffness, setup.rolling, angle * math.cos(direction),
+        angle * math.sin(direction), setup.starvation, setup.carryover,
+    ]  # fmt: skip
+    return np.array([*whole, *(offsets + setup.clearance_change), *softer])
+
+
+def _factor(law: PivotLaw) -> float:
+    return law.stiffness_factor * _factor(law.law) if isinstance(law, ScaledPivot) else 1.0
+
+
+def at(base: Setup, name: str, value: float) -> Setup:
+    """The baseline with one of its numbers moved."""
+    kind, _, number = name.partition(" ")
+    oil = base.bearing.oil
+    scaled = {"viscosity": "viscosity_40", "exponent": "viscosity_exponent"}
+    if kind in scaled:
+        moved = replace(oil, **{scaled[kind]: getattr(oil, scaled[kind]) * math.exp(value)})
+        return base.change(bearing=replace(base.bearing, oil=moved))
+    if kind == "heat":
+        moved = replace(oil, specific_heat=oil.specific_heat * math.exp(-value))
+        return base.change(bearing=replace(base.bearing, oil=moved))
+    if kind == "lean":
+        lean = np.array([math.cos(base.misalignment[1]), math.sin(base.misalignment[1])]) * base.misalignment[0]
+        lean["xy".index(number)] += value
+        return base.change(misalignment=(float(np.hypot(*lean)), math.atan2(lean[1], lean[0])))
+    simple = {"supply": "supply_change", "damping": "pivot_damping", "rotation": "rotational_stiffness"}
+    if kind == "bore":
+        return apply_effects(base, [Effect("preload_error", pad_clearance_change=value)])
+    if kind == "offset":
+        return apply_effects(base, [Effect("pad_offset", pad=int(number) + 1, radial_offset=value)])
+    if kind == "pivot":
+        return apply_effects(base, [Effect("soft_pivot", pad=int(number) + 1, stiffness_factor=math.exp(-value))])
+    return base.change(**{simple.get(kind, kind): value})
+
+
+@dataclass(frozen=True)
+class Table:
+    """Answers of the model as numbers that are nearly linear in the coordinates.
+
+    Attributes
+    ----------
+    base : (m,) ndarray
+    splines : list of CubicSpline
+        Of the change along every coordinate.
+    pairs : (c, c, m) ndarray
+        Bilinear terms, half of each at either place.
+    together : dict of str to CubicSpline
+        Of what is still missing when all pads move alike.
+    """
+
+    base: FloatArray
+    splines: list[CubicSpline] = field(repr=False)
+    pairs: FloatArray = field(repr=False)
+    together: dict[str, CubicSpline] = field(repr=False)
+
+    def __call__(self, place: FloatArray) -> FloatArray:
+        """Answers at a place (c,)."""
+        moved = np.flatnonzero(place)
+        out = self.base.copy()
+        for i in moved:
+            out += _follow(self.splines[i], place[i])
+        for kind, spline in self.together.items():
+            out += _follow(spline, float(np.mean(place[_members(kind)])))
+        u = place[moved]
+        return np.asarray(out + np.tensordot(np.outer(u, u), self.pairs[np.ix_(moved, moved)], 2))
+
+
+def _members(kind: str) -> list[int]:
+    return [i for i, name in enumerate(NAMES) if name.startswith(kind + " ")]
+
+
+def _follow(spline: CubicSpline, value: float) -> FloatArray:
+    """Along a spline, and straight on beyond its ends."""
+    inside = min(max(value, spline.x[0]), spline.x[-1])
+    out = spline(inside)
+    return np.asarray(out + spline(inside, 1) * (value - inside) if inside != value else out)
+
+
+@dataclass
+class Emulated(Memory):
+    """Stands where the model's memory stands, and never solves anything."""
+
+    base: Setup | None = None
+    points: dict[tuple[StaticPoint, tuple[float, ...]], slice] = field(default_factory=dict)
+    table: Table | None = None
+    _last: tuple[bytes, FloatArray] | None = None
+    _setup: tuple[Setup, FloatArray] | None = None
+
+    def copy(self) -> Emulated:
+        """The same: nothing that is asked changes an answer."""
+        return self
+
+    def ask(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]) -> Reading:
+        """See `Memory.ask`."""
+        if self._setup is None or self._setup[0] is not setup:
+            self._setup = setup, self._answers(setup)
+        latent = self._setup[1][self.points[(point, lines)]]
+        return _solved(latent, point, len(lines)).read(setup, lines)
+
+    def _answers(self, setup: Setup) -> FloatArray:
+        assert self.base is not None
+        assert self.table is not None
+        place = coordinates(setup, self.base)
+        place[np.abs(place) < 1e-13] = 0.0
+        for name, value in zip(NAMES, place, strict=True):
+            if abs(value) > REACH * AXES[name][1]:
+                raise NoEquilibriumError(f"{name} beyond what was solved")
+        key = place.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = key, self.table(place)
+        return self._last[1]
+
+
+def _latent(found: Solved) -> FloatArray:
+    """Direct coefficients as logarithms where they are positive, cross ones against them."""
+    h = found.h
+    direct = np.stack([h[:, 0, 0].real, h[:, 1, 1].real, h[:, 0, 0].imag, h[:, 1, 1].imag])
+    cross = np.stack([h[:, 0, 1].real, h[:, 1, 0].real, h[:, 0, 1].imag, h[:, 1, 0].imag])
+    parts = [np.arcsinh(direct / _SCALE).ravel(), (cross / _SCALE).ravel(), found.position * 1e5]
+    return np.concatenate([*parts, found.temperature, found.pad_load / 1e3])
+
+
+#: A coefficient far below this acts linearly, one above it as its logarithm [N/m].
+_SCALE = 3e7
+
+
+def _solved(latent: FloatArray, point: StaticPoint, lines: int) -> Solved:
+    direct = _SCALE * np.sinh(latent[: 4 * lines].reshape(4, lines))
+    cross = _SCALE * latent[4 * lines : 8 * lines].reshape(4, lines)
+    h = np.empty((lines, 2, 2), complex)
+    h[:, 0, 0], h[:, 1, 1] = direct[0] + 1j * direct[2], direct[1] + 1j * direct[3]
+    h[:, 0, 1], h[:, 1, 0] = cross[0] + 1j * cross[2], cross[1] + 1j * cross[3]
+    rest = latent[8 * lines :]
+    force = point[0] * np.array([math.cos(point[1]), math.sin(point[1])])
+    return Solved(h, rest[:2] / 1e5, force, rest[2:7], rest[7:12] * 1e3)
+
+
+def emulate(forward: Forward, more: Layout, kept: Path | None = None) -> Emulated:
+    """Solve what an emulator needs (some minutes), or read it.
+
+    Parameters
+    ----------
+    forward : Forward
+        The model at its baseline.
+    more : Layout
+        Further operating points that are asked for.
+    kept : Path, optional
+        File that holds it, or is going to.
+    """
+    points: dict[tuple[StaticPoint, tuple[float, ...]], slice] = {}
+    count = 0
+    for point, lines in _asked(forward.layout, more):
+        size = 8 * len(lines) + 12
+        points[(point, lines)] = slice(count, count + size)
+        count += size
+    if kept is not None and kept.exists():
+        table = pickle.loads(kept.read_bytes())
+    else:
+        table = _tabulate(forward, points)
+        if kept is not None:
+            kept.write_bytes(pickle.dumps(table))
+    return Emulated(base=forward.setup, points=points, table=table)
+
+
+def _asked(*layouts: Layout) -> Iterator[tuple[StaticPoint, tuple[float, ...]]]:
+    for layout in layouts:
+        for test in layout.dynamic:
+            yield (test.load, test.direction, test.speed), tuple(test.excitation)
+        for one in layout.locus:
+            yield (one.load, one.direction, one.speed), (one.speed,)
+
+
+def solve(forward: Forward, setup: Setup, points: Any) -> FloatArray:
+    """Answers of the model itself, in the emulator's numbers."""
+    memory = Memory({}, dict(forward.memory.start))
+    key = setup.change(**_PLAIN)
+    sensors = (SENSOR,) * len(setup.bearing.pads)
+    out = []
+    for point, lines in points:
+        memory.ask(key, point, lines, sensors)
+        out.append(_latent(memory.solved[(key, point, (*lines, *sensors))]))
+    return np.concatenate(out)
+
+
+def _tabulate(forward: Forward, points: Any) -> Table:
+    start = forward.setup
+    base = solve(forward, start, points)
+    splines = [_spline(forward, points, base, lambda v, n=name: at(start, n, v), *AXES[name][:2]) for name in NAMES]
+    table = Table(base, splines, np.zeros((len(NAMES), len(NAMES), len(base))), {})
+    for i, j in itertools.combinations(range(len(NAMES)), 2):
+        steps = [AXES[NAMES[k]][2] for k in (i, j)]
+        corners = []
+        for sign in (1.0, -1.0):
+            a, b = (sign * step if AXES[NAMES[k]][0] is _BOTH else step for k, step in zip((i, j), steps, strict=True))
+            place = np.zeros(len(NAMES))
+            place[[i, j]] = a, b
+            try:
+                missing = solve(forward, at(at(start, NAMES[i], a), NAMES[j], b), points) - table(place)
+            except NoEquilibriumError:
+                continue
+            corners.append(missing / (a * b))
+        if corners:
+            table.pairs[i, j] = table.pairs[j, i] = 0.5 * np.mean(corners, axis=0)
+    for kind, (shares, reach) in TOGETHER.items():
+        names = [NAMES[i] for i in _members(kind)]
+
+        def moved(value: float, names: list[str] = names) -> Setup:
+            return functools.reduce(lambda setup, name: at(setup, name, value), names, start)
+
+        def known(value: float, kind: str = kind) -> FloatArray:
+            place = np.zeros(len(NAMES))
+            place[_members(kind)] = value
+            return table(place)
+
+        table.together[kind] = _spline(forward, points, known, moved, shares, reach)
+    return table
+
+
+def _spline(
+    forward: Forward, points: Any, known: FloatArray | Callable[[float], FloatArray], moved: Callable[[float], Setup],
+    shares: tuple[float, ...], reach: float,
+) -> CubicSpline:  # fmt: skip
+    """A spline of what the model says beyond what is known, 0 at the baseline."""
+    nodes, values = [], []
+    for share in sorted((0.0, *shares)):
+        told = known if isinstance(known, np.ndarray) else known(share * reach)
+        try:
+            values.append(solve(forward, moved(share * reach), points) - told if share else np.zeros_like(told))
+        except NoEquilibriumError:
+            continue
+        nodes.append(share * reach)
+    return CubicSpline(np.array(nodes), np.array(values), bc_type="natural")

@@ -1,0 +1,140 @@
+"""A table of coefficients, as a paper's figures or another program give them: K and C with how far they hold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tpjb_ident.errors import BadInputError
+from tpjb_ident.schema import ENTRIES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+HZ = 2.0 * math.pi
+_UNITS = {"k": "N_per_m", "c": "Ns_per_m"}
+
+
+@dataclass(frozen=True)
+class TableSource:
+    """A table of coefficients in the place of a campaign: what pages call it."""
+
+    id: str
+    description: str = "K and C from a table"
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """Coefficients of one operating point.
+
+    Attributes
+    ----------
+    load, direction, speed, omega : float
+        Static load [N] and its direction [rad], shaft speed and excitation [rad/s].
+    coefficients : dict of str to (float, float)
+        Value and standard error of those that are known, by name: ``"kxx"`` [N/m], ``"cyy"`` [N s/m].
+    """
+
+    load: float
+    direction: float
+    speed: float
+    omega: float
+    coefficients: dict[str, tuple[float, float]]
+
+
+def read_coefficients(path: Path, reading_error: float | None = None) -> tuple[TableRow, ...]:
+    """Read a table of coefficients.
+
+    Parameters
+    ----------
+    path : Path
+        CSV with the columns of ``coefficients.csv``: ``static_load_N``, ``shaft_speed_Hz``, one of the coefficients at
+        least (``kxx_N_per_m`` .. ``cyy_Ns_per_m``) with ``.._se`` or ``.._lo`` and ``.._hi``;
+        ``static_load_direction_deg`` (else -90) and ``excitation_Hz`` (else the shaft's). Empty cells are left out.
+    reading_error : float, optional
+        Standard error of a coefficient without one in the table, as a share of its value.
+
+    Returns
+    -------
+    tuple of TableRow
+        Those that hold a coefficient.
+
+    Raises
+    ------
+    BadInputError
+        No such file or column, a cell that is no number, a coefficient without any error, two rows for one point, or
+        no coefficient at all.
+    """
+    rows: list[TableRow] = []
+    points: set[tuple[float, ...]] = set()
+    for number, row in enumerate(_read(path).to_dict("records"), start=2):
+        where = f"{path.name}, line {number}"
+        place = _place(row, where)
+        found = _coefficients(row, reading_error, where)
+        if not found:
+            continue
+        if place in points:
+            raise BadInputError(f"{where}: a second row for the same point. Keep one of them.")
+        points.add(place)
+        rows.append(TableRow(*place, found))
+    if not rows:
+        raise BadInputError(f"{path.name}: holds no coefficient. Name columns as in coefficients.csv: kxx_N_per_m, ...")
+    return tuple(rows)
+
+
+def _read(path: Path) -> pd.DataFrame:
+    import pandas as pd
+
+    try:
+        frame = pd.read_csv(path, sep=None, engine="python", comment="#", encoding="utf-8-sig")
+    except (OSError, ValueError) as error:
+        raise BadInputError(
+            f"{path}: cannot be read as a table ({error}). Save it as CSV with a line of names."
+        ) from error
+    for name in ("static_load_N", "shaft_speed_Hz"):
+        if name not in frame.columns:
+            raise BadInputError(f"{path.name}: column {name} is missing. Add it.")
+    return frame
+
+
+def _number(row: Mapping[Any, Any], name: str, where: str) -> float:
+    value = row.get(name)
+    try:
+        return float(value) if value is not None and value != "" else math.nan
+    except (TypeError, ValueError) as error:
+        raise BadInputError(
+            f"{where}, {name}: {value!r} is no number. Leave the cell empty where nothing is known."
+        ) from error
+
+
+def _place(row: Mapping[Any, Any], where: str) -> tuple[float, float, float, float]:
+    load, speed = _number(row, "static_load_N", where), HZ * _number(row, "shaft_speed_Hz", where)
+    direction, line = _number(row, "static_load_direction_deg", where), HZ * _number(row, "excitation_Hz", where)
+    if not (load > 0.0 and speed > 0.0):
+        raise BadInputError(f"{where}: static_load_N and shaft_speed_Hz must be positive numbers.")
+    return load, math.radians(-90.0 if math.isnan(direction) else direction), speed, speed if math.isnan(line) else line
+
+
+def _coefficients(row: Mapping[Any, Any], reading_error: float | None, where: str) -> dict[str, tuple[float, float]]:
+    """Value and standard error of every coefficient that a row holds."""
+    out = {}
+    for part, unit in _UNITS.items():
+        for entry in ENTRIES:
+            name = f"{part}{entry}_{unit}"
+            value = _number(row, name, where)
+            if math.isnan(value):
+                continue
+            error = _number(row, f"{name}_se", where)
+            if math.isnan(error):
+                error = (_number(row, f"{name}_hi", where) - _number(row, f"{name}_lo", where)) / (2 * 1.96)
+            if math.isnan(error) and reading_error is not None:
+                error = reading_error * abs(value)
+            if not error >= 0.0:
+                raise BadInputError(
+                    f"{where}, {name}: nothing says how far it holds. Add {name}_se, _lo and _hi, or --reading-error."
+                )
+            out[f"{part}{entry}"] = (value, error)
+    return out
