@@ -6,7 +6,7 @@ Campaigns of the paper's plan are drawn from an emulator of the model (`emulated
 from its stated tolerance (cut off at two standard deviations), the model differs smoothly by 0.05 to 0.2 % (two
 programs that solve the same equations differ by that), noise is what the sample campaigns have. Kinds: ``scatter``
 (nothing hidden), ``clean`` (one effect of twelve standard deviations on a bearing as drawn), ``one``, ``two``,
-``three`` (effects of the library), ``outside`` (an effect that is taken out of the library, a cross-coupled stiffness, or growth
+``three`` (effects of the library), ``outside`` (an effect that is taken out of it, a cross-coupled stiffness, or growth
 in proportion to the load), ``beside`` (an effect of the library and one outside it). Rows go to a JSON-lines file;
 rows that are there are not drawn again; the tables are made from it.
 """
@@ -107,7 +107,7 @@ def bench(name: str, folder: Path) -> Bench:
 
 def _slope(forward: Forward, base: FloatArray, c: Candidate, i: int) -> FloatArray:
     low, high = c.limits
-    for share in (0.5, -0.5):
+    for share in (0.05, -0.05):
         moved = c.origin.copy()
         moved[i] = min(max(moved[i] + share * c.steps[i], low[i]), high[i])
         if moved[i] != c.origin[i]:

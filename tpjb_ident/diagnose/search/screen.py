@@ -13,11 +13,13 @@ from tpjb_ident.diagnose.forward.candidates import Candidate
 from tpjb_ident.diagnose.forward.forward import ForwardModel
 from tpjb_ident.diagnose.forward.workers import Map
 from tpjb_ident.diagnose.search.assessment import Linear, assess
-from tpjb_ident.diagnose.search.fit import Fit, Start, attempt, slope
+from tpjb_ident.diagnose.search.fit import TIGHT, Fit, Start, attempt, slope
 from tpjb_ident.diagnose.search.problem import Problem
 
 #: Shares of a model's own error scales at which candidates are scored: with the right effect added they fall.
 SHARES = (1.0, 0.1, 0.01, 0.001)
+#: Effects that solve the pads' own heat or bending: seconds a run, and nearly linear at any size that a rig has.
+SLOW = frozenset({"pad_bending", "pad_conduction"})
 #: Amplitudes at which curvature is told, in typical sizes.
 WIDE = 0.8
 
@@ -65,7 +67,7 @@ def bends(run: Map, model: Fit, pool: Sequence[Candidate], table: Columns) -> tu
         Slopes, and half the second derivatives (none for a candidate of several amplitudes).
     """
     slim = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
-    single = [c for c in pool if len(c.steps) == 1]
+    single = [c for c in pool if len(c.steps) == 1 and c.name not in SLOW]
     found = run(_bend, [(slim, model.prediction, c) for c in single])
     slopes, curved = dict(table), {}
     for c, (slope_, bend) in zip(single, found, strict=True):
@@ -135,12 +137,33 @@ def scores(
     return sorted(found, key=lambda s: -s.gain)
 
 
-class _Level:
-    """Scores at one level of the error scales."""
+def alone(problem: Problem, model: Fit, table: Columns, curved: Columns) -> list[Score]:
+    """Score candidates by what they do nearly alone, best first.
 
-    def __init__(self, problem: Problem, model: Fit, table: Columns, share: float, curved: Columns) -> None:
-        scales = model.assessment.scales * share
-        found = assess(problem.basis, model.assessment.linear, np.maximum(scales, 1e-5), fixed=True)
+    Far from the answer nuisances, linear as they are, take up what a large effect does: here they are as good as known,
+    and the model is as wrong as stated, as in the first steps of a fit.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : Fit
+    table, curved : mapping of Candidate to (n, k) ndarray
+        See `bends`.
+    """
+    level = _Level(problem, model, table, None, curved)
+    return sorted((level.score((c,)) for c in table), key=lambda s: -s.gain)
+
+
+class _Level:
+    """Scores at one level of the error scales; at the stated ones, nuisances hardly free, where none is given."""
+
+    def __init__(self, problem: Problem, model: Fit, table: Columns, share: float | None, curved: Columns) -> None:
+        known = model.assessment.linear
+        if share is None:
+            known = replace(known, width=TIGHT * known.width)
+            found = assess(problem.basis, known, problem.basis.stated, fixed=True)
+        else:
+            found = assess(problem.basis, known, np.maximum(model.assessment.scales * share, 1e-5), fixed=True)
         self.offset = found.evidence - model.evidence
         residual = model.assessment.linear.residual
         self.at: dict[Candidate, slice] = {}

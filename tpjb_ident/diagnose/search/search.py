@@ -13,7 +13,7 @@ from tpjb_ident.diagnose.forward.workers import Map
 from tpjb_ident.diagnose.search.assessment import assess
 from tpjb_ident.diagnose.search.fit import Fit, Start, fit, fitted, settle
 from tpjb_ident.diagnose.search.problem import Problem
-from tpjb_ident.diagnose.search.screen import Columns, Score, bends, columns, scores, with_model, without
+from tpjb_ident.diagnose.search.screen import Columns, Score, alone, bends, columns, scores, with_model, without
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 
 Progress = Callable[[str, float], None]
@@ -23,6 +23,8 @@ SWAPS = 2
 ROUNDS_ON_THE_WAY = 2
 #: First effects that are compared with derivatives of their own.
 FIRST = 3
+#: Candidates that are fitted since they explain most by themselves, whatever else may be off.
+ALONE = 3
 #: Pairs of candidates that are fitted from the baseline: forward selection can begin with a compromise.
 PAIRS = 2
 #: Standard deviations from which something that is off is more than its tolerance: a chance of 1 in 370 each.
@@ -115,7 +117,7 @@ def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Pro
     # what is off by two tolerances at once acts no longer to first order: a bearing that is merely off must not need
     # an effect for that
     baseline = settle(run, problem, drawn)
-    hunt = _Hunt(run, problem, settings, drawn, baseline, *bends(run, drawn, problem.pool, first))
+    hunt = _Hunt(run, problem, settings, drawn, [baseline], *bends(run, drawn, problem.pool, first))
     model, singles = hunt.forward(say)
     say("rivals", 0.8)
     rivals: tuple[tuple[Fit, ...], ...] = ()
@@ -128,10 +130,11 @@ def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Pro
     if model.candidates:
         model = hunt.kept(settle(run, problem, model))
     rivals = rivals if model.candidates else ()
+    model = model if model.candidates else hunt.baseline
     values = tuple(hunt.worth_in(model, i) for i in range(len(model.candidates)))
     effects = hunt.named(model)
     less = tuple(hunt.without(effects, i) for i in range(len(effects.candidates)))
-    return Search(baseline, model, effects, values, less, first, singles, rivals)
+    return Search(hunt.baseline, model, effects, values, less, first, singles, rivals)
 
 
 def baseline_fit(problem: Problem) -> Fit:
@@ -148,10 +151,15 @@ class _Hunt:
     problem: Problem
     settings: DiagnoseSettings
     drawn: Fit
-    baseline: Fit
+    _nothing: list[Fit]
     first: Columns
     curved: Columns
     _known: dict[tuple[int, int], tuple[Fit, Worth]] = field(default_factory=dict, repr=False)
+
+    @property
+    def baseline(self) -> Fit:
+        """The likeliest model with nothing added that was met so far."""
+        return self._nothing[0]
 
     def forward(self, say: Progress) -> tuple[Fit, tuple[Fit, ...]]:
         """Add what unseen points want, one at a time or two at once; drop what they do not want any more."""
@@ -160,7 +168,7 @@ class _Hunt:
         for count in range(self.settings.most_effects):
             say(f"fits, effect {count + 1}", 0.2 + 0.2 * count)
             tried = self.extended(model, table)
-            if not count and self.baseline is not self.drawn:
+            if not count:
                 tried = self.best([*tried, *self.extended(self.drawn, table)])
             if count == 1:
                 tried = sorted([*tried, *self.pairs(singles)], key=lambda f: -f.evidence)
@@ -220,7 +228,7 @@ class _Hunt:
         if less is None:
             return Worth(np.inf, np.inf)
         value = worth(self.problem, model, less, model.candidates[index])
-        if self.enough(value):
+        if self.enough(value) and less is not self.baseline:
             # what may be off does without the effect all that it can, not to first order only, and from where it
             # stands beside the effect too: else an effect is named for what a tolerance does
             less = settle(self.run, self.problem, less, ROUNDS_ON_THE_WAY)
@@ -236,7 +244,11 @@ class _Hunt:
             model.nuisance, model.columns,
         )  # fmt: skip
         less = next(iter(self.run(fit, [(start,)])))
-        return less if keep else self.best([self.baseline, *([less] if less is not None else [])])[0]
+        if keep or less is None:
+            return less if keep else self.baseline
+        # the way from an effect back to nothing may end at a better place than the way from the drawing
+        self._nothing[:] = self.best([self.baseline, settle(self.run, self.problem, less)])[:1]
+        return self.baseline
 
     def kept(self, model: Fit) -> Fit:
         """The model itself, or less of it where its last derivatives take an effect's worth away."""
@@ -273,6 +285,10 @@ class _Hunt:
         """Fits of a model with one candidate more, best first."""
         free = {c: v for c, v in table.items() if c.label not in {o.label for o in model.candidates}}
         ranked = self.promising(scores(self.problem, model, free, curved=self.curved))
+        if model is self.drawn:
+            known = {s.candidates for s in ranked}
+            first = alone(self.problem, model, free, self.curved)[:ALONE]
+            ranked = [*ranked, *(s for s in first if s.candidates not in known)]
         return self.fits([with_model(model, s, free, self.curved) for s in ranked])
 
     def best(self, fits: Sequence[Fit]) -> list[Fit]:

@@ -170,20 +170,22 @@ def decide(
             "closed": judged.closed.closed if named.candidates else math.nan,
             "noise_floor": noise_floor(observations),
         },
-        remainder=_remainder(problem, judged, worst[0].observable + " at " + worst[0].where if worst else ""),
-        behaves_like=behaviours(problem, found),
+        remainder=_remainder(
+            problem, judged, worst[0].observable + " at " + worst[0].where if worst else "", settings.alarm
+        ),
+        behaves_like=behaviours(problem, found, judged.left.p < settings.alarm),
         drift=_drifts(problem, found, judged),
         assumptions=_assumptions(problem, found, settings),
         reasons=judged.reasons,
     )
 
 
-def _remainder(problem: Problem, judged: Judged, where: str) -> Remainder:
+def _remainder(problem: Problem, judged: Judged, where: str, alarm: float) -> Remainder:
     """What is left on unseen points once everything that may be off is at its likeliest."""
     left = judged.closed.after if judged.named.candidates else judged.closed.before
     floor, before = noise_floor(problem.observations) ** 2, gap(problem.observations, problem.base) ** 2
     share = max(left**2 - floor, 0.0) / (before - floor) if before > floor else 0.0
-    return Remainder(left, min(share, 1.0), judged.left.where if judged.left.p < 0.005 else where, judged.left.p)
+    return Remainder(left, min(share, 1.0), judged.left.where if judged.left.p < alarm else where, judged.left.p)
 
 
 def _drifts(problem: Problem, found: Search, judged: Judged) -> tuple[Drift, ...]:
