@@ -23,9 +23,9 @@ def gap_controls(
 ) -> Figure:
     """Draw the held-out gap of baseline and updated model beside control models.
 
-    Good controls are: the best wrong effect (must stay clearly above), a correction by a Gaussian process (what a
-    name-free correction reaches: the ceiling), and the same procedure on a campaign without an effect (must not
-    improve).
+    Good controls are: the best wrong effect (must stay clearly above), a correction by a Gaussian process (what can be
+    reached without a name; one that closes less than the named effect bounds nothing), and the same procedure on a
+    campaign without an effect (must not improve).
 
     Parameters
     ----------
