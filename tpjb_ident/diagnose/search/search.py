@@ -284,11 +284,15 @@ class _Hunt:
     def extended(self, model: Fit, table: Columns) -> list[Fit]:
         """Fits of a model with one candidate more, best first."""
         free = {c: v for c, v in table.items() if c.label not in {o.label for o in model.candidates}}
-        ranked = self.promising(scores(self.problem, model, free, curved=self.curved))
+        every = scores(self.problem, model, free, curved=self.curved)
+        ranked = self.promising(every)
         if model is self.drawn:
+            # a fit of a large effect may end on either side of a hill: it begins at both sizes that were proposed
             known = {s.candidates for s in ranked}
             first = alone(self.problem, model, free, self.curved)[:ALONE]
-            ranked = [*ranked, *(s for s in first if s.candidates not in known)]
+            names = {s.candidates for s in first} - known
+            ranked = [*ranked, *first, *(s for s in every if s.candidates in names)]
+            return self.best(self.fits([with_model(model, s, free, self.curved) for s in ranked]))
         return self.fits([with_model(model, s, free, self.curved) for s in ranked])
 
     def best(self, fits: Sequence[Fit]) -> list[Fit]:

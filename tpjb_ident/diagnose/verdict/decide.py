@@ -15,7 +15,7 @@ from tpjb_ident.diagnose.observations.gap import gap, gap_by_observable, noise_f
 from tpjb_ident.diagnose.search.fit import Fit
 from tpjb_ident.diagnose.search.problem import Problem
 from tpjb_ident.diagnose.search.screen import visible
-from tpjb_ident.diagnose.search.search import Search
+from tpjb_ident.diagnose.search.search import Search, baseline_fit
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.diagnose.verdict.behaviour import behaviours
 from tpjb_ident.diagnose.verdict.closure import Closure, closure, effects_unseen, unseen
@@ -72,7 +72,8 @@ def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Judged
     """
     baseline, effects = found.baseline, found.effects
     before = excess(problem, baseline)
-    closed = closure(problem, baseline, effects, found.less)
+    # against the drawing: a baseline at its likeliest has tolerances exceeded in the place of an effect
+    closed = closure(problem, baseline_fit(problem), effects, found.less)
     if not found.model.candidates:
         if before.p >= settings.alarm:
             told = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"
@@ -91,6 +92,8 @@ def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Judged
         return Judged("unexplained", baseline, closed, before, (), reasons)
     alike = _alike(found, settings)
     share = f"{100 * closed.closed:.0f} % of the squared gap on unseen points is closed"
+    if math.isnan(closed.closed):
+        share = "unseen points want it though what may be off closes the gap as well, beyond its tolerances"
     if left.p < settings.alarm or found.model.candidates != effects.candidates:
         told = (
             f"{share}; what is left is more than noise and stated tolerances (p = {left.p:.1g}), most in {left.where}"
