@@ -336,7 +336,7 @@ class _Hunt:
             for old, new, a, at in zip(model.candidates, swapped, model.amplitudes, model.slices, strict=True):
                 more = len(new.free) - len(old.free) if not new.form else 0
                 parts.append(np.column_stack([model.jacobian[:, at], np.zeros((len(model.prediction), more))]))
-                amplitudes.append(np.append(a, [new.about["direction"]] * more))
+                amplitudes.append(np.append(a, [new.about.get("direction", 0.0)] * more))
             model = replace(model, candidates=swapped, amplitudes=tuple(amplitudes), jacobian=np.column_stack(parts))
             start = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
             model = fitted(self.problem, start, model.prediction, model.assessment.scales)
