@@ -310,7 +310,8 @@ class _Hunt:
             if s.gain > 0.3 * ranked[0].gain and s.candidates[0].name not in names:
                 chosen.append(s)
                 names.add(s.candidates[0].name)
-        return [s for s in chosen if s.gain > self.settings.exceeds]
+        # what it is worth is told by the fit
+        return [s for s in chosen if s.gain > 0.0]
 
     def pairs(self, singles: Sequence[Fit]) -> list[Fit]:
         """Fits of two candidates at once from the baseline: what a compromise between two would hide."""
