@@ -21,7 +21,7 @@ Progress = Callable[[str, float], None]
 SWAPS = 2
 #: How often a model takes derivatives of its own while the search goes on.
 ROUNDS_ON_THE_WAY = 2
-#: First effects that are compared with derivatives of their own.
+#: Candidates of every round that are compared with derivatives of their own.
 FIRST = 3
 #: Candidates that are fitted since they explain most by themselves, whatever else may be off.
 ALONE = 3
@@ -174,7 +174,7 @@ class _Hunt:
                 tried = sorted([*tried, *self.pairs(singles)], key=lambda f: -f.evidence)
             # what may be off acts otherwise beside a large effect, and a direction between those of the grid does not
             # show its worth: the likeliest are told with derivatives and directions of their own
-            near = [self.refined(f) for f in tried[: FIRST if not count else 1]]
+            near = [self.refined(f) for f in tried[:FIRST]]
             tried = [*near, *tried[len(near) :]]
             singles = singles or tuple(self.best(tried))
             chosen = self.chosen(model, tried)
