@@ -198,19 +198,11 @@ def compare_campaign(
     curves, clearance, locus = static.curves, static.clearance, static.locus
     names, remarks = possible_variants(settings, curves, bearing)
     remarks += [condition.sentence() for condition in static.left_out]
-    twice = counted_twice(settings.effects)
-    if "measured" in names and twice and not settings.from_measured:
-        remarks.append(
-            f"Measured pivots are predicted without {' and '.join(twice)}: their dry tests hold that already, and it "
-            "would count twice."
-        )
+    remarks += _left_out(settings, names)
     if before_predicting is not None:
         tell("compiling the film solver (once on a machine)", 0, 1)
         before_predicting()
-    if clearance is None:
-        remarks.append("No clearance run: positions cannot be given from the bearing centre.")
-    if locus is None:
-        remarks.append("No locus runs: the shaft centre locus is not compared.")
+    remarks += _not_run(clearance, locus)
     points = [p.point for p in identification.points]
     stations = [] if locus is None else [p.point for p in locus.points]
     variants = []
@@ -222,6 +214,23 @@ def compare_campaign(
     return Comparison(
         campaign, bearing, settings, identification, curves, clearance, locus, tuple(variants), tuple(remarks)
     )
+
+
+def _not_run(clearance: ClearancePolygon | None, locus: Locus | None) -> list[str]:
+    """What is said of runs that a campaign lacks."""
+    said = ["No clearance run: positions cannot be given from the bearing centre."] if clearance is None else []
+    return said + (["No locus runs: the shaft centre locus is not compared."] if locus is None else [])
+
+
+def _left_out(settings: CompareSettings, names: list[str]) -> list[str]:
+    """What is said of effects that measured pivots hold already."""
+    twice = counted_twice(settings.effects)
+    if "measured" not in names or not twice or settings.from_measured:
+        return []
+    return [
+        f"Measured pivots are predicted without {' and '.join(twice)}: their dry tests hold that already, and it would "
+        "count twice."
+    ]
 
 
 def _check(campaign: Campaign, settings: CompareSettings) -> None:
