@@ -270,6 +270,11 @@ def unknown_centre(locus: Locus) -> float:
     """How far the bearing's centre may lie from where positions are counted when no clearance sweep tells it [m].
 
     Positions then count from the probes' own zero, and only their differences say something about the bearing.
+
+    Parameters
+    ----------
+    locus : Locus
+        Mean positions under constant load [m].
     """
     return max(1e-3, 3.0 * max(math.hypot(*p.position) for p in locus.points))
 
@@ -301,7 +306,15 @@ def stated_tolerances(campaign: Campaign, bearing: Bearing, known: Tolerances) -
 
 
 def sensor_positions(campaign: Campaign, bearing: Bearing) -> tuple[float, ...]:
-    """Fraction of the arc at which every pad carries its thermometer, as the manifest states it; else 0.75."""
+    """Fraction of the arc at which every pad carries its thermometer, as the manifest states it; else 0.75.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The campaign that is diagnosed.
+    bearing : Bearing
+        As drawn.
+    """
     given = {int(c.pad): float(c.position) for c in campaign.channels.values()
              if c.quantity == "temperature" and c.pad is not None and c.position is not None}  # fmt: skip
     return tuple(given.get(k, SENSOR) for k in range(1, len(bearing.pads) + 1))

@@ -107,7 +107,17 @@ def _exact(forward: Forward, found: Search) -> FloatArray | None:
 
 
 def pose(observations: Observations, forward: Forward, settings: DiagnoseSettings) -> Problem:
-    """Set a campaign beside a model: baseline, nuisances, candidates."""
+    """Set a campaign beside a model: baseline, nuisances, candidates.
+
+    Parameters
+    ----------
+    observations : Observations
+        What was measured, with its covariance.
+    forward : ForwardModel
+        The model at the points that were observed.
+    settings : DiagnoseSettings
+        Settings of the diagnosis.
+    """
     base = forward()
     trusted = loosened(observations, forward.pad_shares(), settings.tolerance)
     known = nuisances(trusted.elements, forward.setup, settings.tolerances)
@@ -121,7 +131,17 @@ def _column(forward: ForwardModel, base: FloatArray, known: tuple[Nuisance, ...]
 
 
 def solve(problem: Problem, forward: ForwardModel, settings: DiagnoseSettings) -> tuple[Verdict, Search]:
-    """Search and decide in this process, whatever stands behind the model; without a next test."""
+    """Search and decide in this process, whatever stands behind the model; without a next test.
+
+    Parameters
+    ----------
+    problem : Problem
+        Observations beside the baseline, with nuisances and candidates.
+    forward : ForwardModel
+        The model at the points that were observed.
+    settings : DiagnoseSettings
+        Settings of the diagnosis.
+    """
     with workers(forward, problem, 1) as run:
         found = search(run, problem, settings)
     return decide(problem, found, settings), found

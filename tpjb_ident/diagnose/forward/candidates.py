@@ -111,7 +111,13 @@ class Candidate:
         return float(low[0]), float(high[0])
 
     def values(self, amplitudes: FloatArray) -> dict[str, float]:
-        """Parameters at amplitudes (k,), clipped to their bounds; fixed ones too."""
+        """Parameters at amplitudes (k,), clipped to their bounds; fixed ones too.
+
+        Parameters
+        ----------
+        amplitudes : array, shape (k,)
+            One for every free parameter, in its nearly linear form.
+        """
         amplitudes = np.atleast_1d(np.asarray(amplitudes, float))
         if self.basis:
             sizes = np.asarray(self.basis).T @ amplitudes
@@ -125,7 +131,13 @@ class Candidate:
         return {**table, **self.fixed}
 
     def effect(self, amplitudes: FloatArray | float) -> Effect:
-        """Build the effect with these amplitudes (clipped to their bounds)."""
+        """Build the effect with these amplitudes (clipped to their bounds).
+
+        Parameters
+        ----------
+        amplitudes : float or array, shape (k,)
+            One for every free parameter, in its nearly linear form.
+        """
         return Effect(self.name, **self.values(np.atleast_1d(np.asarray(amplitudes, float))))
 
     def refined(self) -> Candidate:
@@ -168,7 +180,13 @@ def candidates(bearing: Bearing, skip: frozenset[str] = frozenset()) -> tuple[Ca
 
 
 def one_amplitude(bearing: Bearing) -> tuple[Candidate, ...]:
-    """Return the candidates with one amplitude each, generic terms left out: what a plan asks about."""
+    """Return the candidates with one amplitude each, generic terms left out: what a plan asks about.
+
+    Parameters
+    ----------
+    bearing : Bearing
+        As drawn.
+    """
     return tuple(c for c in candidates(bearing) if len(c.steps) == 1 and c.name not in TERMS)
 
 

@@ -100,11 +100,23 @@ class Forward:
         return Forward(self.setup, self.layout, self.elements, 0, self.memory.copy(), dict(self._shares))
 
     def knowing(self, memory: Memory) -> Forward:
-        """Return a copy that begins with what is known of its bearing."""
+        """Return a copy that begins with what is known of its bearing.
+
+        Parameters
+        ----------
+        memory : Memory
+            Equilibria that are solved already; it is copied.
+        """
         return Forward(self.setup, self.layout, self.elements, 0, memory.copy())
 
     def fresh_start(self, start: dict[StaticPoint, Equilibrium]) -> Forward:
-        """Return one that writes into this one's memory but starts from other equilibria."""
+        """Return one that writes into this one's memory but starts from other equilibria.
+
+        Parameters
+        ----------
+        start : dict of StaticPoint to Equilibrium
+            Equilibria to start from.
+        """
         memory = Memory(self.memory.solved, dict(start))
         return Forward(self.setup, self.layout, self.elements, 0, memory)
 

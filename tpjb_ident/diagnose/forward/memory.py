@@ -55,7 +55,15 @@ class Solved:
     pad_load: FloatArray
 
     def read(self, setup: Setup, lines: tuple[float, ...]) -> Reading:
-        """As the structure and the instruments of a set-up show it."""
+        """As the structure and the instruments of a set-up show it.
+
+        Parameters
+        ----------
+        setup : Setup
+            Bearing, oil, pivots, structure and instruments of the model.
+        lines : tuple of float
+            Excitation frequencies [rad/s].
+        """
         instruments, omega = setup.instruments, np.array(lines)
         return Reading(
             instruments.shown_stiffness(with_structure(setup, self.h, omega), omega),

@@ -171,7 +171,21 @@ def columns_of(
 def at_baseline(
     forward: ForwardModel, effects: Sequence[Effect], setup: Setup, known: Tolerances, base: FloatArray
 ) -> FloatArray:
-    """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m)."""
+    """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m).
+
+    Parameters
+    ----------
+    forward : ForwardModel
+        The model at the points that were observed.
+    effects : sequence of Effect
+        Effects that act.
+    setup : Setup
+        Bearing, oil, pivots, structure and instruments of the model.
+    known : Tolerances
+        Stated tolerances.
+    base : array, shape (n,)
+        Prediction of the model with nothing moved.
+    """
     found = nuisances(forward.elements, setup, known, by_pad=False)
     return columns_of(forward, effects, found, np.zeros(len(found)), base)
 
@@ -180,7 +194,23 @@ def column_of(
     forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], at: FloatArray, base: FloatArray,
     index: int,
 ) -> FloatArray:  # fmt: skip
-    """One column of `columns_of`."""
+    """One column of `columns_of`.
+
+    Parameters
+    ----------
+    forward : ForwardModel
+        The model at the points that were observed.
+    effects : sequence of Effect
+        Effects that act.
+    known : sequence of Nuisance
+        Everything that is free within a tolerance.
+    at : array, shape (m,)
+        Sizes of the nuisances, in standard deviations.
+    base : array, shape (n,)
+        Prediction of the model with nothing moved.
+    index : int
+        Which nuisance.
+    """
     if known[index].column is not None:
         return np.asarray(known[index].column)
     # towards zero: there the model surely has an equilibrium
@@ -193,7 +223,19 @@ def column_of(
 def predict(
     forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], size: FloatArray
 ) -> FloatArray:
-    """Predict with effects and with nuisances of given sizes (in standard deviations), (n,)."""
+    """Predict with effects and with nuisances of given sizes (in standard deviations), (n,).
+
+    Parameters
+    ----------
+    forward : ForwardModel
+        The model at the points that were observed.
+    effects : sequence of Effect
+        Effects that act.
+    known : sequence of Nuisance
+        Everything that is free within a tolerance.
+    size : array, shape (m,)
+        In standard deviations.
+    """
     shift = Shift(tuple(known), tuple(map(float, size)))
     return forward(effects, shift if np.any(size) else None) + shift.readings
 

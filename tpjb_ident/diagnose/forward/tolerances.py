@@ -98,7 +98,13 @@ class Tolerances:
         return Tolerances(table, self.probe_axes, self.cell_gain, self.centre)
 
     def layered(self, bearing: Bearing) -> Tolerances:
-        """Return a copy with what a bearing file states where the command line states nothing."""
+        """Return a copy with what a bearing file states where the command line states nothing.
+
+        Parameters
+        ----------
+        bearing : Bearing
+            As drawn.
+        """
         typed = {k: v.value for k, v in self.stated.items() if v.source == "command line"}
         return self.states(dict(bearing.tolerances), "bearing file").states(typed, "command line")
 

@@ -31,7 +31,15 @@ class Check:
     sigma: float
 
     def separation(self, one: Sequence[Effect], other: Sequence[Effect]) -> float:
-        """Distance of two explanations in standard deviations; 0 where neither has the effect."""
+        """Distance of two explanations in standard deviations; 0 where neither has the effect.
+
+        Parameters
+        ----------
+        one : sequence of Effect
+            An explanation.
+        other : sequence of Effect
+            Its rival.
+        """
         mine, theirs = self._sizes(one), self._sizes(other)
         neutral = next(p.neutral for p in kind_of(self.effect).parameters if p.name == self.parameter)
         places = mine.keys() | theirs.keys()

@@ -47,7 +47,13 @@ class Design:
     change: Change | None = None
 
     def acting(self, effects: Sequence[Effect]) -> tuple[Effect, ...]:
-        """Effects that act in this test."""
+        """Effects that act in this test.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            Effects that act.
+        """
         return tuple(e for e in effects if e.name not in self.blind)
 
     def fits(self, *explanations: Sequence[Effect]) -> bool:
@@ -57,6 +63,11 @@ class Design:
     def planned(self, setup: Setup) -> Observations:
         """Observation vector that the baseline predicts, with the noise to be expected.
 
+        Parameters
+        ----------
+        setup : Setup
+            Bearing, oil, pivots, structure and instruments of the model.
+
         Raises
         ------
         NoEquilibriumError
@@ -64,7 +75,15 @@ class Design:
         return planned_observations(setup if self.change is None else self.change(setup), self.layout)
 
     def forward(self, setup: Setup, seen: Observations) -> Forward:
-        """The model of this test, for what `planned` lists."""
+        """The model of this test, for what `planned` lists.
+
+        Parameters
+        ----------
+        setup : Setup
+            Bearing, oil, pivots, structure and instruments of the model.
+        seen : Observations
+            What `planned` gave.
+        """
         if self.change is None:
             return Forward(setup, self.layout, seen.elements)
         return ChangedForward(setup, self.layout, seen.elements, last=self.change)
@@ -208,7 +227,13 @@ def _static(at: _Measured) -> list[Design]:
 
 
 def grown(setup: Setup) -> Setup:
-    """A bearing at standstill that keeps the clearance of the running one."""
+    """A bearing at standstill that keeps the clearance of the running one.
+
+    Parameters
+    ----------
+    setup : Setup
+        Bearing, oil, pivots, structure and instruments of the model.
+    """
     by = setup.clearance_change
     hot = setup.change_pads(lambda k, pad: replace(pad, assembled_clearance=pad.assembled_clearance + by))
     return hot.change(clearance_change=0.0)

@@ -23,12 +23,24 @@ CENTRAL = 0.05
 
 
 def reversible(setup: Setup) -> bool:
-    """Whether every pad would carry with the shaft turning the other way."""
+    """Whether every pad would carry with the shaft turning the other way.
+
+    Parameters
+    ----------
+    setup : Setup
+        Bearing, oil, pivots, structure and instruments of the model.
+    """
     return all(abs(pad.pivot_offset - 0.5) <= CENTRAL for pad in setup.bearing.pads)
 
 
 def mirrored(setup: Setup) -> Setup:
-    """The set-up as a mirror shows it: its answers at a mirrored layout are those of the other sense of rotation."""
+    """The set-up as a mirror shows it: its answers at a mirrored layout are those of the other sense of rotation.
+
+    Parameters
+    ----------
+    setup : Setup
+        Bearing, oil, pivots, structure and instruments of the model.
+    """
     angle, towards = setup.misalignment
     turned = setup.change_pads(
         lambda k, pad: replace(pad, pivot_angle=math.pi - pad.pivot_angle, pivot_offset=1.0 - pad.pivot_offset)
@@ -37,7 +49,13 @@ def mirrored(setup: Setup) -> Setup:
 
 
 def mirrored_layout(layout: Layout) -> Layout:
-    """Dynamic tests as a mirror shows them, thermometers where they sit."""
+    """Dynamic tests as a mirror shows them, thermometers where they sit.
+
+    Parameters
+    ----------
+    layout : Layout
+        Tests, with their operating points.
+    """
     tests = tuple(DynamicTest(t.load, math.pi - t.direction, t.speed, t.excitation, t.pads) for t in layout.dynamic)
     return Layout(tests, temperature_position=tuple(1.0 - place for place in layout.temperature_position))
 

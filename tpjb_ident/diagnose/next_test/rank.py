@@ -58,7 +58,15 @@ class Separation:
 
 
 def options_for(setup: Setup, layout: Layout) -> tuple[Design | Check, ...]:
-    """List all that could be done next: tests on the rig and checks beside it."""
+    """List all that could be done next: tests on the rig and checks beside it.
+
+    Parameters
+    ----------
+    setup : Setup
+        Bearing, oil, pivots, structure and instruments of the model.
+    layout : Layout
+        Tests, with their operating points.
+    """
     return (*designs(setup, layout), *CHECKS)
 
 
@@ -105,7 +113,13 @@ def _each(
 
 
 def ranked(tests: Sequence[Separation]) -> tuple[Separation, ...]:
-    """The furthest from the nearest rival first."""
+    """The furthest from the nearest rival first.
+
+    Parameters
+    ----------
+    tests : sequence of Separation
+        Tests, each with how far it separates the best explanation from its rivals.
+    """
     return tuple(sorted(tests, key=lambda s: -s.expected))
 
 
@@ -126,6 +140,13 @@ def chance(separation: float, margin: float = MARGIN) -> float:
     """Probability that chi-square of the wrong explanation exceeds the right one's by `margin`.
 
     The difference is normal with mean d^2 and standard deviation 2 d, d being the separation.
+
+    Parameters
+    ----------
+    separation : float
+        Distance of two explanations in standard deviations.
+    margin : float
+        By how much chi-square must differ.
     """
     from scipy.stats import norm
 
@@ -160,7 +181,15 @@ def together(tests: Sequence[Separation], now: Sequence[float] = ()) -> float:
 
 
 def say(best: Sequence[Separation], one: str, *rivals: str) -> str:
-    """In words: what `suggested` gives, and what it is expected to tell."""
+    """In words: what `suggested` gives, and what it is expected to tell.
+
+    Parameters
+    ----------
+    best : sequence of Separation
+        Tests that are suggested.
+    one : str
+        The best explanation.
+    """
     other = f"{', '.join(rivals[:-1])} and {rivals[-1]}" if len(rivals) > 1 else rivals[0]
     words, expected = " and ".join(t.design.words for t in best), together(best)
     if expected < TELLING:

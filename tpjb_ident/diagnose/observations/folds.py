@@ -63,7 +63,13 @@ def folds(observations: Observations) -> tuple[Fold, ...]:
 
 
 def held_out(observations: Observations) -> BoolArray:
-    """Elements of the folds that ask a model to extrapolate; all of them where there are no such folds."""
+    """Elements of the folds that ask a model to extrapolate; all of them where there are no such folds.
+
+    Parameters
+    ----------
+    observations : Observations
+        What was measured, with its covariance.
+    """
     out = np.zeros(len(observations), dtype=bool)
     for fold in folds(observations):
         if fold.beyond:

@@ -16,6 +16,13 @@ def residuals(observations: Observations, prediction: FloatArray) -> FloatArray:
 
     The centre from which positions are counted is a convention (the clearance polygon's, by some rule) and says
     nothing about the bearing: the shift that fits best is taken off.
+
+    Parameters
+    ----------
+    observations : Observations
+        What was measured, with its covariance.
+    prediction : array, shape (n,)
+        In the units of the observations.
     """
     z = (observations.value - prediction) / observations.total_sigma
     shifts = centre_shifts(observations.elements) / observations.total_sigma[:, None]
@@ -25,7 +32,13 @@ def residuals(observations: Observations, prediction: FloatArray) -> FloatArray:
 
 
 def centre_shifts(elements: Sequence[Element]) -> FloatArray:
-    """Positions and clearances seen from a centre moved by one metre along x and along y, (n, 2)."""
+    """Positions and clearances seen from a centre moved by one metre along x and along y, (n, 2).
+
+    Parameters
+    ----------
+    elements : sequence of Element
+        What each of the n numbers is.
+    """
     out = np.zeros((len(elements), 2))
     for i, e in enumerate(elements):
         if e.observable in {"locus_x", "locus_y"}:
@@ -37,14 +50,32 @@ def centre_shifts(elements: Sequence[Element]) -> FloatArray:
 
 
 def gap(observations: Observations, prediction: FloatArray, chosen: BoolArray | None = None) -> float:
-    """Root mean square of `residuals`; NaN where nothing is chosen."""
+    """Root mean square of `residuals`; NaN where nothing is chosen.
+
+    Parameters
+    ----------
+    observations : Observations
+        What was measured, with its covariance.
+    prediction : array, shape (n,)
+        In the units of the observations.
+    chosen : array of bool, shape (n,), optional
+        Elements that count; all by default.
+    """
     z = residuals(observations, prediction)
     z = z if chosen is None else z[chosen]
     return float(np.sqrt(np.mean(z**2))) if len(z) else float("nan")
 
 
 def noise_floor(observations: Observations, chosen: BoolArray | None = None) -> float:
-    """Gap that measurement noise alone would leave under a perfect model."""
+    """Gap that measurement noise alone would leave under a perfect model.
+
+    Parameters
+    ----------
+    observations : Observations
+        What was measured, with its covariance.
+    chosen : array of bool, shape (n,), optional
+        Elements that count; all by default.
+    """
     share = np.diag(observations.covariance) / observations.total_sigma**2
     share = share if chosen is None else share[chosen]
     return float(np.sqrt(np.mean(share)))
@@ -53,7 +84,19 @@ def noise_floor(observations: Observations, chosen: BoolArray | None = None) -> 
 def gap_by_observable(
     observations: Observations, before: FloatArray, after: FloatArray, chosen: BoolArray
 ) -> dict[str, dict[str, float]]:
-    """Held-out gap before and after, per observable; observables without held-out points use all of theirs."""
+    """Held-out gap before and after, per observable; observables without held-out points use all of theirs.
+
+    Parameters
+    ----------
+    observations : Observations
+        What was measured, with its covariance.
+    before : array, shape (n,)
+        Prediction of the baseline.
+    after : array, shape (n,)
+        Prediction with what was found.
+    chosen : array of bool, shape (n,)
+        Elements held out.
+    """
     out: dict[str, dict[str, float]] = {}
     names = np.array([e.observable for e in observations.elements])
     for name in dict.fromkeys(names):

@@ -26,7 +26,15 @@ STIFF = 1e13
 
 
 def with_housing(setup: Setup, campaign: Campaign) -> Setup:
-    """Tell a model the rig's housing mass and cell stiffness; what the campaign does not show stays as assumed."""
+    """Tell a model the rig's housing mass and cell stiffness; what the campaign does not show stays as assumed.
+
+    Parameters
+    ----------
+    setup : Setup
+        Bearing, oil, pivots, structure and instruments of the model.
+    campaign : Campaign
+        The campaign that is diagnosed.
+    """
     instruments = setup.instruments
     if math.isfinite(campaign.housing_mass):
         instruments = replace(instruments, housing_mass=campaign.housing_mass)
@@ -40,6 +48,11 @@ def cell_stiffness(campaign: Campaign) -> tuple[float, float] | None:
     """Estimate the stiffness between housing and frame in X and Y [N/m].
 
     Accelerations are regressed on cell forces, -a / omega^2 = F / K, run by run; the median over runs counts.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The campaign that is diagnosed.
 
     Returns
     -------

@@ -59,7 +59,13 @@ class Element:
     where: tuple[tuple[str, float], ...]
 
     def place(self, name: str) -> float:
-        """Coordinate of the operating point; NaN where it has none."""
+        """Coordinate of the operating point; NaN where it has none.
+
+        Parameters
+        ----------
+        name : str
+            ``load``, ``direction``, ``speed``, ``excitation``, ..
+        """
         return dict(self.where).get(name, math.nan)
 
 

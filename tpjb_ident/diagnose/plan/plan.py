@@ -127,6 +127,17 @@ def plan(
 ) -> CampaignPlan:
     """Work out what a layout of tests could tell.
 
+    Parameters
+    ----------
+    setup : Setup
+        Bearing, oil, pivots, structure and instruments of the model.
+    layout : Layout
+        Tests, with their operating points.
+    known : Tolerances, optional
+        Stated tolerances; by default those of a good workshop.
+    pool : sequence of Candidate, optional
+        Effects that are asked about; by default all with one amplitude.
+
     Raises
     ------
     NoEquilibriumError
@@ -156,7 +167,13 @@ class Signatures:
     columns: FloatArray = field(repr=False)
 
     def factor(self, free: bool = True) -> FloatArray:
-        """Cholesky factor of the covariance, with or without nuisances."""
+        """Cholesky factor of the covariance, with or without nuisances.
+
+        Parameters
+        ----------
+        free : bool
+            Whether nuisances are free within their tolerances.
+        """
         return usual_factor(self.observations, self.nuisances if free else self.nuisances[:, :0])
 
 
@@ -164,6 +181,17 @@ def signatures(
     setup: Setup, layout: Layout, chosen: Sequence[Candidate], known: Tolerances | None = None
 ) -> Signatures:
     """Work out the signature of every candidate on a layout.
+
+    Parameters
+    ----------
+    setup : Setup
+        Bearing, oil, pivots, structure and instruments of the model.
+    layout : Layout
+        Tests, with their operating points.
+    chosen : sequence of Candidate
+        Effects that are asked about.
+    known : Tolerances, optional
+        Stated tolerances.
 
     Raises
     ------
@@ -194,7 +222,15 @@ def _signature(forward: Forward, base: FloatArray, candidate: Candidate) -> Floa
 
 
 def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:
-    """Sizes and separations of whitened signatures (n, k)."""
+    """Sizes and separations of whitened signatures (n, k).
+
+    Parameters
+    ----------
+    chosen : sequence of Candidate
+        Effects that are asked about.
+    white : array, shape (n, k)
+        Their signatures, whitened.
+    """
     size = np.linalg.norm(white, axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):  # a signature of nothing has no direction: NaN
         unit = white / size

@@ -51,7 +51,13 @@ class Basis:
         return np.array([1e-5 if one.name in {"scatter", "beyond"} else 1.0 for one in self.components])
 
     def covariance(self, scales: FloatArray) -> FloatArray:
-        """Noise and model error at scales t_k, (n, n)."""
+        """Noise and model error at scales t_k, (n, n).
+
+        Parameters
+        ----------
+        scales : array, shape (c,)
+            Variance scale of every component.
+        """
         return np.asarray(self.noise + np.tensordot(scales, self._whole, 1))
 
     @functools.cached_property
@@ -88,7 +94,13 @@ class Linear:
         return np.asarray(scaled @ scaled.T)
 
     def without(self, gone: Sequence[int]) -> Linear:
-        """Return the same without some columns."""
+        """Return the same without some columns.
+
+        Parameters
+        ----------
+        gone : sequence of int
+            Columns to be left out.
+        """
         kept = np.setdiff1d(np.arange(self.columns.shape[1]), np.asarray(gone, int))
         return Linear(self.residual, self.columns[:, kept], self.width[kept])
 
@@ -137,7 +149,13 @@ class Assessment:
         return 0.5 * (log_det - float(error @ weighted[rows]) - len(rows) * math.log(2 * math.pi))
 
     def unseen(self, fold: Fold) -> FloatArray:
-        """Free numbers as all elements but a fold's tell them, (k,)."""
+        """Free numbers as all elements but a fold's tell them, (k,).
+
+        Parameters
+        ----------
+        fold : Fold
+            Elements that are held out together.
+        """
         weighted = self.inverse @ self.linear.residual
         rows = fold.members
         error = np.linalg.solve(self.inverse[np.ix_(rows, rows)], weighted[rows])

@@ -55,7 +55,13 @@ class Component:
 
 
 def components(observations: Observations) -> tuple[Component, ...]:
-    """Components of an observation vector, scaled by its `total_sigma`."""
+    """Components of an observation vector, scaled by its `total_sigma`.
+
+    Parameters
+    ----------
+    observations : Observations
+        What was measured, with its covariance.
+    """
     scale = observations.total_sigma
     everything = np.arange(len(observations))
     out = [Component("scatter", everything, observations.covariance / np.outer(scale, scale), NOTHING)]

@@ -64,11 +64,23 @@ class Problem:
         return held_out(self.observations)
 
     def scaled(self, vector: FloatArray) -> FloatArray:
-        """A vector (n,) or columns (n, k) in units of `sigma`."""
+        """A vector (n,) or columns (n, k) in units of `sigma`.
+
+        Parameters
+        ----------
+        vector : array, shape (n,) or (n, k)
+            In the units of the observations.
+        """
         return np.asarray(vector / (self.sigma if vector.ndim == 1 else self.sigma[:, None]))
 
     def twins(self, candidate: Candidate) -> list[int]:
-        """Nuisances that do what a candidate does."""
+        """Nuisances that do what a candidate does.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            Effect that is tried.
+        """
         names = {candidate.name, candidate.label}
         return [i for i, one in enumerate(self.nuisances) if names & one.twins]
 

@@ -98,7 +98,17 @@ def _bend(
 
 
 def columns(run: Map, model: Fit, pool: Sequence[Candidate]) -> dict[Candidate, FloatArray]:
-    """Change of the prediction per unit of every amplitude of every candidate, at a model; (n, k) each."""
+    """Change of the prediction per unit of every amplitude of every candidate, at a model; (n, k) each.
+
+    Parameters
+    ----------
+    run : callable
+        Maps a task over jobs, in this process or in workers.
+    model : Fit
+        A fitted model.
+    pool : sequence of Candidate
+        Candidates that are asked about.
+    """
     slim = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
     jobs = [(slim, model.prediction, c, i) for c in pool for i in range(len(c.steps))]
     found = iter(run(_column, jobs))
@@ -219,7 +229,19 @@ class _Level:
 
 
 def with_model(model: Fit, score: Score, table: Columns, curved: Columns | None = None) -> Start:
-    """Start of a fit of a model with what was scored."""
+    """Start of a fit of a model with what was scored.
+
+    Parameters
+    ----------
+    model : Fit
+        A fitted model.
+    score : Score
+        What was scored beside the model.
+    table : mapping of Candidate to array
+        Derivatives by candidate, (n, k) each.
+    curved : mapping, optional
+        The same with the curvature over the step that was scored.
+    """
     parts = []
     for c, amplitudes in zip(score.candidates, score.amplitudes, strict=True):
         bend = (curved or {}).get(c)
@@ -230,12 +252,32 @@ def with_model(model: Fit, score: Score, table: Columns, curved: Columns | None 
 
 
 def visible(problem: Problem, model: Fit, candidate: Candidate, column: FloatArray) -> float:
-    """Size of a typical step of a candidate beside a model, in standard deviations of everything else."""
+    """Size of a typical step of a candidate beside a model, in standard deviations of everything else.
+
+    Parameters
+    ----------
+    problem : Problem
+        Observations beside the baseline, with nuisances and candidates.
+    model : Fit
+        A fitted model.
+    candidate : Candidate
+        Effect that is tried.
+    column : array, shape (n, k)
+        Derivatives of the prediction for the candidate.
+    """
     one = problem.scaled(column) @ candidate.steps
     return math.sqrt(max(float(one @ model.assessment.inverse @ one), 0.0))
 
 
 def without(model: Fit, gone: Sequence[int]) -> Linear:
-    """A model's linear form without some nuisances, by their numbers."""
+    """A model's linear form without some nuisances, by their numbers.
+
+    Parameters
+    ----------
+    model : Fit
+        A fitted model.
+    gone : sequence of int
+        Numbers of the nuisances to be left out.
+    """
     count = model.jacobian.shape[1]
     return model.assessment.linear.without([count + i for i in gone])

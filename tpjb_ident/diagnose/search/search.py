@@ -88,6 +88,17 @@ def worth(problem: Problem, model: Fit, less: Fit, candidate: Candidate) -> Wort
 
     Where the model without it needs something to be off by more than is stated, that stands in for the candidate, and
     predicts unseen points just as well: it is set aside, as are nuisances that are the candidate under another name.
+
+    Parameters
+    ----------
+    problem : Problem
+        Observations beside the baseline, with nuisances and candidates.
+    model : Fit
+        A fitted model.
+    less : Fit
+        The same model without the candidate.
+    candidate : Candidate
+        Effect that is tried.
     """
     at = [f.assessment.free[f.jacobian.shape[1] :] for f in (model, less)]
     stand_in = np.flatnonzero((np.abs(at[1]) > STAND_IN) & (np.abs(at[1]) > np.abs(at[0]) + 1.0))
@@ -138,7 +149,13 @@ def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Pro
 
 
 def baseline_fit(problem: Problem) -> Fit:
-    """The model with nothing added, nuisances to first order."""
+    """The model with nothing added, nuisances to first order.
+
+    Parameters
+    ----------
+    problem : Problem
+        Observations beside the baseline, with nuisances and candidates.
+    """
     n, m = problem.columns.shape
     return fitted(problem, Start((), (), np.zeros((n, 0)), np.zeros(m), problem.columns), problem.base)
 

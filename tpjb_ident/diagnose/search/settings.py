@@ -57,5 +57,11 @@ class DiagnoseSettings:
     workers: int | None = None
 
     def with_tolerances(self, stated: Tolerances) -> DiagnoseSettings:
-        """Return a copy with other stated tolerances; the model's own among them."""
+        """Return a copy with other stated tolerances; the model's own among them.
+
+        Parameters
+        ----------
+        stated : Tolerances
+            Stated tolerances.
+        """
         return replace(self, tolerances=stated, tolerance=replace(self.tolerance, stiffness=stated["model"]))

@@ -33,7 +33,15 @@ class Closure:
 
 
 def unseen(problem: Problem, fitted: Fit) -> FloatArray:
-    """Every fold as all others tell it: amplitudes and nuisances without having seen it, (n,)."""
+    """Every fold as all others tell it: amplitudes and nuisances without having seen it, (n,).
+
+    Parameters
+    ----------
+    problem : Problem
+        Observations beside the baseline, with nuisances and candidates.
+    fitted : Fit
+        A fitted model.
+    """
     out = fitted.prediction.copy()
     for fold in problem.folds:
         out[fold.members] = fitted.at(fitted.assessment.unseen(fold))[fold.members]

@@ -24,7 +24,19 @@ class Plausible:
     source: str
 
     def words(self, name: str, value: float, lo: float, hi: float) -> str:
-        """What to say of an amplitude with its interval; empty where it is plausible."""
+        """What to say of an amplitude with its interval; empty where it is plausible.
+
+        Parameters
+        ----------
+        name : str
+            Name of the amplitude, for the sentence.
+        value : float
+            As fitted.
+        lo : float
+            Lower end of its interval.
+        hi : float
+            Upper end of its interval.
+        """
         if lo <= self.high and hi >= self.low:
             return ""
         beyond = self.high if value > self.high else self.low
