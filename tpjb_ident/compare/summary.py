@@ -101,14 +101,14 @@ OFF = 0.05
 
 
 def worth_a_diagnosis(found: tuple[Deviation, ...]) -> bool:
-    """Whether even the closest pivot model is off by more than intervals and a model's tolerance excuse.
+    """Whether even the closest pivot model is off: a direct coefficient by its tolerance, half of its points or more.
 
     Parameters
     ----------
     found : tuple of Deviation
     """
     own = [d for d in found if d.pivots == closest(found) and math.isfinite(d.median)]
-    return any(abs(d.median) > OFF and d.inside < 0.5 * d.n for d in own)
+    return any(abs(d.median) > OFF and d.inside <= 0.5 * d.n for d in own)
 
 
 def verdict_sentence(comparison: Comparison, found: tuple[Deviation, ...]) -> str:
