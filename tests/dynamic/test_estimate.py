@@ -50,6 +50,7 @@ def test_exact_windows_outvote_wrong_ones(method: str):
     assert "zero-scale" in est.status
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("bad", [0.0, 0.15])
 def test_h_follows_axes_phase_and_units_exactly(method: str, bad: float):

@@ -147,6 +147,7 @@ def test_a_point_that_loses_all_its_runs_is_lost_and_the_answer_not_to_be_truste
     assert pd.read_csv(tmp_path / "out" / "coefficients.csv")["static_load_N"].tolist() == [2500.0]
 
 
+@pytest.mark.slow
 def test_where_no_run_is_left_nothing_is_written(spoilt, tmp_path):
     runs = [f"d-0{load}-25-0{i}" for load in (2500, 5000) for i in (1, 2, 3)]
     told = tpjb("identify", spoilt("probe zero", *runs), "--out", tmp_path / "out")

@@ -35,6 +35,7 @@ def quiet_libraries():
     logging.disable(logging.NOTSET)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == "mf4" else n for n in CASES])
 def test_spoilt_files_end_in_data_or_documented_errors(name, tmp_path, quiet_libraries):
     if name in LIBRARIES:

@@ -102,6 +102,7 @@ def test_every_claim_has_a_row_with_a_verdict():
     assert {c.verdict for c in claims} <= {"yes", "in part", "no", "not of the model"}
 
 
+@pytest.mark.slow
 def test_the_documentation_has_the_table(checkout):
     rows = (checkout / "docs" / "model.md").read_text(encoding="utf-8")
     rows = rows.split(paper.BEGIN)[1].split(paper.END)[0].strip().splitlines()[2:]

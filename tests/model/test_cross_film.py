@@ -129,6 +129,7 @@ def couette(nahme: float, cells: int) -> tuple[float, float]:
     return float(face[-1, 0]) - 40.0, float(cross.shear[-1, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nahme", [0.1, 2.0, 8.0])
 def test_shear_heating_is_nahme_s_exact_solution(nahme):
     # k T'' = -tau^2 / mu, mu = mu_0 exp(-beta (T - T_0)); journal at T_0, insulated pad. With sinh a = sqrt(Na / 2):

@@ -146,6 +146,7 @@ SLOW = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in EXTREMES])
 def test_extremes_end_in_a_number_or_a_status(rocker, name):
     bearing, load, more = EXTREMES[name](rocker)

@@ -16,6 +16,7 @@ from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
 SEED = 61
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "rmse"),
     [

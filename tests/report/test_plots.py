@@ -99,6 +99,7 @@ UNITLESS = {"window, in the order of the runs", "robust weight", "multiple coher
             "fall of the squared misfit per point", "data set (ambiguous campaigns)"}  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_axes_have_units(name):
     for axes in picture(name)[0].axes:

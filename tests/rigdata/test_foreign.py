@@ -179,6 +179,7 @@ def test_a_misspelt_channel_is_answered_with_the_nearest(campaign):
         load_campaign(campaign).run("one").record("X1a")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "content"),
     [

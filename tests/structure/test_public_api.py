@@ -91,6 +91,7 @@ def test_a_package_that_bears_the_name_of_a_function_is_called_whatever_was_impo
     ], done.stderr
 
 
+@pytest.mark.slow
 def test_a_path_does_where_a_campaign_is_wanted(small_campaign):
     result = ti.identify(str(small_campaign), ti.IdentifySettings(method="ols"))
     assert repr(result).startswith("<Identification: ")
