@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 
 def main() -> None:
     """Run the command line; the entry point of `tpjb` and of ``python -m tpjb_ident``."""
-    import sys
-
+    _one_thread_for_small_matrices()
     for stream in (sys.stdout, sys.stderr):
         _never_refuse(stream)
     try:
@@ -21,6 +21,19 @@ def main() -> None:
     except OSError as error:  # of the streams: commands turn their own into messages
         print(f"tpjb: error: cannot print: {error.strerror or error}.", file=sys.stderr)
         sys.exit(2)
+
+
+def _one_thread_for_small_matrices() -> None:
+    """Keep the libraries of linear algebra to one thread, unless the user says otherwise; before they are loaded.
+
+    Matrices here have a few hundred rows: threads wait for each other more than they help (a diagnosis took 53 s
+    instead of 22 s), and the last bits of a result depend on their number.
+    """
+    import os
+
+    if "numpy" not in sys.modules:
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+            os.environ.setdefault(name, "1")
 
 
 def _never_refuse(stream: Any) -> None:
