@@ -8,7 +8,10 @@ import sys
 
 import pytest
 
-CODE = (
+CODE = """import os
+from tpjb_ident import cli
+cli._one_thread_for_small_matrices()
+print(os.environ["OMP_NUM_THREADS"])"""
     "import os; from tpjb_ident import cli; cli._one_thread_for_small_matrices(); print(os.environ['OMP_NUM_THREADS'])"
 )
 
