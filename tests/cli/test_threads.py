@@ -12,8 +12,6 @@ CODE = """import os
 from tpjb_ident import cli
 cli._one_thread_for_small_matrices()
 print(os.environ["OMP_NUM_THREADS"])"""
-    "import os; from tpjb_ident import cli; cli._one_thread_for_small_matrices(); print(os.environ['OMP_NUM_THREADS'])"
-)
 
 
 @pytest.mark.parametrize(("given", "used"), [(None, "1"), ("4", "4")])
