@@ -31,8 +31,10 @@ def _one_thread_for_small_matrices() -> None:
     """
     import os
 
+    from tpjb_ident.runtime.threads import THREAD_VARIABLES
+
     if "numpy" not in sys.modules:
-        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        for name in THREAD_VARIABLES:
             os.environ.setdefault(name, "1")
 
 

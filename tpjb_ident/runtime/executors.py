@@ -28,6 +28,7 @@ from multiprocessing.connection import wait as wait_for_end
 from typing import Any, Protocol
 
 from tpjb_ident.errors import TpjbError
+from tpjb_ident.runtime.threads import THREAD_VARIABLES
 
 Task = Callable[..., Any]
 Job = tuple[Any, ...]
@@ -353,9 +354,8 @@ def local_workers(count: int, start: str | None = None, preload: Sequence[str] =
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
     """Processes share the cores already: linear algebra with threads of its own would only be in the way."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
+    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     try:
         yield
     finally:

@@ -221,12 +221,16 @@ def _ratio(cells: ComplexArray, accelerations: ComplexArray, noise: float) -> tu
     return G, float(np.sqrt(spread * np.linalg.inv(gram).real.diagonal().max()))
 
 
+def _severity(share: float) -> str:
+    """Name of what is said of wrong accelerometers, by the share of the force that inertia is."""
+    return "accelerometers-contradict-cells" if share > HARMLESS else "accelerometers-doubtful"
+
+
 def _contradiction(group: Sequence[BalanceRun], G: ComplexArray, what: str) -> tuple[Condition, ...]:
     share = float(np.median([run.inertia for run in group]))
-    name = "accelerometers-contradict-cells" if share > HARMLESS else "accelerometers-doubtful"
     return (
         Condition(
-            name,
+            _severity(share),
             f"acceleration over cell force is {_shown(G)} 1/kg at {group[0].frequency:g} Hz: {what}; "
             f"inertia is {100 * share:.2g} % of the force",
         ),
@@ -241,13 +245,12 @@ def _silence(group: Sequence[BalanceRun], G: ComplexArray, error: float) -> tupl
     if not silent:
         return ()
     share = group[0].mass * omega**2 / SOFT
-    name = "accelerometers-contradict-cells" if share > HARMLESS else "accelerometers-doubtful"
     what = (
         f"they show nothing along {' and '.join(silent)} at {group[0].frequency:g} Hz: the housing would stand on "
         f"springs of over {stiffness.max():.1e} N/m. Are they connected? On soft cells inertia is {100 * share:.2g} % "
         "of the force"
     )
-    return (Condition(name, what),)
+    return (Condition(_severity(share), what),)
 
 
 def _shown(G: ComplexArray) -> str:
