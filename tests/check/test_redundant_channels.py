@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 from rigdata.calibration import Channel
 from tpjb_ident.check import redundant_channels
+from tpjb_ident.check.band_lines import band_lines
 from tpjb_ident.check.redundant_channels import channels_apart, widened
 
 AXES = {"PXA": 45.0, "PYA": 135.0, "PXB": 45.0, "PYB": 135.0}
@@ -25,6 +28,10 @@ class Seen:
 
     lines: Lines
     channels: tuple[Channel, ...] = field(default=())
+
+    @property
+    def phasors(self):
+        return self.lines.phasor[None]
 
     def pick(self, quantity):
         return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
@@ -94,3 +101,24 @@ def test_two_probes_have_nothing_to_be_held_against():
 def test_three_probes_are_held_against_each_other():
     (apart,) = channels_apart(runs((1.1, 1.0, 1.0), axes={"A": 0.0, "B": 120.0, "C": 240.0}))
     assert apart.sentence().startswith("A reads")
+
+
+@pytest.mark.parametrize("gain", [1.0, 1.06])
+def test_planes_of_probes_are_held_against_each_other_over_a_band(gain):
+    rng = np.random.default_rng(5)
+    rate, n, axes = 1000.0, 8000, np.radians(list(AXES.values()))
+    channels = [channel(name, a, 0.005) for name, a in AXES.items()] + [Channel("F", "force", unit="N", axis=0.0)]
+    made = []
+    for _ in range(2):
+        t = np.arange(n) / rate
+        shape = sosfiltfilt(butter(4, (10, 100), "band", fs=rate, output="sos"), rng.standard_normal((2, n)))
+        probes = np.stack([np.cos(axes), np.sin(axes)], axis=1) @ shape * np.array([1, 1, gain, 1])[:, None]
+        probes += 0.01 * rng.standard_normal(probes.shape) + np.cos(2 * np.pi * 22 * t + np.arange(4)[:, None])
+        values = np.concatenate([probes, shape[:1] + 0.01 * rng.standard_normal((1, n))]).T
+        run = SimpleNamespace(band=(12.0, 90.0), sample_rate=rate)
+        rows, _ = band_lines(run, values, [4], [22.0])
+        made += [Seen(Lines(row), tuple(channels)) for row in rows]
+    found = channels_apart(made)
+    assert [a.quantity for a in found] == ([] if gain == 1.0 else ["displacement"])
+    if found:
+        assert found[0].names[int(np.argmin(found[0].gains))] in ("PXA", "PXB")

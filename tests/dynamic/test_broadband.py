@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
+from scipy.stats import t as student_t
 
 from rigdata import load_campaign
 from tests.command_line import tpjb
 from tests.studies.field.band_campaign import write_band_campaign
 from tests.studies.field.band_rig import BandRig, band_plans, stiffness
 from tests.studies.field.broadband import true_parameters
+from tpjb_ident.conditions import untrusted
 from tpjb_ident.dynamic.broadband.band_equations import line_sums
 from tpjb_ident.dynamic.broadband.band_models import Shared, fit_band
 from tpjb_ident.dynamic.broadband.classic import h1_fit, h2_fit, hv_fit
@@ -19,6 +22,7 @@ from tpjb_ident.dynamic.broadband.line_rows import LineRows
 from tpjb_ident.dynamic.broadband.local_regression import local_fit
 from tpjb_ident.dynamic.broadband.period import find_period, resampled
 from tpjb_ident.dynamic.broadband.repeated_periods import periods_fit
+from tpjb_ident.dynamic.broadband.run_scatter import run_scatter
 from tpjb_ident.dynamic.broadband.samples import Samples
 from tpjb_ident.dynamic.identify import identify
 
@@ -148,7 +152,7 @@ def test_a_model_over_the_band_is_free_of_the_lines_bias():
         lines.append(
             LineRows(300.0 + k, noisy, F + 20.0 * _complex(rng, F.shape), 0 * D, None, run, np.zeros(12), True, False)
         )
-    none = Shared(np.zeros((100, 2, 8)), np.zeros((2, 2, 2)))
+    none = Shared(np.zeros((100, 2, 8)), np.zeros((2, 2)))
     constant = fit_band([replace(line, omega=300.0 + 1e-3 * k) for k, line in enumerate(lines)], "K-C", "periods", none)
     z = (constant.parameters[:4] - H.real.ravel()) / constant.standard_error[:4]
     assert np.abs(z).max() < 4
@@ -217,6 +221,104 @@ def test_cells_on_a_clock_of_another_rate_are_found_and_put_right(tmp_path, kind
     assert abs(np.median(np.angle(result.h[:, 0, 0] / h[:, 0, 0]))) < 0.01
     same = band_of(tmp_path, replace(rig, cells=0.0), seed=3)
     assert "clocks-differ" not in same.quality
+
+
+def _inverted(group):
+    group["A2"][:] = -group["A2"][:]
+
+
+def _exchanged(group):
+    first = group["A1"][:]
+    group["A1"][:], group["A2"][:] = group["A2"][:], first
+
+
+def _late(group):
+    for name in ("A1", "A2"):
+        group[name][:] = np.roll(group[name][:], 1)
+
+
+CONTRADICT = "accelerometers-contradict-cells"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["multisine", "random", "sweep", "impact"])
+@pytest.mark.parametrize(
+    ("fault", "named"),
+    [
+        (None, None),
+        (_inverted, CONTRADICT),
+        (_exchanged, CONTRADICT),
+        (_late, "cells-and-accelerometers-out-of-phase"),
+    ],
+)
+def test_accelerometers_that_contradict_the_cells_are_told_for_every_kind(tmp_path, kind, fault, named):
+    path = campaign(tmp_path, BandRig(kind=kind, seconds=8.0), seed=90001)
+    if fault is not None:
+        with h5py.File(path, "r+") as file:
+            for group in file["runs"].values():
+                fault(group)
+    (result,) = identify(load_campaign(path)).bands
+    assert [str(c) for c in untrusted(result.quality)] == ([] if named is None else [named])
+
+
+@pytest.mark.slow
+def test_cells_a_little_late_widen_the_interval_and_say_nothing(tmp_path):
+    path = campaign(tmp_path, BandRig(kind="random", seconds=8.0, band=(10.0, 60.0)), seed=90002)
+    (before,) = identify(load_campaign(path)).bands
+    with h5py.File(path, "r+") as file:
+        for group in file["runs"].values():
+            for name in ("F1", "F2"):
+                group[name][:] = np.interp(np.arange(8000) - 0.08, np.arange(8000), group[name][:])
+    (result,) = identify(load_campaign(path)).bands
+    assert not untrusted(result.quality)
+    h = truth(BandRig(), result)
+    width, known = result.models["K-C-M"].half_width(), true_parameters(BandRig(), 5000.0)
+    assert width[7] > 1.3 * before.models["K-C-M"].half_width()[7]
+    assert abs(result.models["K-C-M"].parameters[7] - known[7]) < width[7]
+    assert np.mean(np.abs((result.h - h).imag.reshape(-1, 4)) <= result.half_width()[:, 4:]) > 0.9
+
+
+@pytest.mark.slow
+def test_a_dead_cell_costs_its_run_and_an_inverted_one_the_band(tmp_path):
+    path = campaign(tmp_path, BandRig(kind="random", seconds=8.0), seed=90003, directions=(0.0, 45.0, 90.0, 135.0))
+    with h5py.File(path, "r+") as file:
+        file["runs/b-5000-1/F1"][:] = 0.25
+    found = identify(load_campaign(path))
+    (result,) = found.bands
+    assert "run-left-out" in result.quality
+    assert "runs-left-out" in found.conditions
+    assert result.runs == ("b-5000-0", "b-5000-2", "b-5000-3")
+    with h5py.File(path, "r+") as file:
+        for group in file["runs"].values():
+            group["F2"][:] = -group["F2"][:]
+    (result,) = identify(load_campaign(path)).bands
+    assert "records-contradicted" in untrusted(result.quality)
+
+
+def test_what_runs_show_of_their_gains_is_told_from_what_h_takes():
+    """Gains put on the runs of 300 campaigns of 40 quiet lines: their size comes back, and h's interval holds."""
+    rng = np.random.default_rng(12)
+    sizes, inside = [], []
+    directions = np.radians([0.0, 45.0, 90.0, 135.0])
+    for _ in range(300):
+        gains = 1 + 0.01 * rng.standard_normal(4)
+        fits = []
+        for k in range(6):
+            along = np.stack([np.cos(directions), np.sin(directions)], axis=1) * _complex(rng, 4)[:, None]
+            D = np.repeat(np.linalg.solve(H, along.T).T, 8, axis=0)
+            F = np.repeat(gains, 8)[:, None] * (D @ H.T)
+            D = D + 1e-3 * np.abs(D).mean() * _complex(rng, D.shape)
+            run = np.repeat(np.arange(4), 8)
+            rows = LineRows(300.0 + k, D, F, 0 * D, None, run, np.zeros(32), repeated=True, ends=False)
+            fits.append(periods_fit(rows))
+        scatter = run_scatter(fits, 400)
+        off = np.concatenate([(fits[0].h - H).real.ravel(), (fits[0].h - H).imag.ravel()])
+        half = 1.96 * scatter.changes(fits[0]).std(axis=0)
+        inside.append(np.abs(off[[0, 3, 4, 7]]) <= half[[0, 3, 4, 7]])
+        sizes.append(scatter.size)
+    widening = student_t.ppf(0.975, 2.0) / 1.96
+    assert np.sqrt(np.mean(np.square(sizes))) / widening == pytest.approx(0.01, rel=0.1)
+    assert 0.92 <= np.mean(inside) <= 0.99
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from tpjb_ident.check.findings import Reporter, verdicts
 from tpjb_ident.check.observation import observe
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.records.kept_readings import beginning_of, with_kept_beginning
+from tpjb_ident.dynamic.records.run_data import PhasorSettings
 from tpjb_ident.dynamic.runs.kept_observation import packed, unpacked
 from tpjb_ident.dynamic.settings import IdentifySettings
 
@@ -94,3 +95,23 @@ def test_one_inverted_probe_costs_its_run_inverted_cells_all_points(tmp_path):
     cells = replace(QUICK, devices={"F2": Device(gain=-1.0)})
     result = identify(written(tmp_path / "cells.h5", cells), IdentifySettings(methods=()))
     assert "records-contradicted" in result.points[0].quality
+
+
+@pytest.mark.slow
+def test_records_of_several_excitations_are_checked_at_each(tmp_path):
+    """The drive's second harmonic, made strong, serves as the other excitation."""
+    rig = replace(QUICK, seconds=3.0, drive_harmonic=0.5)
+    plans = plans_of(loads=(5000.0,), frequencies=(20.0,))
+    settings = IdentifySettings(methods=(), phasors=PhasorSettings(excitation_lines=(20.0, 40.0)))
+    good = identify(written(tmp_path / "good.h5", rig, plans), settings)
+    assert [p.point.excitation_hz for p in good.points] == [20.0, 40.0]
+    assert not any({"records-contradicted", "records-doubtful"} & set(p.quality) for p in good.points)
+
+    def dead(values, run, rng):
+        return np.full_like(values, 3.0) if "-20-2-" in run else values
+
+    lost = identify(written(tmp_path / "dead.h5", replace(rig, devices={"F1": Device(reading=dead)}), plans), settings)
+    assert all("run-left-out" in p.quality for p in lost.points)
+    cells = replace(rig, devices={"F2": Device(gain=-1.0)})
+    turned = identify(written(tmp_path / "cells.h5", cells, plans), settings)
+    assert all("records-contradicted" in p.quality for p in turned.points)

@@ -64,8 +64,9 @@ def judged(campaign: Campaign, seen: Sequence[Observation]) -> list[Observation]
     """
     seen = [replace(one, report=one.report.copy()) for one in seen]
     of_kind = {k: [s for s in seen if s.run.kind == k] for k in ("dynamic", "dry_pivot", "locus", "clearance")}
+    dynamic = of_kind["dynamic"]
     # what is judged by one line of excitation says nothing of runs that are excited over a band
-    of_kind["dynamic"] = [s for s in of_kind["dynamic"] if s.run.excitation_kind == "sine"]
+    of_kind["dynamic"] = [s for s in dynamic if s.run.excitation_kind == "sine"]
     for one in seen:
         check_speed(one)
     if check_static_loads(seen):
@@ -75,9 +76,9 @@ def judged(campaign: Campaign, seen: Sequence[Observation]) -> list[Observation]
     check_dry(of_kind["dry_pivot"])
     _spread_doubts(seen)
     check_responses(of_kind["dynamic"], campaign.housing_mass, of_kind["clearance"])
-    check_accelerometers(of_kind["dynamic"])
+    check_accelerometers(dynamic)
     check_housing(of_kind["dynamic"])
-    report_apart(of_kind["dynamic"])
+    report_apart(dynamic)
     check_shaft_follows(of_kind["dry_pivot"])
     check_sweeps(of_kind["clearance"])
     check_locus(of_kind["locus"])
@@ -98,7 +99,7 @@ def _check_duplicates(seen: Sequence[Observation]) -> None:
     first: dict[str, Observation] = {}
     for one in seen:
         other = first.setdefault(one.digest, one) if one.digest else one
-        if other is one:
+        if other.run.id == one.run.id:  # itself, or another excitation in its record
             continue
         if _shared_record(one.run, other.run):
             what = f"shares its record with run {other.run.id}, at another excitation frequency"

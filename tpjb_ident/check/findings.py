@@ -36,15 +36,18 @@ class Reporter:
     found : list of Finding
     doubts : set of str
         Quantities that an error of this run makes useless for further conclusions.
+    gains : dict of str to float
+        Standard deviation that a finding adds to the gain of a channel, by its name.
     """
 
     run: Run
     found: list[Finding] = field(default_factory=list)
     doubts: set[str] = field(default_factory=set)
+    gains: dict[str, float] = field(default_factory=dict)
 
     def copy(self) -> Reporter:
         """A reporter that has found the same so far."""
-        return Reporter(self.run, list(self.found), set(self.doubts))
+        return Reporter(self.run, list(self.found), set(self.doubts), dict(self.gains))
 
     def say(self, key: str, severity: Severity, place: str, what: str, cure: str) -> None:
         """Note a finding; `key` is the same for equal findings in other runs.
@@ -150,15 +153,17 @@ def verdicts(reports: Sequence[Reporter]) -> Verdicts:
         As of the observations that `tpjb_ident.check.campaign.judged` gives.
     """
     groups: dict[tuple[str, Severity], dict[str, Problem]] = {}
+    found = Verdicts()
     for one in reports:
+        found.gains.update(one.gains)
         for finding in one.found:
             groups.setdefault((finding.key, finding.problem.severity), {}).setdefault(one.run.id, finding.problem)
-    found = Verdicts()
+    alike = len({one.run.id for one in reports})
     for (_, severity), concerned in groups.items():
         for run, problem in concerned.items():
             if severity == "warning":
                 found.doubtful.setdefault(run, []).append(problem)
-            elif severity == "error" and is_shared(len(concerned), len(reports)):
+            elif severity == "error" and is_shared(len(concerned), alike):
                 found.shared.setdefault(run, []).append(problem)
             elif severity == "error":
                 found.unusable.setdefault(run, problem)

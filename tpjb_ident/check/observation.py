@@ -13,7 +13,8 @@ from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from tpjb_ident.arrays import FloatArray
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.check.band_lines import band_lines
 from tpjb_ident.check.clock import check_clock
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.lines import RecordLines, fit_lines, strongest_line
@@ -26,6 +27,8 @@ _FITTED = 2**16
 _DECIMATED = 4000
 #: Samples that tell the quantiles of a channel, and whether it has noise.
 _SPREAD = 8192
+#: Mains of any country [Hz].
+MAINS = (50.0, 60.0)
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,8 @@ class Observation:
         Of all displacement and force readings; "" where none could be read.
     report : Reporter
         Findings so far.
+    band : (k, m) complex ndarray
+        Phasors of `channels` at some strong lines of an excitation over a band, SI; without rows for a sine.
     """
 
     run: Run
@@ -62,6 +67,14 @@ class Observation:
     speed: float
     digest: str
     report: Reporter = field(repr=False)
+    band: ComplexArray = field(default_factory=lambda: np.empty((0, 0), complex), repr=False)
+
+    @property
+    def phasors(self) -> ComplexArray:
+        """Phasors of `channels` at the excitation, one row per line that is looked at, SI."""
+        if len(self.band) or self.lines is None:
+            return self.band
+        return np.asarray(self.lines.phasor, dtype=np.complex128)[None]
 
     def pick(self, quantity: str) -> list[int]:
         """Places of the channels of `quantity` in `channels`.
@@ -74,12 +87,14 @@ class Observation:
         return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
 
 
-def observe(run: Run) -> Observation:
+def observe(run: Run, driven: Sequence[float] = ()) -> Observation:
     """Read every channel of `run` once, block by block, and judge each by itself.
 
     Parameters
     ----------
     run : Run
+    driven : sequence of float, optional
+        Other excitations in its record [Hz].
     """
     report = Reporter(run)
     try:
@@ -95,7 +110,7 @@ def observe(run: Run) -> Observation:
         return _blind(run, report)
     live = tuple(c for n, c in readable.items() if c.quantity in VECTOR_QUANTITIES and not _is_dead(statistics[n]))
     used = np.stack([first[c.name] for c in live], axis=1) if live else np.empty((length, 0))
-    lines = _lines(run, live, time[:_FITTED], used[:_FITTED]) if time is not None and live else None
+    lines = _lines(run, live, time[:_FITTED], used[:_FITTED], driven) if time is not None and live else None
     noise_free = _is_noise_free(run, live, used, lines)
     if noise_free:
         report.say("no noise", "note", "", "the readings show no noise", "Nothing, if the data are computed")
@@ -106,17 +121,32 @@ def observe(run: Run) -> Observation:
     if time is None or not live:
         return replace(_blind(run, report), digest=digest, speed=_mean_speed(readable, first))
     thin = slice(None, None, max(1, len(time) // _DECIMATED))
+    band, lines = _over_band(run, live, used[:_FITTED], lines)
     return Observation(
         run=run,
         channels=live,
         lines=lines,
         spread=_spread(used),
-        other_line=_other_line(run, live, time[:_FITTED], used[:_FITTED]),
+        other_line=_other_line(run, live, time[:_FITTED], used[:_FITTED], driven),
         samples=used[thin] if run.kind in {"dry_pivot", "clearance"} else np.empty((0, len(live))),
         speed=_mean_speed(readable, first),
         digest=digest,
         report=report,
+        band=band,
     )
+
+
+def _over_band(
+    run: Run, live: Sequence[Channel], used: FloatArray, lines: RecordLines | None
+) -> tuple[ComplexArray, RecordLines | None]:
+    """Phasors at some lines of an excitation over a band, and the run's lines with what noise makes of one of them."""
+    if run.excitation_kind == "sine" or lines is None:
+        return np.empty((0, len(live)), complex), lines
+    turning = [run.point.shaft_speed_hz] if run.point.shaft_speed > 0 else []
+    force = [i for i, c in enumerate(live) if c.quantity == "force"]
+    rows, floor = band_lines(run, used, force, [*turning, *MAINS])
+    first = rows[0] if len(rows) else np.full(len(live), np.nan + 0j)
+    return rows, replace(lines, phasor=first, floor=floor)
 
 
 def _usable_time(report: Reporter, run: Run, length: int) -> FloatArray | None:
@@ -199,10 +229,12 @@ def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: R
     return True
 
 
-def _lines(run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray) -> RecordLines:
+def _lines(
+    run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray, driven: Sequence[float]
+) -> RecordLines:
     excitation = run.point.excitation_hz if run.kind == "dynamic" else 0.0
     probes = values[:, [i for i, c in enumerate(channels) if c.quantity == "displacement"]]
-    others = [excitation, 50.0, 2 * excitation]
+    others = [excitation, *(f for f in driven if f != excitation), 50.0, 2 * excitation]
     speed = turning_frequency(time, probes, run.point.shaft_speed_hz, [f for f in others if f > 0])
     return fit_lines(time, values, [excitation, speed, 2 * speed, *others[1:]], [speed, 2 * speed])
 
@@ -217,13 +249,15 @@ def _spread(values: FloatArray) -> FloatArray:
     return spread
 
 
-def _other_line(run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray) -> float:
+def _other_line(
+    run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray, driven: Sequence[float]
+) -> float:
     where = [i for i, c in enumerate(channels) if c.quantity == "force"]
     if run.kind != "dynamic" or not where:
         return math.nan
     column = values[:, max(where, key=lambda i: _range(values[:, i]))]
     speed = run.point.shaft_speed_hz
-    return strongest_line(time, column, [speed, 2 * speed, 50.0, run.point.excitation_hz])
+    return strongest_line(time, column, [speed, 2 * speed, 50.0, run.point.excitation_hz, *driven])
 
 
 def _range(values: FloatArray) -> float:

@@ -81,19 +81,17 @@ def channels_apart(runs: Sequence[Observation]) -> tuple[ApartChannels, ...]:
         kept: dict[tuple[str, ...], list[Channel]] = {}
         for seen in runs:
             where = seen.pick(quantity)
-            if seen.lines is None or len(where) < 3 or not excited(seen):
+            if len(where) < 3 or not excited(seen):
                 continue
-            phasors = np.asarray(seen.lines.phasor[where], dtype=np.complex128)
-            if np.isfinite(phasors).all():
-                names = tuple(seen.channels[i].name for i in where)
-                groups.setdefault(names, []).append(phasors)
-                kept[names] = [seen.channels[i] for i in where]
+            names = tuple(seen.channels[i].name for i in where)
+            kept[names] = [seen.channels[i] for i in where]
+            groups.setdefault(names, []).extend(z for z in seen.phasors[:, where] if np.isfinite(z).all())
         found += [a for names, z in groups.items() if (a := _apart(quantity, kept[names], np.array(z))) is not None]
     return tuple(found)
 
 
 def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) -> ApartChannels | None:
-    """Judge the phasors (runs, m) of one set of channels."""
+    """Judge the phasors (n, m) of one set of channels: one of every sine, several of an excitation over a band."""
     axes = np.array([float(c.axis or 0.0) for c in channels])
     directions = np.stack([np.cos(axes), np.sin(axes)], axis=1)
     if len(phasors) < MIN_RUNS or np.linalg.matrix_rank(directions) < 2:
@@ -118,7 +116,7 @@ def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) ->
 
 
 def report_apart(runs: Sequence[Observation]) -> None:
-    """Warn of channels that contradict each other.
+    """Warn of channels that contradict each other, and note what that adds to the uncertainty of their gains.
 
     Parameters
     ----------
@@ -127,10 +125,10 @@ def report_apart(runs: Sequence[Observation]) -> None:
     """
     cure = "Calibrate them against each other, or state the `uncertainty` of their gains"
     for apart in channels_apart(runs):
-        for seen in runs:
-            if seen.pick(apart.quantity):
-                place = f"channels {', '.join(apart.names)}"
-                seen.report.say(f"apart {apart.quantity}", "warning", place, apart.sentence(), cure)
+        for report in {seen.run.id: seen.report for seen in runs if seen.pick(apart.quantity)}.values():
+            report.gains.update(apart.uncertainty())
+            place = f"channels {', '.join(apart.names)}"
+            report.say(f"apart {apart.quantity}", "warning", place, apart.sentence(), cure)
 
 
 def widened(channels: Mapping[str, Channel], more: Mapping[str, float]) -> dict[str, Channel]:

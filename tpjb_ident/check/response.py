@@ -141,12 +141,12 @@ def check_accelerometers(runs: Sequence[Observation]) -> None:
         directions = [r / abs(r) for _, r in ratios]
         if len(ratios) >= 3 and float(np.mean(np.real(directions))) > 0.7:
             what = "moves in phase with the cell force; the housing on its springs should move against it"
-            for seen, _ in ratios:
+            for seen in {s.run.id: s for s, _ in ratios}.values():
                 seen.report.say(f"accelerometer {name}", "warning", f"channel {name}", what, cure)
         least = min(usual.values(), default=math.nan)
         if name in usual and usual[name] > _MAX_ANISOTROPY * least:
             what = f"shows {usual[name] / least:.0f} times the acceleration per force of the other direction"
-            for seen, _ in ratios:
+            for seen in {s.run.id: s for s, _ in ratios}.values():
                 seen.report.say(f"acceleration {name}", "warning", f"channel {name}", what, cure)
 
 
@@ -155,12 +155,13 @@ def _accelerations(seen: Observation) -> list[tuple[str, complex]]:
     lines, where = seen.lines, seen.pick("force")
     if lines is None or len(where) < 2 or "force" in seen.report.doubts or not excited(seen):
         return []
-    force = to_plane([seen.channels[i] for i in where], lines.phasor[where])
     found: list[tuple[str, complex]] = []
-    for index in seen.pick("acceleration"):
-        channel, phasor = seen.channels[index], lines.phasor[index]
-        axis = channel.axis or 0.0
-        along = complex(force @ np.array([math.cos(axis), math.sin(axis)]))
-        if abs(phasor) > 8 * lines.floor[index] and abs(along) > 0.3 * float(np.linalg.norm(force)):
-            found.append((channel.name, complex(phasor) / along))
+    for row in seen.phasors:
+        force = to_plane([seen.channels[i] for i in where], row[where])
+        for index in seen.pick("acceleration"):
+            channel, phasor = seen.channels[index], row[index]
+            axis = channel.axis or 0.0
+            along = complex(force @ np.array([math.cos(axis), math.sin(axis)]))
+            if abs(phasor) > 8 * lines.floor[index] and abs(along) > 0.3 * float(np.linalg.norm(force)):
+                found.append((channel.name, complex(phasor) / along))
     return found

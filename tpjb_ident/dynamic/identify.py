@@ -11,11 +11,12 @@ from rigdata.campaign import Campaign
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.check.redundant_channels import widened
-from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.broadband.band_result import BandResult
+from tpjb_ident.conditions import merged
+from tpjb_ident.dynamic.broadband.band_point import BandSettings
 from tpjb_ident.dynamic.broadband.band_runs import is_broadband
-from tpjb_ident.dynamic.broadband.identify_bands import BandSettings, identify_bands
+from tpjb_ident.dynamic.broadband.identify_bands import IdentifiedBands, identify_bands
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change, gain_draws
+from tpjb_ident.dynamic.corrections.cell_zero import cell_zero_uncertainty
 from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
 from tpjb_ident.dynamic.corrections.mains import MAINS_ON_LINE, force_pickup, force_pickup_spread
 from tpjb_ident.dynamic.corrections.systematic_sources import SystematicSources, systematic_sources
@@ -85,15 +86,17 @@ def identify(
     tell = progress or (lambda text, done, total: None)
     settings = _with_mains(settings, campaign)
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
-    bands: tuple[BandResult, ...] = ()
+    bands = IdentifiedBands()
     if any(is_broadband(run) for run in runs):
         rig = measured_baseline(campaign, settings.phasors, own_method(settings.method))
         bands = identify_bands(campaign, _band_settings(settings), tell, rig)
     if not sines.of_kind("dynamic"):
         empty = np.zeros((settings.n_calibration, 0))
-        return Identification(campaign.id, settings.method, (), empty, bands=bands)
+        return Identification(campaign.id, settings.method, (), empty, bands.conditions, bands.results)
     with all_runs(sines, settings.phasors, tell, workers, store) as finished:
-        return replace(assemble(sines, finished, settings, tell), bands=bands)
+        found = assemble(sines, finished, settings, tell)
+    told = {c.sentence(): c for c in (*found.conditions, *bands.conditions)}
+    return replace(found, conditions=tuple(told.values()), bands=bands.results)
 
 
 def _band_settings(settings: IdentifySettings) -> BandSettings:
@@ -153,7 +156,7 @@ def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySetti
     left, several = finished.left_out, bool(settings.phasors.excitation_lines)
     told = named_runs(left, len(digests) + len(left)) + lost_points(points, left, several)
     named = with_probe_doubts(sweeps, named_at_points(points, left, several), settings.clearance)
-    return Identification(campaign.id, settings.method, named, joint, _campaign_conditions(work.draws) + told)
+    return Identification(campaign.id, settings.method, named, joint, work.draws.conditions() + told)
 
 
 @dataclass(frozen=True)
@@ -225,17 +228,6 @@ def delays_stated(campaign: Campaign) -> bool:
     )
 
 
-def cell_zero_uncertainty(campaign: Campaign) -> float:
-    """Standard uncertainty of the cells' zero by the manifest [N]; 0 where it says nothing.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    """
-    cells = [c for c in campaign.channels.values() if c.quantity == "force"]
-    return float(max((getattr(c, "zero_uncertainty", 0.0) for c in cells), default=0.0))
-
-
 def _counted_only(est: DynamicStiffness) -> DynamicStiffness:
     """The estimate with a verdict per window in place of its weights: 1 byte instead of 16."""
     return replace(est, weights=(est.weights.min(axis=1) >= REJECTED_WEIGHT)[:, None])
@@ -256,14 +248,3 @@ def directions_differ(first: list[DynamicStiffness]) -> bool:
     dof = sum(est.spare_equations for est in known)
     total = sum(est.chi_square * est.spare_equations for est in known)
     return dof > 0 and float(chi2.sf(total, dof)) < 1e-4
-
-
-def _campaign_conditions(draws: GainDraws) -> tuple[Condition, ...]:
-    if not draws.unstated:
-        return ()
-    return (
-        Condition(
-            "calibration-uncertainty-unstated",
-            f"no uncertainty in the manifest for {', '.join(draws.unstated)}: their systematic part is left out",
-        ),
-    )

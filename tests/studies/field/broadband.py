@@ -1,14 +1,16 @@
 """Broadband excitation against the truth, the sine's result and pyFRF: ``python -m tests.studies.field.broadband``.
 
-``--seeds 20`` campaigns per row; ``--only WORDS``. The tables of docs/broadband.md come from here and from
-`broadband_beside`.
+``--seeds 20`` campaigns per row; ``--only WORDS``; what was named goes to the other stream. The tables of
+docs/broadband.md come from here and from `broadband_beside`.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
 import warnings
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -79,11 +81,13 @@ class Tally:
     results: int = 0
     lines: int = 0
     method: str = ""
+    named: Counter[str] = field(default_factory=Counter)
 
     def add(self, result: BandResult, rig: BandRig) -> None:
         """Hold one operating point against the truth."""
         self.results += 1
         self.refused += bool(untrusted(result.quality))
+        self.named.update(str(c) for c in result.quality)
         if not result.lines:
             return
         load = result.point.static_load
@@ -132,12 +136,12 @@ def true_parameters(rig: BandRig, load: float) -> np.ndarray:
     return np.concatenate([K, C, np.ravel(bearing.M)])
 
 
-def run_row(row: BandRow, seeds: int) -> Tally:
+def run_row(row: BandRow, seeds: range) -> Tally:
     """Fresh campaigns of one row."""
     tally = Tally()
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
-        for seed in range(7000, 7000 + seeds):
+        for seed in seeds:
             path = Path(folder) / "band.h5"
             write_band_campaign(path, row.rig, row.plans, seed)
             for result in identify(load_campaign(path)).bands:
@@ -150,6 +154,7 @@ def main() -> None:
     """Command line."""
     options = argparse.ArgumentParser()
     options.add_argument("--seeds", type=int, default=20)
+    options.add_argument("--first-seed", type=int, default=7000)
     options.add_argument("--only", default="")
     given = options.parse_args()
     print("| excitation | method | lines | h inside % | half width % | H1 kyy % | kyy % | K-C-M inside % | kyy +- % | "
@@ -157,7 +162,9 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|---|---|---|")
     for row in band_rows():
         if given.only in row.name:
-            print(run_row(row, given.seeds).line(row.name), flush=True)
+            tally = run_row(row, range(given.first_seed, given.first_seed + given.seeds))
+            print(tally.line(row.name), flush=True)
+            print(f"{row.name}: {dict(tally.named)}", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -109,8 +109,8 @@ class Shared:
     ----------
     lines : (n_lines, n, 8) ndarray
         Change of Re and Im of h at every line [N/m].
-    runs : (n, n_runs, 2) ndarray
-        Relative change of every run's force along X and Y.
+    runs : (n, n_runs) ndarray
+        Relative change of every run's force.
     """
 
     lines: FloatArray
@@ -236,7 +236,7 @@ def _moved(sums: list[list[RunSums]], found: _Solution, shared: Shared) -> Float
         for r, (run, w) in enumerate(zip(line, own)):
             total = np.einsum("nij,aj->nia", change, run.A0)
             if shared.runs[:, r].any():
-                total = total + shared.runs[:, r, :, None] * (found.theta @ run.A.T)
+                total = total + shared.runs[:, r, None, None] * (found.theta @ run.A.T)
             right += np.einsum("ik,nka->nia", w, total).real.reshape(len(right), -1)
     return np.asarray(right @ found.inverse.T)
 

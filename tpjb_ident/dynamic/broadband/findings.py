@@ -1,23 +1,14 @@
-"""What is said of a band as a whole, and how its runs differ from one another by a gain.
-
-Line by line such a difference drowns in noise; over all lines it is told to a fraction of a per cent. Two runs are
-needed for h itself: only from the third on anything is known of it.
-"""
+"""What is said of a band as a whole."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import t as student_t
 
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.broadband.band_result import BandLine
 from tpjb_ident.dynamic.broadband.line_estimates import STRONG, LineEstimates
-from tpjb_ident.dynamic.broadband.line_fit import LineFit
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 
 #: Share of the lines that must be told from noise.
@@ -71,77 +62,3 @@ def band_conditions(
 
 def _inside(spectra: RunSpectra, frequency: float) -> bool:
     return bool(spectra.frequencies[0] <= frequency <= spectra.frequencies[-1])
-
-
-#: Probability of chance below which runs differ,
-DIFFERENT = 1e-3
-#: and the relative difference that is too much for one bearing.
-TOO_MUCH = 0.05
-
-
-@dataclass(frozen=True)
-class RunScatter:
-    """How runs differ.
-
-    Attributes
-    ----------
-    size : float
-        Standard deviation of their gains, widened for the few runs that tell it; 0 where none is clear.
-    draws : (n, n_runs, 2) ndarray
-        Standard normal numbers, one per run and force axis.
-    conditions : tuple of Condition
-    """
-
-    size: float
-    draws: FloatArray
-    conditions: tuple[Condition, ...] = ()
-
-    @property
-    def gains(self) -> FloatArray:
-        """Relative change of every run's force along X and Y, (n, n_runs, 2)."""
-        return self.size * self.draws
-
-    def changes(self, fit: LineFit) -> FloatArray:
-        """Change of the eight entries of h in every draw, (n, 8) [N/m].
-
-        Parameters
-        ----------
-        fit : LineFit
-        """
-        if not self.size:
-            return np.zeros((len(self.draws), 8))
-        taken = np.einsum("ij,rjk->rik", fit.h, fit.share)
-        moved = self.size * np.einsum("nri,rik->nik", self.draws, taken).reshape(-1, 4)
-        return np.concatenate([moved.real, moved.imag], axis=1)
-
-
-def run_scatter(fits: Sequence[LineFit], numbers: FloatArray) -> RunScatter:
-    """What the lines of a point say of its runs together.
-
-    Parameters
-    ----------
-    fits : sequence of LineFit
-        Of the lines that count.
-    numbers : (n, ...) ndarray
-        As many draws as this has are made.
-    """
-    n_runs = len(fits[0].dof) if fits else 0
-    half = np.random.default_rng(n_runs).standard_normal((max(len(numbers) // 2, 1), max(n_runs, 1), 2))
-    draws = np.concatenate([half, -half])
-    if n_runs < 2 or not fits:
-        return RunScatter(0.0, draws)
-    if n_runs == 2:
-        told = "with two runs the interval holds how their repeats differ, not how runs do"
-        return RunScatter(0.0, draws, (Condition("no-spare-direction", told),))
-    apart = np.sum([fit.apart for fit in fits], axis=0)
-    gain = apart[:, 0] / apart[:, 1]
-    noise = apart[:, 2].real / apart[:, 1].real ** 2
-    spare = 2 * (n_runs - 2)
-    total = float(np.sum(2 * np.abs(gain) ** 2 / noise))
-    if not chi2.sf(total, spare) < DIFFERENT:
-        return RunScatter(0.0, draws)
-    size = float(np.sqrt(np.sum(np.abs(gain) ** 2) / (n_runs - 2)))
-    found: tuple[Condition, ...] = ()
-    if size > TOO_MUCH:
-        found = (Condition("runs-disagree", f"runs differ by {100 * size:.1f} % in force over displacement"),)
-    return RunScatter(size * float(student_t.ppf(0.975, spare)) / 1.96, draws, found)

@@ -2,114 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rigdata.campaign import Campaign
-from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
+from rigdata.run import Run
 from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.check.observation import Observation, observe
+from tpjb_ident.check.redundant_channels import widened
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.broadband.band_models import MODELS, BandModel, Shared, between, fit_band, supported
+from tpjb_ident.dynamic.broadband.band_point import BandPoint, BandSettings, read_point
 from tpjb_ident.dynamic.broadband.band_result import BandLine, BandResult
-from tpjb_ident.dynamic.broadband.band_runs import BandGroup, band_groups, is_broadband
-from tpjb_ident.dynamic.broadband.clock_rate import common_rates
-from tpjb_ident.dynamic.broadband.findings import RunScatter, band_conditions, run_scatter
+from tpjb_ident.dynamic.broadband.band_runs import band_groups, is_broadband
+from tpjb_ident.dynamic.broadband.findings import band_conditions
 from tpjb_ident.dynamic.broadband.line_estimates import LineEstimates, estimate_line
 from tpjb_ident.dynamic.broadband.line_fit import LineFit
-from tpjb_ident.dynamic.broadband.line_plan import LinePlan, line_plan, line_rows
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
-from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, RunSpectra, SpectraSettings, run_clocks, run_spectra
+from tpjb_ident.dynamic.broadband.run_scatter import RunScatter, run_scatter
 from tpjb_ident.dynamic.broadband.shared_sources import SharedSources, shared_sources, slope_over_load
+from tpjb_ident.dynamic.corrections.cell_zero import cell_zero_uncertainty
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, load_conditions, load_misses
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.runs.baseline import Baseline
-from tpjb_ident.errors import BadInputError
+from tpjb_ident.dynamic.runs.checked_runs import campaign_verdicts, check_conditions
+from tpjb_ident.dynamic.runs.left_out import LISTED, LeftOut, named_runs
 
-#: Kinds that excite every frequency again and again: what a sweep does once tells nothing of clocks.
-TELL_CLOCKS = ("multisine", "random", "impact")
 Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
-class BandSettings:
-    """Choices, as those for sines.
+class IdentifiedBands:
+    """What a campaign's broadband runs give.
 
     Attributes
     ----------
-    mains : float
-        [Hz]; 0 for none.
-    delays : dict
-        Seconds by which a quantity's channels are recorded late, besides what the manifest says.
-    correct : bool
-        Bring every run to its set-point load where the campaign's loads tell the slope.
-    n_calibration, seed : int
-        Draws of what lines share, and their seed.
-    """
-
-    mains: float = 50.0
-    delays: dict[str, float] = field(default_factory=dict)
-    correct: bool = True
-    n_calibration: int = 400
-    seed: int = 20190722
-
-
-@dataclass(frozen=True)
-class BandPoint:
-    """One group of runs, transformed.
-
-    Attributes
-    ----------
-    group : BandGroup
-    spectra : list of RunSpectra
-    plan : LinePlan
-    baseline : Baseline
-        Of the rig without its bearing.
+    results : tuple of BandResult
     conditions : tuple of Condition
-        Of its reading.
+        Of the campaign: runs that take no part, points that lost all of theirs, calibrations that are not stated.
     """
 
-    group: BandGroup
-    spectra: list[RunSpectra]
-    plan: LinePlan
-    baseline: Baseline
+    results: tuple[BandResult, ...] = ()
     conditions: tuple[Condition, ...] = ()
-
-    @property
-    def point(self) -> OperatingPoint:
-        """Set points."""
-        return self.group.point
-
-    @property
-    def mean_loads(self) -> FloatArray:
-        """Mean cell force of every run, (n_runs, 2) [N]."""
-        return np.array([s.mean_load for s in self.spectra])
-
-    def rows(self, k: int, miss: LoadMiss | None = None, slope: ComplexArray | None = None) -> LineRows:
-        """Rows of line `k`, without the rig's own stiffness, and at the set load where the slope over load is known.
-
-        Parameters
-        ----------
-        k : int
-        miss : LoadMiss, optional
-        slope : (2, 2) complex ndarray, optional
-            dh/d(ln W) [N/m].
-        """
-        rows = line_rows(self.spectra, self.plan, k, self.group.kind in OPEN_ENDS)
-        F = rows.F
-        rig = self.baseline.at(rows.omega)
-        if rig is not None:
-            F = F - rows.D @ rig[0].T
-        if miss is not None and slope is not None:
-            F = F - miss.size[rows.run][:, None] * (rows.D @ slope.T)
-        return rows.with_force(F)
 
 
 def identify_bands(
     campaign: Campaign, settings: BandSettings, progress: Progress, baseline: Baseline | None = None
-) -> tuple[BandResult, ...]:
+) -> IdentifiedBands:
     """Identify every operating point of a campaign that was excited over a band.
 
     Parameters
@@ -124,83 +66,56 @@ def identify_bands(
     Raises
     ------
     rigdata.problem.RigDataError
-        A record cannot be used.
+        None of the records can be used.
     BadInputError
         Records are too short for their band.
     """
     runs = tuple(run for run in campaign.of_kind("dynamic") if is_broadband(run))
-    done, points = 0, []
-    for group in band_groups(runs):
-        progress(group.runs[0].id, done, len(runs))
-        points.append(_read(group, campaign.housing_mass, settings, baseline or Baseline()))
-        done += len(group.runs)
-    zero = campaign_zero(points, _cell_zero(campaign))
+    seen = list(_observed(runs, progress))
+    checked = campaign_verdicts(campaign, seen)
+    left = [LeftOut(r.id, r.point, RigDataError(checked.unusable[r.id])) for r in runs if r.id in checked.unusable]
+    points: list[BandPoint] = []
+    for group in band_groups(tuple(run for run in runs if run.id not in checked.unusable)):
+        point, bad = read_point(group, campaign.housing_mass, settings, baseline or Baseline())
+        left += bad
+        points += [] if point is None else [point]
+    if not points:
+        raise left[0].error
+    zero = campaign_zero(points, cell_zero_uncertainty(campaign))
     misses, common = load_misses(points, zero.force)
     first = [[estimate_line(point.rows(k), classic=False) for k in range(len(point.plan.bins))] for point in points]
-    sources = shared_sources(campaign, settings.n_calibration, settings.seed)
+    channels = widened(campaign.channels, checked.gains)
+    sources = shared_sources(replace(campaign, channels=channels), settings.n_calibration, settings.seed)
     results = []
     for i, point in enumerate(points):
         slopes = _slopes(points, first, i) if settings.correct else None
         told = load_conditions(misses[i], common) + zero.conditions()
+        told += check_conditions(checked, [s.phasors.run for s in point.spectra]) + _without(point, left)
         results.append(_finish(point, misses[i], slopes, sources, told))
-    return tuple(results)
+    return IdentifiedBands(tuple(results), named_runs(left, len(runs)) + _lost(points, left) + sources.conditions())
 
 
-def _read(group: BandGroup, housing_mass: float, settings: BandSettings, baseline: Baseline) -> BandPoint:
-    """Transform the runs of a group; one that cannot be used is left out where others remain."""
-    spectra, errors = [], []
-    chosen = _with_clocks(group, _spectra_settings(group, settings))
-    for run in group.runs:
-        try:
-            spectra.append(run_spectra(run, housing_mass, chosen))
-        except RigDataError as error:
-            errors.append(error)
-    if errors and not spectra:
-        raise errors[0]
-    told = tuple(Condition("run-left-out", str(error).splitlines()[0]) for error in errors[:1])
-    return BandPoint(group, _alike(spectra), line_plan(spectra), baseline, told)
+def _observed(runs: tuple[Run, ...], progress: Progress) -> Iterator[Observation]:
+    for done, run in enumerate(runs):
+        progress(run.id, done, len(runs))
+        yield observe(run)
 
 
-def _with_clocks(group: BandGroup, settings: SpectraSettings) -> SpectraSettings:
-    """The settings with the differences between clocks that the group's runs show together."""
-    seen = []
-    for run in group.runs if group.kind in TELL_CLOCKS else ():
-        try:
-            seen.append(run_clocks(run, settings))
-        except RigDataError:  # its own transform says so
-            continue
-    reach = 2 * np.pi * group.band[1] * (settings.seconds or 0.0)
-    return replace(settings, clocks=common_rates(seen, reach))
+def _without(point: BandPoint, left: Sequence[LeftOut]) -> tuple[Condition, ...]:
+    """Name the runs of a point that take no part."""
+    mine = [one.run for one in left if replace(one.point, excitation=0.0) == point.point]
+    return (Condition("run-left-out", f"without {', '.join(mine)}, which cannot be used"),) if mine else ()
 
 
-def _spectra_settings(group: BandGroup, settings: BandSettings) -> SpectraSettings:
-    seconds = min(run.length / run.sample_rate for run in group.runs)
-    return SpectraSettings(group.band, seconds, settings.mains, settings.delays)
-
-
-def _alike(spectra: list[RunSpectra]) -> list[RunSpectra]:
-    """Runs with the same bins.
-
-    Raises
-    ------
-    BadInputError
-        Some of them are periodic and others not, or their periods differ.
-    """
-    first = spectra[0]
-    for other in spectra[1:]:
-        same = len(other.frequencies) == len(first.frequencies)
-        if not same or np.abs(other.frequencies / first.frequencies - 1).max() > 1e-3:
-            told = [f"{s.phasors.run} {'none' if s.period is None else f'{s.period:.4g} s'}" for s in (first, other)]
-            raise BadInputError(
-                f"runs at {first.phasors.point} repeat with different periods ({', '.join(told)}); "
-                "excite the runs of one point with one period, or list them as different kinds of excitation"
-            )
-    return spectra
-
-
-def _cell_zero(campaign: Campaign) -> float:
-    cells = [c for c in campaign.channels.values() if c.quantity == "force"]
-    return float(max((c.zero_uncertainty for c in cells), default=0.0))
+def _lost(points: Sequence[BandPoint], left: Sequence[LeftOut]) -> tuple[Condition, ...]:
+    """Name the operating points that have no run left."""
+    kept = [point.point for point in points]
+    lost = [one for one in left if replace(one.point, excitation=0.0) not in kept]
+    if not lost:
+        return ()
+    places = dict.fromkeys(f"{one.point.static_load / 1e3:g} kN" for one in lost)
+    runs = ", ".join(one.run for one in lost[:LISTED]) + (", ..." if len(lost) > LISTED else "")
+    return (Condition("point-lost", f"no usable run over a band at {'; '.join(places)}: {runs}"),)
 
 
 def _slopes(points: list[BandPoint], first: list[list[LineEstimates]], i: int) -> ComplexArray | None:
@@ -245,7 +160,7 @@ def _finish(
     ]
     estimates = [(k, rows, estimate_line(rows)) for k, rows in every]
     good = [line for _, _, line in estimates if line.usable]
-    scatter = run_scatter([line.fit for line in good], sources.load)
+    scatter = run_scatter([line.fit for line in good], len(sources.load))
     # a model takes all lines with an answer: which of them stand clear of the noise is chance in part
     used = [(rows, line) for _, rows, line in estimates if line.usable or (line.fit.found and line.method != "hv")]
     both = [_line(point, rows, line, (miss, slopes is not None), sources, scatter) for rows, line in used]

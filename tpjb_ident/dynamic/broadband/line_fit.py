@@ -15,6 +15,34 @@ from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
+class RunsApart:
+    """How far every run's force is from what h gives, along that force.
+
+    Attributes
+    ----------
+    left : (n_runs,) complex ndarray
+        Residual force times the conjugate force that h gives, summed over rows and axes [N^2].
+    force : (n_runs, 2, 2) complex ndarray
+        Sum of f f^H over the rows, f the force that h gives [N^2].
+    variance : (n_runs,) ndarray
+        Of `left`, by the line's noise [N^4].
+    """
+
+    left: ComplexArray
+    force: ComplexArray
+    variance: FloatArray
+
+    @property
+    def power(self) -> FloatArray:
+        """Sum of |f|^2, (n_runs,) [N^2]."""
+        return np.asarray(np.einsum("rii->r", self.force).real)
+
+
+def _nothing_apart() -> RunsApart:
+    return RunsApart(np.empty(0, complex), np.empty((0, 2, 2), complex), np.empty(0))
+
+
+@dataclass(frozen=True)
 class LineFit:
     """Estimate of h at one line.
 
@@ -37,9 +65,7 @@ class LineFit:
         explains the displacements; infinite where nothing is explained by anything.
     share : (n_runs, 2, 2) complex ndarray
         Sum of D g^T over the rows of each run: what h takes of that run. They sum to the unit matrix.
-    apart : (n_runs, 3) complex ndarray
-        Of every run: its residual force along the force that h gives, that force squared, and the variance of the first
-        by the line's noise [N^2, N^2, N^4].
+    apart : RunsApart
     """
 
     h: ComplexArray
@@ -50,7 +76,7 @@ class LineFit:
     slopes: ComplexArray = field(repr=False)
     strength: float = np.inf
     share: ComplexArray = field(default_factory=lambda: np.empty((0, 2, 2), complex), repr=False)
-    apart: ComplexArray = field(default_factory=lambda: np.empty((0, 3), complex), repr=False)
+    apart: RunsApart = field(default_factory=_nothing_apart, repr=False)
 
     @property
     def found(self) -> bool:
@@ -103,8 +129,8 @@ def by_runs(D: ComplexArray, g: ComplexArray, run: IntArray, n_runs: int) -> tup
     return leverage, share
 
 
-def runs_apart(given: ComplexArray, left: ComplexArray, noise: ComplexArray, run: IntArray) -> ComplexArray:
-    """How far every run's force is from what h gives, along that force; see `LineFit.apart`.
+def runs_apart(given: ComplexArray, left: ComplexArray, noise: ComplexArray, run: IntArray) -> RunsApart:
+    """How far every run's force is from what h gives.
 
     Parameters
     ----------
@@ -114,13 +140,12 @@ def runs_apart(given: ComplexArray, left: ComplexArray, noise: ComplexArray, run
         Of one row [N^2].
     run : (n,) ndarray of int
     """
-    out = np.empty((len(noise), 3), dtype=complex)
-    for r, spread in enumerate(noise):
-        mine = run == r
-        f = given[mine]
-        variance = np.einsum("ni,ik,nk->", f.conj(), spread, f)
-        out[r] = np.sum(f.conj() * left[mine]), np.sum(np.abs(f) ** 2), variance
-    return out
+    rows = [(given[run == r], left[run == r]) for r in range(len(noise))]
+    return RunsApart(
+        np.array([np.sum(f.conj() * rest) for f, rest in rows]),
+        np.array([np.einsum("ni,nk->ik", f, f.conj()) for f, _ in rows]),
+        np.array([np.einsum("ni,ik,nk->", f.conj(), spread, f).real for (f, _), spread in zip(rows, noise)]),
+    )
 
 
 def no_fit(n_runs: int) -> LineFit:

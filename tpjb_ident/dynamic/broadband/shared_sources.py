@@ -12,6 +12,7 @@ import numpy as np
 
 from rigdata.campaign import Campaign
 from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change, gain_draws
@@ -37,6 +38,10 @@ class SharedSources:
     gains: GainDraws
     others: SystematicSources
     load: FloatArray
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """What to say of calibrations that the manifest does not state."""
+        return self.gains.conditions()
 
     def changes(
         self, rows: LineRows, spectra: list[RunSpectra], est: DynamicStiffness, miss: LoadMiss, corrected: bool

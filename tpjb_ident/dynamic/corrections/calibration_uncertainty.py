@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from tpjb_ident.arrays import FloatArray
+from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.runs.point_data import PointData
 
@@ -33,6 +34,13 @@ class GainDraws:
     force: FloatArray
     acceleration: FloatArray
     unstated: tuple[str, ...]
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """What to say of channels without a stated uncertainty."""
+        if not self.unstated:
+            return ()
+        told = f"no uncertainty in the manifest for {', '.join(self.unstated)}: their systematic part is left out"
+        return (Condition("calibration-uncertainty-unstated", told),)
 
 
 def gain_draws(channels: Mapping[str, Any], n: int, seed: int) -> GainDraws:

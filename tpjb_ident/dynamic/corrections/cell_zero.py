@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigdata.campaign import Campaign
 from tpjb_ident.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
 
@@ -90,3 +91,14 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0
 
 def _one_direction(set_points: ComplexArray) -> bool:
     return bool(np.abs(set_points / np.abs(set_points) - set_points[0] / abs(set_points[0])).max() < MIN_RANGE)
+
+
+def cell_zero_uncertainty(campaign: Campaign) -> float:
+    """Standard uncertainty of the cells' zero by the manifest [N]; 0 where it says nothing.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    """
+    cells = [c for c in campaign.channels.values() if c.quantity == "force"]
+    return float(max((getattr(c, "zero_uncertainty", 0.0) for c in cells), default=0.0))

@@ -29,6 +29,8 @@ HARMLESS = 2e-3
 CLEAR = 8.0
 #: A lag of the cells counts from so many standard errors on.
 CLEAR_LAG = 2.0
+#: Smaller singular value of the directions of force, of six runs or less, below which they are one.
+ONE_LINE = 0.3
 MIN_RUNS = 3
 #: No housing stands on springs as stiff as this [N/m]: a steel bar of 1 m^2 and 2 m has it. One that seems to does not
 #: move for its accelerometers, which are dead.
@@ -177,7 +179,7 @@ def _judge(group: Sequence[BalanceRun]) -> Balance:
     cells = np.array([run.cells for run in group])
     accelerations = np.array([run.acceleration for run in group])
     size = np.linalg.norm(cells, axis=1, keepdims=True)
-    if np.linalg.svd(cells / size, compute_uv=False)[-1] < 0.3:
+    if np.linalg.svd(cells / size, compute_uv=False)[-1] < ONE_LINE * max(1.0, np.sqrt(len(cells) / 6)):
         return Balance()
     # the accelerometers' noise is the same in all runs: a run counts by its force and its windows
     usual = float(np.median([run.variance for run in group]))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from rigdata.campaign import Campaign
 from rigdata.problem import Problem
 from tpjb_ident.check.campaign import judged
 from tpjb_ident.check.findings import Verdicts, verdicts
-from tpjb_ident.check.redundant_channels import channels_apart
+from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 
@@ -28,20 +28,30 @@ def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
     rigdata.problem.RigDataError
         None of the runs can be used.
     """
-    seen = [digest.seen for digest in finished.digests if digest.seen is not None]
-    if not seen:  # runs that are no files
+    found = campaign_verdicts(campaign, [seen for digest in finished.digests for seen in digest.seen])
+    finished.leave_out_unusable(found.unusable)
+    if not finished.places:
+        raise finished.left_out[0].error
+    return found
+
+
+def campaign_verdicts(campaign: Campaign, seen: Sequence[Observation]) -> Verdicts:
+    """What the checks say of dynamic runs beside each other, by run.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    seen : sequence of Observation
+        Empty for runs that are no files.
+    """
+    if not seen:
         return Verdicts()
     found = verdicts([one.report for one in judged(campaign, seen)])
-    for apart in channels_apart(seen):
-        found.gains.update(apart.uncertainty())
-    finished.leave_out_unusable(found.unusable)
     # without accelerometers the inertia stays in the force: that is told, and no reason to refuse
     optional = {f"channel {c.name}" for c in campaign.channels.values() if c.quantity == "acceleration"}
     for run, problems in found.shared.items():
         found.doubtful.setdefault(run, []).extend(p for p in problems if p.place in optional)
         problems[:] = [p for p in problems if p.place not in optional]
-    if not finished.places:
-        raise finished.left_out[0].error
     return found
 
 

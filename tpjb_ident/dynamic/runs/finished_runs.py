@@ -57,8 +57,8 @@ class RunDigest:
         [Hz]
     mains_force : (2,) complex ndarray or None
         Oil force at the mains line, where it stands apart [N].
-    seen : Observation or None
-        What the checks need of the run.
+    seen : tuple of Observation
+        What the checks need of the run, one for every excitation.
     """
 
     run: str
@@ -71,7 +71,7 @@ class RunDigest:
     harmonics: tuple[tuple[LineMean, LineMean] | None, ...] = ()
     sample_rate: float = 0.0
     mains_force: ComplexArray | None = None
-    seen: Observation | None = field(default=None, repr=False)
+    seen: tuple[Observation, ...] = field(default=(), repr=False)
 
 
 def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:

@@ -35,6 +35,7 @@ def packed(seen: Observation) -> dict[str, Any]:
     """
     lines = None if seen.lines is None else {name: _plain(value) for name, value in vars(seen.lines).items()}
     return {
+        "excitation": seen.run.point.excitation,
         "channels": [c.name for c in seen.channels],
         "lines": lines,
         "spread": seen.spread.tolist(),
@@ -47,13 +48,15 @@ def packed(seen: Observation) -> dict[str, Any]:
 
 
 def unpacked(stored: Mapping[str, Any], run: Run) -> Observation:
-    """What `packed` made, of `run`.
+    """What `packed` made, of `run` at the excitation that was looked at.
 
     Parameters
     ----------
     stored : mapping
     run : rigdata.run.Run
     """
+    if stored["excitation"] != run.point.excitation:
+        run = replace(run, point=replace(run.point, excitation=stored["excitation"]))
     channels = tuple(run.channels[name] for name in stored["channels"])
     lines = stored["lines"]
     found = [Finding(Problem(**problem), key) for problem, key in stored["found"]]

@@ -87,7 +87,7 @@ def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[Op
     groups: dict[tuple[float, ...], tuple[OperatingPoint, list[tuple[int, int]]]] = {}
     for k, (stated, frequencies) in enumerate(runs):
         for i, frequency in enumerate(frequencies):
-            point = _point_of(stated, frequency)
+            point = point_of(stated, frequency)
             key = (
                 point.static_load,
                 point.static_load_direction_deg,
@@ -98,8 +98,16 @@ def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[Op
     return [groups[key] for key in sorted(groups)]
 
 
-def _point_of(stated: OperatingPoint, frequency: float) -> OperatingPoint:
-    """Operating point of one line; the set point's frequency where the line belongs to it."""
+def point_of(stated: OperatingPoint, frequency: float) -> OperatingPoint:
+    """Operating point of one line; the set point's frequency where the line belongs to it.
+
+    Parameters
+    ----------
+    stated : OperatingPoint
+        Of the run.
+    frequency : float
+        Of the line [Hz].
+    """
     nominal = stated.excitation_hz
     if abs(frequency - nominal) <= 0.02 * max(nominal, 1e-9):
         return stated

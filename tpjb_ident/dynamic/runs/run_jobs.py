@@ -24,6 +24,7 @@ from tpjb_ident.dynamic.runs.dead_channels import dead_accelerometers
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 from tpjb_ident.dynamic.runs.kept_observation import of_run
 from tpjb_ident.dynamic.runs.left_out import LeftOut
+from tpjb_ident.dynamic.runs.point_data import point_of
 from tpjb_ident.dynamic.runs.run_result import RunResult
 from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
 from tpjb_ident.dynamic.spectral_lines.windows import RecordTooShortError
@@ -169,16 +170,17 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResul
         return RunResult(result, mean_temperatures(kept), _seen(run, kept, phasors))
 
 
-def _seen(run: Run, kept: Run, phasors: RunPhasors) -> Observation | None:
-    """What the checks make of the run's beginning, at the excitation frequency that was found in it.
-
-    Records that hold several excitations are no case for them.
-    """
+def _seen(run: Run, kept: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
+    """What the checks make of the run's beginning, at every excitation frequency that was found in it."""
     beginning = beginning_of(kept)
-    if beginning is None or len(phasors.lines.excitation) != 1:
-        return None
-    omega = 2 * np.pi * phasors.lines.excitation[0].frequency
-    return of_run(observe(replace(beginning, point=replace(run.point, excitation=omega))), run)
+    found = [line.frequency for line in phasors.lines.excitation]
+    if beginning is None:
+        return ()
+    if len(found) == 1:
+        point = replace(run.point, excitation=2 * np.pi * found[0])
+        return (of_run(observe(replace(beginning, point=point)), run),)
+    points = [point_of(run.point, frequency) for frequency in found]
+    return tuple(of_run(observe(replace(beginning, point=p), found), replace(run, point=p)) for p in points)
 
 
 def _mended(run: Run) -> tuple[Condition, ...]:

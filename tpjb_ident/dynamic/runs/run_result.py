@@ -17,10 +17,10 @@ class RunResult:
     phasors : RunPhasors
     temperatures : dict of int to float
         Mean per pad [K].
-    seen : Observation or None
-        What the checks need of it; None of what is not read from a file.
+    seen : tuple of Observation
+        What the checks need of it, one for every excitation; none of what is not read from a file.
     """
 
     phasors: RunPhasors
     temperatures: dict[int, float]
-    seen: Observation | None = field(default=None, repr=False)
+    seen: tuple[Observation, ...] = field(default=(), repr=False)

@@ -115,7 +115,7 @@ class RunStore:
             "lines": _packed_lines(phasors.lines),
             "conditions": _packed_conditions(phasors.conditions),
             "temperatures": {str(pad): value for pad, value in result.temperatures.items()},
-            "seen": None if result.seen is None else packed(result.seen),
+            "seen": [packed(seen) for seen in result.seen],
         }
         text = np.array(json.dumps(meta))
         with suppress(FileNotFoundError):  # another run into the same folder has ended and cleared it
@@ -156,7 +156,7 @@ class RunStore:
             arrays["speeds"],
             _unpacked_conditions(meta["conditions"]),
         )
-        seen = None if meta["seen"] is None else unpacked(meta["seen"], run)
+        seen = tuple(unpacked(each, run) for each in meta["seen"])
         return RunResult(phasors, {int(pad): value for pad, value in meta["temperatures"].items()}, seen)
 
     def clear(self) -> None:
