@@ -11,7 +11,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from rigdata.calibration import Channel
 from tpjb_ident.check import redundant_channels
-from tpjb_ident.check.band_lines import band_lines
+from tpjb_ident.check.lines import band_lines
 from tpjb_ident.check.redundant_channels import channels_apart, widened
 
 AXES = {"PXA": 45.0, "PYA": 135.0, "PXB": 45.0, "PYB": 135.0}

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigdata.run import Run
 from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.spectral_lines.line_fit import GLITCH_LIMIT, fit_without_glitches
 from tpjb_ident.dynamic.spectral_lines.windows import line_design
@@ -18,6 +19,12 @@ _PARTED = 2.5
 _BESIDE = (5, 7, 9, 11, 15)
 #: Samples that tell the scale of what a fit leaves.
 _SCALED = 4096
+#: Lines of a band that are looked at, the strongest of as many parts of it.
+BAND_LINES = 8
+#: Bins to either side of a disturbing line that are left alone.
+_CLEAR_OF = 5
+#: Noise is looked at from this many times the band's top on.
+_ABOVE = 1.3
 
 
 @dataclass(frozen=True)
@@ -147,3 +154,42 @@ def strongest_line(time: FloatArray, values: FloatArray, apart_from: Sequence[fl
     for known in apart_from:
         allowed &= np.abs(frequency - known) > 3.0 / (step * len(filled))
     return float(frequency[np.argmax(np.where(allowed, power, 0.0))]) if allowed.any() else float("nan")
+
+
+def band_lines(
+    run: Run, values: FloatArray, force: Sequence[int], disturbing: Sequence[float]
+) -> tuple[ComplexArray, FloatArray]:
+    """Phasors (k, m) at strong lines of an excitation over a band, and what noise makes of a line (m,).
+
+    What channels owe one another (two planes of probes, cells and accelerometers) holds at every line, so a few that
+    stand clear of the noise, away from shaft and mains, serve the checks as the one line of a sine does.
+
+    Parameters
+    ----------
+    run : rigdata.run.Run
+        Excited over a band.
+    values : (n, m) ndarray
+        Samples of its channels, SI; NaN where missing.
+    force : sequence of int
+        Columns that are forces.
+    disturbing : sequence of float
+        Other lines, with all their harmonics [Hz].
+    """
+    none = np.empty((0, values.shape[1]), complex), np.full(values.shape[1], np.nan)
+    known = np.isfinite(values)
+    if run.band is None or not len(force) or len(values) < 64 or not known.any(axis=0).all():
+        return none
+    middle = np.nanmedian(values, axis=0)
+    window = np.hanning(len(values))
+    spectrum = np.fft.rfft(np.where(known, values - middle, 0.0) * window[:, None], axis=0) * (2 / window.sum())
+    frequency = np.fft.rfftfreq(len(values), 1 / run.sample_rate)
+    free = np.ones(len(frequency), dtype=bool)
+    for line in disturbing:
+        free &= np.abs(frequency - line * np.maximum(np.round(frequency / line), 1)) > _CLEAR_OF * frequency[1]
+    inside = np.flatnonzero(free & (frequency >= run.band[0]) & (frequency <= run.band[1]))
+    beyond = free & (frequency > _ABOVE * run.band[1]) & (frequency < 0.45 * run.sample_rate)
+    if len(inside) < BAND_LINES or beyond.sum() < BAND_LINES:
+        return none
+    power = np.sum(np.abs(spectrum[:, list(force)]) ** 2, axis=1)
+    chosen = [part[np.argmax(power[part])] for part in np.array_split(inside, BAND_LINES)]
+    return np.asarray(spectrum[chosen]), np.median(np.abs(spectrum[beyond]), axis=0)

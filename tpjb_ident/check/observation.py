@@ -14,10 +14,9 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.arrays import ComplexArray, FloatArray
-from tpjb_ident.check.band_lines import band_lines
 from tpjb_ident.check.clock import check_clock
 from tpjb_ident.check.findings import Reporter
-from tpjb_ident.check.lines import RecordLines, fit_lines, strongest_line
+from tpjb_ident.check.lines import RecordLines, band_lines, fit_lines, strongest_line
 from tpjb_ident.check.rotation import turning_frequency
 from tpjb_ident.check.signals import check_signal, needed
 

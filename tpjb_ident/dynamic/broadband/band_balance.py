@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
+from tpjb_ident.dynamic.broadband.spectra.run_spectra import RunSpectra
 from tpjb_ident.dynamic.instruments.housing_balance import BalanceRun, balances
 
 #: Parts of the band that are judged one by one: a lag shows at the top, a sign everywhere.

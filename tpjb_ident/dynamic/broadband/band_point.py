@@ -13,10 +13,16 @@ from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.broadband.band_balance import band_balance
 from tpjb_ident.dynamic.broadband.band_runs import BandGroup
-from tpjb_ident.dynamic.broadband.clock_rate import common_rates
 from tpjb_ident.dynamic.broadband.line_plan import LinePlan, line_plan, line_rows
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
-from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, RunSpectra, SpectraSettings, run_clocks, run_spectra
+from tpjb_ident.dynamic.broadband.spectra.clock_rate import common_rates
+from tpjb_ident.dynamic.broadband.spectra.run_spectra import (
+    OPEN_ENDS,
+    RunSpectra,
+    SpectraSettings,
+    run_clocks,
+    run_spectra,
+)
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.left_out import LeftOut

@@ -9,7 +9,7 @@ import numpy as np
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.broadband.band_result import BandLine
 from tpjb_ident.dynamic.broadband.line_estimates import STRONG, LineEstimates
-from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
+from tpjb_ident.dynamic.broadband.spectra.run_spectra import RunSpectra
 
 #: Share of the lines that must be told from noise.
 LEAST_LINES = 0.5

@@ -10,7 +10,7 @@ import numpy as np
 
 from tpjb_ident.arrays import FloatArray, IntArray
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
-from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
+from tpjb_ident.dynamic.broadband.spectra.run_spectra import RunSpectra
 from tpjb_ident.errors import BadInputError
 
 #: Lines over a band where a record resolves more, and bins that a line takes at least.

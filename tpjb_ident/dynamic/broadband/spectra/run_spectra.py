@@ -10,8 +10,8 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.broadband.clock_rate import ClockRate, clock_rates, with_one_clock
-from tpjb_ident.dynamic.broadband.disturbing_lines import (
+from tpjb_ident.dynamic.broadband.spectra.clock_rate import ClockRate, clock_rates, with_one_clock
+from tpjb_ident.dynamic.broadband.spectra.disturbing_lines import (
     LEFT_OUT,
     LEFT_OUT_OF_PERIOD,
     Disturbance,
@@ -19,8 +19,8 @@ from tpjb_ident.dynamic.broadband.disturbing_lines import (
     find_disturbances,
     without_disturbances,
 )
-from tpjb_ident.dynamic.broadband.period import Period, find_period, resampled
-from tpjb_ident.dynamic.broadband.samples import Samples, read_samples
+from tpjb_ident.dynamic.broadband.spectra.period import Period, find_period, resampled
+from tpjb_ident.dynamic.broadband.spectra.samples import Samples, read_samples
 from tpjb_ident.dynamic.instruments.findings import START
 from tpjb_ident.dynamic.records.compensation import compensated
 from tpjb_ident.dynamic.records.oil_force import oil_force
