@@ -28,7 +28,10 @@ def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
     rigdata.problem.RigDataError
         None of the runs can be used.
     """
-    found = campaign_verdicts(campaign, [seen for digest in finished.digests for seen in digest.seen])
+    seen = [one for digest in finished.digests for one in digest.seen]
+    if not seen:  # runs that are no files
+        return Verdicts()
+    found = campaign_verdicts(campaign, seen)
     finished.leave_out_unusable(found.unusable)
     if not finished.places:
         raise finished.left_out[0].error
@@ -42,10 +45,7 @@ def campaign_verdicts(campaign: Campaign, seen: Sequence[Observation]) -> Verdic
     ----------
     campaign : Campaign
     seen : sequence of Observation
-        Empty for runs that are no files.
     """
-    if not seen:
-        return Verdicts()
     found = verdicts([one.report for one in judged(campaign, seen)])
     # without accelerometers the inertia stays in the force: that is told, and no reason to refuse
     optional = {f"channel {c.name}" for c in campaign.channels.values() if c.quantity == "acceleration"}
