@@ -152,6 +152,9 @@ class Pad:
             f"Cb {1e6 * self.assembled_clearance:.4g} um, preload {self.preload:.3g}"
         )
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self}>"
+
     @property
     def leading_edge(self) -> float:
         """Angle of the leading edge from the pivot [rad], negative: the film enters there."""
@@ -243,6 +246,9 @@ class Bearing:
             f"{self.name}: {len(self.pads)} pads, {1e3 * self.journal_diameter:.6g} x {1e3 * self.length:.6g} mm{sizes}"
             f", {self.pivot.kind} pivots, oil {self.oil.grade or 'unnamed'} at {self.oil.supply_temperature:g} degC"
         )
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self}>"
 
     def with_pads(self, pads: tuple[Pad, ...]) -> Bearing:
         """Return a copy with other pads.

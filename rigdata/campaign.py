@@ -71,6 +71,9 @@ class Campaign:
         listed = ", ".join(f"{n} {k}" for k, n in kinds.items())
         return f"campaign {self.id}: {len(self.runs)} runs ({listed}), {len(self.channels)} channels"
 
+    def __repr__(self) -> str:
+        return f"<Campaign {str(self).partition(' ')[2]}, {self.path.name}>"
+
     def run(self, run_id: str) -> Run:
         """Find the run `run_id`.
 

@@ -56,8 +56,8 @@ _HOMES = {
     "plots": "tpjb_ident.report",
 }
 
-#: Functions whose first argument is a campaign: the path of one does as well.
-_TAKES_CAMPAIGN = {"identify", "fit_pivots", "measure_locus", "measure_clearance", "compare_campaign"}
+#: Functions that take a campaign or a bearing: the path of one does as well.
+_TAKES_PATHS = {"identify", "fit_pivots", "measure_locus", "measure_clearance", "compare_campaign", "predict"}
 
 __all__ = sorted([*_HOMES, "__version__"])
 
@@ -76,7 +76,7 @@ def __getattr__(name: str) -> Any:
         check_model()
     module = importlib.import_module(home)
     value: Any = module if home == f"tpjb_ident.{name}" else getattr(module, name)  # a package that can be called
-    if name in _TAKES_CAMPAIGN:
+    if name in _TAKES_PATHS:
         from tpjb_ident.arguments import takes_paths
 
         value = takes_paths(value)

@@ -1,13 +1,15 @@
-"""Arguments as a user gives them: a campaign, or the path of one."""
+"""Arguments as a user gives them: a campaign or a bearing, or the path of one."""
 
 from __future__ import annotations
 
 import functools
+import inspect
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.errors import ArgumentError
+from tpjb_ident.presentation import shown_by
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
@@ -41,15 +43,23 @@ def as_campaign(given: Any, name: str) -> Campaign:
 
 
 def takes_paths(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Let the first argument of a function, a campaign, be a path as well.
+    """Let the arguments of a function that are a campaign or a bearing be paths as well.
 
     Parameters
     ----------
     function : callable
+        Its parameters named ``campaign`` and ``bearing`` are meant.
     """
+    signature = inspect.signature(function)
 
     @functools.wraps(function)
-    def wrapper(campaign: Any, *args: Any, **kwargs: Any) -> Any:
-        return function(as_campaign(campaign, f"{function.__name__}: campaign"), *args, **kwargs)
+    def wrapper(*args: Any, **kwargs: Any) -> Any:
+        given = signature.bind(*args, **kwargs)
+        found = given.arguments
+        if "campaign" in found:
+            found["campaign"] = as_campaign(found["campaign"], f"{function.__name__}: campaign")
+        if "bearing" in found:
+            found["bearing"] = shown_by("diagnose.from_python", "as_bearing")(found["bearing"])
+        return function(*given.args, **given.kwargs)
 
     return wrapper

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -43,7 +44,21 @@ UNITS = {
     "K": ("K", 1.0),
     "kg": ("kg", 1.0),
     "Pa": ("MPa", 1e6),
+    "W/m^2/K": ("W/m²/K", 1.0),
+    "1": ("%", 0.01),
 }
+
+
+def label_in_words(name: str) -> str:
+    """Name of an effect, a parameter or an observable as people write it.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``"soft_pivot pad 2"`` or ``"misalignment direction 0.785398"`` [rad].
+    """
+    text = re.sub(r"\bpad (\d)", r"pad #\1", name.replace("_", " "))
+    return re.sub(r"\bdirection (-?\d+\.?\d*)", lambda m: f"at {plain(math.degrees(float(m[1])), 0)}°", text)
 
 
 def amount(found: Found, size: bool = False) -> str:
@@ -56,7 +71,7 @@ def amount(found: Found, size: bool = False) -> str:
     size : bool
         Without its sign, where the words say the direction.
     """
-    unit, scale = UNITS.get(found.unit, ("%", 0.01))
+    unit, scale = UNITS.get(found.unit, (found.unit, 1.0))
     value, low, high = found.value, found.lo, found.hi
     if size and value < 0:
         value, low, high = -value, -high, -low

@@ -5,27 +5,40 @@ from __future__ import annotations
 import html
 import importlib
 import re
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.schema import KINDS
+from tpjb_ident.schema import KINDS, POINT_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
 
 #: Rows of a table in a notebook.
 MOST_ROWS = 30
+#: Unit in a column's name: the unit that people read, and its size.
+_DISPLAYED = {**{kind.suffix: (kind.display_unit, kind.display_scale) for kind in KINDS.values()}, "N": ("kN", 1e3),
+              "m": ("µm", 1e-6)}  # fmt: skip
+_WITH_UNIT = re.compile(rf"(.+?)_({'|'.join(_DISPLAYED)}|deg|Hz|K)(_lo|_hi|_se|_predicted)?")
+_COEFFICIENT = re.compile(r"[kc](?:xx|xy|yx|yy)_")
+_FOR_PEOPLE = re.compile(
+    rf"{_COEFFICIENT.pattern}(?:N|Ns)_per_m(?:_lo|_hi|_predicted)?|{'|'.join(POINT_COLUMNS)}|pivots|quality"
+)
 
 
 class Presented:
-    """A result that a person looks at; subclasses give the frame, the sentences and the picture."""
+    """A result that a person looks at; subclasses give a table, sentences (`summary` or `__str__`) and the picture."""
+
+    def to_frame(self) -> pd.DataFrame:
+        """The table as it is written to disk."""
+        raise NotImplementedError
 
     def to_dataframe(self) -> pd.DataFrame:
         """The result as a table, SI, units in the names of the columns."""
-        raise NotImplementedError
+        return self.to_frame()
 
     def summary(self) -> str:
         """What came out, in sentences and in the units that people read."""
-        raise NotImplementedError
+        return str(self)
 
     def plot(self, **options: Any) -> Any:
         """The picture that shows it best; further ones are in `tpjb_ident.report.plots`.
@@ -50,7 +63,7 @@ class Presented:
 
 
 def in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
-    """Coefficients in MN/m and kN s/m to four digits, loads in kN, without the columns that only scripts want.
+    """A table in MN/m, kN s/m, kN and µm to four digits; of coefficients without the columns that only scripts want.
 
     Parameters
     ----------
@@ -59,20 +72,31 @@ def in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
     """
     import pandas as pd
 
+    wanted = [name for name in frame.columns if _FOR_PEOPLE.fullmatch(name)]
     shown: dict[str, Any] = {}
-    for name in frame.columns:
-        kind = KINDS.get(name[0])
-        found = re.fullmatch(r"([kc](?:xx|xy|yx|yy))_(?:N|Ns)_per_m(_lo|_hi|_predicted)?", name)
-        if found and kind is not None:
-            label = f"{found[1]}{(found[2] or '').replace('_', ' ')}, {kind.display_unit}"
-            shown[label] = (frame[name] / kind.display_scale).map("{:.4g}".format)
-        elif name in {"static_load_N"}:
-            shown["load, kN"] = frame[name] / 1e3
-        elif name in {"static_load_direction_deg", "shaft_speed_Hz", "excitation_Hz", "pivots", "quality"}:
-            shown[
-                name.rpartition("_")[0].replace("_", " ") + f", {name.rpartition('_')[2]}" if "_" in name else name
-            ] = frame[name]
+    for name in wanted if any(_COEFFICIENT.match(name) for name in wanted) else frame.columns:
+        found = _WITH_UNIT.fullmatch(name)
+        words, unit, end = (found[1], found[2], found[3] or "") if found else (name, "", "")
+        label, scale = _DISPLAYED.get(unit, (unit, 1.0))
+        values = frame[name]
+        if pd.api.types.is_float_dtype(values):
+            values = (values / scale).map("{:.4g}".format)
+        shown[(words + end).replace("_", " ") + (f", {label}" if label else "")] = values
     return pd.DataFrame(shown)
+
+
+def changed(settings: Any) -> str:
+    """Settings as a call with what differs from the defaults: ``IdentifySettings(method='ols')``.
+
+    Parameters
+    ----------
+    settings : dataclass
+        All of whose fields have defaults.
+    """
+    default = type(settings)()
+    named = {f.name: getattr(settings, f.name) for f in fields(settings)}
+    other = [f"{name}={value!r}" for name, value in named.items() if value != getattr(default, name)]
+    return f"{type(settings).__name__}({', '.join(other)})"
 
 
 def shown_by(module: str, function: str) -> Any:

@@ -19,7 +19,8 @@ _WORDS = (
     ("displacement", r"disp|prox|probe|weg|gap|sonde|^x\d*[ab]?$|^y\d*[ab]?$|^d[xy]?\d*$|^x\d+[a-d]$|^y\d+[a-d]$"),
 )
 #: How loggers spell units that a manifest spells otherwise.
-_SPELT = {"U/min": "rpm", "1/min": "rpm", "min-1": "rpm", "degc": "degC", "C": "degC", "m/s2": "m/s^2"}
+_SPELT = {"U/min": "rpm", "1/min": "rpm", "min-1": "rpm", "degc": "degC", "C": "degC", "m/s2": "m/s^2", "Volts": "V",
+          "volts": "V", "Volt": "V", "Newtons": "N", "newtons": "N", "Newton": "N", "mils": "mil"}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -183,9 +183,9 @@ def test_a_misspelt_channel_is_answered_with_the_nearest(campaign):
 @pytest.mark.parametrize(
     ("name", "content"),
     [
-        pytest.param("one.mf4", b"") if (name, content) == ("one.mf4", b"") else in_a_child(name, content)
+        in_a_child(name, content)
         for name in ("one.tdms", "one.unv", "one.mf4", "one.mat", "one.parquet")
-        for content in (b"", b"rubbish\n" * 50, b"TDSm" + b"\xff" * 400, b"PAR1" + b"\0" * 64)
+        for content in (b"rubbish\n" * 50, b"TDSm" + b"\xff" * 400, b"PAR1" + b"\0" * 64)
     ],
 )
 @pytest.mark.filterwarnings("ignore")
@@ -212,6 +212,21 @@ def test_links_out_of_a_matlab_file_are_refused(tmp_path):
     with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
         file["x"] = h5py.ExternalLink("/etc/passwd", "/x")
     with pytest.raises(RigDataError, match="is a link"):
+        read_foreign(tmp_path / "a.mat", "a.mat")
+
+
+@pytest.mark.parametrize("suffix", sorted(FORMATS))
+def test_an_empty_file_is_called_empty(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").write_bytes(b"")
+    with pytest.raises(RigDataError, match="is empty"):
+        read_foreign(tmp_path / f"a{suffix}", f"a{suffix}")
+
+
+def test_a_matlab_file_without_vectors_says_what_it_holds(tmp_path):
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"gain": 2.0, "note": "bearing 3"})
+    with pytest.raises(RigDataError, match="no vector of at least 8 numbers, only gain, note"):
         read_foreign(tmp_path / "a.mat", "a.mat")
 
 

@@ -136,6 +136,7 @@ def test_channels_are_guessed_by_unit_first_then_by_name(name, unit, quantity, a
 def test_units_are_spelt_as_a_manifest_spells_them():
     assert usable_unit("µm") == "um"
     assert usable_unit("U/min") == "rpm"
+    assert (usable_unit("Volts"), usable_unit("Newtons"), usable_unit("mils")) == ("V", "N", "mil")
     assert usable_unit("g/no") == ""
 
 

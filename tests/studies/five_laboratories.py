@@ -1,12 +1,12 @@
-"""Five exports as five laboratories write them, each from file to report by the README and the guide alone.
+"""Exports as six laboratories write them, each from file to report by the README and the guide alone.
 
-    python -m tests.studies.five_laboratories [FOLDER]
+    python -m tests.studies.five_laboratories [FOLDER] [--docs]
 
 One campaign of the virtual rig (rocker bearing, short plan, seed 1) is written as a German catman ASCII with two rates,
 as TDMS in volts, as UFF data set 58, as a MATLAB matrix with ChannelNames, as CSV with ISO 8601 stamps and as LabVIEW
 .lvm. Every folder holds records and the bearing's file, nothing else. What a person types is here: commands, and lines
-of the drafted manifest. Printed: commands typed, lines edited by hand, seconds of the commands, largest difference of a
-direct stiffness from what the campaign gives as it was simulated.
+of the drafted manifest. Printed: commands typed, lines edited by hand, minutes of the commands, largest difference of a
+direct stiffness from what the campaign gives as it was simulated; ``--docs`` puts the table into the tutorial.
 """
 
 from __future__ import annotations
@@ -33,6 +33,9 @@ ROOT = Path(__file__).resolve().parents[2]
 BEARING = ROOT / "model" / "bearings" / "rocker.toml"
 SLOW = 20  # samples of the fast clock per temperature
 MOST_LINES = 10
+PAGE = ROOT / "docs" / "guide" / "tutorial.md"
+BEGIN, END = "<!-- laboratories: begin -->\n", "<!-- laboratories: end -->"
+HEAD = "| export | commands | lines edited | minutes | K beside the simulated records |\n|---|---|---|---|---|\n"
 Table = dict[str, np.ndarray]
 #: What a person fills in: (channel or table, key) -> value, "" deletes the mark of comment before the key.
 Edits = Mapping[tuple[str, str], str]
@@ -247,70 +250,67 @@ def type_in(*words: str) -> tuple[float, str, int]:
     return time.monotonic() - began, done.stdout + done.stderr, done.returncode
 
 
-def through(laboratory: Laboratory, campaign: Campaign, folder: Path, report: bool = True) -> dict[str, object]:
-    """One laboratory's way from its records to the report, and how it went."""
+def through(laboratory: Laboratory, campaign: Campaign, folder: Path) -> dict[str, object]:
+    """One laboratory's way from its records to the report, and how it went; ends at the first command that fails."""
     records, out = folder / "records", folder / "out"
     records.mkdir(parents=True)
     for run in campaign.runs:
         laboratory.write(records, run)
     shutil.copy(BEARING, records)
     commands = [("init", str(records)), ("check", str(records), "--out", str(out))]
-    commands.append(("compare" if report else "identify", str(records), "--out", str(out)))
+    commands.append(("compare", str(records), "--out", str(out)))
     seconds, lines = 0.0, 0
     for command in commands:
         took, said, code = type_in(*command)
         seconds += took
-        print(f"--- tpjb {' '.join(command[:1])} -> {code} ({took:.0f} s)", file=sys.stderr)
-        if code:
-            print(said, file=sys.stderr)
+        assert code == 0, f"{laboratory.name}: tpjb {command[0]} ended with {code}\n{said}"
         if command[0] == "init":
             manifest = records / "campaign.toml"
             before = manifest.read_text("utf-8")
             manifest.write_text(fill_in(before, laboratory.edits), "utf-8")
             lines = edited_lines(before, manifest.read_text("utf-8"))
-    return {"laboratory": laboratory.name, "commands": len(commands), "lines": lines, "seconds": seconds, "exit": code,
-            "report": (out / "report.html").exists(), "worst": _worst(out, campaign)}  # fmt: skip
+    return {"laboratory": laboratory.name, "commands": len(commands), "lines": lines, "minutes": seconds / 60.0,
+            "report": (out / "report.html").exists(), "worst": _worst(out / "comparison.csv", campaign)}  # fmt: skip
 
 
-def _worst(out: Path, campaign: Campaign) -> float:
+def _worst(table: Path, campaign: Campaign) -> float:
     """Largest difference of a direct stiffness from the campaign as it was simulated, in per cent."""
-    name = "coefficients" if (out / "coefficients.csv").exists() else "comparison"
-    if not (out / f"{name}.csv").exists():
-        return float("nan")
     import tpjb_ident as ti
 
     truth = {(p.point.static_load, p.point.excitation_hz): p.stiffness.k for p in ti.identify(campaign).points}
-    found = pd.read_csv(out / f"{name}.csv")
+    found = pd.read_csv(table)
     worst = 0.0
     for (load, line), k in truth.items():
         near = np.isclose(found["static_load_N"], load, rtol=0.02)
-        rows = found[near & np.isclose(found["excitation_Hz"], line, rtol=0.01)]
-        column = "kyy_N_per_m" if "kyy_N_per_m" in rows else "kyy_measured_N_per_m"
-        if rows.empty or column not in rows:
-            return float("nan")
+        row = found[near & np.isclose(found["excitation_Hz"], line, rtol=0.01)].iloc[0]
         for entry, value in (("kxx", k[0, 0]), ("kyy", k[1, 1])):
-            worst = max(worst, abs(float(rows[column.replace("kyy", entry)].iloc[0]) / value - 1.0))
+            worst = max(worst, abs(float(row[f"{entry}_N_per_m"]) / value - 1.0))
     return 100.0 * worst
 
 
-def main(folder: Path) -> None:
-    """Print the table of all laboratories."""
+def main(folder: Path, docs: bool) -> None:
+    """Print the table of all laboratories, and put it into the tutorial with `docs`."""
     source = folder / "simulated"
     if not (source / "campaign.h5").exists():
         type_in("simulate", str(BEARING), "--plan", "short", "--seed", "1", "--out", str(source))
     campaign = load_campaign(source / "campaign.h5")
-    print("laboratory                commands  lines edited  seconds  exit  report  K against the simulated records")
+    rows = []
     for laboratory in LABORATORIES:
         place = folder / laboratory.write.__name__
         shutil.rmtree(place, ignore_errors=True)
         found = through(laboratory, campaign, place)
-        print(f"{found['laboratory']:<26}{found['commands']:>8}{found['lines']:>14}{found['seconds']:>9.0f}{found['exit']:>6}"
-              f"{'yes' if found['report'] else 'no':>8}  {found['worst']:.2f} %", flush=True)  # fmt: skip
+        assert found["report"], f"{laboratory.name}: no report.html"
+        rows.append("| {laboratory} | {commands} | {lines} | {minutes:.1f} | {worst:.2f} % |".format(**found))
+        print(rows[-1], flush=True)
+    if docs:
+        before, rest = PAGE.read_text("utf-8").split(BEGIN)
+        PAGE.write_text(f"{before}{BEGIN}{HEAD}" + "\n".join(rows) + f"\n{END}{rest.split(END)[1]}", "utf-8")
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        main(Path(sys.argv[1]))
+    words = [word for word in sys.argv[1:] if word != "--docs"]
+    if words:
+        main(Path(words[0]), "--docs" in sys.argv)
     else:
         with tempfile.TemporaryDirectory() as scratch:
-            main(Path(scratch))
+            main(Path(scratch), "--docs" in sys.argv)

@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rigdata.campaign import Campaign, load_campaign
+from rigdata.campaign import Campaign
 from rigdata.leftovers import leftovers
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
+from tpjb_ident.arguments import as_campaign
 from tpjb_ident.check.consistency import check_housing, check_load_ratios
 from tpjb_ident.check.findings import Finding, merge
 from tpjb_ident.check.observation import Observation, observe
@@ -23,13 +24,13 @@ _ORDER = {"error": 0, "warning": 1, "note": 2}
 Progress = Callable[[int, int], None]
 
 
-def check_campaign(path: str | Path, progress: Progress | None = None) -> list[Problem]:
+def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = None) -> list[Problem]:
     """Read every channel of every run and judge it, alone and beside the others.
 
     Parameters
     ----------
-    path : str or Path
-        As for `rigdata.load_campaign`.
+    campaign : str, Path or Campaign
+        As for `rigdata.load_campaign`, or what that gives.
     progress : callable, optional
         Called with the number of runs read so far and of all runs.
 
@@ -40,7 +41,7 @@ def check_campaign(path: str | Path, progress: Progress | None = None) -> list[P
         with a `run` concerns that run alone; one without concerns the campaign.
     """
     try:
-        campaign = load_campaign(path)
+        campaign = as_campaign(campaign, "check_campaign: campaign")
     except RigDataError as error:
         return _sorted(error.problems)
     seen: list[Observation] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from rigdata.problem import Problem, RigDataError
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, sentences
+from tpjb_ident.presentation import Presented, shown_by
 from tpjb_ident.slow_records.flat_channels import refuse_flat_channels
 from tpjb_ident.slow_records.glitches import good_samples
 from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
@@ -58,8 +59,8 @@ class LocusPoint:
     covariance: FloatArray
 
 
-@dataclass(frozen=True)
-class Locus:
+@dataclass(frozen=True, repr=False)
+class Locus(Presented):
     """Positions of the shaft centre over load direction.
 
     Attributes
@@ -99,6 +100,16 @@ class Locus:
                 "run": [p.run for p in self.points],
             }
         )
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the positions; see `tpjb_ident.report.plots.clearance_and_locus`.
+
+        Parameters
+        ----------
+        **options
+            ``polygons``, ``predicted``, ``drawing``, ``title``.
+        """
+        return shown_by("report.plots", "clearance_and_locus")(locus=self, **options)
 
     def __str__(self) -> str:
         radii = [1e6 * float(np.hypot(*p.position)) for p in self.points]

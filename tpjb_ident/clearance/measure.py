@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from tpjb_ident.clearance.side_fit import SideFit, fit_sides
 from tpjb_ident.clearance.sweep import Touch, read_sweep
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.presentation import Presented, shown_by
 from tpjb_ident.slow_records.noise import NoiseModel
 
 if TYPE_CHECKING:
@@ -33,8 +34,8 @@ GAIN_ERRORS = 4.0  # standard errors, of few sides
 DISAGREES = 0.1  # share: a shaft that slides into its corner slowly makes up for some per cent
 
 
-@dataclass(frozen=True)
-class ClearancePolygon:
+@dataclass(frozen=True, repr=False)
+class ClearancePolygon(Presented):
     """The polygon in which the shaft centre can move, cold or hot.
 
     Attributes
@@ -117,6 +118,16 @@ class ClearancePolygon:
     def regular(self) -> bool:
         """Whether all clearances are one and the same, within their errors or half a micrometre."""
         return "irregular" not in self.status
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the polygon; see `tpjb_ident.report.plots.clearance_and_locus`.
+
+        Parameters
+        ----------
+        **options
+            ``locus``, ``predicted``, ``drawing``, ``title``.
+        """
+        return shown_by("report.plots", "clearance_and_locus")(self, **options)
 
     def __str__(self) -> str:
         pads = ", ".join(

@@ -16,7 +16,7 @@ from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.model_guard import check_model
-from tpjb_ident.presentation import Presented, shown_by
+from tpjb_ident.presentation import Presented, changed, shown_by
 
 check_model()
 
@@ -61,6 +61,9 @@ class CompareSettings:
     effects: tuple[Effect, ...] = ()
     identify: IdentifySettings = field(default_factory=IdentifySettings)
     from_measured: bool = False
+
+    def __repr__(self) -> str:
+        return changed(self)
 
     def effects_with(self, pivots: str) -> tuple[Effect, ...]:
         """Effects that are switched on with a pivot model.

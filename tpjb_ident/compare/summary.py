@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from tpjb_ident.compare.comparison import Comparison
 
+#: Clearances no farther from the drawing are as drawn [m].
+AS_DRAWN = 0.3e-6
 PIVOTS_IN_WORDS = {
     "rigid": "rigid pivots",
     "kirk": "Kirk pivots (printed formula, tangent)",
@@ -218,6 +220,8 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
     if not np.isfinite(off).any():
         return []
     pad = int(np.nanargmax(np.abs(off)))
+    if abs(off[pad]) < AS_DRAWN:
+        return [f"The measured clearance is that of the drawing, within {1e6 * abs(off[pad]):.1g} µm at every pad."]
     median, worst = signed(1e6 * float(np.nanmedian(off))), signed(1e6 * float(off[pad]))
     return [
         f"The measured clearance differs from the drawing by {worst} µm at pad #{pad + 1}, where it differs most "
@@ -230,5 +234,8 @@ def _locus_sentence(comparison: Comparison) -> list[str]:
     known = {name: d for name, d in distances.items() if math.isfinite(d)}
     if not known:
         return []
-    parts = ", ".join(f"{1e6 * d:.1f} µm with {name} pivots" for name, d in known.items())
+    parts = ", ".join(
+        f"{1e6 * d:.1f} µm with {name.capitalize() if name.startswith('kirk') else name} pivots"
+        for name, d in known.items()
+    )
     return [f"The predicted shaft centre locus is off the measured one by (root mean square) {parts}."]

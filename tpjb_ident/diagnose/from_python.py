@@ -119,7 +119,7 @@ def plan(
     ArgumentError
         No dynamic runs.
     """
-    drawn = _bearing(bearing)
+    drawn = as_bearing(bearing)
     tests = points_of(points) if isinstance(points, Mapping) else points
     static = (locus, dry_tests, float(to_si(push, "force", "push")), temperatures)
     return work_out(Setup(drawn, pivot_laws(pivots, drawn)), planned_layout(drawn, tests, static))
@@ -205,13 +205,24 @@ def bearing_of(campaign: Campaign, given: Bearing | str | Path | None) -> Bearin
         Neither is there.
     """
     if given is not None:
-        return _bearing(given)
+        return as_bearing(given)
     if not campaign.bearing_text:
         raise ArgumentError(f"bearing: campaign {campaign.id} carries no bearing file. Give one, or its path.")
     return load_bearing(campaign.bearing_text)
 
 
-def _bearing(given: Bearing | str | Path) -> Bearing:
+def as_bearing(given: Bearing | str | Path) -> Bearing:
+    """Return the bearing given, or read its file.
+
+    Parameters
+    ----------
+    given : Bearing, str or Path
+
+    Raises
+    ------
+    ArgumentError
+        Neither.
+    """
     if isinstance(given, Bearing):
         return given
     if isinstance(given, (str, Path)):

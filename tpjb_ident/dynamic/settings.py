@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from tpjb_ident.dynamic.estimators.methods import TABLED
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
+from tpjb_ident.presentation import changed
 
 
 @dataclass(frozen=True)
@@ -41,3 +42,6 @@ class IdentifySettings:
     n_calibration: int = 400
     seed: int = 20190722
     keep_weights: bool = True
+
+    def __repr__(self) -> str:
+        return changed(self)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,10 @@ from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.hysteresis import Hysteresis
 from tpjb_ident.pivot.laws.law_fit import FRICTION, OFFSET, SCALE, LawFit
 from tpjb_ident.pivot.records.projection import PadDirection
+from tpjb_ident.presentation import Presented, shown_by
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 EXTRAPOLATION_SPREAD = 0.04  # of ln(stiffness) per e-fold of load beyond the points: no law is quite the pivot's own
 
@@ -49,8 +54,8 @@ class PivotSteps:
         return len(self.load)
 
 
-@dataclass(frozen=True)
-class PivotCurve:
+@dataclass(frozen=True, repr=False)
+class PivotCurve(Presented):
     """Load-deflection curve of one pad's pivot, housing included.
 
     The displacement is measured between shaft and housing, so pivot, pad back and housing seat all give:
@@ -303,6 +308,21 @@ class PivotCurve:
         if not 0.0 < level < 1.0:
             raise ArgumentError(f"level must lie between 0 and 1, got {level}")
         return float(special.ndtri(0.5 + 0.5 * level))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Rows of ``pivot_curves.csv``."""
+        frame: pd.DataFrame = shown_by("pivot.table", "pivot_table")([self])
+        return frame
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the stiffness over the load; see `tpjb_ident.report.plots.pivot_stiffness`.
+
+        Parameters
+        ----------
+        **options
+            ``formula``, ``loads``, ``secant``, ``level``, ``title``.
+        """
+        return shown_by("report.plots", "pivot_stiffness")([self], **options)
 
     def __str__(self) -> str:
         parameters = ", ".join(

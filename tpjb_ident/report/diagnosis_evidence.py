@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from tpjb_ident.effect_words import UNITS, label_in_words
+from tpjb_ident.report.diagnosis_words import in_words
 from tpjb_ident.report.page import Section, Table
+from tpjb_ident.rounding import signed
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnose.verdict.verdict import Assumption, Verdict
@@ -30,9 +33,10 @@ def evidence_sections(verdict: Verdict) -> list[Section]:
             "One standard deviation each. They are free within these in every fit and part of every interval; the last "
             "column is what the fit made of them. That of the model is what the campaign turned out to need."
         )
-        columns = ["tolerance", "stated", "unit", "source", "fitted"]
+        columns = ["tolerance", "stated", "source", "fitted"]
         rows = [_row(a) for a in verdict.assumptions]
-        out.append(Section("What may be off", [note], tables=[Table("Stated tolerances", columns, rows)]))
+        table = Table("Stated tolerances", columns, rows, frozenset({0, 2, 3}))
+        out.append(Section("What may be off", [note], tables=[table]))
     return out
 
 
@@ -46,15 +50,17 @@ def left_sentences(verdict: Verdict) -> list[str]:
     left = verdict.remainder
     out = [
         f"On points that no fit has seen {left.sigma:.2f} sigma are left, {100 * left.share:.1f} % of the squared gap, "
-        f"most in {left.where}; against noise and stated tolerances p = {left.p:.2g}."
+        f"most in {in_words(left.where)}; against noise and stated tolerances p = {left.p:.2g}."
     ]
     out += [f"The rest behaves like {b.words} (within {100 * b.spread:.0f} %)." for b in verdict.behaves_like]
-    out += [f"{d.effect.replace('_', ' ')}: its {d.parameter.replace('_', ' ')} {d.words}, from {d.start:.3g} to "
+    out += [f"{label_in_words(d.effect)}: its {label_in_words(d.parameter)} {d.words}, from {d.start:.3g} to "
             f"{d.end:.3g}." for d in verdict.drift]  # fmt: skip
     return out
 
 
 def _row(one: Assumption) -> list[str]:
+    """A tolerance in the units that people read; a ratio in per cent."""
     values: Sequence[float] = one.fitted if isinstance(one.fitted, list) else [one.fitted]
-    fitted = ", ".join(f"{v:.2g}" for v in values)
-    return [one.name.replace("_", " "), f"{one.stated:.3g}", one.unit, one.source, fitted]
+    unit, scale = UNITS.get(one.unit, (one.unit, 1.0))
+    fitted = ", ".join(signed(v / scale) for v in values)
+    return [label_in_words(one.name), f"{one.stated / scale:.3g} {unit}", one.source, f"{fitted} {unit}"]

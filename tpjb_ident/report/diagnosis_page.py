@@ -87,7 +87,7 @@ def diagnosis_page(
         more=more,
         key_table=_effects_table(verdict) if verdict.effects else _gap_table(verdict),
         sections=_sections(result, table),
-        settings={k: str(v) for k, v in settings.items()},
+        settings={k: "none" if v is None else str(v) for k, v in settings.items()},
         inputs=dict(inputs),
     )
 

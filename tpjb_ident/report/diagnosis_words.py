@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.effect_words import WORDS, amount, finding
-from tpjb_ident.rounding import percent
+from tpjb_ident.effect_words import UNITS, WORDS, amount, finding, label_in_words
+from tpjb_ident.rounding import MINUS, percent
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnose.verdict.verdict import Verdict
@@ -65,7 +65,7 @@ def verdict_sentences(
     if verdict.next_test and verdict.verdict in {"ambiguous", "unexplained", "partly-explained"}:
         sentences.append(f"Next test: {in_words(verdict.next_test)}.")
     if verdict.below_floor:
-        hidden = ", ".join(_words(n) for n in verdict.below_floor)
+        hidden = ", ".join(label_in_words(n) for n in verdict.below_floor)
         sentences.append(f"This campaign could not have seen {hidden}: silence about that is no absence.")
     return sentences
 
@@ -78,7 +78,7 @@ def _answer(name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, f
     if verdict.verdict == "named":
         return f"{name}: {found}. That explains the disagreement."
     if verdict.verdict == "ambiguous":
-        rivals = dict.fromkeys(_words(n) for group in verdict.indistinguishable for n in group[1:])
+        rivals = dict.fromkeys(label_in_words(n) for group in verdict.indistinguishable for n in group[1:])
         return f"{name}: {found}; these data cannot tell it from {' or '.join(rivals)}."
     if verdict.effects:
         return f"{name}: {found}. That explains most of the disagreement, and something is left."
@@ -100,7 +100,8 @@ def _remainder_sentences(verdict: Verdict) -> list[str]:
         known.setdefault(name, getattr(verdict, name, None))
     sentences = [f"What is left behaves like {in_words(_get(one, 'words'))}." for one in known["behaves_like"] or ()]
     return sentences + [
-        f"The size of {_words(_get(one, 'effect'))} {in_words(_get(one, 'words'))}." for one in known["drift"] or ()
+        f"The size of {label_in_words(_get(one, 'effect'))} {in_words(_get(one, 'words'))}."
+        for one in known["drift"] or ()
     ]
 
 
@@ -116,7 +117,7 @@ def observable(name: str) -> str:
     name : str
         As in ``diagnosis.json``: ``"kxx"``, ``"locus_x"``, ..
     """
-    return OBSERVABLES.get(name, _words(name))
+    return OBSERVABLES.get(name, label_in_words(name))
 
 
 def place(where: str) -> str:
@@ -148,16 +149,17 @@ def in_words(text: str) -> str:
     found = place(text).removeprefix("at ")
     for name, words in OBSERVABLES.items():
         found = found.replace(name, words)
-    return re.sub(r"(?<=[a-z])_(?=[a-z])", " ", found)
+    return label_in_words(re.sub(r"(-?\d(?:\.\d+)?e[+-]?\d+) (N/m|N s/m|m|rad)\b", _read, found))
+
+
+def _read(number: re.Match[str]) -> str:
+    unit, scale = UNITS[number[2]]
+    return f"{float(number[1]) / scale:.4g} {unit}".replace("-", MINUS)
 
 
 def _worse(gap: Mapping[str, float]) -> bool:
     before, after = (next((v for k, v in gap.items() if k.endswith(end)), 0.0) for end in ("_before", "_after"))
     return after > max(before + 0.3, 1.0)
-
-
-def _words(name: str) -> str:
-    return re.sub(r"\bpad (\d)", r"pad #\1", name.replace("_", " "))
 
 
 def effect_rows(verdict: Verdict) -> list[list[str]]:
@@ -167,7 +169,7 @@ def effect_rows(verdict: Verdict) -> list[list[str]]:
     ----------
     verdict : Verdict
     """
-    return [[_words(e.label), finding(e.name, e.parameters), in_words(e.stands_in)] for e in verdict.effects]
+    return [[label_in_words(e.label), finding(e.name, e.parameters), in_words(e.stands_in)] for e in verdict.effects]
 
 
 def next_command(campaign: str, bearing: str, verdict: Verdict, folder: str) -> str:
@@ -197,7 +199,7 @@ def parameter_rows(verdict: Verdict) -> list[list[str]]:
     verdict : Verdict
     """
     return [
-        [_words(e.name), _words(key), f"#{p.value:.0f}" if key == "pad" else amount(p)]
+        [label_in_words(e.name), label_in_words(key), f"#{p.value:.0f}" if key == "pad" else amount(p)]
         for e in verdict.effects
         for key, p in e.parameters.items()
     ]

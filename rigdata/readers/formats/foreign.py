@@ -61,6 +61,8 @@ def read_foreign(path: Path, file: str, run: str | None = None) -> list[Series]:
 
     if not path.is_file():
         raise refuse("the file is not there", "Restore it, or delete the run")
+    if path.stat().st_size == 0:
+        raise refuse("is empty", "Export or copy it again from the logger")
     if path.stat().st_size > LARGEST:
         raise refuse(f"is larger than {LARGEST >> 30} GB", "Split the run")
     name, extra = FORMATS.get(path.suffix.lower(), ("text.catman", ""))
@@ -79,6 +81,8 @@ def read_foreign(path: Path, file: str, run: str | None = None) -> list[Series]:
     except Exception as error:  # whatever another library raises on a broken file: it is the file's fault here
         what = f"cannot be read as {path.suffix.lstrip('.').upper()} ({type(error).__name__}: {str(error)[:120]})"
         raise refuse(what, "Export or copy it again from the logger") from error
+    if not series:
+        raise refuse("holds no channel of numbers", "Export the run again, with its channels")
     return series
 
 

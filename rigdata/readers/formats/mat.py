@@ -48,6 +48,10 @@ def read_series(path: Path) -> list[Series]:
             named, stated = _columns(name, value, texts)
             vectors.update(named)
             units.update(stated)
+    if not vectors:
+        held = ", ".join(name for name, _ in flat[:6]) or "no numbers at all"
+        what = f"holds no vector of at least {_SHORTEST} numbers, only {held}"
+        raise RigDataError(Problem("error", path.name, "", what, "Save the channels as vectors, or as a matrix"))
     clock = next((n for n in vectors if is_time(n.rpartition(".")[2])), None)
     time = None if clock is None else seconds(vectors.pop(clock), units.get(clock, ""))
     rate = next((v for n, v in scalars.items() if n.rpartition(".")[2].lower() in _RATES and v > 0), None)

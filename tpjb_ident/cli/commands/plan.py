@@ -14,6 +14,7 @@ from tpjb_ident.cli.common.inputs import refuse_special
 from tpjb_ident.cli.common.options import BearingPath, LoadDirections, Loads, Out, PivotChoice, Speeds, out_folder
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress, table
+from tpjb_ident.effect_words import UNITS, label_in_words
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_table, write_text
@@ -102,12 +103,12 @@ def _show(found: CampaignPlan) -> None:
     rows = []
     for row in found.to_frame().to_dict("records"):
         at = float(row["seen_from"])
-        seen = "never" if math.isnan(at) else f"{at:.4g} {row['unit']}"
-        rows.append([row["effect"], f"{row['typical_size_sigma']:.1f}", seen, row["mistaken_for"] or "-"])
-    table(
-        "What this campaign could tell",
-        ["effect", "typical size, sigma", "seen from", "could be mistaken for"], rows, (0, 2, 3),
-    )  # fmt: skip
-    blind = found.below_floor
+        unit, scale = UNITS.get(row["unit"], (row["unit"], 1.0))
+        seen = "never" if math.isnan(at) else f"{at / scale:.3g} {unit}"
+        like = label_in_words(row["mistaken_for"]) or "-"
+        rows.append([label_in_words(row["effect"]), f"{row['typical_size_sigma']:.1f}", seen, like])
+    table("What this campaign could tell", ["effect", "sigma", "seen from", "like"], rows, (0, 3))
+    print_line("sigma: standard deviations that the effect is seen with at a typical size; like: what looks the same.")
+    blind = [label_in_words(name) for name in found.below_floor]
     print_line(f"Below the floor at a size that would not surprise: {', '.join(blind) if blind else 'nothing'}.")
     print_line(f"Pairs it could not tell apart at d' = 6: {len(found.confusable)} of {found.pairs}.")

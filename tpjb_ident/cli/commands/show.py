@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from rigdata.run import Run
     from rigdata.survey.spectrum import Look
 
+#: Unit that people read, its size in SI and where its zero lies.
+READ = {"m": ("µm", 1e-6, 0.0), "K": ("degC", 1.0, 273.15), "rad/s": ("Hz", 2 * math.pi, 0.0), "Pa": ("bar", 1e5, 0.0)}
 CAMPAIGNS = (".h5", ".hdf5", ".hdf", ".he5", ".toml")
 Source = Annotated[
     Path, typer.Argument(metavar="FILE", help="A campaign, or one record file (CSV, TDMS, UFF, MAT, ..).")
@@ -36,7 +40,8 @@ def show(source: Source, run: Wanted = None, picture: Picture = False, out: Out 
     """Show channels, statistics and spectra of a file.
 
     Of a campaign the list of its runs, or one of them with --run. With --picture or --out also writes channels.csv and
-    .parquet, and the picture. Values of a campaign are in SI; of a record file in the units that the file has.
+    .parquet, and the picture. Values of a campaign are shown in µm, N, m/s^2, degC, Hz and written in SI; those of a
+    record file have the units of the file.
     """
     place = campaign_place(source)
     if not place.exists():
@@ -51,10 +56,11 @@ def show(source: Source, run: Wanted = None, picture: Picture = False, out: Out 
         raise BadInputError(f"--run: {source.name} is a single record, not a campaign. Leave the option out.")
     with progress(f"looking at {source.name}"):
         title, series = run_series(campaign.run(run)) if campaign and run else file_series(source)
-        looks = {s.name: _look(s) for s in series}
-    show_channels(title, series, looks)
+        shown = [for_people(s) for s in series] if campaign else series
+        looks = {s.name: _look(s) for s in shown}
+    show_channels(title, shown, looks)
     if picture or out is not None:
-        _write(out_folder(out, "show"), source, (title, series, looks), picture)
+        _write(out_folder(out, "show"), source, title, series, (shown, looks) if picture else None)
 
 
 def show_campaign(campaign: Campaign) -> None:
@@ -123,6 +129,18 @@ def file_series(path: Path) -> tuple[str, list[Series]]:
     return path.name, list(read_export(path).series)
 
 
+def for_people(one: Series) -> Series:
+    """A calibrated channel in the unit that people read.
+
+    Parameters
+    ----------
+    one : Series
+        SI.
+    """
+    unit, scale, zero = READ.get(one.unit, (one.unit, 1.0, 0.0))
+    return replace(one, unit=unit, values=one.values / scale - zero)
+
+
 def _look(series: Series) -> Look:
     from rigdata.survey.spectrum import look_at
 
@@ -155,15 +173,16 @@ def show_channels(title: str, series: list[Series], looks: dict[str, Look]) -> N
         table("spectra, 3 decades", ["channel", "from 0", "to Hz"], drawn, words=(0, 1))
 
 
-def _write(target: Path, source: Path, shown: tuple[str, list[Series], dict[str, Look]], picture: bool) -> None:
+def _write(
+    target: Path, source: Path, title: str, series: list[Series], picture: tuple[list[Series], dict[str, Look]] | None
+) -> None:
     import pandas as pd
 
-    title, series, looks = shown
     rows = [
         {"channel": s.name, "unit": s.unit, "samples": k.count, "missing": k.missing, "sample_rate_Hz": s.rate,
          "mean": k.mean, "standard_deviation": k.deviation, "minimum": k.low, "maximum": k.high,
          **{f"line{i + 1}_Hz": k.lines[i].frequency if i < len(k.lines) else float("nan") for i in range(3)}}
-        for s, k in ((s, looks[s.name]) for s in series)
+        for s, k in ((s, _look(s)) for s in series)
     ]  # fmt: skip
     inputs = {}
     if source.is_file():
@@ -175,6 +194,6 @@ def _write(target: Path, source: Path, shown: tuple[str, list[Series], dict[str,
         if picture:
             from tpjb_ident.report.quick_look import write_quick_look
 
-            write_quick_look(folder, title, series, looks)
+            write_quick_look(folder, title, *picture)
         write_record(folder, target, "show", {"source": source, "shown": title}, inputs)
     print_line(f"Results: {target}")

@@ -55,9 +55,15 @@ def print_line(text: str) -> None:
     command_output().sentences.append(printable(text))
     if command_output().silent:
         return
-    if _console().is_terminal or "COLUMNS" in os.environ:  # whole words on every line; a log file has no edge
-        text = "\n".join(wrapped(text, width()))
-    _console().print("\n".join(printable(line) for line in text.split("\n")), markup=False)
+    _console().print(_fitted(text), markup=False)
+
+
+def _fitted(text: str, stderr: bool = False) -> str:
+    """Lines with whole words on a terminal; as they are in a log, which has no edge, and for who searches messages."""
+    lines = [printable(line) for line in text.split("\n")]
+    if _console(stderr).is_terminal or ("COLUMNS" in os.environ and not stderr):
+        lines = [part for line in lines for part in wrapped(line, width())]
+    return "\n".join(lines)
 
 
 def command_line(text: str) -> None:
@@ -86,7 +92,7 @@ def error_line(kind: str, text: str) -> None:
     lines = "\n".join(printable(line) for line in text.splitlines())
     command_output().remarks.append({"kind": kind, "text": lines})
     style = "bold red" if kind == "bug" else None
-    _console(stderr=True).print(f"tpjb: {kind}: {lines}", markup=False, style=style)
+    _console(stderr=True).print(_fitted(f"tpjb: {kind}: {lines}", stderr=True), markup=False, style=style)
 
 
 def note_line(kind: str, text: str) -> None:
@@ -103,7 +109,7 @@ def note_line(kind: str, text: str) -> None:
         command_output().remarks.append({"kind": kind, "text": printable(text)})
     if command_output().silent and kind != "warning":
         return
-    _console(stderr=True).print(f"tpjb: {kind}: {printable(text)}", markup=False)
+    _console(stderr=True).print(_fitted(f"tpjb: {kind}: {printable(text)}", stderr=True), markup=False)
 
 
 def table(

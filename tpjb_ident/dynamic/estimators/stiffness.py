@@ -11,6 +11,8 @@ from scipy.stats import t as student_t
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import ArgumentError
+from tpjb_ident.rounding import with_interval
+from tpjb_ident.schema import DAMPING, STIFFNESS
 
 #: Order of the eight real unknowns everywhere: Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...
 ENTRIES = ("xx", "xy", "yx", "yy")
@@ -137,6 +139,20 @@ class DynamicStiffness:
         """
         half = self.half_width(level, systematic)
         return Interval(self.vector - half, self.vector + half)
+
+    def direct_coefficients(self) -> str:
+        """Direct coefficients with half their 95 % intervals, in MN/m and kN s/m."""
+        half, named = self.half_width(), []
+        for j, entry in ((0, "xx"), (3, "yy")):
+            for name, i, omega, kind in (("k", j, 1.0, STIFFNESS), ("c", 4 + j, self.omega, DAMPING)):
+                low, high = (self.vector[i] - half[i]) / omega, (self.vector[i] + half[i]) / omega
+                value = with_interval(self.vector[i] / omega, low, high, kind.display_scale)
+                named.append(f"{name}{entry} {value} {kind.display_unit}")
+        return ", ".join(named)
+
+    def __repr__(self) -> str:
+        at = f"at {self.omega / (2 * np.pi):.4g} Hz by {self.method}"
+        return f"<DynamicStiffness {at}: {self.direct_coefficients()}>"
 
     def __str__(self) -> str:
         half = self.half_width().reshape(2, 4)

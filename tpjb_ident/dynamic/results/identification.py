@@ -22,8 +22,6 @@ from tpjb_ident.dynamic.results.identification_tables import (
 )
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.presentation import Presented, shown_by
-from tpjb_ident.rounding import with_interval
-from tpjb_ident.schema import DAMPING, STIFFNESS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,24 +60,10 @@ class Identification(Presented):
         """Calibration covariance over all P points, (8 P, 8 P) [N^2/m^2]; made when asked for: it grows with P^2."""
         return np.asarray(self.calibration_changes.T @ self.calibration_changes / len(self.calibration_changes))
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """``coefficients.csv``; see `to_frame`."""
-        return self.to_frame()
-
     def summary(self) -> str:
         """Direct coefficients of every point with half their 95 % intervals, and its flags."""
         lines = [f"{self.campaign}: {len(self.points)} operating points by {self.method}"]
-        for p in self.points:
-            half, omega = p.stiffness.half_width(), p.stiffness.omega
-            named = []
-            for j, entry in ((0, "xx"), (3, "yy")):
-                k, c = p.stiffness.vector[j], p.stiffness.vector[4 + j] / omega
-                named.append(f"k{entry} {with_interval(k, k - half[j], k + half[j], STIFFNESS.display_scale)} MN/m")
-                wide = half[4 + j] / omega
-                named.append(f"c{entry} {with_interval(c, c - wide, c + wide, DAMPING.display_scale)} kN s/m")
-            flags = f" ({', '.join(str(q) for q in p.quality)})" if p.quality else ""
-            lines.append(f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz: {', '.join(named)}{flags}")
-        return "\n".join(lines)
+        return "\n".join([*lines, *(str(p) for p in self.points)])
 
     def plot(self, **options: Any) -> Any:
         """Draw the direct stiffness over load; see `tpjb_ident.report.plots.direct_coefficients`.

@@ -96,6 +96,14 @@ class PointResult:
     clearance: float | None = field(default=None, repr=False)
     budget: dict[str, FloatArray] = field(default_factory=dict, repr=False)
 
+    def __str__(self) -> str:
+        flags = f" ({', '.join(str(q) for q in self.quality)})" if self.quality else ""
+        at = f"{self.point.static_load / 1e3:g} kN, {self.point.excitation_hz:g} Hz"
+        return f"{at}: {self.stiffness.direct_coefficients()}{flags}"
+
+    def __repr__(self) -> str:
+        return f"<PointResult: {self}>"
+
     @property
     def condition_number(self) -> float:
         """Condition number of the displacement directions."""

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
+from tpjb_ident.effect_words import label_in_words
 from tpjb_ident.report.drawing.colours import LIGHT, SEQUENTIAL
 from tpjb_ident.report.drawing.picture import CHARACTER, FONT_SIZE, add_colour_bar, label, new_pictures, shrink
 
@@ -47,7 +48,7 @@ def isolability(
     k = len(matrix)
     if matrix.shape != (k, k) or len(names) != k:
         raise ValueError(f"the matrix must be square with one name per row, got shape {matrix.shape}")
-    words = [name.replace("_", " ") for name in names]
+    words = [label_in_words(name) for name in names]
     room = CHARACTER * max(len(word) for word in words)
     # the panel's own margins and the colour bar come on top of cells and names
     figure, ((axes,),) = new_pictures(
