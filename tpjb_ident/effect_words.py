@@ -58,7 +58,7 @@ def label_in_words(name: str) -> str:
         Such as ``"soft_pivot pad 2"`` or ``"misalignment direction 0.785398"`` [rad].
     """
     text = re.sub(r"\bpad (\d)", r"pad #\1", name.replace("_", " "))
-    return re.sub(r"\bdirection (-?\d+\.?\d*)", lambda m: f"at {plain(math.degrees(float(m[1])), 0)}°", text)
+    return re.sub(r"(?<!load )\bdirection (-?\d+\.?\d*)", lambda m: f"at {plain(math.degrees(float(m[1])), 0)}°", text)
 
 
 def amount(found: Found, size: bool = False) -> str:

@@ -8,7 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 from model.effects import kind_of, known_effects
-from tpjb_ident.effect_words import WORDS, amount, finding
+from tpjb_ident.diagnose.verdict.verdict import Assumption
+from tpjb_ident.effect_words import WORDS, amount, finding, label_in_words
+from tpjb_ident.report.diagnosis_evidence import _row
 from tpjb_ident.report.diagnosis_words import in_words, place
 
 
@@ -18,6 +20,37 @@ def found(value, half, unit):
 
 def test_every_effect_of_the_library_has_its_words():
     assert set(known_effects()) <= set(WORDS)
+
+
+@pytest.mark.parametrize(
+    ("label", "says"),
+    [
+        ("soft_pivot pad 2", "soft pivot pad #2"),
+        ("misalignment direction 0.785398", "misalignment at 45°"),
+        ("structure_compliance direction -1.5708", "structure compliance at −90°"),
+    ],
+)
+def test_labels_in_words(label, says):
+    assert label_in_words(label) == says
+
+
+def test_numbers_of_a_sentence_are_in_the_units_that_people_read():
+    assert in_words("a stiffness of -3.61e+07 N/m, most in load_ratio at static_load_direction -72-72 deg") == (
+        "a stiffness of −36.1 MN/m, most in the size of the measured load at load direction -72 to 72°"
+    )
+
+
+def test_tolerances_are_in_the_units_that_people_read():
+    rows = [_row(Assumption(*one)) for one in (
+        ("clearance_scatter", 2e-6, [6.6e-07, -1.2e-06], "m", "default"),
+        ("film_heat", 0.07, -0.0357, "1", "default"),
+        ("supply_temperature", 0.5, -0.39, "K", "default"),
+    )]  # fmt: skip
+    assert rows == [
+        ["clearance scatter", "2 µm", "default", "+0.7, −1.2 µm"],
+        ["film heat", "7 %", "default", "−3.6 %"],
+        ["supply temperature", "0.5 K", "default", "−0.4 K"],
+    ]
 
 
 @pytest.mark.parametrize("name", sorted(known_effects()))

@@ -103,6 +103,17 @@ def test_a_path_does_where_a_campaign_is_wanted(small_campaign):
         ti.identify(5)
 
 
+def test_a_path_does_where_a_bearing_is_wanted(rocker_file):
+    found = ti.predict(str(rocker_file), load=5000.0, speed=138.0, excitation=157.0, thermal="isothermal")
+    assert found.converged
+    with pytest.raises(ValueError, match="bearing: must be a Bearing or the path of a bearing file, got int"):
+        ti.predict(5, load=5000.0, speed=138.0)
+
+
+def test_an_open_campaign_is_checked_as_its_path_is(small_campaign):
+    assert ti.check_campaign(ti.load_campaign(small_campaign)) == ti.check_campaign(small_campaign)
+
+
 def test_a_plan_from_python(rocker_file):
     import math
 

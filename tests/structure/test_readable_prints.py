@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 
+import pytest
+
+import tpjb_ident as ti
 from model.bearing_file import load_bearing
 from model.predict import predict
 from rigdata import OperatingPoint
+from tests.report.plot_cases import curve, locus, polygon
 
 
 def test_bearing_and_pad(rocker_file):
@@ -15,8 +19,35 @@ def test_bearing_and_pad(rocker_file):
         "Rocker-backed five-pad bearing: 5 pads, 99.86 x 69.6 mm, Cb 80 um, preload 0.385 (pad #1), rocker pivots, "
         "oil ISO VG 46 at 40 degC"
     )
+    assert repr(bearing) == f"<Bearing: {bearing}>"
     assert str(bearing.pads[0]) == "pad at -90 deg, 63.5 deg of arc, Cb 80 um, preload 0.385"
     assert "0 pads" in str(bearing.with_pads(()))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        pytest.param((ti.IdentifySettings(), "IdentifySettings()"), id="defaults"),
+        pytest.param((ti.IdentifySettings(method="ols"), "IdentifySettings(method='ols')"), id="one changed"),
+        pytest.param((ti.CompareSettings(thermal="tehd"), "CompareSettings(thermal='tehd')"), id="of a comparison"),
+    ],
+)
+def test_settings_show_what_was_changed(settings):
+    assert repr(settings[0]) == settings[1]
+
+
+def test_a_campaign_is_one_line(small_campaign):
+    shown = repr(ti.load_campaign(small_campaign))
+    assert shown.startswith("<Campaign ")
+    assert len(shown) < 140
+
+
+def test_positions_and_curves_are_one_line_and_a_table_in_a_notebook():
+    for result in (polygon(), locus(), curve(1)):
+        assert repr(result).startswith(f"<{type(result).__name__}: ")
+        assert "\n" not in repr(result)
+        assert "µm" in result._repr_html_() or "MN/m" in result._repr_html_()
+        assert len(result.to_dataframe())
 
 
 def test_prediction(rocker_file):

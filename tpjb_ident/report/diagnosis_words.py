@@ -132,7 +132,7 @@ def place(where: str) -> str:
     def kilo(match: re.Match[str]) -> str:
         return f"{' to '.join(f'{float(v) / 1e3:g}' for v in match[1].split('-'))} kN"
 
-    text = re.sub(r"((?:\d+(?:\.\d+)?)(?:-\d+(?:\.\d+)?)?) N\b", kilo, where)
+    text = re.sub(r"((?:\d+(?:\.\d+)?)(?:-\d+(?:\.\d+)?)?) N\b(?!/| s)", kilo, where)
     text = text.replace("static_load_direction", "load direction").replace("static_load", "static load")
     text = re.sub(r"(-?\d+)-(-?\d+) deg", r"\1 to \2°", text)
     text = re.sub(r"\bpads? (\d)", r"pad #\1", text).replace(" deg", "°")
