@@ -161,7 +161,7 @@ def predict_setup(
     # A load near the smallest float is none: its quotients would not be numbers.
     pushing = load if load > NO_LOAD else 0.0
     force = pushing * np.array([math.cos(load_direction), math.sin(load_direction)])
-    setup, equilibrium = _solve_as_it_runs(setup, force, speed, start)
+    setup, equilibrium = solve_as_it_runs(setup, force, speed, start)
     lines = np.atleast_1d(omega)
     h, regimes = _impedance(setup, equilibrium, lines)
     instruments = setup.instruments
@@ -196,10 +196,27 @@ def _impedance(setup: Setup, equilibrium: Equilibrium, lines: FloatArray) -> tup
     ) if setup.friction else ()
 
 
-def _solve_as_it_runs(
-    setup: Setup, force: FloatArray, speed: float, start: Equilibrium | None
+def solve_as_it_runs(
+    setup: Setup, force: FloatArray, speed: float, start: Equilibrium | None = None
 ) -> tuple[Setup, Equilibrium]:
-    """Equilibrium with the clearances that belong to its own temperatures; returns the setup they make, too."""
+    """Find the equilibrium with the clearances that belong to its own temperatures.
+
+    Parameters
+    ----------
+    setup : Setup
+    force : (2,) ndarray
+        Static load on the shaft [N].
+    speed : float
+        [rad/s]
+    start : Equilibrium, optional
+        A neighbouring solution on the same mesh.
+
+    Returns
+    -------
+    setup : Setup
+        With these clearances.
+    equilibrium : Equilibrium
+    """
     growth = setup.growth
     if growth is None:
         return setup, solve_equilibrium(setup, force, speed, start)

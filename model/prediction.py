@@ -226,12 +226,7 @@ class Prediction:
         (n_pads,) ndarray
             [degC]
         """
-        out = []
-        for film in self.equilibrium.films:
-            angle = film.pad.leading_edge + fraction * film.pad.arc
-            middle = 0 if film.grid.first == 0 else len(film.grid.z) // 2
-            out.append(float(np.interp(angle, film.grid.angle, film.face_temperature[:, middle])))
-        return np.array(out)
+        return np.array([film.temperature_at(fraction) for film in self.equilibrium.films])
 
     @property
     def pad_matrices(self) -> tuple[PadMatrices, ...]:

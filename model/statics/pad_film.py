@@ -114,6 +114,18 @@ class PadFilm:
         """Of the pad's face [degC], (nt + 1, nz + 1); the film's own where it has one across."""
         return self.work.temperature if self.cross is None else self.cross.face
 
+    def temperature_at(self, fraction: float) -> float:
+        """Of the pad's face at mid-length [degC].
+
+        Parameters
+        ----------
+        fraction : float
+            Of the arc, from the leading edge.
+        """
+        angle = self.pad.leading_edge + fraction * self.pad.arc
+        middle = 0 if self.grid.first == 0 else len(self.grid.z) // 2
+        return float(np.interp(angle, self.grid.angle, self.face_temperature[:, middle]))
+
     @property
     def lost(self) -> bool:
         """Whether the film closed, so that it has no pressure."""

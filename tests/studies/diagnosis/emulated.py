@@ -165,8 +165,8 @@ class Emulated(Memory):
         """See `Memory.ask`."""
         if self._setup is None or self._setup[0] is not setup:
             self._setup = setup, self._answers(setup)
-        latent = self._setup[1][self.points[(point, lines)]]
-        return _solved(latent, point, len(lines)).read(setup, lines)
+        asked = lines or (point[2],)
+        return _solved(self._setup[1][self.points[(point, asked)]], point, len(asked)).read(setup, lines)
 
     def _answers(self, setup: Setup) -> FloatArray:
         assert self.base is not None
@@ -249,7 +249,7 @@ def solve(forward: Forward, setup: Setup, points: Any) -> FloatArray:
     out = []
     for point, lines in points:
         memory.ask(key, point, lines, sensors)
-        out.append(_latent(memory.solved[(key, point, (*lines, *sensors))]))
+        out.append(_latent(memory.solved[key][(point, lines, sensors)]))
     return np.concatenate(out)
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from model.effects import Effect, apply_effects
 from model.setup import Setup
 from model.static_tests import dry_curve, polygon_sides
-from model.statics.equilibrium import Equilibrium
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.memory import Memory, NoEquilibriumError, Reading, StaticPoint
 from tpjb_ident.diagnose.observations.layout import DryTest, DynamicTest, Layout
@@ -88,7 +87,7 @@ class Forward:
                 self._shares[(*point, float(pad))] = float(load) / test.load
         for one in self.layout.locus:
             point = (one.load, one.direction, one.speed)
-            table.locus(point, self._solve(setup, point, (one.speed,)))
+            table.locus(point, self._solve(setup, point, ()))
         for dry in self.layout.dry:
             table.dry(dry)
         if self.layout.push_load is not None:
@@ -108,17 +107,6 @@ class Forward:
             Equilibria that are solved already; it is copied.
         """
         return Forward(self.setup, self.layout, self.elements, 0, memory.copy())
-
-    def fresh_start(self, start: dict[StaticPoint, Equilibrium]) -> Forward:
-        """Return one that writes into this one's memory but starts from other equilibria.
-
-        Parameters
-        ----------
-        start : dict of StaticPoint to Equilibrium
-            Equilibria to start from.
-        """
-        memory = Memory(self.memory.solved, dict(start))
-        return Forward(self.setup, self.layout, self.elements, 0, memory)
 
     def pad_shares(self) -> FloatArray:
         """Share of the static load on the pad of every temperature element at the last call; NaN elsewhere, (n,)."""

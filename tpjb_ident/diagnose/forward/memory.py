@@ -6,22 +6,22 @@ most of what is tried at another frequency. Campaigns of one bearing begin with 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from model.dynamics.reduction import with_structure
+from model.dynamics.reduction import bearing_impedance, with_structure
 from model.instruments import Instruments
-from model.predict import predict_setup
-from model.prediction import Prediction
+from model.predict import solve_as_it_runs
 from model.setup import Setup
 from model.statics.equilibrium import Equilibrium
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.errors import TpjbError
 
 StaticPoint = tuple[float, float, float]
-Key = tuple[Setup, StaticPoint, tuple[float, ...]]
+Key = tuple[StaticPoint, tuple[float, ...], tuple[float, ...]]
 _PLAIN: dict[str, Any] = {
     "instruments": Instruments(), "series_compliance": (0.0, 0.0, 0.0), "added_mass": 0.0,
     "parallel_stiffness": (0.0,) * 4, "parallel_damping": (0.0,) * 4,
@@ -66,7 +66,7 @@ class Solved:
         """
         instruments, omega = setup.instruments, np.array(lines)
         return Reading(
-            instruments.shown_stiffness(with_structure(setup, self.h, omega), omega),
+            instruments.shown_stiffness(with_structure(setup, self.h, omega), omega) if lines else self.h,
             instruments.shown_position(self.position + setup.structure @ self.force),
             instruments.shown_load(self.force), self.temperature, self.pad_load,
         )  # fmt: skip
@@ -90,17 +90,19 @@ class Memory:
     Attributes
     ----------
     solved : dict
-        By set-up (instruments and structure apart, which change no equilibrium), static point and lines.
+        By set-up (instruments and structure apart, which change no equilibrium), then by static point, lines and
+        places of thermometers.
     start : dict
         Equilibrium per static point.
     """
 
-    solved: dict[Key, Solved] = field(default_factory=dict, repr=False)
+    solved: dict[Setup, dict[Key, Solved]] = field(default_factory=dict, repr=False)
     start: dict[StaticPoint, Equilibrium] = field(default_factory=dict, repr=False)
+    _last: tuple[Setup, Setup, dict[Key, Solved]] | None = field(default=None, repr=False)
 
     def copy(self) -> Memory:
         """Return a memory of its own that begins with the same knowledge."""
-        return Memory(dict(self.solved), dict(self.start))
+        return Memory({setup: dict(known) for setup, known in self.solved.items()}, dict(self.start))
 
     def ask(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]) -> Reading:
         """Look a point up, or solve it.
@@ -110,7 +112,7 @@ class Memory:
         setup : Setup
         point : (load [N], direction [rad], speed [rad/s])
         lines : tuple of float
-            [rad/s]
+            Excitation frequencies [rad/s]; none where a test is static.
         sensors : tuple of float
             Fraction of the arc at which every pad carries its thermometer.
 
@@ -118,22 +120,25 @@ class Memory:
         ------
         NoEquilibriumError
         """
-        key = (setup.change(**_PLAIN), point, (*lines, *sensors))
-        known = self.solved.get(key)
-        if known is None:
-            known = self.solved[key] = _kept(self._solve(key[0], point, lines), sensors)
-        return known.read(setup, lines)
+        if self._last is None or self._last[0] is not setup:
+            # a set-up is some hundred numbers to be compared: once for all points of a prediction
+            plain = setup.change(**_PLAIN)
+            self._last = setup, plain, self.solved.setdefault(plain, {})
+        _, plain, known = self._last
+        key = point, lines, sensors
+        found = known.get(key)
+        if found is None:
+            found = known[key] = self._solve(plain, point, lines, sensors)
+        return found.read(setup, lines)
 
-    def _solve(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...]) -> Prediction:
-        prediction = predict_setup(setup, *point, np.array(lines), self.start.get(point))
-        if not prediction.converged:
-            raise NoEquilibriumError(f"no equilibrium at {point[0]:.0f} N ({', '.join(prediction.status)})")
-        self.start[point] = prediction.equilibrium
-        return prediction
-
-
-def _kept(found: Prediction, sensors: tuple[float, ...]) -> Solved:
-    force = found.load * np.array([np.cos(found.load_direction), np.sin(found.load_direction)])
-    table = {place: found.pad_temperature(place) for place in set(sensors)}
-    warm = np.array([table[place][k] for k, place in enumerate(sensors)])
-    return Solved(found.bearing_h, found.bearing_position, force, warm, found.pad_load)
+    def _solve(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]) -> Solved:
+        load, direction, speed = point
+        force = load * np.array([math.cos(direction), math.sin(direction)])
+        running, found = solve_as_it_runs(setup, force, speed, self.start.get(point))
+        if not found.converged:
+            raise NoEquilibriumError(f"no equilibrium at {load:.0f} N ({', '.join(found.status)})")
+        self.start[point] = found
+        h = bearing_impedance(running, found, np.array(lines)) if lines else np.zeros((0, 2, 2), complex)
+        warm = np.array([film.temperature_at(place) for film, place in zip(found.films, sensors, strict=True)])
+        loads = np.array([film.forces.force[0] if film.forces is not None else 0.0 for film in found.films])
+        return Solved(h, found.position, force, warm, loads)

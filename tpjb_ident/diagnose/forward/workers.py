@@ -5,11 +5,13 @@ from __future__ import annotations
 import itertools
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 from tpjb_ident.diagnose.forward.forward import ForwardModel
-from tpjb_ident.runtime.executors import cores, in_order, local_workers
+from tpjb_ident.runtime.executors import Workers, cores, in_order, local_workers
 
 #: What the workers of this process share: they are forked from it and have it from there. Sent with every job it would
 #: be megabytes of equilibria each time.
@@ -23,7 +25,47 @@ def _run(number: int, task: Callable[..., Any], *arguments: Any) -> Any:
     return task(forward.fresh(), problem, *arguments)
 
 
-Map = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterator[Any]]
+Answer = TypeVar("Answer")
+
+
+@dataclass(frozen=True)
+class Map:
+    """Maps a task over jobs, in this process or in workers.
+
+    Attributes
+    ----------
+    opened : Workers
+    number : int
+        Of what they share.
+    """
+
+    opened: Workers
+    number: int
+
+    def __call__(self, task: Callable[..., Any], jobs: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
+        """Yield ``task(forward, problem, argument, ..)`` for every job, in order.
+
+        Parameters
+        ----------
+        task : callable
+            Of a module.
+        jobs : sequence of tuple
+            Further arguments.
+        """
+        return in_order(self.opened, _run, [(self.number, task, *arguments) for arguments in jobs])
+
+    def together(self, tasks: Sequence[Callable[[], Answer]]) -> list[Answer]:
+        """Do several things that each wait for workers now and then: while one waits, they work for another.
+
+        Parameters
+        ----------
+        tasks : sequence of callable
+            The workers must have begun; a fork from a process with threads can hang.
+        """
+        if self.opened.count == 1 or len(tasks) < 2:
+            return [task() for task in tasks]
+        with ThreadPoolExecutor(len(tasks)) as threads:
+            return list(threads.map(lambda task: task(), tasks))
 
 
 @contextmanager
@@ -40,8 +82,7 @@ def workers(forward: ForwardModel, problem: Any, count: int | None = None) -> It
 
     Yields
     ------
-    callable
-        ``run(task, [(argument, ..), ..])`` yields ``task(forward, problem, argument, ..)`` in order.
+    Map
     """
     number = next(_numbers)
     _shared[number] = (forward, problem)
@@ -49,6 +90,6 @@ def workers(forward: ForwardModel, problem: Any, count: int | None = None) -> It
         # fork: effects that the user registered are known in the workers too
         able = "fork" in multiprocessing.get_all_start_methods()
         with local_workers((count or cores()) if able else 1, start="fork") as opened:
-            yield lambda task, jobs: in_order(opened, _run, [(number, task, *arguments) for arguments in jobs])
+            yield Map(opened, number)
     finally:
         del _shared[number]

@@ -13,7 +13,8 @@ from tpjb_ident.diagnose.forward.candidates import Candidate
 from tpjb_ident.diagnose.forward.forward import ForwardModel
 from tpjb_ident.diagnose.forward.workers import Map
 from tpjb_ident.diagnose.search.assessment import Linear, assess
-from tpjb_ident.diagnose.search.fit import TIGHT, Fit, Start, attempt, slope
+from tpjb_ident.diagnose.search.descend import TIGHT, attempt, slope
+from tpjb_ident.diagnose.search.fit import Fit, Start
 from tpjb_ident.diagnose.search.problem import Problem
 
 #: Shares of a model's own error scales at which candidates are scored: with the right effect added they fall.
@@ -46,8 +47,27 @@ class Score:
 Columns = Mapping[Candidate, FloatArray]
 
 
-def bends(run: Map, model: Fit, pool: Sequence[Candidate], table: Columns) -> tuple[Columns, Columns]:
-    """Slope and curvature of the prediction over the amplitude of every candidate that has one; (n, 1) each.
+@dataclass(frozen=True)
+class Survey:
+    """What every candidate does beside a model, for itself.
+
+    Attributes
+    ----------
+    secants : mapping of Candidate to (n, k) ndarray
+        Change of the prediction per unit of every amplitude, over a step of a size that one would expect.
+    slopes : mapping of Candidate to (n, k) ndarray
+        The same at the model itself where the curvature is known.
+    curved : mapping of Candidate to (n, 1) ndarray
+        Half the second derivatives, of candidates of one amplitude.
+    """
+
+    secants: Columns
+    slopes: Columns
+    curved: Columns
+
+
+def survey(run: Map, model: Fit, pool: Sequence[Candidate]) -> Survey:
+    """Ask what every candidate does: slope and curvature over its amplitude where it has one.
 
     A clearance that grows by a third of itself does not do three times what a ninth does: to first order a large
     effect explains little, and others would be fitted in its place.
@@ -58,28 +78,32 @@ def bends(run: Map, model: Fit, pool: Sequence[Candidate], table: Columns) -> tu
         See `workers`.
     model : Fit
     pool : sequence of Candidate
-    table : mapping of Candidate to (n, k) ndarray
-        Slopes, for those that have several amplitudes.
-
-    Returns
-    -------
-    tuple of mapping
-        Slopes, and half the second derivatives (none for a candidate of several amplitudes).
     """
     slim = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
-    single = [c for c in pool if len(c.steps) == 1 and c.name not in SLOW]
-    found = run(_bend, [(slim, model.prediction, c) for c in single])
-    slopes, curved = dict(table), {}
-    for c, (slope_, bend) in zip(single, found, strict=True):
-        if np.any(bend):
-            slopes[c], curved[c] = slope_[:, None], bend[:, None]
-    return slopes, curved
+    # the longest ones begin: nobody waits for them at the end
+    order = sorted(pool, key=lambda c: c.name not in SLOW)
+    found = dict(zip(order, run(_surveyed, [(slim, model.prediction, c) for c in order]), strict=True))
+    secants, slopes = ({c: found[c][i] for c in pool} for i in range(2))
+    return Survey(secants, slopes, {c: found[c][2] for c in pool if found[c][2] is not None})
 
 
-def _bend(
+def _surveyed(
     forward: ForwardModel, problem: Problem, model: Start, y: FloatArray, candidate: Candidate
-) -> tuple[FloatArray, FloatArray]:
-    """A parabola through two amplitudes beside the neutral one; zeros where the model has no equilibrium there."""
+) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """Secants, slopes, and the curvature where it can be told."""
+    if len(candidate.steps) == 1 and candidate.name not in SLOW:
+        bent = _bent(forward, problem, model, y, candidate)
+        if bent is not None:
+            return bent
+    parts = [_column(forward, problem, model, y, candidate, i) for i in range(len(candidate.steps))]
+    found = np.column_stack(parts)
+    return found, found, None
+
+
+def _bent(
+    forward: ForwardModel, problem: Problem, model: Start, y: FloatArray, candidate: Candidate
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """A parabola through two amplitudes beside the neutral one; None where the model has no equilibrium there."""
     low, high = (float(v[0]) for v in candidate.limits)
     around, step = candidate.neutral, WIDE * candidate.step
     shares = [s for s in (1.0, -1.0, 2.0, -2.0) if low <= around + s * step <= high][:2]
@@ -89,12 +113,12 @@ def _bend(
                         amplitudes=(*model.amplitudes, np.array([around + share * step])))  # fmt: skip
         other = attempt(forward, problem, start)
         if other is None:
-            return np.zeros_like(y), np.zeros_like(y)
+            return None
         rows.append((other - y) / (share * step))
     if len(rows) < 2:
-        return np.zeros_like(y), np.zeros_like(y)
+        return None
     bend = (rows[0] - rows[1]) / ((shares[0] - shares[1]) * step)
-    return rows[0] - bend * shares[0] * step, bend
+    return rows[0][:, None], (rows[0] - bend * shares[0] * step)[:, None], bend[:, None]
 
 
 def columns(run: Map, model: Fit, pool: Sequence[Candidate]) -> dict[Candidate, FloatArray]:
@@ -136,7 +160,7 @@ def scores(
     table : mapping of Candidate to (n, k) ndarray
     pairs : bool
     curved : mapping of Candidate to (n, 1) ndarray, optional
-        See `bends`.
+        See `Survey`.
     """
     levels = [_Level(problem, model, table, share, curved or {}) for share in SHARES]
     pool = list(table)
@@ -158,7 +182,7 @@ def alone(problem: Problem, model: Fit, table: Columns, curved: Columns) -> list
     problem : Problem
     model : Fit
     table, curved : mapping of Candidate to (n, k) ndarray
-        See `bends`.
+        See `Survey`.
     """
     level = _Level(problem, model, table, None, curved)
     return sorted((level.score((c,)) for c in table), key=lambda s: -s.gain)
@@ -249,6 +273,37 @@ def with_model(model: Fit, score: Score, table: Columns, curved: Columns | None 
     jacobian = np.column_stack([model.jacobian, *parts])
     return Start((*model.candidates, *score.candidates), (*model.amplitudes, *score.amplitudes), jacobian,
                  model.nuisance, model.columns)  # fmt: skip
+
+
+def instead(problem: Problem, model: Fit, table: Columns, beyond: float) -> list[Start]:
+    """Starts in which an effect takes over from what is off further than its tolerance allows and does the same.
+
+    Oil that is three tolerances too thin has the evidence of an effect, and no residual that would ask for it.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : Fit
+        A fitted model.
+    table : mapping of Candidate to (n, k) ndarray
+        Derivatives by candidate.
+    beyond : float
+        In standard deviations.
+    """
+    size = model.assessment.free[model.jacobian.shape[1] :]
+    out = []
+    for c, column in table.items():
+        for i in problem.twins(c):
+            if abs(size[i]) <= beyond or column.shape[1] != 1:
+                continue
+            own, other = problem.scaled(column)[:, 0], problem.scaled(model.columns)[:, i] * size[i]
+            low, high = c.limits
+            amplitude = np.clip(c.origin + (own @ other) / max(float(own @ own), 1e-300), low, high)
+            nuisance = model.nuisance.copy()
+            nuisance[i] = 0.0
+            jacobian = np.column_stack([model.jacobian, column])
+            out.append(Start((*model.candidates, c), (*model.amplitudes, amplitude), jacobian, nuisance, model.columns))
+    return out
 
 
 def visible(problem: Problem, model: Fit, candidate: Candidate, column: FloatArray) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -10,11 +11,13 @@ import numpy as np
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.candidates import TERMS, Candidate
 from tpjb_ident.diagnose.forward.workers import Map
-from tpjb_ident.diagnose.search.assessment import assess
-from tpjb_ident.diagnose.search.fit import Fit, Start, fit, fitted, settle
+from tpjb_ident.diagnose.search.descend import fit
+from tpjb_ident.diagnose.search.fit import Fit, Start, fitted
 from tpjb_ident.diagnose.search.problem import Problem
-from tpjb_ident.diagnose.search.screen import Columns, Score, alone, bends, columns, scores, with_model, without
+from tpjb_ident.diagnose.search.screen import Columns, Score, alone, columns, instead, scores, survey, with_model
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+from tpjb_ident.diagnose.search.settle import settle
+from tpjb_ident.diagnose.search.worth import STAND_IN, Worth, worth
 
 Progress = Callable[[str, float], None]
 #: How often another explanation may take the place of one effect of the model.
@@ -23,30 +26,17 @@ SWAPS = 2
 ROUNDS_ON_THE_WAY = 2
 #: Candidates of every round that are compared with derivatives of their own.
 FIRST = 3
+#: Of these, the ones that may yet be the best: derivatives from elsewhere mistake a fit by up to 25 nats where it rises
+#: by as many, and by a third of its rise where that is large (`docs/diagnosis.md`).
+NEAR, HALF = 30.0, 0.5
+#: Evidence [nats] that no tolerance makes up once an effect is taken away: 45 at the most in all samples.
+HOPELESS = 100.0
 #: Candidates that are fitted since they explain most by themselves, whatever else may be off.
 ALONE = 3
 #: Pairs of candidates that are fitted from the baseline: forward selection can begin with a compromise.
 PAIRS = 2
-#: Standard deviations from which something that is off is more than its tolerance: a chance of 1 in 370 each.
-STAND_IN = 3.0
 #: Candidates that are fitted in the place of every effect of the model.
 RIVALS = 3
-
-
-@dataclass(frozen=True)
-class Worth:
-    """What an effect is worth in a model.
-
-    Attributes
-    ----------
-    unseen : float
-        Rise of the log score of folds that are left out in turn, nuisances that do the same set aside [nats].
-    beside : float
-        Rise of the log evidence beside all stated tolerances [nats].
-    """
-
-    unseen: float
-    beside: float
 
 
 @dataclass(frozen=True)
@@ -66,7 +56,7 @@ class Search:
     less : tuple of Fit or None
         `effects` without each of its own.
     first : dict of Candidate to (n, k) ndarray
-        Derivatives of every candidate at the baseline.
+        What every candidate does at the baseline, per unit of its amplitudes.
     singles : tuple of Fit
         Fits of one candidate each, best first.
     rivals : tuple of tuple of Fit
@@ -83,33 +73,6 @@ class Search:
     rivals: tuple[tuple[Fit, ...], ...] = field(repr=False)
 
 
-def worth(problem: Problem, model: Fit, less: Fit, candidate: Candidate) -> Worth:
-    """What a candidate is worth in a model, beside the same model without it.
-
-    Where the model without it needs something to be off by more than is stated, that stands in for the candidate, and
-    predicts unseen points just as well: it is set aside, as are nuisances that are the candidate under another name.
-
-    Parameters
-    ----------
-    problem : Problem
-        Observations beside the baseline, with nuisances and candidates.
-    model : Fit
-        A fitted model.
-    less : Fit
-        The same model without the candidate.
-    candidate : Candidate
-        Effect that is tried.
-    """
-    at = [f.assessment.free[f.jacobian.shape[1] :] for f in (model, less)]
-    stand_in = np.flatnonzero((np.abs(at[1]) > STAND_IN) & (np.abs(at[1]) > np.abs(at[0]) + 1.0))
-    gone = sorted({*problem.twins(candidate), *(int(i) for i in stand_in)})
-    unseen = []
-    for one in (model, less):
-        told = assess(problem.basis, without(one, gone), one.assessment.scales) if gone else one.assessment
-        unseen.append(float(np.sum(told.scores())))
-    return Worth(unseen[0] - unseen[1], model.evidence - less.evidence)
-
-
 def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Progress | None = None) -> Search:
     """Look for the effects and terms that unseen points want.
 
@@ -124,11 +87,11 @@ def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Pro
     say = progress or (lambda what, share: None)
     drawn = baseline_fit(problem)
     say("every effect of the library", 0.1)
-    first = columns(run, drawn, problem.pool)
+    first = survey(run, drawn, problem.pool)
     # what is off by two tolerances at once acts no longer to first order: a bearing that is merely off must not need
     # an effect for that
     baseline = settle(run, problem, drawn)
-    hunt = _Hunt(run, problem, settings, drawn, [baseline], *bends(run, drawn, problem.pool, first))
+    hunt = _Hunt(run, problem, settings, drawn, [baseline], first.slopes, first.curved)
     model, singles = hunt.forward(say)
     say("rivals", 0.8)
     rivals: tuple[tuple[Fit, ...], ...] = ()
@@ -145,7 +108,7 @@ def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Pro
     values = tuple(hunt.worth_in(model, i) for i in range(len(model.candidates)))
     effects = hunt.named(model)
     less = tuple(hunt.without(effects, i) for i in range(len(effects.candidates)))
-    return Search(hunt.baseline, model, effects, values, less, first, singles, rivals)
+    return Search(hunt.baseline, model, effects, values, less, first.secants, singles, rivals)
 
 
 def baseline_fit(problem: Problem) -> Fit:
@@ -172,6 +135,7 @@ class _Hunt:
     first: Columns
     curved: Columns
     _known: dict[tuple[int, int], tuple[Fit, Worth]] = field(default_factory=dict, repr=False)
+    _less: dict[tuple[int, int], tuple[Fit, Fit | None]] = field(default_factory=dict, repr=False)
 
     @property
     def baseline(self) -> Fit:
@@ -191,17 +155,25 @@ class _Hunt:
                 tried = sorted([*tried, *self.pairs(singles)], key=lambda f: -f.evidence)
             # what may be off acts otherwise beside a large effect, and a direction between those of the grid does not
             # show its worth: the likeliest are told with derivatives and directions of their own
-            near = [self.refined(f) for f in tried[:FIRST]]
+            lead = self.leading(model, tried[:FIRST])
+            near = self.run.together([functools.partial(self.refined, f) for f in lead])
             tried = [*near, *tried[len(near) :]]
             singles = singles or tuple(self.best(tried))
             chosen = self.chosen(model, tried)
             if chosen is None:
                 break
-            model = self.backward(chosen if any(chosen is f for f in near) else self.refined(chosen))
+            chosen = chosen if any(chosen is f for f in near) else self.refined(chosen)
+            model = self.backward(settle(self.run, self.problem, chosen))
             if len(model.candidates) <= count:
                 break
             table = self.renewed(model)
         return model, singles
+
+    def leading(self, model: Fit, first: Sequence[Fit]) -> list[Fit]:
+        """Those of the first fits that may yet be the best."""
+        best = first[0].evidence if first else 0.0
+        least = best - max(NEAR, HALF * (best - model.evidence))
+        return [f for f in first if f.evidence > least]
 
     def chosen(self, model: Fit, tried: Sequence[Fit]) -> Fit | None:
         """The best that unseen points want; an effect of the library before a generic term that does no better."""
@@ -245,7 +217,7 @@ class _Hunt:
         if less is None:
             return Worth(np.inf, np.inf)
         value = worth(self.problem, model, less, model.candidates[index])
-        if self.enough(value) and less is not self.baseline:
+        if self.enough(value) and less is not self.baseline and value.beside < HOPELESS:
             # what may be off does without the effect all that it can, not to first order only, and from where it
             # stands beside the effect too: else an effect is named for what a tolerance does
             less = settle(self.run, self.problem, less, ROUNDS_ON_THE_WAY)
@@ -254,6 +226,12 @@ class _Hunt:
 
     def without(self, model: Fit, index: int) -> Fit | None:
         """A model without one of its candidates, the others fitted again."""
+        known = self._less.get((id(model), index))
+        if known is None:
+            known = self._less[(id(model), index)] = model, self._without(model, index)
+        return known[1] if len(model.candidates) > 1 else self.baseline
+
+    def _without(self, model: Fit, index: int) -> Fit | None:
         keep = [i for i in range(len(model.candidates)) if i != index]
         start = Start(
             tuple(model.candidates[i] for i in keep), tuple(model.amplitudes[i] for i in keep),
@@ -263,6 +241,8 @@ class _Hunt:
         less = next(iter(self.run(fit, [(start,)])))
         if keep or less is None:
             return less if keep else self.baseline
+        if model.evidence - max(less.evidence, self.baseline.evidence) > HOPELESS:
+            return self.baseline
         # the way from an effect back to nothing may end at a better place than the way from the drawing
         self._nothing[:] = self.best([self.baseline, settle(self.run, self.problem, less)])[:1]
         return self.baseline
@@ -310,7 +290,11 @@ class _Hunt:
             names = {s.candidates for s in first} - known
             ranked = [*ranked, *first, *(s for s in every if s.candidates in names)]
             return self.best(self.fits([with_model(model, s, free, self.curved) for s in ranked]))
-        return self.fits([with_model(model, s, free, self.curved) for s in ranked])
+        starts = [with_model(model, s, free, self.curved) for s in ranked]
+        if model.candidates:
+            known = {s.candidates for s in ranked}
+            starts += [s for s in instead(self.problem, model, free, STAND_IN) if s.candidates[-1:] not in known]
+        return self.fits(starts)
 
     def best(self, fits: Sequence[Fit]) -> list[Fit]:
         """The better fit of every set of candidates, best first."""

@@ -14,7 +14,8 @@ from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.candidates import TERMS
 from tpjb_ident.diagnose.search.fit import Fit
 from tpjb_ident.diagnose.search.problem import Problem
-from tpjb_ident.diagnose.search.search import STAND_IN, Search
+from tpjb_ident.diagnose.search.search import Search
+from tpjb_ident.diagnose.search.worth import STAND_IN
 
 #: A smaller principal value below this share of the larger one makes a term one of one direction.
 ONE_WAY = 0.2

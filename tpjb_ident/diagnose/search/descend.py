@@ -1,0 +1,178 @@
+"""Descend: amplitudes of effects by damped Gauss-Newton steps, everything that may be off following to first order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.diagnose.forward.forward import ForwardModel, NoEquilibriumError
+from tpjb_ident.diagnose.forward.nuisance import predict
+from tpjb_ident.diagnose.search.assessment import Assessment, assess
+from tpjb_ident.diagnose.search.fit import Fit, Start, build, fitted, linear
+from tpjb_ident.diagnose.search.problem import Problem
+
+MAX_STEPS = 4
+#: Share of their tolerances that nuisances have at first.
+TIGHT = 0.2
+#: A fit is settled when a step would move every amplitude by less than this share of its standard error.
+SETTLED = 0.1
+#: A step that loses less than this [nats] is not tried shorter: it loses by its derivative, which is better known after
+#: it, and not by its length.
+HARDLY = 0.3
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where all free numbers stand, and what the model predicts there, (n,)."""
+
+    start: Start
+    prediction: FloatArray
+
+    def cost(self, problem: Problem, weight: FloatArray) -> float:
+        """Squared misfit under noise and model error, plus that of all priors.
+
+        Parameters
+        ----------
+        problem : Problem
+        weight : (n, n) ndarray
+            Inverse of the covariance of noise and model error, in units of `Problem.sigma`.
+        """
+        z = problem.scaled(problem.observations.value - self.prediction)
+        return float(z @ weight @ z + np.sum((self.start.free / self.start.width) ** 2))
+
+
+def fit(forward: ForwardModel, problem: Problem, start: Start) -> Fit | None:
+    """Fit amplitudes; nuisances follow to first order.
+
+    First the effects alone have to do it: far from the answer nuisances, linear as they are here, would bend the way.
+    Then these are as free as stated, the model counting as wrong by what is stated and no more: where it may be wrong
+    by anything, nothing needs to move. Last by what the residual tells.
+
+    Derivatives are corrected along every step (Broyden, Math. Comp. 19 (1965) 577): a step costs one run of the model.
+
+    Parameters
+    ----------
+    forward : ForwardModel
+    problem : Problem
+    start : Start
+
+    Returns
+    -------
+    Fit or None
+        None where the model has no equilibrium near the start.
+    """
+    y = attempt(forward, problem, start)
+    if y is None:
+        return None
+    here = _descended(forward, problem, Place(start, y), problem.basis.stated, TIGHT)
+    here = _descended(forward, problem, here, problem.basis.stated)
+    found = fitted(problem, here.start, here.prediction)
+    there = _descended(forward, problem, here, found.assessment.scales)
+    if there is here:
+        return found
+    other = fitted(problem, there.start, there.prediction, found.assessment.scales)
+    return other if other.evidence > found.evidence else found
+
+
+def _descended(forward: ForwardModel, problem: Problem, here: Place, scales: FloatArray, slack: float = 1.0) -> Place:
+    """Steps at fixed scales of the model's error until no amplitude moves."""
+    for _ in range(MAX_STEPS if here.start.jacobian.shape[1] else 0):
+        found = assess(problem.basis, linear(problem, here.start, here.prediction, slack), scales, fixed=True)
+        now = np.concatenate(here.start.amplitudes)
+        step = np.concatenate(here.start.split(_targets(here.start, found))) - now
+        errors = np.sqrt(np.maximum(np.diag(found.covariance)[: len(now)], 0.0))
+        if np.all(np.abs(step) < SETTLED * errors):
+            break
+        moved = _improved(forward, problem, here, step, found, slack)
+        if moved is None:
+            break
+        here = moved
+    return here
+
+
+def _improved(
+    forward: ForwardModel, problem: Problem, here: Place, step: FloatArray, found: Assessment, slack: float
+) -> Place | None:
+    """The place after a step, or after a part of it, that is better; None if none is."""
+    now = np.concatenate(here.start.amplitudes)
+    for share in (1.0, 0.4, 0.1):
+        trial = replace(here.start, amplitudes=here.start.split(now + share * step))
+        y = attempt(forward, problem, trial)
+        if y is None:
+            continue
+        taken = np.concatenate(trial.amplitudes) - now
+        trial = replace(trial, jacobian=_corrected(here.start, y - here.prediction, taken))
+        told = assess(problem.basis, linear(problem, trial, y, slack), found.scales, fixed=True)
+        if told.evidence > found.evidence:
+            return Place(trial, y)
+        if found.evidence - told.evidence < HARDLY:
+            break
+    return None
+
+
+def _targets(start: Start, found: Assessment) -> FloatArray:
+    count = start.jacobian.shape[1]
+    return np.concatenate([c.origin for c in start.candidates]) + found.free[:count]
+
+
+def _corrected(start: Start, change: FloatArray, step: FloatArray) -> FloatArray:
+    """Broyden's update, amplitudes measured in their prior widths."""
+    width = np.concatenate([c.width for c in start.candidates])
+    scaled = step / width
+    length = float(scaled @ scaled)
+    if length < 1e-20:
+        return start.jacobian
+    return np.asarray(start.jacobian + np.outer(change - start.jacobian @ step, scaled / length) / width)
+
+
+def attempt(forward: ForwardModel, problem: Problem, start: Start) -> FloatArray | None:
+    """Predict; None where the model has no equilibrium.
+
+    Parameters
+    ----------
+    forward : ForwardModel
+    problem : Problem
+    start : Start
+        Where all free numbers stand.
+    """
+    try:
+        return predict(forward, build(start.candidates, start.amplitudes), problem.nuisances, start.nuisance)
+    except NoEquilibriumError:
+        return None
+
+
+def slope(forward: ForwardModel, problem: Problem, start: Start, y: FloatArray, index: int, share: float) -> FloatArray:
+    """Change of the prediction per unit of one amplitude, by a one-sided difference that stays inside the bounds.
+
+    Parameters
+    ----------
+    forward : ForwardModel
+    problem : Problem
+    start : Start
+    y : (n,) ndarray
+        The prediction there.
+    index : int
+        Of the amplitude.
+    share : float
+        Step, in typical sizes.
+
+    Returns
+    -------
+    (n,) ndarray
+        Zero where the model has no equilibrium on either side.
+    """
+    flat = np.concatenate(start.amplitudes)
+    size = share * np.concatenate([c.steps for c in start.candidates])[index]
+    for signed in (size, -size, 0.1 * size, -0.1 * size):
+        moved = flat.copy()
+        moved[index] += signed
+        trial = replace(start, amplitudes=start.split(moved))
+        taken = np.concatenate(trial.amplitudes)[index] - flat[index]
+        if taken == 0.0:
+            continue
+        other = attempt(forward, problem, trial)
+        if other is not None:
+            return np.asarray((other - y) / taken)
+    return np.zeros_like(y)
