@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import t as student_t
 
@@ -328,12 +329,36 @@ def test_the_command_writes_h_over_the_band_whole(tmp_path):
     assert result.exit_code == 0, result.output
     written = {p.name for p in (tmp_path / "out").iterdir()}
     assert {"frf.csv", "frf.parquet", "frf_estimators.csv", "frf_models.csv", "run.json"} <= written
-    assert "coefficients.csv" not in written
     assert "models over the band" in result.output
-    again = tpjb("compare", path, "--out", tmp_path / "compared")
-    assert again.exit_code == 2
-    assert "band only" in again.output
+    rows = pd.read_csv(tmp_path / "out" / "coefficients.csv")
+    assert len(rows) == 8
+    assert set(rows["method"]) == {"band-periods"}
+    exported = tpjb("export", tmp_path / "out", "--to", "ross", "--out", tmp_path / "ross")
+    assert exported.exit_code == 0, exported.output
     assert tpjb("check", path, "--out", tmp_path / "checked").exit_code == 0
+
+
+@pytest.mark.slow
+def test_a_band_is_compared_and_stands_beside_sines(tmp_path):
+    """Parts of the band at their middles: as independent as runs with sines, and sorted among them."""
+    path = tmp_path / "both.h5"
+    write_band_campaign(path, BandRig(kind="random", seconds=8.0), band_plans(), 90004)
+    result = identify(load_campaign(path))
+    assert len(result.points) == 8
+    assert result.systematic.shape == (64, 64)
+    frequencies = [p.point.excitation_hz for p in result.points]
+    assert frequencies == sorted(frequencies)
+    rig = BandRig()
+    inside = []
+    for p in result.points:
+        h = stiffness(rig.bearing, np.array([p.stiffness.omega]), 5000.0)[0]
+        away = p.stiffness.vector - np.concatenate([h.real.ravel(), h.imag.ravel()])
+        inside.append(np.abs(away) <= p.stiffness.half_width())
+    assert np.mean(inside) > 0.88
+    compared = tpjb("compare", path, "--pivots", "rigid", "--out", tmp_path / "compared")
+    assert compared.exit_code in (0, 3), compared.output
+    table = pd.read_csv(tmp_path / "compared" / "comparison.csv")
+    assert set(table["excitation_Hz"]) == set(frequencies)
 
 
 @pytest.mark.slow

@@ -242,10 +242,6 @@ def _check(campaign: Campaign, settings: CompareSettings) -> None:
         raise ComparisonError(f"pivot model {unknown[:1]} is not known; use some of {', '.join(VARIANTS)}")
     if not campaign.of_kind("dynamic"):
         raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to compare")
-    if all(run.excitation_kind != "sine" for run in campaign.of_kind("dynamic")):
-        raise ComparisonError(
-            f"campaign {campaign.id} is excited over a band only; a comparison takes runs with a sine"
-        )
 
 
 def _labelled(progress: Progress, label: str) -> Progress:

@@ -179,8 +179,6 @@ def measure_campaign(
     tell = progress or (lambda text, done, total: None)
     if not campaign.of_kind("dynamic"):
         raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to diagnose")
-    if all(run.excitation_kind != "sine" for run in campaign.of_kind("dynamic")):
-        raise ComparisonError(f"campaign {campaign.id} is excited over a band only; a diagnosis takes runs with a sine")
     least = min(pad.assembled_clearance for pad in bearing.pads)
     chosen = replace(estimator or IdentifySettings(), clearance=least)
     found = identify(campaign, chosen, lambda text, done, total: tell(f"identifying, {text}", 20 * done, 100 * total))

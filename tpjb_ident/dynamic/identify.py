@@ -86,22 +86,37 @@ def identify(
     tell = progress or (lambda text, done, total: None)
     settings = _with_mains(settings, campaign)
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
-    bands = IdentifiedBands()
+    bands = None
     if any(is_broadband(run) for run in runs):
         rig = measured_baseline(campaign, settings.phasors, own_method(settings.method))
         bands = identify_bands(campaign, _band_settings(settings), tell, rig)
     if not sines.of_kind("dynamic"):
-        empty = np.zeros((settings.n_calibration, 0))
-        return Identification(campaign.id, settings.method, (), empty, bands.conditions, bands.results)
+        empty = Identification(campaign.id, settings.method, (), np.zeros((settings.n_calibration, 0)))
+        return empty if bands is None else _with_bands(empty, bands)
     with all_runs(sines, settings.phasors, tell, workers, store) as finished:
         found = assemble(sines, finished, settings, tell)
+    return found if bands is None else _with_bands(found, bands)
+
+
+def _with_bands(found: Identification, bands: IdentifiedBands) -> Identification:
+    """The points of sines and those of bands together, sorted as ever."""
+    points = [*found.points, *(p for band in bands.results for p in band.points)]
+    changes = np.concatenate([found.calibration_changes, bands.changes], axis=1).reshape(-1, len(points), 8)
+    order = sorted(range(len(points)), key=lambda i: points[i].point)
     told = {c.sentence(): c for c in (*found.conditions, *bands.conditions)}
-    return replace(found, conditions=tuple(told.values()), bands=bands.results)
+    return replace(
+        found,
+        points=tuple(points[i] for i in order),
+        calibration_changes=changes[:, order].reshape(len(changes), -1),
+        conditions=tuple(told.values()),
+        bands=bands.results,
+    )
 
 
 def _band_settings(settings: IdentifySettings) -> BandSettings:
     phasors = settings.phasors
-    return BandSettings(phasors.lines.mains, phasors.delays, settings.correct, settings.n_calibration, settings.seed)
+    lines, draws = phasors.lines.mains, (settings.n_calibration, settings.seed)
+    return BandSettings(lines, phasors.delays, settings.correct, *draws, settings.clearance)
 
 
 def _with_mains(settings: IdentifySettings, campaign: Campaign) -> IdentifySettings:

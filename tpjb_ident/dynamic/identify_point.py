@@ -25,6 +25,7 @@ from tpjb_ident.dynamic.results.quality import (
 )
 from tpjb_ident.dynamic.runs.nominal_drive import nominal_drive
 from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.dynamic.runs.temperatures import pad_means
 from tpjb_ident.dynamic.settings import IdentifySettings
 
 
@@ -236,15 +237,3 @@ def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[
     if not found:
         return ()
     return (Condition("methods-disagree", f"{', '.join(found)} away from {default}"),)
-
-
-def pad_means(runs: list[dict[int, float]]) -> dict[int, float]:
-    """Mean temperature by pad over the runs that have it [K].
-
-    Parameters
-    ----------
-    runs : list of dict
-        Temperature by pad number, per run.
-    """
-    pads = sorted({pad for run in runs for pad in run})
-    return {pad: float(np.mean([run[pad] for run in runs if pad in run])) for pad in pads}

@@ -72,6 +72,7 @@ class Tally:
 
     inside: list[float] = field(default_factory=list)
     model_inside: list[float] = field(default_factory=list)
+    points_inside: list[float] = field(default_factory=list)
     width: list[float] = field(default_factory=list)
     model_width: list[float] = field(default_factory=list)
     bias_h1: list[float] = field(default_factory=list)
@@ -103,6 +104,11 @@ class Tally:
         if len(h1):
             self.bias_h1.append(float(np.mean((h1 / h[: len(h1), 1, 1]).real)) - 1)
         self.bias.append(float(np.mean((result.h[:, 1, 1] / h[:, 1, 1]).real)) - 1)
+        for point in result.points:
+            est = point.stiffness
+            known = stiffness(rig.bearing, np.array([est.omega]), load)[0]
+            truth = np.concatenate([known.real.ravel(), known.imag.ravel()])
+            self.points_inside.append(float(np.mean(np.abs(est.vector - truth) <= est.half_width())))
         model = result.models.get("K-C-M")
         if model is not None:
             known = true_parameters(rig, load)
@@ -120,11 +126,10 @@ class Tally:
             return f"{100 * np.mean(values):+.1f}" if values else "-"
 
         told = f"{self.refused} of {self.results}"
-        return (
-            f"| {name} | `{self.method}` | {self.lines} | {share(self.inside)} | {share(self.width)} | "
-            f"{signed(self.bias_h1)} | {signed(self.bias)} | {share(self.model_inside)} | {share(self.model_width)} | "
-            f"{self.models_refused} | {told} |"
-        )
+        cells = [name, f"`{self.method}`", str(self.lines), share(self.inside), share(self.width)]
+        cells += [signed(self.bias_h1), signed(self.bias), share(self.points_inside), share(self.model_inside)]
+        cells += [share(self.model_width), str(self.models_refused), told]
+        return f"| {' | '.join(cells)} |"
 
 
 def true_parameters(rig: BandRig, load: float) -> np.ndarray:
@@ -157,9 +162,9 @@ def main() -> None:
     options.add_argument("--first-seed", type=int, default=7000)
     options.add_argument("--only", default="")
     given = options.parse_args()
-    print("| excitation | method | lines | h inside % | half width % | H1 kyy % | kyy % | K-C-M inside % | kyy +- % | "
-          "refused | told |")  # fmt: skip
-    print("|---|---|---|---|---|---|---|---|---|---|---|")
+    names = ["excitation", "method", "lines", "h inside %", "half width %", "H1 kyy %", "kyy %", "points inside %"]
+    print(f"| {' | '.join([*names, 'K-C-M inside %', 'kyy +- %', 'refused', 'told'])} |")
+    print("|" + "---|" * 12)
     for row in band_rows():
         if given.only in row.name:
             tally = run_row(row, range(given.first_seed, given.first_seed + given.seeds))

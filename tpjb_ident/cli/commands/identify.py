@@ -315,6 +315,5 @@ def refuse_untrusted(result: Identification) -> None:
         raise NotTrustedError("; ".join(lost))
     if bad:
         more = f"\n... and {len(bad) - 5} more" if len(bad) > 5 else ""
-        raise NotTrustedError(
-            f"{len(bad)} of {len(result.points) + len(result.bands)} points:\n" + "\n".join([*bad[:5], *lost]) + more
-        )
+        of = len(result.points) + sum(not band.points for band in result.bands)
+        raise NotTrustedError(f"{len(bad)} of {of} points:\n" + "\n".join([*bad[:5], *lost]) + more)

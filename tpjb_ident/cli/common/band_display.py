@@ -71,7 +71,7 @@ def _lines(result: Identification) -> None:
 
 
 def refused_bands(bands: Sequence[BandResult]) -> list[str]:
-    """What forbids trust in points that were excited over a band, one line each.
+    """What forbids trust in bands that give no points, one line each; where there are points, they say it.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def refused_bands(bands: Sequence[BandResult]) -> list[str]:
     found = []
     for band in bands:
         serious = sentences(untrusted(band.quality))
-        if serious or not band.lines:
+        if not band.points and (serious or not band.lines):
             why = "; ".join(serious) or "no line stands clear of the noise"
             found.append(f"{band.point.static_load / 1e3:g} kN, {band.kind}: {why}")
     return found

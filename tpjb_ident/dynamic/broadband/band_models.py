@@ -30,6 +30,39 @@ ROUNDS = 3
 
 
 @dataclass(frozen=True)
+class BandPart:
+    """h in a part of the band, by the lines of that part alone; a model only says how h changes within it.
+
+    Attributes
+    ----------
+    omega : float
+        Mean of its lines [rad/s].
+    h : (2, 2) complex ndarray
+        [N/m]
+    covariance : (8, 8) ndarray
+        Random part, of Re and Im of h; parts share no line, so theirs have nothing in common.
+    dof : (8,) ndarray
+    moved : (n, 8) ndarray
+        Change in every draw of what lines share [N/m].
+    span : (float, float)
+        Lowest and highest of its lines [rad/s].
+    bracket : (8,) ndarray
+        Half the way between two estimates that truth lies between; zero where there is one [N/m].
+    off : (8,) ndarray
+        h of the part less that of the model [N/m].
+    """
+
+    omega: float
+    h: ComplexArray
+    covariance: FloatArray = field(repr=False)
+    dof: FloatArray = field(repr=False)
+    moved: FloatArray = field(repr=False)
+    span: tuple[float, float]
+    bracket: FloatArray = field(repr=False)
+    off: FloatArray = field(repr=False)
+
+
+@dataclass(frozen=True)
 class BandModel:
     """One model over the lines of a band.
 
@@ -51,6 +84,8 @@ class BandModel:
     band : (float, float)
         Lowest and highest line [Hz].
     n_lines : int
+    parts : tuple of BandPart
+        What it was held against, rising in frequency; empty where some could not be solved.
     """
 
     model: str
@@ -64,6 +99,7 @@ class BandModel:
     misfit: float
     band: tuple[float, float]
     n_lines: int
+    parts: tuple[BandPart, ...] = field(default=(), repr=False)
 
     @property
     def refused(self) -> bool:
@@ -154,7 +190,8 @@ def fit_band(rows: Sequence[LineRows], model: str, instrument: str, shared: Shar
         return None
     covariance, dof = _covariance(sums, found)
     moved = _moved(sums, found, shared)
-    chi_square, spare, probability, misfit = _held_against(rows, found, middle, basis, instrument)
+    parts = _parts(rows, (found, middle, basis), instrument, shared)
+    chi_square, spare, probability, misfit = _held_against(parts, 2 * found.theta.shape[1])
     scale = np.repeat(1 / middle ** np.arange(m), 4)
     outer = np.outer(scale, scale)
     order = _by_kind(m)
@@ -170,6 +207,7 @@ def fit_band(rows: Sequence[LineRows], model: str, instrument: str, shared: Shar
         misfit,
         (float(omegas.min()) / (2 * np.pi), float(omegas.max()) / (2 * np.pi)),
         len(rows),
+        parts,
     )
 
 
@@ -241,33 +279,47 @@ def _moved(sums: list[list[RunSums]], found: _Solution, shared: Shared) -> Float
     return np.asarray(right @ found.inverse.T)
 
 
-def _held_against(
-    rows: Sequence[LineRows], found: _Solution, middle: float, basis: Basis, instrument: str
-) -> tuple[float, int, float, float]:
-    """Chi-square, degrees of freedom, probability and misfit of the model in parts of the band."""
-    parts = [p for p in np.array_split(np.arange(len(rows)), min(PARTS, len(rows) // 2)) if len(p)]
-    q = found.theta.shape[1]
-    spare = 8 * len(parts) - 2 * q
-    total, squares, noise_dof = 0.0, [], 0.0
-    for part in parts:
-        left = [_left(rows[k], found.theta, middle, basis) for k in part]
-        sums = [line_sums(line, middle, complex_h, instrument) for line in left]
+def _parts(
+    rows: Sequence[LineRows], model: tuple[_Solution, float, Basis], instrument: str, shared: Shared
+) -> tuple[BandPart, ...]:
+    """H in parts of the band; none where one of them cannot be solved."""
+    found, middle, basis = model
+    order = _by_kind(2)
+    parts = []
+    for part in np.array_split(np.arange(len(rows)), min(PARTS, len(rows) // 2)):
+        sums = [line_sums(_left(rows[k], found.theta, middle, basis), middle, complex_h, instrument) for k in part]
         alone = _solve(sums)
         if alone is None:
-            return float("nan"), 0, 1.0, float("nan")
+            return ()
         covariance, dof = _covariance(sums, alone)
-        x = alone.theta.ravel()
-        nu = float(np.median(dof))
+        omega = float(np.mean([rows[k].omega for k in part]))
+        by_model = np.einsum("s,isj->ij", basis(np.array([omega / middle]))[0], found.theta.reshape(2, -1, 2))
+        off = alone.theta.ravel()[order]
+        h = by_model + (off[:4] + 1j * off[4:]).reshape(2, 2)
+        own = replace(shared, lines=shared.lines[part])
+        moved = _moved(sums, replace(alone, theta=np.concatenate([h.real, h.imag], axis=1)), own)[:, order]
+        covariance = covariance[np.ix_(order, order)]
+        span = (rows[part[0]].omega, rows[part[-1]].omega)
+        parts.append(BandPart(omega, h, covariance, dof[order], moved, span, np.zeros(8), off))
+    return tuple(parts)
+
+
+def _held_against(parts: Sequence[BandPart], unknowns: int) -> tuple[float, int, float, float]:
+    """Chi-square, degrees of freedom, probability and misfit of the model in parts of the band."""
+    if not parts:
+        return float("nan"), 0, 1.0, float("nan")
+    spare = 8 * len(parts) - unknowns
+    total, squares, noise_dof = 0.0, [], 0.0
+    for part in parts:
+        x, nu = part.off, float(np.median(part.dof))
         # a measured covariance of nu degrees of freedom, inverted, is too large by nu / (nu - p - 1) on average
-        total += float(x @ np.linalg.solve(covariance, x)) * max(1 - (len(x) + 1) / nu, 0.1)
-        mean = float(np.mean([rows[k].omega for k in part])) / middle
-        h = np.einsum("s,isj->ij", basis(np.array([mean]))[0], found.theta.reshape(2, -1, 2))
-        squares.append((float(x @ x) - float(np.trace(covariance))) / float(np.sum(np.abs(h) ** 2)))
+        total += float(x @ np.linalg.solve(part.covariance, x)) * max(1 - (len(x) + 1) / nu, 0.1)
+        size = float(np.sum(np.abs(part.h) ** 2))
+        squares.append((float(x @ x) - float(np.trace(part.covariance))) / size)
         noise_dof += nu
-    if spare <= 0:
-        return total, 0, 1.0, float(np.sqrt(max(*squares, 0.0)))
-    probability = float(f_distribution.sf(total / spare, spare, noise_dof))
-    return total, spare, probability, float(np.sqrt(max(*squares, 0.0)))
+    misfit = float(np.sqrt(max(*squares, 0.0)))
+    probability = float(f_distribution.sf(total / spare, spare, noise_dof)) if spare > 0 else 1.0
+    return total, max(spare, 0), probability, misfit
 
 
 def _left(line: LineRows, theta: FloatArray, middle: float, basis: Basis) -> LineRows:
@@ -296,6 +348,17 @@ def between(low: BandModel, high: BandModel) -> BandModel:
         chi_square=unjudged,
         probability=unjudged,
         misfit=unjudged,
+        parts=tuple(_middle(a, b) for a, b in zip(low.parts, high.parts)),
+    )
+
+
+def _middle(low: BandPart, high: BandPart) -> BandPart:
+    half = 0.5 * (high.h - low.h)
+    return replace(
+        low,
+        h=low.h + half,
+        covariance=np.diag(np.maximum(np.diag(low.covariance), np.diag(high.covariance))),
+        bracket=np.concatenate([half.real.ravel(), half.imag.ravel()]),
     )
 
 

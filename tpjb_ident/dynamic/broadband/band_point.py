@@ -46,6 +46,8 @@ class BandSettings:
         Bring every run to its set-point load where the campaign's loads tell the slope.
     n_calibration, seed : int
         Draws of what lines share, and their seed.
+    clearance : float or None
+        Assembled [m], for the amplitude check.
     """
 
     mains: float = 50.0
@@ -53,6 +55,7 @@ class BandSettings:
     correct: bool = True
     n_calibration: int = 400
     seed: int = 20190722
+    clearance: float | None = None
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.broadband.band_models import BandModel
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES, DynamicStiffness
+from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.schema import KINDS, STATIC_COLUMNS
 
 if TYPE_CHECKING:
@@ -71,6 +72,8 @@ class BandResult:
         Of the excitation [s].
     resolution : float
         Width of a line [Hz].
+    points : tuple of PointResult
+        K and C in parts of the band, as of sines at their middles; none where the lines do not give them.
     """
 
     point: OperatingPoint
@@ -82,6 +85,7 @@ class BandResult:
     runs: tuple[str, ...]
     period: float | None
     resolution: float
+    points: tuple[PointResult, ...] = field(default=(), repr=False)
 
     @property
     def frequencies(self) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.check.redundant_channels import widened
 from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.broadband.band_coefficients import band_points
 from tpjb_ident.dynamic.broadband.band_models import MODELS, BandModel, Shared, between, fit_band, supported
 from tpjb_ident.dynamic.broadband.band_point import BandPoint, BandSettings, read_point
 from tpjb_ident.dynamic.broadband.band_result import BandLine, BandResult
@@ -41,11 +42,14 @@ class IdentifiedBands:
     Attributes
     ----------
     results : tuple of BandResult
+    changes : (n, 8 P) ndarray
+        What n draws of systematic errors do to all P points of the results, in their order [N/m].
     conditions : tuple of Condition
         Of the campaign: runs that take no part, points that lost all of theirs, calibrations that are not stated.
     """
 
-    results: tuple[BandResult, ...] = ()
+    results: tuple[BandResult, ...]
+    changes: FloatArray = field(repr=False)
     conditions: tuple[Condition, ...] = ()
 
 
@@ -86,13 +90,19 @@ def identify_bands(
     first = [[estimate_line(point.rows(k), classic=False) for k in range(len(point.plan.bins))] for point in points]
     channels = widened(campaign.channels, checked.gains)
     sources = shared_sources(replace(campaign, channels=channels), settings.n_calibration, settings.seed)
-    results = []
+    results, changes = [], []
     for i, point in enumerate(points):
         slopes = _slopes(points, first, i) if settings.correct else None
         told = load_conditions(misses[i], common) + zero.conditions()
         told += check_conditions(checked, [s.phasors.run for s in point.spectra]) + _without(point, left)
-        results.append(_finish(point, misses[i], slopes, sources, told))
-    return IdentifiedBands(tuple(results), named_runs(left, len(runs)) + _lost(points, left) + sources.conditions())
+        result = _finish(point, misses[i], slopes, sources, told)
+        own, moved = band_points(point, result, misses[i], settings.clearance)
+        results.append(replace(result, points=own))
+        changes.append(moved if len(own) else np.empty((len(sources.load), 0)))
+    joint = np.concatenate(changes, axis=1)
+    return IdentifiedBands(
+        tuple(results), joint, named_runs(left, len(runs)) + _lost(points, left) + sources.conditions()
+    )
 
 
 def _observed(runs: tuple[Run, ...], progress: Progress) -> Iterator[Observation]:

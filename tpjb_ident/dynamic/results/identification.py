@@ -136,7 +136,7 @@ class Identification(Presented):
                 place = f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz"
                 places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
         for band in self.bands:
-            for condition in band.quality:
+            for condition in () if band.points else band.quality:
                 place = f"{band.point.static_load / 1e3:g} kN, {band.kind}"
                 places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
         for name, found in places.items():

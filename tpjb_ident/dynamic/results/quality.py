@@ -121,14 +121,7 @@ def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> tup
     found += _missing(data)
     if len(data.runs) and data.runs[0].acceleration is None and np.isfinite(stiffness.h).all():
         found.append(_inertia_left(data.runs[0].housing_mass, stiffness.omega))
-    if _feeds_motion(stiffness):
-        found.append(
-            Condition(
-                "negative-damping",
-                "the film would feed the motion instead of damping it: check polarity, axes and sign of forces",
-            )
-        )
-    return tuple(found)
+    return (*found, *feeds_motion(stiffness))
 
 
 def _inertia_left(mass: float, omega: float) -> Condition:
@@ -157,14 +150,21 @@ def _missing(data: PointData) -> list[Condition]:
     return []
 
 
-def _feeds_motion(stiffness: DynamicStiffness) -> bool:
-    """Whether the dissipative part of H (its skew-Hermitian part) is negative beyond doubt."""
+def feeds_motion(stiffness: DynamicStiffness) -> tuple[Condition, ...]:
+    """Say where the dissipative part of H (its skew-Hermitian part) is negative beyond doubt.
+
+    Parameters
+    ----------
+    stiffness : DynamicStiffness
+    """
     h = stiffness.h
     if not np.isfinite(h).all():
-        return False
-    dissipative = (h - h.conj().T) / 2j
+        return ()
     doubt = 3 * float(stiffness.standard_error[4:].max())
-    return bool(np.linalg.eigvalsh(dissipative)[0] < -doubt)
+    if not np.linalg.eigvalsh((h - h.conj().T) / 2j)[0] < -doubt:
+        return ()
+    told = "the film would feed the motion instead of damping it: check polarity, axes and sign of forces"
+    return (Condition("negative-damping", told),)
 
 
 def directional_pattern(data: PointData, weights: FloatArray) -> Condition | None:

@@ -27,12 +27,11 @@ from tpjb_ident.dynamic.runs.left_out import LeftOut
 from tpjb_ident.dynamic.runs.point_data import point_of
 from tpjb_ident.dynamic.runs.run_result import RunResult
 from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
+from tpjb_ident.dynamic.runs.temperatures import mean_temperatures
 from tpjb_ident.dynamic.spectral_lines.windows import RecordTooShortError
 from tpjb_ident.runtime.executors import InProcessWorkers, Workers, each_finished
 
 Progress = Callable[[str, int, int], None]
-#: Samples from which a run's temperatures are taken.
-TEMPERATURE_SAMPLES = 2**17
 
 
 def all_runs(
@@ -188,21 +187,3 @@ def _mended(run: Run) -> tuple[Condition, ...]:
     problems = run.reader.problems() if hasattr(run, "reader") else ()
     mended = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
     return (Condition("record-damaged", "; ".join(mended)),) if mended else ()
-
-
-def mean_temperatures(run: Run) -> dict[int, float]:
-    """Mean temperature per pad over a run [K]; pads with several sensors give their mean.
-
-    Parameters
-    ----------
-    run : Run
-    """
-    found: dict[int, list[float]] = {}
-    for sensor in run.temperatures():
-        if sensor.pad is None:
-            continue
-        values = run.record(sensor.channel, 0, TEMPERATURE_SAMPLES).values
-        known = values[np.isfinite(values)]
-        if len(known):
-            found.setdefault(sensor.pad, []).append(float(known.mean()))
-    return {pad: float(np.mean(values)) for pad, values in sorted(found.items())}

@@ -27,6 +27,7 @@ from tpjb_ident.dynamic.records.oil_force import oil_force
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.raw_look import look_at_readings
 from tpjb_ident.dynamic.records.run_data import RunPhasors
+from tpjb_ident.dynamic.runs.temperatures import mean_temperatures
 from tpjb_ident.dynamic.spectral_lines.lines import Line, LineSet
 
 #: Kinds that may repeat themselves; those that never do are not asked.
@@ -53,8 +54,10 @@ class RunSpectra:
     disturbances : tuple of Disturbance
     period : float or None
         [s]; None where nothing repeats.
-    mean_load : (2,) ndarray
-        Mean cell force [N].
+    mean_load, position : (2,) ndarray
+        Mean cell force [N], and mean displacement from the probes' zero [m].
+    temperatures : dict of int to float
+        Mean per pad [K].
     start : float
         Standard deviation of the cells' start against the probes' [s], where their clocks differ.
     """
@@ -69,7 +72,14 @@ class RunSpectra:
     disturbances: tuple[Disturbance, ...]
     period: float | None
     mean_load: FloatArray
+    position: FloatArray
+    temperatures: dict[int, float]
     start: float = 0.0
+
+    @property
+    def amplitude(self) -> float:
+        """Of a sine that moves the shaft as much as all bins of the band together do [m]."""
+        return float(np.sqrt(np.sum(np.mean(np.abs(self.D) ** 2, axis=0))))
 
 
 @dataclass(frozen=True)
@@ -129,10 +139,11 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
     with run.kept_open():
         slower, told = look_at_readings(run)
         samples = read_samples(run, settings.seconds)
+        temperatures = mean_temperatures(run)
     if settings.band[1] >= 0.45 * samples.rate:
         what = f"the band reaches {settings.band[1]:g} Hz, more than 0.45 of the sample rate of {samples.rate:g} Hz"
         raise _error(run, "excitation_band", what, "Sample faster, or excite lower frequencies")
-    mean_load = samples.values["force"].mean(axis=1)
+    means = samples.values["force"].mean(axis=1), samples.values["displacement"].mean(axis=1)
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.mains, settings.band[1])
     samples, clocks = with_one_clock(samples, settings.clocks), settings.clocks
     period = _period(run, samples, settings.band, lines)
@@ -161,7 +172,8 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
         bins_taken(frequencies, lines, length / clean.rate, LEFT_OUT if period is None else LEFT_OUT_OF_PERIOD),
         lines,
         None if period is None else length / clean.rate,
-        mean_load,
+        *means,
+        temperatures,
         START / samples.rate if "force" in clocks else 0.0,
     )
 
