@@ -9,12 +9,16 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numba
 from numba import njit
+
+from model.pad.store import cache_folder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -53,8 +57,18 @@ OPTIONS: dict[str, Any] = {
 #: Where nothing can be written: a read-only installation and a user without a home, as services and containers have.
 _NO_PLACE = (
     "there is no folder to keep the model's machine code in, so every process compiles it again, which takes half a "
-    "minute: set NUMBA_CACHE_DIR to a folder that can be written"
+    "minute: set TPJB_CACHE to a folder that can be written"
 )
+
+
+def _place() -> None:
+    """Keep machine code under TPJB_CACHE where that is set, and NUMBA_CACHE_DIR says nothing else."""
+    folder = cache_folder()
+    if os.environ.get("TPJB_CACHE") and folder is not None and "NUMBA_CACHE_DIR" not in os.environ:
+        numba.config.CACHE_DIR = str(folder / "compiled")
+
+
+_place()
 
 
 def _stamp() -> str:

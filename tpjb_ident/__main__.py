@@ -21,7 +21,7 @@ def _run_as_folder():  # type: () -> None
         sys.path.insert(0, bootstrap_folder)
         import bootstrap
 
-        bootstrap.run("tpjb_ident", sys.argv[1:])
+        bootstrap.run("tpjb_ident", sys.argv[1:], ("view", "formats"))
     sys.path.insert(0, os.path.dirname(here))  # the folder of an installed copy: nothing to set up
 
 

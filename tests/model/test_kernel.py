@@ -56,7 +56,7 @@ def test_without_numbas_cache_the_code_is_compiled_anew(monkeypatch):
 def test_where_nothing_can_be_written_the_code_is_compiled_and_the_cure_is_told(monkeypatch):
     monkeypatch.setattr(numba.core.caching.CacheImpl, "_locator_classes", [])
     compilation._tell.cache_clear()
-    with pytest.warns(RuntimeWarning, match="NUMBA_CACHE_DIR") as told:
+    with pytest.warns(RuntimeWarning, match="TPJB_CACHE") as told:
         twice, thrice = compilation.compiled(lambda x: 2.0 * x), compilation.compiled(lambda x: 3.0 * x)
     assert (twice(3.0), thrice(3.0)) == (6.0, 9.0)
     assert len(told) == 1
@@ -69,3 +69,16 @@ def test_other_troubles_of_the_compiler_are_not_taken_for_that(monkeypatch):
     monkeypatch.setattr(compilation, "njit", broken)
     with pytest.raises(RuntimeError, match="another"):
         compilation.compiled(compilation._stamp)
+
+
+@pytest.mark.parametrize(
+    ("chosen", "numbas", "under"), [("own", None, "own/compiled"), ("own", "other", None), ("off", None, None)]
+)
+def test_one_variable_moves_the_machine_code_too(monkeypatch, tmp_path, chosen, numbas, under):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.setenv("TPJB_CACHE", "off" if chosen == "off" else str(tmp_path / chosen))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    if numbas:
+        monkeypatch.setenv("NUMBA_CACHE_DIR", numbas)
+    compilation._place()
+    assert (numba.config.CACHE_DIR or None) == (under and str(tmp_path / under))

@@ -86,9 +86,9 @@ def test_it_is_made_again_when_something_changed(bootstrap, monkeypatch, change)
 @pytest.mark.parametrize(
     ("works", "uv", "expected"),
     [
-        ("venv pip", None, "{venv} -m pip install"),
-        ("ensurepip", None, "{venv} -m pip install"),
-        ("host pip", None, "{host} -m pip --python {venv} install"),
+        ("venv pip", None, "{venv} -m pip install --no-compile"),
+        ("ensurepip", None, "{venv} -m pip install --no-compile"),
+        ("host pip", None, "{host} -m pip --python {venv} install --no-compile"),
         ("", "/usr/bin/uv", "/usr/bin/uv pip install --python {venv}"),
         ("", None, None),
     ],

@@ -5,19 +5,19 @@
 One campaign of the virtual rig (rocker bearing, short plan, seed 1) is written as a German catman ASCII with two rates,
 as TDMS in volts, as UFF data set 58, as a MATLAB matrix with ChannelNames, as CSV with ISO 8601 stamps and as LabVIEW
 .lvm. Every folder holds records and the bearing's file, nothing else. What a person types is here: commands, and lines
-of the drafted manifest. Printed: commands typed, lines edited by hand, minutes of the commands, largest difference of a
+of the drafted manifest. Printed: commands typed, lines edited by hand, processor minutes of the commands, largest difference of a
 direct stiffness from what the campaign gives as it was simulated; ``--docs`` puts the table into the tutorial.
 """
 
 from __future__ import annotations
 
 import difflib
+import os
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
-import time
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ SLOW = 20  # samples of the fast clock per temperature
 MOST_LINES = 10
 PAGE = ROOT / "docs" / "guide" / "tutorial.md"
 BEGIN, END = "<!-- laboratories: begin -->\n", "<!-- laboratories: end -->"
-HEAD = "| export | commands | lines edited | minutes | K beside the simulated records |\n|---|---|---|---|---|\n"
+HEAD = "| export | commands | lines edited | processor minutes | K beside the simulated records |\n|---|---|---|---|---|\n"
 Table = dict[str, np.ndarray]
 #: What a person fills in: (channel or table, key) -> value, "" deletes the mark of comment before the key.
 Edits = Mapping[tuple[str, str], str]
@@ -244,10 +244,12 @@ def edited_lines(before: str, after: str) -> int:
 
 
 def type_in(*words: str) -> tuple[float, str, int]:
-    """Run `tpjb words`; seconds, what it printed, exit code."""
-    began = time.monotonic()
+    """Run `tpjb words`; seconds of processor time, what it printed, exit code."""
+    began = os.times()
     done = subprocess.run([sys.executable, "-m", "tpjb_ident", *words], capture_output=True, text=True, cwd=ROOT)
-    return time.monotonic() - began, done.stdout + done.stderr, done.returncode
+    ended = os.times()
+    seconds = ended.children_user + ended.children_system - began.children_user - began.children_system
+    return seconds, done.stdout + done.stderr, done.returncode
 
 
 def through(laboratory: Laboratory, campaign: Campaign, folder: Path) -> dict[str, object]:

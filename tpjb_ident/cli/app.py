@@ -24,6 +24,12 @@ from tpjb_ident.cli.commands.view import view
 from tpjb_ident.cli.commands.watch import watch
 from tpjb_ident.cli.common.registration import add_command
 
+#: What is written outside --out.
+CACHES = (
+    "Results go into --out. Outside it only caches are kept: pad solutions in the user's cache folder (at most 200 MB), "
+    "the model's machine code beside the program (35 MB). The variable TPJB_CACHE names another folder for both; "
+    "TPJB_CACHE=off keeps no pad solutions."
+)
 # plain help: the markup renderer costs more start-up time than all the rest together
 app = typer.Typer(
     name="tpjb",
@@ -31,6 +37,7 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
+    epilog=CACHES,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 

@@ -22,6 +22,7 @@ from tpjb_ident.cli.common.options import (
     Out,
     ReadingError,
     Thermal,
+    as_given,
     out_folder,
     refuse_unknown,
 )
@@ -58,15 +59,13 @@ def compare(
     With rigid, Kirk and measured pivots: writes report.html, comparison, coefficients, estimators, windows,
     pivot_curves, locus and clearance tables, pivots.toml, and the figures as SVG and PNG.
     """
-    variants = _variants(pivots)
+    options = as_given(locals())
+    options["pivots"] = list(variants := _variants(pivots))
     model = model_settings("kirk", thermal, effects)
     from tpjb_ident.compare.comparison import CompareSettings
     from tpjb_ident.compare.pivot_effects import counts_from_measured
 
     settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
-    options = {"campaign": campaign, "bearing": bearing, "pivots": list(variants), "thermal": thermal,
-               "effects": effects, "coefficients": coefficients, "reading_error": reading_error, "method": method,
-               "norm": norm}  # fmt: skip
     files = {effects.name: sha256(effects)} if effects else {}
     target = out_folder(out, "compare")
     if (campaign is None) == (coefficients is None):

@@ -20,6 +20,8 @@ from tpjb_ident.cli.common.options import (
     Out,
     ReadingError,
     Thermal,
+    WorkerCount,
+    as_given,
     out_folder,
 )
 from tpjb_ident.cli.common.run_record import write_record
@@ -60,7 +62,7 @@ def diagnose(
     coefficients: Coefficients = None,
     reading_error: ReadingError = None,
     library: Library = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes [default: all cores].")] = None,
+    workers: WorkerCount = None,
     out: Out = None,
 ) -> None:
     """Name what the model lacks where it and the rig disagree.
@@ -68,6 +70,7 @@ def diagnose(
     Says what is left, and so when it does not know. Writes diagnosis.json, updated.effects.toml (for
     `tpjb predict --effects` and `tpjb compare --effects`), report.html, and the identified coefficients.
     """
+    options = as_given(locals())
     if (campaign is None) == (coefficients is None):
         raise BadInputError("diagnose: give a campaign, or --coefficients TABLE.csv with --bearing FILE; one of them.")
     if model_tolerance is not None and not 1e-4 <= model_tolerance <= 0.5:
@@ -76,9 +79,6 @@ def diagnose(
         from model.effects.user_library import load_library
 
         load_library(library)
-    options = {"campaign": campaign, "bearing": bearing, "pivots": pivots, "thermal": thermal, "effects": effects,
-               "model_tolerance": model_tolerance, "tolerance": tolerance, "coefficients": coefficients,
-               "reading_error": reading_error, "library": library}  # fmt: skip
     settings = _settings(model_tolerance, tolerance or [], workers)
     start = pivots if pivots == "measured" else pivot_choice(pivots)
     model = model_settings("kirk", thermal, effects)

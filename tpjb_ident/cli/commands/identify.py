@@ -28,6 +28,7 @@ from tpjb_ident.cli.common.options import (
     Out,
     Scheduler,
     WorkerCount,
+    as_given,
     out_folder,
     refuse_unknown,
 )
@@ -82,6 +83,7 @@ def identify(
     frequency, per load), each as .csv and .parquet. Runs excited over a band (multi-sine, noise, sweep, impact) give
     frf, frf_estimators and frf_models. Exit code 3 if a point is not to be trusted.
     """
+    options = as_given(locals())
     source = open_campaign(campaign)
     phasors = phasor_settings(lines, delay or ())
     settings = replace(identify_settings(source, method, norm), phasors=phasors, keep_weights=False)
@@ -100,7 +102,6 @@ def identify(
         write_identification(folder, result)
         if plain or keep_r:
             write_plain(folder, source, plain_settings(window, norm), keep_r)
-        options = {"campaign": campaign, "method": method, "norm": norm, "lines": lines, "delay": delay}
         write_record(folder, target, "identify", options, source.fingerprint(), result.remarks())
     if result.points or not result.bands:
         show_summary(result)

@@ -39,9 +39,9 @@ Out = Annotated[
 
 @guarded
 def init(folder: Folder, bearing: Bearing = None, update: Update = False, out: Out = None) -> None:
-    """Look at a folder of exports and draft its campaign.toml, and bearing.toml where there is none.
+    """Draft the campaign.toml of a folder of exports.
 
-    Channels, units, rates and kinds of run are guessed from names and signals; what only the person at the rig can
+    And its bearing.toml, where there is none. Channels, units, rates and kinds of run are guessed from names and signals; what only the person at the rig can
     know is marked ??. Records are only read. A campaign.toml that is there already stays as it is; with --update it is
     carried on: what you changed stays, open places and guesses are made anew, new records become runs.
     """

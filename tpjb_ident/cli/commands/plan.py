@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tpjb_ident.cli.commands.predict import operating_points, pivot_choice
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import refuse_special
-from tpjb_ident.cli.common.options import BearingPath, LoadDirections, Loads, Out, PivotChoice, Speeds, out_folder
+from tpjb_ident.cli.common.options import (
+    BearingPath,
+    LoadDirections,
+    Loads,
+    Out,
+    PivotChoice,
+    Speeds,
+    as_given,
+    out_folder,
+)
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress, table
 from tpjb_ident.effect_words import UNITS, label_in_words
@@ -51,6 +60,7 @@ def plan(
     (A), all of h (B), with locus and polygon (C), everything planned (D) and a second speed beside it (E) could tell,
     and a matrix and a picture of each.
     """
+    options = as_given(locals())
     refuse_special(bearing)
     from model.bearing_file import load_bearing
     from model.pivots import pivot_laws
@@ -63,11 +73,6 @@ def plan(
     points = operating_points(load, load_direction, speed, excitation)
     tests = planned_layout(drawn, points, (locus, dry, push, temperatures))
     target = out_folder(out, "plan")
-    options: dict[str, Any] = {
-        "bearing": bearing, "pivots": pivots, "load": load, "load_direction": load_direction, "speed": speed,
-        "excitation": excitation, "locus": locus, "dry": dry, "push": push, "temperatures": temperatures,
-        "data_sets": data_sets,
-    }  # fmt: skip
     with output_folder(target, "plan") as folder:
         with progress("planning") as show:
             show("every effect of the library", 0, 1)

@@ -22,6 +22,7 @@ from tpjb_ident.cli.common.options import (
     PivotChoice,
     Speeds,
     Thermal,
+    as_given,
     out_folder,
     refuse_unknown,
 )
@@ -58,6 +59,7 @@ def predict(
     Lists and ranges carry units: "2.5 kN, 5 kN", "2.5, 5 kN", "2.5..8.75:1.25 kN" (from..to:step). Every
     combination of load, direction, speed and excitation is predicted. Writes prediction.csv and .parquet.
     """
+    options = as_given(locals()) | {"excitation": excitation or "synchronous"}
     points = operating_points(load, load_direction, speed, excitation)
     choice = pivot_choice(pivots)
     settings = replace(model_settings(choice, thermal, effects), options=parse_physics(physics, housing_temperature))
@@ -70,9 +72,6 @@ def predict(
     loaded = load_bearing(bearing)
     target = out_folder(out, "predict")
     inputs = {p.name: sha256(p) for p in (bearing, effects, choice) if isinstance(p, Path)}
-    options = {"bearing": bearing, "load": load, "load_direction": load_direction, "speed": speed,
-               "excitation": excitation or "synchronous", "pivots": pivots, "thermal": thermal,
-               "effects": effects, "physics": physics, "housing_temperature": housing_temperature}  # fmt: skip
     with output_folder(target, "predict") as folder:
         with progress("predicting") as show:
             predictions = predict_points(loaded, points, settings, show)

@@ -12,7 +12,16 @@ from rigdata.near_names import nearest_name
 from tpjb_ident.cli.commands.predict import model_settings, operating_points, pivot_choice
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import refuse_special
-from tpjb_ident.cli.common.options import BearingPath, EffectsFile, Out, PivotChoice, Speeds, Thermal, out_folder
+from tpjb_ident.cli.common.options import (
+    BearingPath,
+    EffectsFile,
+    Out,
+    PivotChoice,
+    Speeds,
+    Thermal,
+    as_given,
+    out_folder,
+)
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress
 from tpjb_ident.errors import BadInputError
@@ -54,6 +63,7 @@ def simulate(
     The model gives K, C, positions and temperatures; noise, runout, drift, mains, 16-bit steps and glitches are
     those of a real rig. Effects that act on the records (probe_gain, ..) spoil the instruments.
     """
+    options = as_given(locals(), "layout") | {"format": layout, "fault": fault or []}
     settings = model_settings(pivot_choice(pivots), thermal, effects)
     refuse_special(bearing)
     from rigdata.virtual_rig import write_campaign
@@ -61,9 +71,6 @@ def simulate(
     rig = _rig(bearing, settings, seed, noise)
     rig = replace(rig, campaign=name, plan=_plan(plan, load, excitation, speed, repeats), faults=_faults(fault or []))
     target = out_folder(out, "simulate")
-    options = {"bearing": bearing, "pivots": pivots, "thermal": thermal, "effects": effects, "plan": plan,
-               "load": load, "excitation": excitation, "speed": speed, "repeats": repeats, "noise": noise,
-               "fault": fault or [], "seed": seed, "name": name, "format": layout}  # fmt: skip
     inputs = {p.name: sha256(p) for p in (bearing, effects, settings.pivots) if isinstance(p, Path)}
     file = "campaign.h5" if layout == "hdf5" else "campaign"
     with output_folder(target, "simulate") as folder:

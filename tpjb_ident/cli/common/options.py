@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -25,7 +25,7 @@ CampaignPath = Annotated[
     Path, typer.Argument(metavar="CAMPAIGN", help="Campaign: a folder with campaign.toml, or one HDF5 file.")
 ]
 MaybeCampaign = Annotated[
-    Path | None, typer.Argument(metavar="[CAMPAIGN]", help="Campaign: a folder with campaign.toml, or one HDF5 file.")
+    Path | None, typer.Argument(metavar="CAMPAIGN", help="Campaign: a folder with campaign.toml, or one HDF5 file.")
 ]
 Coefficients = Annotated[
     Path | None,
@@ -92,6 +92,19 @@ Scheduler = Annotated[
     str | None,
     typer.Option("--scheduler", metavar="ADDRESS", help="Dask scheduler to work on, such as tcp://host:8786."),
 ]
+
+
+def as_given(arguments: Mapping[str, Any], *without: str) -> dict[str, Any]:
+    """What a command was called with, for its record: ``as_given(locals())`` before anything else has a name.
+
+    Parameters
+    ----------
+    arguments : mapping of str to object
+        By parameter.
+    *without : str
+        Parameters that change nothing in the result, besides ``out``, ``workers`` and ``scheduler``.
+    """
+    return {k: v for k, v in arguments.items() if k not in {"out", "workers", "scheduler", *without}}
 
 
 def refuse_unknown(value: str, known: Iterable[str], option: str, several: bool = False) -> None:

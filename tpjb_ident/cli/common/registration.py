@@ -9,12 +9,50 @@ from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from tpjb_ident.cli.common.examples import EXAMPLES
 from tpjb_ident.cli.common.output import output_of
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document with all results, for other programs.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings and errors only.")]
+
+
+#: Parameters from which on headings help more than they cost.
+MANY = 11
+#: Headings of the help with the parameters under them, in their order; others stand under "Options".
+HEADINGS = {
+    "Arguments": "",
+    "Operating points": "load load_direction speed excitation",
+    "Model": "bearing pivots thermal effects physics housing_temperature model_tolerance tolerance library",
+    "A table in place of records": "coefficients reading_error",
+    "Estimation": "method norm lines delay",
+    "Tests": "plan locus dry push temperatures repeats noise fault",
+    "Options": "",
+    "Running": "workers scheduler seed",
+    "Output": "name layout plain keep_r window data_sets out as_json quiet help",
+}
+
+
+class Grouped(TyperCommand):
+    """A command whose help lists its options under headings, in plain text, where there are many."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write arguments, then options by heading; what every command has stands last."""
+        parameters = self.get_params(ctx)
+        groups: dict[str, list[tuple[str, str]]] = {heading: [] for heading in HEADINGS}
+        for one in parameters:
+            heading = next((h for h, names in HEADINGS.items() if one.name in names.split()), "Options")
+            if one.param_type_name == "argument":
+                heading = "Arguments"
+            elif len(parameters) < MANY:
+                heading = "Options"
+            if record := one.get_help_record(ctx):
+                groups[heading].append(record)
+        for heading, records in groups.items():
+            if records:
+                with formatter.section(heading):
+                    formatter.write_dl(records)
 
 
 def add_command(app: typer.Typer, command: Callable[..., None], name: str | None = None) -> None:
@@ -29,7 +67,7 @@ def add_command(app: typer.Typer, command: Callable[..., None], name: str | None
         Default: the function's own.
     """
     name = name or command.__name__
-    app.command(name, epilog=examples_text(name))(with_output_options(command, name))
+    app.command(name, cls=Grouped, epilog=examples_text(name))(with_output_options(command, name))
 
 
 def with_output_options(command: Callable[..., None], name: str) -> Callable[..., None]:
