@@ -15,10 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numba
-from numba import njit
-
-from model.pad.store import cache_folder
+from numba import config, njit
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -62,10 +59,10 @@ _NO_PLACE = (
 
 
 def _place() -> None:
-    """Keep machine code under TPJB_CACHE where that is set, and NUMBA_CACHE_DIR says nothing else."""
-    folder = cache_folder()
-    if os.environ.get("TPJB_CACHE") and folder is not None and "NUMBA_CACHE_DIR" not in os.environ:
-        numba.config.CACHE_DIR = str(folder / "compiled")
+    """Keep machine code under TPJB_CACHE where that is set, as pad solutions are, and NUMBA_CACHE_DIR is not."""
+    folder = os.environ.get("TPJB_CACHE", "").strip()
+    if folder.lower() not in ("", "off") and "NUMBA_CACHE_DIR" not in os.environ:
+        config.CACHE_DIR = str(Path(folder) / "compiled")  # type: ignore[attr-defined]
 
 
 _place()

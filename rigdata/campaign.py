@@ -193,7 +193,8 @@ def _read_text(path: Path, file: str, limit: int) -> str:
 
 def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
     from rigdata.readers.formats.foreign import ForeignReader, is_foreign
-    from rigdata.readers.text.csv import CsvReader, TableCache
+    from rigdata.readers.table_cache import TableCache
+    from rigdata.readers.text.csv import CsvReader
 
     text = _read_text(manifest_path, manifest_path.name, MAX_MANIFEST)
     files: dict[str, Path] = {manifest_path.name: manifest_path}
@@ -214,7 +215,7 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
         rate = entry.sample_rate or manifest.sample_rate
         reader: RunReader
         if is_foreign(target):
-            reader = ForeignReader(target, entry.file, entry.id, frozenset(manifest.channels), rate)
+            reader = ForeignReader(target, entry.file, entry.id, frozenset(manifest.channels), rate, cache)
         else:
             reader = CsvReader(target, entry.file, entry.id, manifest.csv, manifest.channels, rate, cache)
         runs.append(_make_run(entry, channels, reader))
@@ -244,7 +245,7 @@ def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
         reader = replace(old, path=path, file=file, run=run_id)
     elif is_foreign(path):
         described = frozenset(old.channels if isinstance(old, CsvReader) else old.described)
-        reader = ForeignReader(path, file, run_id, described, old.stated_rate)
+        reader = ForeignReader(path, file, run_id, described, old.stated_rate, old.cache)
     else:
         reader = CsvReader(path, file, run_id, CsvSpec(), run.channels, old.stated_rate)
     return replace(run, id=run_id, reader=reader)

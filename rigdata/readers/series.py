@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -11,6 +13,8 @@ from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import MAX_REQUEST, rate_of_time
 
+#: Channels larger than this wait in a file without a name, and are read from there in pieces [bytes].
+SET_ASIDE = 2**23
 #: Two clocks whose samples lie this share of a step apart count as one.
 _SAME = 0.01
 
@@ -67,11 +71,40 @@ class Columns:
     notes: tuple[str, ...] = ()
 
     @property
+    def nbytes(self) -> int:
+        """Size of all channels [bytes], in memory or set aside."""
+        return sum(a.nbytes for a in self.values.values()) + (0 if self.time is None else self.time.nbytes)
+
+    @property
     def length(self) -> int:
         """Samples per channel."""
         return len(next(iter(self.values.values()))) if self.values else 0
 
 
+def set_aside(values: FloatArray) -> FloatArray:
+    """Move a long channel out of memory: it is in a file without a name, which goes when nobody holds it any more.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+
+    Returns
+    -------
+    (n,) ndarray
+        The same numbers; short ones as they are. In memory where no temporary file can be written.
+    """
+    if values.nbytes <= SET_ASIDE or isinstance(values, np.memmap):
+        return values
+    try:
+        with tempfile.TemporaryFile(prefix="tpjb-") as file:
+            values.tofile(file)
+            file.flush()
+            return np.memmap(file, dtype=values.dtype, mode="r", shape=values.shape)
+    except OSError:
+        return values
+
+
+@functools.lru_cache(maxsize=1)  # the channels of a file mostly share one clock
 def equidistant(count: int, step: float, start: float = 0.0) -> FloatArray:
     """Seconds of `count` samples, `step` apart.
 
@@ -84,7 +117,9 @@ def equidistant(count: int, step: float, start: float = 0.0) -> FloatArray:
     start : float, optional
         Of the first sample [s].
     """
-    return start + step * np.arange(count, dtype=np.float64)
+    seconds = start + step * np.arange(count, dtype=np.float64)
+    seconds.flags.writeable = False
+    return set_aside(seconds)
 
 
 def without_twins(series: Sequence[Series]) -> list[Series]:
@@ -167,6 +202,8 @@ def _checked(one: Series, file: str, run: str | None) -> FloatArray:
 
 
 def _alike(time: FloatArray, clock: FloatArray) -> bool:
+    if time is clock:
+        return True
     if len(time) != len(clock):
         return False
     step = (clock[-1] - clock[0]) / max(len(clock) - 1, 1)
@@ -178,7 +215,7 @@ def _interpolated(one: Series, clock: FloatArray, file: str, run: str | None) ->
     known = np.isfinite(one.values)
     if not known.any():
         return np.full(len(clock), np.nan)
-    return np.interp(clock, time[known], one.values[known], left=np.nan, right=np.nan)
+    return set_aside(np.interp(clock, time[known], one.values[known], left=np.nan, right=np.nan))
 
 
 def _refuse(file: str, run: str | None, what: str, cure: str) -> RigDataError:

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from rigdata import RigDataError, load_campaign
+from rigdata.readers import series
 from rigdata.readers.formats.foreign import ForeignReader, is_foreign, read_foreign
-from rigdata.readers.series import Series, on_one_clock
+from rigdata.readers.series import Series, equidistant, on_one_clock
 from rigdata.readers.suffixes import FORMATS
+from rigdata.readers.table_cache import TableCache
 from rigdata.readers.time_names import is_time, seconds
 from tpjb_ident.check.campaign import check_campaign
 
@@ -228,6 +230,33 @@ def test_a_matlab_file_without_vectors_says_what_it_holds(tmp_path):
     savemat(tmp_path / "a.mat", {"gain": 2.0, "note": "bearing 3"})
     with pytest.raises(RigDataError, match="no vector of at least 8 numbers, only gain, note"):
         read_foreign(tmp_path / "a.mat", "a.mat")
+
+
+@pytest.mark.parametrize("name", ["one.tdms", "one.parquet", "one.unv"])
+def test_long_channels_wait_in_files_and_read_as_short_ones_do(tmp_path, monkeypatch, name):
+    path = tmp_path / name
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        WRITERS[name](path)
+    short = ForeignReader(path, path.name, "r")
+    monkeypatch.setattr(series, "SET_ASIDE", 1000)
+    equidistant.cache_clear()
+    long = ForeignReader(path, path.name, "r")
+    assert any(isinstance(v, np.memmap) for v in long._columns().values.values())
+    for start, stop in ((0, COUNT), (17, 400), (COUNT - 3, COUNT)):
+        np.testing.assert_array_equal(long.read(["X1A"], start, stop), short.read(["X1A"], start, stop))
+        np.testing.assert_array_equal(long.time(start, stop), short.time(start, stop))
+
+
+def test_a_campaign_keeps_few_columns_however_many_runs_it_has(tmp_path):
+    cache = TableCache(limit=3 * 8 * COUNT)
+    from scipy.io import savemat
+
+    for i in range(6):
+        savemat(tmp_path / f"{i}.mat", {"X1A": X + i, "fs": RATE})
+        reader = ForeignReader(tmp_path / f"{i}.mat", f"{i}.mat", "r", cache=cache)
+        assert reader.read(["X1A"], 0, 1)[0][0] == X[0] + i
+    assert sum(t.nbytes for t in cache._tables.values()) <= 3 * 8 * COUNT
 
 
 def test_channels_without_times_must_be_of_one_length():

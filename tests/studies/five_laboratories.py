@@ -5,8 +5,9 @@
 One campaign of the virtual rig (rocker bearing, short plan, seed 1) is written as a German catman ASCII with two rates,
 as TDMS in volts, as UFF data set 58, as a MATLAB matrix with ChannelNames, as CSV with ISO 8601 stamps and as LabVIEW
 .lvm. Every folder holds records and the bearing's file, nothing else. What a person types is here: commands, and lines
-of the drafted manifest. Printed: commands typed, lines edited by hand, processor minutes of the commands, largest difference of a
-direct stiffness from what the campaign gives as it was simulated; ``--docs`` puts the table into the tutorial.
+of the drafted manifest. Printed: commands typed, lines edited by hand, processor minutes of the commands, largest
+difference of a direct stiffness from what the campaign gives as it was simulated; ``--docs`` puts the table into the
+tutorial.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ SLOW = 20  # samples of the fast clock per temperature
 MOST_LINES = 10
 PAGE = ROOT / "docs" / "guide" / "tutorial.md"
 BEGIN, END = "<!-- laboratories: begin -->\n", "<!-- laboratories: end -->"
-HEAD = "| export | commands | lines edited | processor minutes | K beside the simulated records |\n|---|---|---|---|---|\n"
+HEAD = "| export | commands | lines edited | processor minutes | K beside what was simulated |\n|---|---|---|---|---|\n"
 Table = dict[str, np.ndarray]
 #: What a person fills in: (channel or table, key) -> value, "" deletes the mark of comment before the key.
 Edits = Mapping[tuple[str, str], str]

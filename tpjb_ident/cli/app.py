@@ -26,8 +26,8 @@ from tpjb_ident.cli.common.registration import add_command
 
 #: What is written outside --out.
 CACHES = (
-    "Results go into --out. Outside it only caches are kept: pad solutions in the user's cache folder (at most 200 MB), "
-    "the model's machine code beside the program (35 MB). The variable TPJB_CACHE names another folder for both; "
+    "Results go into --out. Outside it only caches are kept: pad solutions in the user's cache folder (at most 200 "
+    "MB), the model's machine code beside the program (35 MB). The variable TPJB_CACHE names another folder for both; "
     "TPJB_CACHE=off keeps no pad solutions."
 )
 # plain help: the markup renderer costs more start-up time than all the rest together

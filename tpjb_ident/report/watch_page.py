@@ -14,7 +14,7 @@ from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
 from tpjb_ident.rounding import with_interval
 from tpjb_ident.runtime.tables import write_text
-from tpjb_ident.watch.next_steps import described, said
+from tpjb_ident.watch.next_steps import described, lacking, said
 
 if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.point_result import PointResult
@@ -161,12 +161,11 @@ def points_table(points: tuple[PointResult, ...]) -> Table:
     rows = []
     for p in points:
         half, omega = p.stiffness.half_width(), p.stiffness.omega
-        cells = []
+        cells, why = [], lacking(p)
         for i, scale in ((0, 1e6), (3, 1e6), (4, 1e3 * omega), (7, 1e3 * omega)):
             value = p.stiffness.vector[i]
-            known = np.isfinite(p.stiffness.h).all()
-            cells.append(with_interval(value, value - half[i], value + half[i], scale) if known else "no answer")
-        flags = ", ".join(q.sentence() for q in p.quality)
+            cells.append("–" if why else with_interval(value, value - half[i], value + half[i], scale))
+        flags = why or ", ".join(q.sentence() for q in p.quality)
         place = [f"{p.point.static_load / 1e3:g}", f"{p.point.excitation_hz:g}", str(p.n_records)]
         rows.append([*place, *cells, flags])
     columns = ["load, kN", "excitation, Hz", "records", "kxx, MN/m", "kyy, MN/m", "cxx, kN s/m", "cyy, kN s/m", "flags"]

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem
 from rigdata.run import Run
@@ -105,6 +107,21 @@ def described(run: Run) -> str:
     if run.excitation_direction is not None:
         words.append(f"along {math.degrees(run.excitation_direction):.0f} deg")
     return ", ".join(words)
+
+
+def lacking(point: PointResult) -> str:
+    """What an operating point lacks for K and C; "" where it has them.
+
+    Parameters
+    ----------
+    point : PointResult
+    """
+    if np.isfinite(point.stiffness.h).all():
+        return ""
+    if point.n_records == 1:
+        return "no K and C yet: they take a second record, excited in another direction"
+    why = "; ".join(q.sentence() for q in point.quality) or "the records do not determine them"
+    return f"no K and C from {point.n_records} records: {why}"
 
 
 def said(problem: Problem) -> str:

@@ -18,6 +18,7 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import missing_channel, rate_of_time, undescribed
 from rigdata.readers.series import Columns, Series, on_one_clock
 from rigdata.readers.suffixes import FORMATS, suffix_hint
+from rigdata.readers.table_cache import TableCache
 
 #: Larger files are refused: these formats are read whole [bytes].
 LARGEST = 2**31
@@ -86,14 +87,6 @@ def read_foreign(path: Path, file: str, run: str | None = None) -> list[Series]:
     return series
 
 
-@dataclass
-class _Kept:
-    """Columns of one file, as long as it does not change."""
-
-    signature: tuple[int, int] | None = None
-    columns: Columns | None = None
-
-
 @dataclass(frozen=True)
 class ForeignReader:
     """One run's file in a foreign format.
@@ -108,6 +101,8 @@ class ForeignReader:
         Names of all channels of the manifest.
     stated_rate : float or None
         Sample rate where the file knows no times [Hz].
+    cache : TableCache
+        Of the campaign: columns of the files that were read last.
     """
 
     path: Path
@@ -115,7 +110,7 @@ class ForeignReader:
     run: str
     described: frozenset[str] = field(default=frozenset(), repr=False)
     stated_rate: float | None = None
-    kept: _Kept = field(default_factory=_Kept, repr=False, compare=False)
+    cache: TableCache = field(default_factory=TableCache, repr=False, compare=False)
 
     def _error(self, place: str, what: str, cure: str) -> RigDataError:
         return RigDataError(Problem("error", self.file, place, what, cure, self.run))
@@ -125,12 +120,12 @@ class ForeignReader:
             state = self.path.stat()
         except OSError as error:
             raise self._error("", "the file is not there", "Restore it, or delete the run") from error
-        signature = (state.st_size, state.st_mtime_ns)
-        if self.kept.columns is None or self.kept.signature != signature:
-            series = read_foreign(self.path, self.file, self.run)
-            self.kept.columns = on_one_clock(series, self.file, self.run)
-            self.kept.signature = signature
-        return self.kept.columns
+        key = (self.path, state.st_size, state.st_mtime_ns)
+        known = self.cache.get(key)
+        if known is None:
+            known = on_one_clock(read_foreign(self.path, self.file, self.run), self.file, self.run)
+            self.cache.put(key, known)
+        return known
 
     def names(self) -> tuple[str, ...]:
         """Names of all channels."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.readers.series import Series, equidistant
+from rigdata.readers.series import Series, equidistant, set_aside
 from rigdata.readers.time_names import is_time, seconds
 
 
@@ -39,7 +39,7 @@ def read_series(path: Path) -> list[Series]:
 
 
 def _series(channel: Any, group: str, shared: FloatArray | None) -> Series:
-    values = np.asarray(channel[:], dtype=float)
+    values = set_aside(np.asarray(channel[:], dtype=float))
     unit = str(channel.properties.get("unit_string", ""))
     step = channel.properties.get("wf_increment")
     time: FloatArray | None

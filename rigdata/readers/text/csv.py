@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import threading
-from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,78 +14,12 @@ from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import missing_channel, rate_of_time, undescribed
 from rigdata.readers.suffixes import suffix_hint
+from rigdata.readers.table_cache import TableCache
 from rigdata.readers.text.csv_table import Source, Table, read_table
 from rigdata.readers.text.dialect import Dialect, DialectFinder
 
-#: Parsed columns kept by a campaign before the oldest run is let go [bytes].
-CACHE_BYTES = 96 * 2**20
 #: A file above this size is parsed column by column, not all channels at once [bytes].
 _LARGE_FILE = 2**29
-_MAX_DIALECTS = 10_000
-
-
-class TableCache:
-    """Parsed tables and dialects of a campaign's files, the last used ones, up to a number of bytes."""
-
-    def __init__(self, limit: int = CACHE_BYTES) -> None:
-        self._limit = limit
-        self._tables: OrderedDict[tuple[object, ...], Table] = OrderedDict()
-        self._dialects: dict[tuple[object, ...], Dialect] = {}
-        self._lock = threading.Lock()
-
-    def __reduce__(self) -> tuple[type[TableCache], tuple[int]]:
-        return TableCache, (self._limit,)  # a worker process starts with an empty one
-
-    def get(self, key: tuple[object, ...]) -> Table | None:
-        """Give the table under `key`, None where it is not kept.
-
-        Parameters
-        ----------
-        key : tuple
-            State of a file, and what of it.
-        """
-        with self._lock:
-            table = self._tables.get(key)
-            if table is not None:
-                self._tables.move_to_end(key)
-            return table
-
-    def put(self, key: tuple[object, ...], table: Table) -> None:
-        """Keep `table`, letting go of the longest unused ones.
-
-        Parameters
-        ----------
-        key : tuple
-            State of a file, and what of it.
-        table : Table
-            Parsed columns.
-        """
-        with self._lock:
-            self._tables[key] = table
-            self._tables.move_to_end(key)
-            size = sum(t.nbytes for t in self._tables.values())
-            while size > self._limit and len(self._tables) > 1:
-                _, old = self._tables.popitem(last=False)
-                size -= old.nbytes
-
-    def dialect(self, key: tuple[object, ...], find: Callable[[], Dialect]) -> Dialect:
-        """Give the dialect under `key`, found once.
-
-        Parameters
-        ----------
-        key : tuple
-            State of a file, and what of it.
-        find : callable
-            Finds it where it is not known.
-        """
-        known = self._dialects.get(key)
-        if known is None:
-            known = find()
-            with self._lock:
-                if len(self._dialects) >= _MAX_DIALECTS:
-                    self._dialects.clear()
-                self._dialects[key] = known
-        return known
 
 
 @dataclass(frozen=True)

@@ -41,9 +41,10 @@ Out = Annotated[
 def init(folder: Folder, bearing: Bearing = None, update: Update = False, out: Out = None) -> None:
     """Draft the campaign.toml of a folder of exports.
 
-    And its bearing.toml, where there is none. Channels, units, rates and kinds of run are guessed from names and signals; what only the person at the rig can
-    know is marked ??. Records are only read. A campaign.toml that is there already stays as it is; with --update it is
-    carried on: what you changed stays, open places and guesses are made anew, new records become runs.
+    And its bearing.toml, where there is none. Channels, units, rates and kinds of run are guessed from names and
+    signals; what only the person at the rig can know is marked ??. Records are only read. A campaign.toml that is there
+    already stays as it is; with --update it is carried on: what you changed stays, open places and guesses are made
+    anew, new records become runs.
     """
     if not folder.is_dir():
         raise BadInputError(f"{folder}: is no folder. Give the folder that holds the records.")

@@ -243,10 +243,14 @@ def _landed_line(status: RunStatus, snapshot: Snapshot, with_result: bool) -> st
     if point is None or not with_result:
         return line
     from tpjb_ident.rounding import with_interval
+    from tpjb_ident.watch.next_steps import lacking
 
+    records = f"{point.n_records} record{'s' if point.n_records > 1 else ''}"
+    place = f"{point.point.static_load / 1e3:g} kN, {point.point.excitation_hz:g} Hz, {records}"
+    if why := lacking(point):
+        return f"{line}; {place}: {why}"
     half, v = point.stiffness.half_width(), point.stiffness.vector
     k = [with_interval(v[i], v[i] - half[i], v[i] + half[i], 1e6) for i in (0, 3)]
-    place = f"{point.point.static_load / 1e3:g} kN, {point.point.excitation_hz:g} Hz, {point.n_records} records"
     return f"{line}; {place}: kxx {k[0]}, kyy {k[1]} MN/m"
 
 
