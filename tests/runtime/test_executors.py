@@ -8,9 +8,11 @@ import warnings
 from concurrent.futures import Executor, Future
 from pathlib import Path
 
+import numpy  # noqa: F401  (has to be loaded)
 import pytest
 
 from tpjb_ident.runtime.executors import InProcessWorkers, LostJobsError, PoolWorkers, in_order, local_workers
+from tpjb_ident.runtime.threads import _loaded, limited_threads
 from tpjb_ident.runtime.workers import open_workers
 
 
@@ -130,3 +132,17 @@ def test_a_job_that_kills_every_worker_is_given_up():
 def test_one_worker_is_this_process():
     with open_workers(1) as workers:
         assert isinstance(workers, InProcessWorkers)
+
+
+def _threads() -> list[int]:
+    return [asked() for asked, _ in _loaded()]
+
+
+@pytest.mark.skipif(not _loaded(), reason="no OpenBLAS that can be asked")
+def test_linear_algebra_that_is_loaded_takes_one_thread_in_workers_and_beside_them():
+    """Processes that are forked have numpy already: the environment does not reach it."""
+    with limited_threads(2):
+        with local_workers(2, start="fork") as workers:
+            assert set(next(in_order(workers, _threads, [()]))) == {1}
+            assert set(_threads()) == {1}
+        assert set(_threads()) == {2}

@@ -66,14 +66,32 @@ def rig_truth(bearing: Bearing, settings: ModelSettings, bearing_text: str = "")
         When a campaign is written: no equilibrium at one of its points.
     """
     physical = [effect for effect in settings.effects if effect.name not in INSTRUMENT_ERRORS]
-    setup = apply_effects(Setup(bearing, pivot_laws(settings.pivots, bearing), settings.thermal), physical)
+    return truth_of(
+        apply_effects(Setup(bearing, pivot_laws(settings.pivots, bearing), settings.thermal), physical), bearing_text
+    )
+
+
+def truth_of(setup: Setup, bearing_text: str = "") -> RigTruth:
+    """Give a set-up's physics to the virtual rig.
+
+    Parameters
+    ----------
+    setup : Setup
+        What the bearing is really like.
+    bearing_text : str
+        Text of the bearing file, for the campaign.
+
+    Returns
+    -------
+    RigTruth
+    """
     world = _World(setup)
     return RigTruth(
         stiffness=world.stiffness,
         position=world.position,
         temperature=world.temperature,
         pivot_deflection=world.pivot_deflection,
-        pivot_angles=tuple(pad.pivot_angle for pad in bearing.pads),
+        pivot_angles=tuple(pad.pivot_angle for pad in setup.bearing.pads),
         clearance=tuple(pad.assembled_clearance for pad in setup.bearing.pads),
         bearing_name="bearing.toml",
         bearing_text=bearing_text,

@@ -6,15 +6,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from model.effects import apply_effects
+from model.effects import Effect, apply_effects
 from model.setup import Mesh, Setup
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.candidates import candidates
 from tpjb_ident.diagnose.forward.forward import Forward, ForwardModel, NoEquilibriumError
 from tpjb_ident.diagnose.forward.memory import Memory
 from tpjb_ident.diagnose.forward.nuisance import Nuisance, column_of, nuisances
-from tpjb_ident.diagnose.forward.workers import workers
-from tpjb_ident.diagnose.next_test.rank import options_for, rank_designs, say, suggested
+from tpjb_ident.diagnose.forward.tolerances import Tolerances
+from tpjb_ident.diagnose.forward.workers import Map, workers
+from tpjb_ident.diagnose.next_test.rank import Separation, options_for, ranked, say, separated, suggested
+from tpjb_ident.diagnose.observations.layout import Layout
 from tpjb_ident.diagnose.observations.observe import Observations
 from tpjb_ident.diagnose.observations.thinned import thinned
 from tpjb_ident.diagnose.search.fit import Fit
@@ -91,9 +93,9 @@ def diagnose(
     problem = pose(observations, forward, settings)
     with workers(forward, problem, settings.workers) as run:
         found = search(run, problem, settings, progress)
-    exact = _exact(forward, found)
-    verdict = decide(problem, found, settings, exact)
-    verdict = replace(verdict, next_test=_next_test(verdict, found, quick, observations, settings))
+        exact = _exact(forward, found)
+        verdict = decide(problem, found, settings, exact)
+        verdict = replace(verdict, next_test=_next_test(run, verdict, found, (quick, observations.layout), settings))
     after = problem.base if not verdict.effects or exact is None else exact
     return Diagnosis(verdict, problem, found, after)
 
@@ -148,7 +150,7 @@ def solve(problem: Problem, forward: ForwardModel, settings: DiagnoseSettings) -
 
 
 def _next_test(
-    verdict: Verdict, found: Search, setup: Setup, observations: Observations, settings: DiagnoseSettings
+    run: Map, verdict: Verdict, found: Search, baseline: tuple[Setup, Layout], settings: DiagnoseSettings
 ) -> str:
     """What one more test would tell, in words: which explanation it is, or that it is the one named."""
     if verdict.verdict == "consistent":
@@ -156,19 +158,28 @@ def _next_test(
     if not verdict.effects:
         worst = verdict.disagreement[0]
         return f"repeat {worst.observable} at {worst.where}, where the unknown shows most, with another sensor set"
+    setup, layout = baseline
     rivals = _rivals(found)
     if not rivals:
         return ""
-    options = options_for(setup, observations.layout)
     model = _possible(setup, found.model)
     others = [e for r in rivals if (e := _possible(setup, r)) is not None]
     if model is None or not others:
         return ""
-    ranked = rank_designs(setup, model, others, options, settings.tolerances)
-    if not ranked:
+    count = len(options_for(setup, layout))
+    tried = run(_separated, [(setup, i, model, tuple(others), settings.tolerances) for i in range(count)])
+    tests = ranked([one for one in tried if one is not None])
+    if not tests:
         return ""
-    told = say(suggested(ranked), found.model.label, *(r.label for r in rivals))
+    told = say(suggested(tests), found.model.label, *(r.label for r in rivals))
     return f"to confirm: {told}" if verdict.verdict == "named" else told
+
+
+def _separated(
+    forward: Forward, problem: Problem, setup: Setup, index: int, one: tuple[Effect, ...],
+    rivals: tuple[tuple[Effect, ...], ...], known: Tolerances,
+) -> Separation | None:  # fmt: skip
+    return separated(setup, options_for(setup, forward.layout)[index], one, rivals, known)
 
 
 def _possible(setup: Setup, fitted: Fit):  # type: ignore[no-untyped-def]

@@ -28,7 +28,7 @@ from multiprocessing.connection import wait as wait_for_end
 from typing import Any, Protocol
 
 from tpjb_ident.errors import TpjbError
-from tpjb_ident.runtime.threads import THREAD_VARIABLES
+from tpjb_ident.runtime.threads import THREAD_VARIABLES, limit_threads, limited_threads
 
 Task = Callable[..., Any]
 Job = tuple[Any, ...]
@@ -301,8 +301,9 @@ def _portable(error: Exception) -> Exception:
 
 
 def _begin_worker() -> None:
-    """Leave Ctrl-C to the parent, and end with it."""
+    """Leave Ctrl-C to the parent, and end with it; the cores are shared already."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    limit_threads()
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
@@ -353,11 +354,12 @@ def local_workers(count: int, start: str | None = None, preload: Sequence[str] =
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Processes share the cores already: linear algebra with threads of its own would only be in the way."""
+    """Processes share the cores already: linear algebra with threads of its own would only be in the way, here too."""
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     try:
-        yield
+        with limited_threads():
+            yield
     finally:
         for name, value in before.items():
             with suppress(KeyError):

@@ -55,6 +55,8 @@ KINDS = (
     "scatter", "one", "two", "clean", "outside", "scatter", "one", "two", "clean", "outside",
 )  # fmt: skip
 HIDDEN = {"scatter": 0, "clean": 1, "one": 1, "two": 2, "three": 3, "outside": 0, "beside": 1}
+#: What is hidden beyond the library.
+OUTSIDE = ("left out", "cross-coupled", "growth with the load")
 #: Sizes are drawn between these, in typical ones; at least this many standard deviations of everything else.
 SIZES, SEEN, CLEAN = (0.8, 2.5), 10.0, 12.0
 #: Smooth difference of the models, share of a coefficient.
@@ -81,8 +83,18 @@ class Bench:
     seen: dict[str, float]
 
 
-def bench(name: str, folder: Path) -> Bench:
-    """Pose the paper's plan for a bundled bearing; the emulator's table is kept in a folder."""
+def bench(name: str, folder: Path | None, skip: frozenset[str] = SKIPPED) -> Bench:
+    """Pose the paper's plan for a bundled bearing, on an emulator whose table is kept in a folder, or on the model.
+
+    Parameters
+    ----------
+    name : str
+        Of the bearing.
+    folder : Path or None
+        None: the model itself.
+    skip : frozenset of str
+        Effects that are left out.
+    """
     bearing = load_bearing(BEARINGS / f"{name}.toml")
     setup = Setup(bearing, pivot_laws("kirk", bearing), mesh=MESH, accuracy=ACCURACY)
     sweep = dynamic([5000.0], [HZ * f for f in (10, 20, 25, 30, 40, 50)], SPEED, -math.pi / 2, 5)
@@ -92,15 +104,17 @@ def bench(name: str, folder: Path) -> Bench:
     observations = planned_observations(setup, layout)
     model = Forward(setup, layout, observations.elements)
     model()
-    folder.mkdir(parents=True, exist_ok=True)
-    memory = emulate(model, new, folder / f"{name}.table")
+    memory = model.memory
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        memory = emulate(model, new, folder / f"{name}.table")
     forward = Forward(setup, layout, observations.elements, 0, memory)
     elsewhere = Forward(setup, new, planned_observations(setup, new).elements, 0, memory)
-    problem = pose(observations, forward, DiagnoseSettings(workers=1, skip=SKIPPED))
+    problem = pose(observations, forward, DiagnoseSettings(workers=1, skip=skip))
     base = baseline_fit(problem)
     seen = {}
     for c in problem.pool:
-        columns = [_slope(forward, problem.base, c, i) for i in range(len(c.steps))]
+        columns = [_slope(forward.fresh(), problem.base, c, i) for i in range(len(c.steps))]
         seen[c.label] = visible(problem, base, c, np.column_stack(columns))
     return Bench(problem, forward, elsewhere, seen)
 
@@ -136,6 +150,8 @@ class Drawn:
         What is off, in standard deviations.
     hidden : tuple of Effect
         Everything that is hidden.
+    growth : float
+        Of the clearance, in proportion to the load, at the top load [m].
     """
 
     truth: tuple[Effect, ...]
@@ -144,10 +160,21 @@ class Drawn:
     shares: tuple[float, ...]
     size: FloatArray
     hidden: tuple[Effect, ...]
+    growth: float
 
 
-def draw(one: Bench, kind: str, rng: np.random.Generator) -> Drawn | None:
-    """Draw a campaign; None where the model has no equilibrium."""
+def draw(one: Bench, kind: str, rng: np.random.Generator, beyond: Sequence[str] = OUTSIDE) -> Drawn | None:
+    """Draw a campaign; None where the model has no equilibrium.
+
+    Parameters
+    ----------
+    one : Bench
+    kind : str
+        See `HIDDEN`.
+    rng : Generator
+    beyond : sequence of str
+        What may be hidden that the library does not hold.
+    """
     library = [
         c for c in one.problem.pool
         if c.name not in TERMS and len(c.steps) == 1 and SIZES[1] * one.seen[c.label] >= SEEN
@@ -157,7 +184,7 @@ def draw(one: Bench, kind: str, rng: np.random.Generator) -> Drawn | None:
     truth = tuple(_sized(one, c, rng, kind == "clean") for c in chosen)
     outside, hidden, pool, growth = "", truth, one.problem.pool, 0.0
     if kind in {"outside", "beside"}:
-        outside = str(rng.choice(["left out", "cross-coupled", "growth with the load"]))
+        outside = str(rng.choice(list(beyond)))
         if outside == "left out":
             gone = _of(library, str(rng.choice([n for n in names if n not in {c.name for c in chosen}])), rng)
             hidden, outside = (*truth, _sized(one, gone, rng, False)), f"left out: {gone.label}"
@@ -179,7 +206,7 @@ def draw(one: Bench, kind: str, rng: np.random.Generator) -> Drawn | None:
     noisy = value + _noise(one.problem.observations, value, rng)
     observations = replace(one.problem.observations, value=noisy)
     return Drawn(truth, outside, replace(one.problem, observations=observations, pool=pool), tuple(shares), size,
-                 tuple(hidden))  # fmt: skip
+                 tuple(hidden), growth)  # fmt: skip
 
 
 def _of(library: Sequence[Candidate], name: str, rng: np.random.Generator) -> Candidate:

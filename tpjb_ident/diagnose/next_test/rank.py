@@ -89,16 +89,29 @@ def rank_designs(
     options : sequence of Design or Check
     known : Tolerances
     """
-    out = []
-    for design in options:
-        if isinstance(design, Check):
-            out.append(Separation(design, tuple(design.separation(one, other) for other in rivals)))
-        elif design.fits(one, *rivals):
-            try:
-                out.append(Separation(design, _each(setup, design, one, rivals, known)))
-            except NoEquilibriumError:
-                continue
-    return ranked(out)
+    found = [separated(setup, design, one, rivals, known) for design in options]
+    return ranked([each for each in found if each is not None])
+
+
+def separated(
+    setup: Setup, design: Design | Check, one: Sequence[Effect], rivals: Sequence[Sequence[Effect]], known: Tolerances
+) -> Separation | None:
+    """What one design would show; None where it cannot be or the model has no equilibrium.
+
+    Parameters
+    ----------
+    setup, one, rivals, known
+        As of `rank_designs`.
+    design : Design or Check
+    """
+    if isinstance(design, Check):
+        return Separation(design, tuple(design.separation(one, other) for other in rivals))
+    if not design.fits(one, *rivals):
+        return None
+    try:
+        return Separation(design, _each(setup, design, one, rivals, known))
+    except NoEquilibriumError:
+        return None
 
 
 def _each(

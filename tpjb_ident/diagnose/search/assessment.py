@@ -15,10 +15,12 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
+from scipy.sparse import csr_array
 
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.observations.folds import Fold
@@ -58,15 +60,25 @@ class Basis:
         scales : array, shape (c,)
             Variance scale of every component.
         """
-        return np.asarray(self.noise + np.tensordot(scales, self._whole, 1))
+        own = np.array(scales, float)
+        for one, scale in zip(self.components, scales, strict=True):
+            own[list(one.made_of)] += scale
+        out = self.noise.copy()
+        for one, scale, at in zip(self.components, own, self._at, strict=True):
+            if not one.made_of:
+                out[at] += scale * one.matrix
+        return out
 
     @functools.cached_property
-    def _whole(self) -> FloatArray:
-        """The components' matrices over all elements, (c, n, n)."""
-        out = np.zeros((len(self.components), *self.noise.shape))
-        for one, matrix in zip(self.components, out, strict=True):
-            matrix[np.ix_(one.rows, one.rows)] = one.matrix
-        return out
+    def _at(self) -> list[Any]:
+        """Where every component stands in the whole covariance."""
+        whole = len(self.noise)
+        return [np.s_[:, :] if len(c.rows) == whole else np.ix_(c.rows, c.rows) for c in self.components]
+
+    @functools.cached_property
+    def sparse(self) -> csr_array:
+        """The first component's matrix: identification ties the entries of one point together, and nothing else."""
+        return csr_array(self.components[0].matrix)
 
 
 @dataclass(frozen=True)
@@ -182,37 +194,42 @@ def assess(basis: Basis, linear: Linear, start: FloatArray | None = None, fixed:
     if start is None:
         logs[0] = math.log(1e-2)
     spread = linear.spread
-    value, inverse = _evidence(basis, linear, spread, logs)
+    value, factor = _evidence(basis, linear, spread, logs)
+    inverse = _inverse(factor)
     damping = 1e-3
     lowest, highest = np.array([(one.lowest, one.highest) for one in basis.components]).T
     for _ in range(0 if fixed else STEPS):
         gradient, fisher = _slopes(basis, linear, inverse, logs)
         moved = np.linalg.solve(fisher + damping * np.diag(np.diag(fisher)) + 1e-9 * np.eye(len(logs)), gradient)
         new = np.clip(logs + np.clip(moved, -3.0, 3.0), lowest, highest)
-        trial, other = _evidence(basis, linear, spread, new)
+        trial, factor = _evidence(basis, linear, spread, new)
         if trial < value:
             damping = max(10.0 * damping, 0.1)
             if damping > 1e4:
                 break
             continue
         done = np.max(np.abs(new - logs)) < FOUND or trial - value < 0.01
-        logs, value, inverse, damping = new, trial, other, 0.1 * damping
+        logs, value, inverse, damping = new, trial, _inverse(factor), 0.1 * damping
         if done:
             break
     return Assessment(np.exp(logs), value, inverse, linear, basis.folds)
 
 
 def _evidence(basis: Basis, linear: Linear, spread: FloatArray, logs: FloatArray) -> tuple[float, FloatArray]:
+    """Log evidence, and the Cholesky factor of the whole covariance."""
     total = basis.covariance(np.exp(logs)) + spread
-    factor, failed = lapack.dpotrf(total, lower=1, clean=1)
+    factor, failed = lapack.dpotrf(total.T, lower=1, clean=1, overwrite_a=1)  # symmetric, and as Fortran has it
     if failed:
         return -math.inf, total
-    inverse = lapack.dpotri(factor, lower=1)[0]
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
-    quadratic = float(linear.residual @ inverse @ linear.residual)
+    white = lapack.dtrtrs(factor, linear.residual, lower=1)[0]
     log_det = 2.0 * float(np.sum(np.log(np.diag(factor))))
-    value = -0.5 * (quadratic + log_det + len(total) * math.log(2 * math.pi))
-    return value + _prior(logs), inverse
+    value = -0.5 * (float(white @ white) + log_det + len(total) * math.log(2 * math.pi))
+    return value + _prior(logs), factor
+
+
+def _inverse(factor: FloatArray) -> FloatArray:
+    lower = lapack.dpotri(factor, lower=1)[0]
+    return np.asarray(lower + np.tril(lower, -1).T)
 
 
 def _prior(logs: FloatArray) -> float:
@@ -225,17 +242,21 @@ def _slopes(
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     scales = np.exp(logs)
     weighted = inverse @ linear.residual
-    products = [inverse[:, one.rows] @ one.matrix for one in basis.components]
-    trace = np.array([np.trace(p[one.rows]) for p, one in zip(products, basis.components, strict=True)])
-    square = np.array([weighted[one.rows] @ one.matrix @ weighted[one.rows] for one in basis.components])
+    known = basis.components
+    own = [i for i, one in enumerate(known) if not one.made_of]
+    # Q D_k over the rows that each acts on
+    products = {i: inverse[:, known[i].rows] @ known[i].matrix if i else (basis.sparse @ inverse).T for i in own}
+    made = np.zeros((len(known), len(own)))  # what is made of others has their sums
+    for i, one in enumerate(known):
+        made[i, [own.index(k) for k in one.made_of or (i,)]] = 1.0
+    trace = made @ [np.trace(products[i][known[i].rows]) for i in own]
+    square = made @ [weighted[known[i].rows] @ known[i].matrix @ weighted[known[i].rows] for i in own]
     share = scales / (1.0 + scales)
     gradient = 0.5 * scales * (square - trace) + 0.5 - share
-    count = len(scales)
-    fisher = np.zeros((count, count))
-    for i, one in enumerate(basis.components):
-        for j in range(i, count):
-            other = basis.components[j]
-            # tr(Q Di Q Dj) over the rows that each acts on
-            value = float(np.sum(products[i][other.rows] * products[j][one.rows].T))
-            fisher[i, j] = fisher[j, i] = 0.5 * scales[i] * scales[j] * value
+    both = np.zeros((len(own), len(own)))
+    for a, i in enumerate(own):
+        for b, j in enumerate(own[a:], a):
+            # tr(Q D_i Q D_j) over the rows that each acts on
+            both[a, b] = both[b, a] = float(np.vdot(products[i][known[j].rows], products[j][known[i].rows].T))
+    fisher = 0.5 * np.outer(scales, scales) * (made @ both @ made.T)
     return gradient, fisher + np.diag(share * (1.0 - share))

@@ -45,6 +45,8 @@ class Component:
         Of the log scale. No campaign shows a model to be better than a tenth of what is stated: programs that solve
         the same equations differ by that much (`docs/diagnosis.md`). And no kind of observable by itself may be off by
         more than is stated: the few numbers of a polygon would be discounted where they disagree.
+    made_of : tuple of int
+        Numbers of other components of which it is the sum.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Component:
     matrix: FloatArray = field(repr=False)
     lowest: float = LOWEST
     highest: float = 0.0
+    made_of: tuple[int, ...] = ()
 
 
 def components(observations: Observations) -> tuple[Component, ...]:
@@ -66,7 +69,7 @@ def components(observations: Observations) -> tuple[Component, ...]:
     everything = np.arange(len(observations))
     out = [Component("scatter", everything, observations.covariance / np.outer(scale, scale), NOTHING)]
     share = observations.sigma / scale
-    beyond = np.zeros_like(observations.covariance)
+    beyond = np.zeros_like(observations.covariance)  # all kinds together
     kinds = np.array([KINDS[e.family] for e in observations.elements])
     for kind in dict.fromkeys(kinds):
         rows = np.flatnonzero(kinds == kind)
@@ -74,7 +77,7 @@ def components(observations: Observations) -> tuple[Component, ...]:
         matrix = _correlation(mine) * np.outer(share[rows], share[rows])
         beyond[np.ix_(rows, rows)] = matrix
         out.append(Component(str(kind), rows, matrix))
-    return (*out, Component("beyond", everything, beyond, NOTHING, HIGHEST))
+    return (*out, Component("beyond", everything, beyond, NOTHING, HIGHEST, tuple(range(1, len(out)))))
 
 
 def _correlation(elements: Sequence[Element]) -> FloatArray:
