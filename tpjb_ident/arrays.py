@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,3 +11,6 @@ FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 IntArray = NDArray[np.int_]
 BoolArray = NDArray[np.bool_]
+TextArray = NDArray[np.str_]
+#: Real or complex.
+AnyArray = NDArray[Any]

@@ -10,11 +10,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
-from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.arrays import AnyArray, ComplexArray, FloatArray
 from tpjb_ident.check.agreement import check_agreement
 from tpjb_ident.check.answers import Answer, answer_of, misfit_of, robust_stiffness
 from tpjb_ident.check.observation import Observation
@@ -58,7 +57,7 @@ def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[O
             check_gains(group, outliers, readings)
 
 
-def definiteness(matrix: NDArray) -> float:
+def definiteness(matrix: AnyArray) -> float:
     """Least over greatest eigenvalue of the symmetric part; 1 is isotropic, not above 0 impossible.
 
     Parameters

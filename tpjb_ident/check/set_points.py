@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
 from rigdata.vector import inverse_directions
-from tpjb_ident.arrays import ComplexArray
+from tpjb_ident.arrays import AnyArray, ComplexArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.wiring import guess_wiring, repairs
 from tpjb_ident.dynamic.records.oil_force import oil_force as film_force
@@ -23,7 +22,7 @@ _LINE_OVER_FLOOR = 8.0
 NO_STATIC = (0.002, 0.02)
 
 
-def to_plane(channels: Sequence[Channel], readings: NDArray) -> NDArray:
+def to_plane(channels: Sequence[Channel], readings: AnyArray) -> AnyArray:
     """X, Y from one value per channel; complex stays complex.
 
     Parameters
@@ -36,7 +35,7 @@ def to_plane(channels: Sequence[Channel], readings: NDArray) -> NDArray:
     return np.asarray(inverse @ readings)
 
 
-def plane_vector(seen: Observation, quantity: str, values: NDArray) -> NDArray | None:
+def plane_vector(seen: Observation, quantity: str, values: AnyArray) -> AnyArray | None:
     """X, Y of one value per channel of `quantity`; None where its channels do not span the plane.
 
     Parameters
@@ -117,7 +116,7 @@ def without_static_part(ratios: ComplexArray) -> bool:
     return bool(mean < NO_STATIC[0] or (mean < NO_STATIC[1] and mean < 4 * error))
 
 
-def _check_static_load(seen: Observation, mean: NDArray, ratio: float) -> None:
+def _check_static_load(seen: Observation, mean: AnyArray, ratio: float) -> None:
     run, place = seen.run, "mean force"
     _check_size(seen, ratio)
     if ratio < 0.02 or seen.lines is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -167,7 +168,7 @@ def _next_test(
     if model is None or not others:
         return ""
     count = len(options_for(setup, layout))
-    tried = run(_separated, [(setup, i, model, tuple(others), settings.tolerances) for i in range(count)])
+    tried = run(_separated, [(setup, i, (model, *others), settings.tolerances) for i in range(count)])
     tests = ranked([one for one in tried if one is not None])
     if not tests:
         return ""
@@ -176,10 +177,10 @@ def _next_test(
 
 
 def _separated(
-    forward: Forward, problem: Problem, setup: Setup, index: int, one: tuple[Effect, ...],
-    rivals: tuple[tuple[Effect, ...], ...], known: Tolerances,
-) -> Separation | None:  # fmt: skip
-    return separated(setup, options_for(setup, forward.layout)[index], one, rivals, known)
+    forward: Forward, problem: Problem, setup: Setup, index: int, told: Sequence[tuple[Effect, ...]], known: Tolerances
+) -> Separation | None:
+    """What one option would show between the first explanation and the others."""
+    return separated(setup, options_for(setup, forward.layout)[index], told[0], told[1:], known)
 
 
 def _possible(setup: Setup, fitted: Fit):  # type: ignore[no-untyped-def]

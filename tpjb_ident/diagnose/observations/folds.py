@@ -10,9 +10,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tpjb_ident.arrays import BoolArray
+from tpjb_ident.arrays import BoolArray, IntArray
 from tpjb_ident.diagnose.observations.observe import Element, Observations
 
 #: Frequencies at one load from which each is a block of its own.
@@ -35,7 +34,7 @@ class Fold:
     """
 
     name: str
-    members: NDArray[np.intp] = field(repr=False)
+    members: IntArray = field(repr=False)
     beyond: bool = False
 
 

@@ -12,10 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from tpjb_ident.arrays import FloatArray
+from tpjb_ident.arrays import FloatArray, TextArray
 from tpjb_ident.clearance.locus import Locus
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.diagnose.observations.layout import DryTest, DynamicTest, Layout, LocusTest
@@ -96,12 +95,12 @@ class Observations:
         return len(self.value)
 
     @property
-    def blocks(self) -> NDArray[np.str_]:
+    def blocks(self) -> TextArray:
         """Block of every element."""
         return np.array([e.block for e in self.elements])
 
     @property
-    def families(self) -> NDArray[np.str_]:
+    def families(self) -> TextArray:
         """Family of every element."""
         return np.array([e.family for e in self.elements])
 

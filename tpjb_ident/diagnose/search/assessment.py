@@ -18,11 +18,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 from scipy.sparse import csr_array
 
-from tpjb_ident.arrays import FloatArray
+from tpjb_ident.arrays import FloatArray, IntArray
 from tpjb_ident.diagnose.observations.folds import Fold
 from tpjb_ident.diagnose.search.components import Component
 
@@ -154,7 +153,7 @@ class Assessment:
         weighted = self.inverse @ self.linear.residual
         return np.array([self._score(f.members, weighted) for f in self.folds])
 
-    def _score(self, rows: NDArray[np.intp], weighted: FloatArray) -> float:
+    def _score(self, rows: IntArray, weighted: FloatArray) -> float:
         block = self.inverse[np.ix_(rows, rows)]
         error = np.linalg.solve(block, weighted[rows])
         log_det = float(np.linalg.slogdet(block)[1])

@@ -13,9 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tpjb_ident.arrays import FloatArray
+from tpjb_ident.arrays import FloatArray, IntArray
 from tpjb_ident.diagnose.observations.observe import Element, Observations
 from tpjb_ident.diagnose.observations.scale import coordinate
 
@@ -50,7 +49,7 @@ class Component:
     """
 
     name: str
-    rows: NDArray[np.intp] = field(repr=False)
+    rows: IntArray = field(repr=False)
     matrix: FloatArray = field(repr=False)
     lowest: float = LOWEST
     highest: float = 0.0
