@@ -43,6 +43,7 @@ from tpjb_ident.diagnose.search.problem import Problem
 from tpjb_ident.diagnose.search.screen import visible
 from tpjb_ident.diagnose.search.search import baseline_fit
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+from tpjb_ident.diagnose.verdict.verdict import Verdict
 
 BEARINGS = Path(__file__).parents[3] / "model" / "bearings"
 HZ = 2 * math.pi
@@ -268,20 +269,32 @@ def run(one: Bench, kind: str, seed: int, settings: DiagnoseSettings) -> dict[st
         return None
     began = time.process_time()
     verdict, found = solve(drawn.problem, one.forward, settings)
-    named = [
-        {"name": e.name, "parameters": {k: (p.value, p.lo, p.hi) for k, p in e.parameters.items()}}
-        for e in verdict.effects
-    ]
     return {
-        "kind": kind, "seed": seed, "truth": [{"name": e.name, **e.parameters} for e in drawn.truth],
-        "shares": drawn.shares, "outside": drawn.outside, "verdict": verdict.verdict, "named": named,
-        "alike": [list(g) for g in verdict.indistinguishable], "behaves_like": [b.words for b in verdict.behaves_like],
-        "drift": [f"{d.effect}: {d.words}" for d in verdict.drift], "gap": verdict.gap,
+        "kind": kind, "seed": seed, **hidden(drawn), **said(verdict), "gap": verdict.gap,
         "remainder": verdict.remainder.sigma, "p": verdict.remainder.p, "reasons": list(verdict.reasons),
         "worth": [(c.label, w.unseen, w.beside) for c, w in zip(found.model.candidates, found.worth, strict=True)],
         "singles": [(f.label, f.evidence - found.baseline.evidence) for f in found.singles[:5]],
         "elsewhere": _elsewhere(one, drawn, found.effects.effects if verdict.effects else ()),
         "seconds": time.process_time() - began,
+    }  # fmt: skip
+
+
+def hidden(drawn: Drawn) -> dict[str, Any]:
+    """What is hidden, for a row."""
+    truth = [{"name": e.name, **e.parameters} for e in drawn.truth]
+    return {"truth": truth, "shares": drawn.shares, "outside": drawn.outside}
+
+
+def said(verdict: Verdict) -> dict[str, Any]:
+    """What was said of it."""
+    named = [
+        {"name": e.name, "parameters": {k: (p.value, p.lo, p.hi) for k, p in e.parameters.items()}}
+        for e in verdict.effects
+    ]
+    return {
+        "verdict": verdict.verdict, "named": named, "alike": [list(g) for g in verdict.indistinguishable],
+        "behaves_like": [b.words for b in verdict.behaves_like],
+        "drift": [f"{d.effect}: {d.words}" for d in verdict.drift],
     }  # fmt: skip
 
 

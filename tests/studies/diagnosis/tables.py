@@ -30,23 +30,23 @@ def tables(rows: Sequence[Row]) -> str:
     rows : sequence of mapping
         As `mixtures.run` gives them.
     """
-    inside = [r for r in rows if r["truth"] and not r["outside"]]
-    mixed = [r for r in inside if r["kind"] != "clean"]
+    mixed = [r for r in rows if r["truth"] and not r["outside"] and r["kind"] != "clean"]
+    scatter, sized, there, no_false, intervals, described, clean = standing(rows)
     outside = [r for r in rows if r["kind"] == "outside"]
     lines = [
         *_verdicts(rows),
         "",
         "| asked | wanted | held (95 % interval) |",
         "|---|---|---|",
-        _line("scatter alone: no name", "95 %", [not r["named"] for r in rows if r["kind"] == "scatter"]),
-        _line("dominant cause named, its size inside its interval", "90 %", [_dominant(r, True) for r in mixed]),
+        _line("scatter alone: no name", "95 %", scatter),
+        _line("dominant cause named, its size inside its interval", "90 %", sized),
         _line("dominant cause named, or in a group of three at most", "", [_dominant(r, False) for r in mixed]),
-        _line("every hidden effect named, or in such a group", "", [_all_there(r) for r in mixed]),
-        _line("no false name beside or instead", "95 %", [_no_false(r) for r in mixed]),
-        _line("intervals of right names hold", "90 to 98 %", [ok for r in inside for ok in _intervals(r)]),
-        _line("outside the library: a term, a drift, or unexplained", "90 %", [_described(r) for r in outside]),
+        _line("every hidden effect named, or in such a group", "", there),
+        _line("no false name beside or instead", "95 %", no_false),
+        _line("intervals of right names hold", "90 to 98 %", intervals),
+        _line("outside the library: a term, a drift, or unexplained", "90 %", described),
         _line("outside the library: no wrong name as the whole story", "", [r["verdict"] != "named" for r in outside]),
-        _line("one clean cause of d' = 12 named", "98 %", [_dominant(r, False) for r in rows if r["kind"] == "clean"]),
+        _line("one clean cause of d' = 12 named", "98 %", clean),
         "",
         *_elsewhere(mixed),
         "",
@@ -54,6 +54,26 @@ def tables(rows: Sequence[Row]) -> str:
         f"{max(r['seconds'] for r in rows):.0f}.",
     ]
     return "\n".join(lines)
+
+
+def standing(rows: Sequence[Row]) -> list[list[bool]]:
+    """What holds, row by row: by what is asked, in the order of `tables`; groups and elsewhere left out.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+    """
+    inside = [r for r in rows if r["truth"] and not r["outside"]]
+    mixed = [r for r in inside if r["kind"] != "clean"]
+    return [
+        [not r["named"] for r in rows if r["kind"] == "scatter"],
+        [_dominant(r, True) for r in mixed],
+        [_all_there(r) for r in mixed],
+        [_no_false(r) for r in mixed],
+        [ok for r in inside for ok in _intervals(r)],
+        [_described(r) for r in rows if r["kind"] == "outside"],
+        [_dominant(r, False) for r in rows if r["kind"] == "clean"],
+    ]
 
 
 def _verdicts(rows: Sequence[Row]) -> list[str]:

@@ -33,7 +33,7 @@ from model.effects import Effect, apply_effects
 from model.pivots import pivot_laws
 from model.setup import Setup
 from rigdata.virtual_rig import Instruments, Noise, RigPlan, RigTruth, VirtualRig, write_campaign
-from tests.studies.diagnosis.mixtures import BEARINGS, KINDS, OUTSIDE, Bench, Drawn, bench, draw
+from tests.studies.diagnosis.mixtures import BEARINGS, KINDS, OUTSIDE, Bench, Drawn, bench, draw, hidden
 from tests.studies.diagnosis.tables import tables
 from tpjb_ident.compare.rig_from_model import INSTRUMENT_ERRORS, erring_instruments, truth_of
 from tpjb_ident.diagnose.forward.nuisance import Nuisance, Shift
@@ -138,8 +138,7 @@ def run(one: Bench, name: str, kind: str, seed: int) -> dict[str, Any] | None:
         for e in told["effects"]
     ]
     return {
-        "kind": kind, "seed": seed, "truth": [{"name": e.name, **e.parameters} for e in drawn.truth],
-        "shares": drawn.shares, "outside": drawn.outside, "code": done.returncode, "verdict": told["verdict"],
+        "kind": kind, "seed": seed, **hidden(drawn), "code": done.returncode, "verdict": told["verdict"],
         "named": named, "alike": told["indistinguishable"],
         "behaves_like": [b["words"] for b in told["behaves_like"]],
         "drift": [f"{d['effect']}: {d['words']}" for d in told["drift"]], "gap": told["gap"],
