@@ -43,6 +43,15 @@ class Growth:
         if len(self.expansion) != 2 or not all(0.0 <= a < 1e-4 for a in self.expansion):
             raise OptionError(f"expansion must be two numbers from 0 to 1e-4 1/K, got {self.expansion!r}")
 
+    def closing(self, bearing: Bearing) -> float:
+        """What a kelvin of the journal's takes from every clearance [m/K].
+
+        Parameters
+        ----------
+        bearing : Bearing
+        """
+        return self.expansion[0] * bearing.journal_radius
+
 
 def grown(bearing: Bearing, growth: Growth, supply: float, journal: float) -> Bearing:
     """Bearing with its clearances as they run.
@@ -66,10 +75,10 @@ def grown(bearing: Bearing, growth: Growth, supply: float, journal: float) -> Be
     BearingError
         Nothing is left of a clearance.
     """
-    by_journal, by_housing = growth.expansion
+    by_housing = growth.expansion[1]
     warm = supply - growth.reference
     outward = supply if growth.housing is None else growth.housing
-    out = by_journal * bearing.journal_radius * (journal - growth.reference)
+    out = growth.closing(bearing) * (journal - growth.reference)
 
     def run(number: int, pad: Pad) -> Pad:
         seat = bearing.journal_radius + pad.pad_clearance + pad.thickness

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,6 @@ from model.pivots import pivot_laws
 from model.possible import check_possible
 from model.prediction import Prediction
 from model.setup import Mesh, Setup
-from model.statics.conditions import NOT_CONVERGED, UNSETTLED_GROWTH
 from model.statics.equilibrium import Equilibrium
 from model.statics.solve import solve_equilibrium
 from model.units import to_si
@@ -218,35 +216,14 @@ def solve_as_it_runs(
     equilibrium : Equilibrium
     """
     growth = setup.growth
-    if growth is None:
-        return setup, solve_equilibrium(setup, force, speed, start)
-    journal = setup.inlet_temperature if growth.journal is None else growth.journal
-    if growth.journal is None and start is not None and start.converged:
-        journal = start.mean_journal_temperature
-    settled, roughly = False, growth.journal is None
-    for _ in range(MAX_GROWTH_STEPS):
-        bearing = grown(setup.bearing, growth, setup.inlet_temperature, journal)
-        running = setup.change(bearing=bearing, grown=True)
-        found = running.change(accuracy=max(setup.accuracy, ROUGH_ACCURACY)) if roughly else running
-        equilibrium = start = solve_equilibrium(found, force, speed, start)
-        felt = growth.journal if growth.journal is not None else equilibrium.mean_journal_temperature
-        settled = not equilibrium.converged or (not roughly and abs(felt - journal) < GROWTH_TOLERANCE)
-        if settled:
-            break
-        roughly = roughly and abs(felt - journal) > ROUGH_GROWTH
-        journal = felt
-    if not settled:
-        names = (*equilibrium.status, UNSETTLED_GROWTH, NOT_CONVERGED)
-        equilibrium = replace(equilibrium, status=names)
-    return running, equilibrium
-
-
-#: Journal temperature that is near enough for the clearances [K]: a few nanometres.
-GROWTH_TOLERANCE = 0.01
-MAX_GROWTH_STEPS = 20
-#: As long as the journal's temperature moves by more than this from one equilibrium to the next [K], they are found to
-#: this share of the load only.
-ROUGH_GROWTH, ROUGH_ACCURACY = 0.5, 1e-3
+    if growth is not None and growth.journal is not None:
+        given = grown(setup.bearing, growth, setup.inlet_temperature, growth.journal)
+        setup = setup.change(bearing=given, grown=True)
+    equilibrium = solve_equilibrium(setup, force, speed, start)
+    if setup.growth is not None:
+        running = setup.bearing.with_pads(tuple(f.pad for f in equilibrium.films))
+        setup = setup.change(bearing=running, grown=True)
+    return setup, equilibrium
 
 
 def _check_point(load: float, direction: float, speed: float, omega: FloatArray) -> None:

@@ -41,7 +41,7 @@ class CrossOperator(NamedTuple):
     journal : (nt, nz + 1, 2) ndarray
         Exchange with the journal at the earlier and the later station [W/K].
     made : (nt, n) ndarray
-        Dissipation [W].
+        Dissipation [W], and what the balances take from it per kelvin, at the present temperature.
     carried : (nz + 1, cells) ndarray
         Heat carried over the trailing edge per kelvin [W/K].
     """
@@ -55,7 +55,7 @@ class CrossOperator(NamedTuple):
 
 @compiled
 def cross_operator(
-    grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float, heat: tuple[float, float, float, float]
+    grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float, heat: tuple[float, float, float, float, float]
 ) -> tuple[CrossOperator, float]:
     """Set up and factorise the heat balances of a film.
 
@@ -68,8 +68,8 @@ def cross_operator(
     speed : float
         Surface speed of the journal [m/s].
     heat : tuple of float
-        Specific heat [J/kg/K] and conductivity [W/m/K] of the oil, share of the dissipation that stays in it, and 1 for
-        a journal that takes part, 0 for an insulated one.
+        Specific heat [J/kg/K] and conductivity [W/m/K] of the oil, share of the dissipation that stays in it, 1 for
+        a journal that takes part, 0 for an insulated one, and the exponent of the viscosity [1/K].
 
     Returns
     -------
@@ -95,7 +95,6 @@ def cross_operator(
     for i in range(nt):
         _box(grid, work, cross, speed, heat, i, flows, space)
         _set_rows(space, factor[i], before[i])
-        _factorise(factor[i], cells)
         for j in range(lines):
             exchange = space.high[j, cells - 1]
             journal[i, j, 0] = (1.0 - space.theta[j, cells - 1]) * exchange
@@ -105,6 +104,11 @@ def cross_operator(
         _dissipation(grid, work, cross, speed, i + 1, last)
         for k in range(n):
             made[i, k] += 0.5 * heat[2] * last[k]
+            # a hotter film shears with less heat: taken as it will be, or the two would swing
+            less = heat[4] * made[i, k]
+            factor[i, k, cells] += less
+            made[i, k] += less * cross.temperature[i + 1, k // cells, k % cells]
+        _factorise(factor[i], cells)
     carried = np.empty((lines, cells))
     for j in range(lines):
         for m in range(cells):
@@ -205,7 +209,7 @@ def _box(
     work: FilmWork,
     cross: CrossFilm,
     speed: float,
-    heat: tuple[float, float, float, float],
+    heat: tuple[float, float, float, float, float],
     i: int,
     flows: FloatArray,
     space: _Space,

@@ -66,7 +66,17 @@ def margin(film: PadFilm, position: FloatArray) -> float:
     float
     """
     assert film.branch is not None
-    return float(film.rigid_approach(position) - film.branch.rigid_approach[0]) / film.pad.pad_clearance
+    return float(_reach(film, position) - film.branch.rigid_approach[0]) / film.pad.pad_clearance
+
+
+def _reach(film: PadFilm, position: FloatArray) -> float:
+    """How near the journal is to a pad on a rigid pivot [m], counting by how much a warm pad's face stands inward."""
+    return film.rigid_approach(position) + film.bulge
+
+
+def _edge(film: PadFilm) -> float:
+    """Share of the clearance by which the table of rigid pads may be wrong about where a pad stops carrying."""
+    return EDGE + abs(film.bulge) / film.pad.pad_clearance
 
 
 def let_idle(film: PadFilm) -> None:
@@ -94,9 +104,9 @@ def set_loaded(film: PadFilm, position: FloatArray) -> None:
     film.idle = margin(film, position) <= 0.0
     film.work.ruptured[:] = False
     if not film.idle:
-        rigid = film.rigid_approach(position)
-        a, b = film.branch.at(rigid)
-        film.deflection = rigid - a
+        reach = _reach(film, position)
+        a, b = film.branch.at(reach)
+        film.deflection = reach - a
         film.tilt = (b - float(film.tangent @ position)) / film.pivot_radius
 
 
@@ -130,7 +140,7 @@ def update_carrying(setup: Setup, films: list[PadFilm], position: FloatArray, su
 
 def _keeps_its_load(setup: Setup, film: PadFilm, inside: float) -> bool:
     """Whether a pad can go on carrying: near its edge, whether the film would push a small change back."""
-    if inside > 0.0 or inside < -EDGE or film.forces is None:
+    if inside > 0.0 or inside < -_edge(film) or film.forces is None:
         return inside > 0.0
     return is_stable(setup, film)
 
@@ -181,7 +191,7 @@ def leave_unstable(setup: Setup, films: list[PadFilm], position: FloatArray) -> 
             continue
         found = True
         film.load_changes += 1
-        if margin(film, position) > EDGE and film.load_changes < MAX_LOAD_CHANGES:
+        if margin(film, position) > _edge(film) and film.load_changes < MAX_LOAD_CHANGES:
             set_loaded(film, position)
         else:
             let_idle(film)
@@ -204,8 +214,8 @@ def unloaded_pads(films: list[PadFilm], position: FloatArray) -> tuple[list[int]
         Numbers of pads that stay unloaded when left alone (a < 0: the film opens towards both edges), and of those
         that would take up load again at once.
     """
-    unloaded = [f for f in films if f.idle and f.branch is not None and margin(f, position) > EDGE]
-    staying = [f.number for f in unloaded if f.rigid_approach(position) <= 0.0]
+    unloaded = [f for f in films if f.idle and f.branch is not None and margin(f, position) > _edge(f)]
+    staying = [f.number for f in unloaded if _reach(f, position) <= 0.0]
     return staying, [f.number for f in unloaded if f.number not in staying]
 
 

@@ -36,12 +36,21 @@ SINGULAR = Condition("singular", "error", "a Newton step has no solution")
 UNSUPPORTED = Condition(
     "no pads against the load", "error", "no set of pivots can balance the load, wherever the journal goes"
 )
-UNSETTLED_GROWTH = Condition(
-    "thermal growth does not settle", "error", "clearances and journal temperature go on changing each other"
-)
 FLOW_BACK = Condition(
     "flow back at a leading edge", "warning", "a pressure peak pushes oil back; the heat balance there is limited"
 )
+
+
+def runaway(share: float) -> Condition:
+    """No equilibrium with all of the heat; where it ended.
+
+    Parameters
+    ----------
+    share : float
+        Of the heat, with which the last one was found.
+    """
+    said = f"journal and films find rest with up to {100 * share:.0f} % of the heat they make, and not with more"
+    return Condition("heat runs away", "error", said)
 
 
 def idle(pads: Sequence[int]) -> Condition:

@@ -27,7 +27,7 @@ from model.statics.heat_paths import FilmAnswer, balance_heat, minimal_residual
 from model.statics.pad_film import PadFilm
 
 #: What a pad conducts is solved to this share in every step; what is left contracts with the rest.
-CONDUCTION_TOLERANCE = 0.1
+CONDUCTION_TOLERANCE = 0.03
 
 
 @dataclass
@@ -86,20 +86,35 @@ def settle_cross_temperatures(
     inlets, journal = balance_heat(setup, order, [a.outer if a is not None else None for a in answers])
     change = 0.0
     for film, part, inlet in zip(order, answers, inlets.tolist(), strict=True):
-        film.inlet = inlet
-        film.temperature_change = 0.0
+        hotter = inlet - film.inlet
+        film.inlet += limited_share(hotter, limits) * hotter
+        film.temperature_change = abs(hotter)
+        change = float(np.maximum(change, film.temperature_change))  # a NaN is not to be lost
         if part is None or film.cross is None:
             continue
         weights = np.array([1.0, inlet, journal])
         asked = (part.fields @ weights).reshape(film.cross.temperature.shape) - film.cross.temperature
         face = np.tensordot(weights, part.faces, 1) - film.cross.face
         film.temperature_change = float(np.maximum(np.abs(asked).max(), np.abs(face).max()))
-        share = limits[0] * min(1.0, limits[1] / max(film.temperature_change, 1e-30))
+        share = limited_share(film.temperature_change, limits)
         film.cross.temperature[:] += share * asked
         film.cross.face[:] += share * face
         film.outlet = float(np.dot(part.outer.outlet, weights))
-        change = float(np.maximum(change, film.temperature_change))  # a NaN is not to be lost
+        change = float(np.maximum(change, film.temperature_change))
     return change, back, journal
+
+
+def limited_share(change: float, limits: tuple[float, float]) -> float:
+    """Share of a change of temperature that is made.
+
+    Parameters
+    ----------
+    change : float
+        [K]
+    limits : tuple of float
+        Relaxation, and the largest change in one step [K].
+    """
+    return limits[0] * min(1.0, limits[1] / max(abs(change), 1e-30))
 
 
 def housing_oil(films: Sequence[PadFilm]) -> float:
@@ -144,7 +159,7 @@ def _answer(
     if film.forces is None or cross is None:
         return None, 0.0
     oil = setup.bearing.oil
-    heat = (oil.specific_heat, oil.conductivity, film.kept, 1.0)
+    heat = (oil.specific_heat, oil.conductivity, film.kept, 1.0, oil.viscosity_exponent)
     operator, back = cross_operator(film.grid, film.work, cross, surface_speed, heat)
     taken = pad_heat(film, around)
     rows, columns = film.work.temperature.shape

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from model.arrays import FloatArray
@@ -52,8 +53,18 @@ class Equilibrium:
         """The journal's temperature, or the mean over the films that carry where it takes no heat [degC]."""
         if math.isfinite(self.journal_temperature):
             return self.journal_temperature
-        carrying = [f for f in self.films if not f.idle]
-        if not carrying:
-            return self.films[0].inlet
-        area = sum(float(f.grid.area.sum()) for f in carrying)
-        return sum(float((f.grid.area * f.work.temperature).sum()) for f in carrying) / area
+        return mean_temperature(self.films)
+
+
+def mean_temperature(films: Sequence[PadFilm]) -> float:
+    """Mean temperature of the films that carry, by area [degC]; the oil's where it enters if none does.
+
+    Parameters
+    ----------
+    films : sequence of PadFilm
+    """
+    carrying = [f for f in films if not f.idle]
+    if not carrying:
+        return films[0].inlet
+    area = sum(float(f.grid.area.sum()) for f in carrying)
+    return sum(float((f.grid.area * f.work.temperature).sum()) for f in carrying) / area

@@ -37,6 +37,8 @@ def solve_films(search: Search) -> float:
     change = 0.0
     if search.setup.thermal != "isothermal":
         change = _heat_films(search)
+    if change < BOUNDLESS:
+        change = max(change, search.warm_up())
     if search.setup.flexible_pads and change < BOUNDLESS:
         # a deformation counts like a temperature change of the same weight in the film's resistance
         change = max(change, HEAT_PER_FORCE * _bend_pads(search))

@@ -36,6 +36,8 @@ NUSSELT = 3.0
 #: Conduction is solved to this share in every step of the equilibrium; what is left contracts with the rest.
 CONDUCTION_TOLERANCE = 0.01
 KRYLOV_STEPS = 12
+#: Share of the oil in the grooves that is fresh after a turn, at least.
+LEAST_FRESH = 1e-3
 
 
 def couples_heat(setup: Setup) -> bool:
@@ -320,4 +322,6 @@ def mixing_shares(order: list[PadFilm], fraction: float) -> list[float]:
     for k, (entering, _) in enumerate(flows):
         hot = fraction * flows[k - 1][1]
         shares.append(1.0 if not hot < entering else max(0.0, hot / entering))
-    return shares
+    # where nothing leaks (all pads idle, on the way) heat would go round for ever
+    most = (1.0 - LEAST_FRESH) ** (1.0 / len(shares))
+    return [min(s, most) for s in shares] if math.prod(shares) > 1.0 - LEAST_FRESH else shares

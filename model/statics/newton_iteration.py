@@ -28,6 +28,7 @@ from model.statics.compiled.constants import (
     RELAXATION,
     SHRINK,
     SLOW,
+    SLOW_ACROSS,
 )
 from model.statics.equilibrium import Equilibrium
 from model.statics.film_step import refine_derivatives, solve_films
@@ -52,10 +53,13 @@ def iterate(search: Search) -> Equilibrium:
     left = best_left = math.inf
     memory, setup = Anderson(), search.setup
     isothermal = setup.thermal == "isothermal" and not setup.flexible_pads
+    # a film with temperatures across knows that it makes less heat when it is hotter: it does not swing
+    relaxed, slow = (1.0, SLOW_ACROSS) if setup.thermal == "thd" else (RELAXATION, SLOW)
+    search.relaxation = relaxed
     for iteration in range(1, MAX_ITERATIONS + 1):
         if update_carrying(setup, search.films, search.position, search.surface_speed):
             memory.reset()
-        before = search.vector() if left > SLOW * best_left and not isothermal else None
+        before = search.vector() if left > slow * best_left and not isothermal else None
         heat = solve_films(search)
         if not heat < BOUNDLESS:
             lost = any(f.lost for f in search.films)
@@ -65,7 +69,7 @@ def iterate(search: Search) -> Equilibrium:
             return _failed(search, iteration, heat, conditions.SINGULAR)
         best_left, left = min(best_left, left), max(residual, heat / HEAT_PER_FORCE)
         near = residual < NEAR and heat < NEAR_HEAT
-        search.relaxation = 1.0 if near else RELAXATION
+        search.relaxation = 1.0 if near else relaxed
         if residual < setup.accuracy and heat < HEAT_PER_FORCE * setup.accuracy:
             if not leave_unstable(setup, search.films, search.position):
                 return _settled(search, iteration, residual, heat)
@@ -75,7 +79,7 @@ def iterate(search: Search) -> Equilibrium:
         best = min(best, residual)
         whole = _move(search, (shift, moves), 0.5 if stalled > PATIENCE else 1.0)
         # steps that were cut short, or still far off, say nothing of the iteration's slow modes
-        if before is not None and whole and near and left > SLOW * best_left:
+        if before is not None and whole and near and left > slow * best_left:
             search.set_vector(memory.next(before, search.vector()))
         else:
             memory.reset()
@@ -92,7 +96,7 @@ def _move(search: Search, step: tuple[FloatArray, FloatArray], damping: float) -
         bent.append(None)
         if film.forces is None:
             continue
-        da = float(film.normal @ shift) - move[1]
+        da = float(film.normal @ shift) - move[1] + film.closing
         db = float(film.tangent @ shift) + film.pivot_radius * move[0]
         if film.deformation is not None and film.step is not None:
             bent[-1] = change_of_shape(film.deformation, film.step, da, db)
@@ -100,6 +104,7 @@ def _move(search: Search, step: tuple[FloatArray, FloatArray], damping: float) -
         if worst * damping < SHRINK - 1.0:
             scale = min(scale, (SHRINK - 1.0) / worst)
     search.position = search.position + scale * shift
+    search.grow(scale)
     for film, move, change in zip(search.films, moves, bent, strict=True):
         film.tilt += float(scale * move[0])
         film.deflection += float(scale * move[1])

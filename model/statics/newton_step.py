@@ -76,7 +76,8 @@ def pad_equations(setup: Setup, carrying: list[PadFilm]) -> PadEquations:
         assert forces is not None
         law, radial = setup.pivots[film.number - 1], float(forces.force[0])
         rows.frame[m] = film.normal, film.tangent
-        rows.force[m], rows.stiffness[m] = forces.force, forces.stiffness
+        # a journal that grows comes nearer, all but at the pads' ends as if it were pushed
+        rows.force[m], rows.stiffness[m] = forces.force + film.closing * forces.stiffness[:, 0], forces.stiffness
         rows.pivot_radius[m] = film.pivot_radius
         hold = tilt_hold(setup, film.tilt, radial)
         rows.holding_force[m] = hold.moment / film.pivot_radius

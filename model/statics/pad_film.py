@@ -75,6 +75,8 @@ class PadFilm:
         Temperatures across the film; None where there is one at each place.
     outlet : float
         Flow-weighted temperature at the trailing edge of a film with temperatures across [degC].
+    closing : float
+        What the present step takes from the clearance, because the journal grows [m].
     """
 
     number: int
@@ -103,6 +105,7 @@ class PadFilm:
     resting: RestingFilm | None = None
     cross: CrossFilm | None = None
     outlet: float = math.nan
+    closing: float = 0.0
 
     @property
     def heat_state(self) -> tuple[FloatArray, ...]:
@@ -130,6 +133,11 @@ class PadFilm:
     def lost(self) -> bool:
         """Whether the film closed, so that it has no pressure."""
         return not self.idle and self.forces is not None and self.forces.steps < 0
+
+    @property
+    def bulge(self) -> float:
+        """How far the face of a pad that bends stands inward at its pivot [m]."""
+        return 0.0 if self.deformation is None else -float(np.interp(0.0, self.grid.angle, self.bent[:, 0]))
 
     def rigid_approach(self, position: FloatArray) -> float:
         """Approach a of the film if the pivot were rigid [m].

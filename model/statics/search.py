@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from model.arrays import FloatArray
 from model.film.mesh import FilmWork
+from model.growth import grown
 from model.setup import Setup
 from model.statics.carrying import find_branch, set_loaded
-from model.statics.compiled.constants import FIRST_HEATING, MICROMETRE, RELAXATION
+from model.statics.compiled.constants import FIRST_HEATING, HEATING_STEP, MICROMETRE
 from model.statics.compiled.first_position import first_position
-from model.statics.equilibrium import Equilibrium
+from model.statics.equilibrium import Equilibrium, mean_temperature
 from model.statics.heat_paths import couples_heat
 from model.statics.pad_film import PadFilm, pad_films
+
+#: A change of the clearance by more than this share asks for the table of a pad's loaded attitudes anew.
+NEW_TABLE = 1e-3
 
 
 @dataclass
@@ -38,6 +42,12 @@ class Search:
         The journal's temperature [degC]; NaN where it takes no heat.
     relaxation : float
         Share of a change of temperature that is made.
+    heat : float
+        Share of the films' heat that is made, 1 but on the way to an equilibrium.
+    warmth : float
+        Temperature of the journal that the clearances belong to [degC].
+    warming : float
+        What the present step changes it by [K].
     works : FilmWork
         The arrays of all films side by side, with a leading axis for the pad.
     shifts : (n, unknowns) ndarray
@@ -51,7 +61,10 @@ class Search:
     position: FloatArray = field(default_factory=lambda: np.zeros(2))
     limited: float = 0.0
     journal: float = math.nan
-    relaxation: float = RELAXATION
+    relaxation: float = 1.0
+    heat: float = 1.0
+    warmth: float = field(init=False)
+    warming: float = 0.0
     works: FilmWork = field(init=False)
     shifts: FloatArray = field(init=False)
 
@@ -69,8 +82,53 @@ class Search:
         return [f for f in self.films if f.forces is not None and f.forces.steps > 0]
 
     def lay_out(self) -> None:
-        """Make all films anew."""
-        self.films, self.works, self.shifts = pad_films(self.setup)
+        """Make all films anew, their clearances those of a journal as warm as the supply."""
+        setup, growth = self.setup, self.setup.growth
+        self.warmth = setup.inlet_temperature
+        if growth is not None:
+            setup = setup.change(bearing=grown(setup.bearing, growth, self.warmth, self.warmth))
+        self.films, self.works, self.shifts = pad_films(setup)
+        for film in self.films:
+            film.kept *= self.heat
+
+    def warm_up(self) -> float:
+        """Say what the journal's temperature will take from the clearances; returns the change asked for [K]."""
+        growth = self.setup.growth
+        if growth is None:
+            return 0.0
+        felt = self.journal if math.isfinite(self.journal) else mean_temperature(self.films)
+        asked = felt - self.warmth
+        self.warming = self.relaxation * math.copysign(min(abs(asked), HEATING_STEP), asked)
+        for film in self.films:
+            film.closing = growth.closing(self.setup.bearing) * self.warming
+        return abs(asked)
+
+    def grow(self, share: float) -> None:
+        """Let the journal grow by a share of what `warm_up` said.
+
+        Parameters
+        ----------
+        share : float
+        """
+        if self.warming:
+            self._set_warmth(self.warmth + share * self.warming)
+
+    def _set_warmth(self, warmth: float) -> None:
+        """Give the clearances that belong to a journal of this temperature [degC]."""
+        growth = self.setup.growth
+        assert growth is not None
+        taken = growth.closing(self.setup.bearing) * (warmth - self.warmth)
+        self.warmth, self.warming = warmth, 0.0
+        for film in self.films:
+            pad = film.pad
+            film.pad = replace(
+                pad,
+                pad_clearance=pad.pad_clearance - taken,
+                assembled_clearance=pad.assembled_clearance - taken,
+            )
+            film.closing = 0.0
+            if film.branch is not None and abs(taken) > NEW_TABLE * pad.pad_clearance:
+                film.branch = None
 
     def start_from(self, start: Equilibrium) -> bool:
         """Take over a neighbour's state; False if it has none or its mesh does not fit.
@@ -104,6 +162,8 @@ class Search:
         self.position = start.position.copy()
         if coupled:
             self.journal = start.journal_temperature
+        if self.setup.growth is not None:
+            self._set_warmth(start.mean_journal_temperature)
         return True
 
     def start_cold(self) -> None:
@@ -123,7 +183,7 @@ class Search:
 
     def vector(self) -> FloatArray:
         """Journal, pads and film temperatures as one vector, in micrometres and kelvins."""
-        parts = [self.position / MICROMETRE]
+        parts = [self.position / MICROMETRE, [self.warmth]]
         for film in self.films:
             parts.append(np.array([film.tilt * film.pivot_radius, film.deflection]) / MICROMETRE)
             parts += [state.ravel() * (0.0 if film.idle else 1.0) for state in film.heat_state]
@@ -140,7 +200,9 @@ class Search:
             Micrometres and kelvins.
         """
         self.position = state[:2] * MICROMETRE
-        at = 2
+        if self.setup.growth is not None:
+            self._set_warmth(float(state[2]))
+        at = 3
         for film in self.films:
             film.tilt = float(state[at]) * MICROMETRE / film.pivot_radius
             film.deflection = float(state[at + 1]) * MICROMETRE

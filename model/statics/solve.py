@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
 from model.arrays import FloatArray
 from model.setup import Setup
 from model.statics.at_once import able, iterate_at_once
+from model.statics.conditions import runaway
 from model.statics.equilibrium import Equilibrium
+from model.statics.heat_paths import couples_heat
 from model.statics.newton_iteration import iterate
 from model.statics.search import Search
 
-#: First share of the load, where the whole of it finds no equilibrium at once, and the least step from one to the next.
+#: First share of the load or the heat, where the whole of it finds no equilibrium at once, and the least step on.
 FIRST_SHARE, LEAST_STEP = 0.25, 0.02
 
 
@@ -40,6 +45,8 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
             return result
         search.lay_out()
     result = _iterated(search, cold=True)
+    if not result.converged and couples_heat(setup):
+        result = _raise_heat(search, result)
     return result if result.converged else _raise_load(search, result)
 
 
@@ -54,16 +61,34 @@ def _iterated(search: Search, cold: bool) -> Equilibrium:
 
 def _raise_load(search: Search, failed: Equilibrium) -> Equilibrium:
     """Raise the load in steps, each started from the one before: hot, thin films are far from the isothermal guess."""
-    load, reached, step = search.load.copy(), 0.0, FIRST_SHARE
+    load = search.load.copy()
+    found, _ = _raise(search, lambda share: setattr(search, "load", share * load))
+    return found or failed
+
+
+def _raise_heat(search: Search, failed: Equilibrium) -> Equilibrium:
+    """Raise the heat in steps: where it goes round, with journal and clearances, cold films are no start for hot ones.
+
+    Names a bearing that is lost on the way: above some share of its heat every film makes more than leaves.
+    """
+    found, reached = _raise(search, lambda share: setattr(search, "heat", share))
+    if found is not None or not reached:
+        return found or failed
+    return replace(failed, status=(runaway(reached), *failed.status))
+
+
+def _raise(search: Search, put: Callable[[float], None]) -> tuple[Equilibrium | None, float]:
+    """Raise what `put` sets a share of from `FIRST_SHARE` to 1; the equilibrium there, and the share reached."""
+    reached, step = 0.0, FIRST_SHARE
     last: Equilibrium | None = None
     while reached < 1.0 and step > LEAST_STEP:
         share = min(1.0, reached + step)
-        search.load = share * load
+        put(share)
         search.lay_out()
         result = _iterated(search, cold=last is None or not search.start_from(last))
         if result.converged:
             last, reached = result, share
         else:
             step *= 0.5
-    search.load = load
-    return last if last is not None and reached == 1.0 else failed
+    put(1.0)
+    return (last if reached == 1.0 else None), reached

@@ -120,7 +120,7 @@ def couette(nahme: float, cells: int) -> tuple[float, float]:
         set_cross_viscosity(cross, work, oil_constants(oil))
         dragged = 0.5 * speed * h * work.density * work.drag * grid.height
         work.flow_x[:] = 0.5 * (dragged[1:] + dragged[:-1])
-        operator, back = cross_operator(grid, work, cross, speed, (2000.0, 0.13, 1.0, 1.0))
+        operator, back = cross_operator(grid, work, cross, speed, (2000.0, 0.13, 1.0, 1.0, 0.0))
         assert back == 0.0
         fields = np.full((41, operator.made.shape[1], 1), 40.0)
         march_cross(operator, fields, operator.made[:, :, None].copy(), np.array([40.0]))
@@ -148,7 +148,7 @@ def test_shear_heating_is_nahme_s_exact_solution(nahme):
 def test_a_well_mixed_film_between_insulated_walls_is_the_adiabatic_one():
     grid, work, cross = solved(6)
     heat, mixing = 2000.0, 1e4
-    operator, _ = cross_operator(grid, work, cross, SURFACE, (heat, mixing, 1.0, 0.0))
+    operator, _ = cross_operator(grid, work, cross, SURFACE, (heat, mixing, 1.0, 0.0, 0.0))
     fields = np.full((81, operator.made.shape[1], 1), 40.0)
     march_cross(operator, fields, operator.made[:, :, None].copy(), np.zeros(1))
     across = fields[:, :, 0].reshape(cross.temperature.shape)
@@ -173,7 +173,7 @@ def test_oil_that_takes_up_any_heat_is_isothermal(rocker):
 
 def test_one_field_marches_as_many_do():
     grid, work, cross = solved(6)
-    operator, _ = cross_operator(grid, work, cross, SURFACE, (2000.0, 0.13, 1.0, 1.0))
+    operator, _ = cross_operator(grid, work, cross, SURFACE, (2000.0, 0.13, 1.0, 1.0, 0.0))
     rng = np.random.default_rng(5)
     sources = rng.standard_normal((80, 7))
     many, spread = np.zeros((81, 42, 1)), np.zeros((80, 42, 1))
