@@ -183,7 +183,7 @@ class Search:
 
     def vector(self) -> FloatArray:
         """Journal, pads and film temperatures as one vector, in micrometres and kelvins."""
-        parts = [self.position / MICROMETRE, [self.warmth]]
+        parts = [self.position / MICROMETRE, np.array([self.warmth])]
         for film in self.films:
             parts.append(np.array([film.tilt * film.pivot_radius, film.deflection]) / MICROMETRE)
             parts += [state.ravel() * (0.0 if film.idle else 1.0) for state in film.heat_state]
