@@ -12,7 +12,7 @@ import math
 from model.arrays import FloatArray
 from model.film.loaded_attitude import Branch, LoadedAttitude, loaded_attitude
 from model.setup import Setup
-from model.statics.compiled.constants import EDGE, LONGEST_STEP, MAX_LOAD_CHANGES, NEAR_EDGE
+from model.statics.compiled.constants import CROWN, EDGE, LONGEST_STEP, MAX_LOAD_CHANGES, NEAR_EDGE
 from model.statics.pad_film import PadFilm
 from model.statics.tilt_hold import tilt_hold
 
@@ -76,7 +76,7 @@ def _reach(film: PadFilm, position: FloatArray) -> float:
 
 def _edge(film: PadFilm) -> float:
     """Share of the clearance by which the table of rigid pads may be wrong about where a pad stops carrying."""
-    return EDGE + abs(film.bulge) / film.pad.pad_clearance
+    return EDGE + CROWN * abs(film.bulge) / film.pad.pad_clearance
 
 
 def let_idle(film: PadFilm) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from model.arrays import FloatArray
 from model.setup import Setup
 from model.statics.at_once import able, iterate_at_once
-from model.statics.conditions import runaway
+from model.statics.conditions import HOTTEST_FILM, runaway
 from model.statics.equilibrium import Equilibrium
 from model.statics.heat_paths import couples_heat
 from model.statics.newton_iteration import iterate
@@ -69,10 +69,11 @@ def _raise_load(search: Search, failed: Equilibrium) -> Equilibrium:
 def _raise_heat(search: Search, failed: Equilibrium) -> Equilibrium:
     """Raise the heat in steps: where it goes round, with journal and clearances, cold films are no start for hot ones.
 
-    Names a bearing that is lost on the way: above some share of its heat every film makes more than leaves.
+    Names a bearing that is lost on the way because it grows hotter and closer for ever: above some share of its heat.
     """
     found, reached = _raise(search, lambda share: setattr(search, "heat", share))
-    if found is not None or not reached:
+    hottest = max(float(f.work.temperature.max()) for f in failed.films)
+    if found is not None or not reached or hottest < HOTTEST_FILM:
         return found or failed
     return replace(failed, status=(runaway(reached), *failed.status))
 

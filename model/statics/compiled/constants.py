@@ -11,6 +11,8 @@ from __future__ import annotations
 #: within it the film decides. Taken as exact, 6 of 600 bearings find no equilibrium any more; with 0.1 one more does,
 #: and another one stands elsewhere.
 EDGE = 0.03
+#: And by so many times what the face of a pad that bends stands inward: its ends stand outward, and it carries sooner.
+CROWN = 4.0
 #: Within this share of it the table is made anew for the film's present temperature. Made once only, one bearing of
 #: 900 is lost; 0.03 and 0.3 do as well.
 NEAR_EDGE = 0.1
