@@ -19,7 +19,7 @@ from model.film.cross_march import face_temperature, march_cross, march_one
 from model.film.energy import solve_energy
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.film.reynolds import solve_film
-from model.growth import Growth
+from model.growth import Growth, grown
 from model.options import Options
 from model.predict import predict
 from model.prediction import Prediction
@@ -220,5 +220,17 @@ def test_a_neighbour_is_a_start(rocker):
     p = run(rocker)
     again = predict(rocker, 5000.0, DOWN, SPEED, thermal="thd", start=p)
     assert again.equilibrium.iterations < p.equilibrium.iterations
-    # the journal settles to 0.01 K, 6 nm of clearance
-    np.testing.assert_allclose(again.h, p.h, rtol=5e-4, atol=5e-4 * np.abs(p.h).max())
+    np.testing.assert_allclose(again.h, p.h, rtol=1e-5, atol=1e-5 * np.abs(p.h).max())
+
+
+@pytest.mark.slow
+def test_the_clearances_found_are_those_of_the_journal_found(rocker):
+    p = run(rocker)
+    felt = p.equilibrium.journal_temperature
+    found = grown(rocker, Growth(), rocker.oil.supply_temperature, felt)
+    for pad, same in zip(p.setup.bearing.pads, found.pads, strict=True):
+        assert pad.pad_clearance == pytest.approx(same.pad_clearance, abs=1e-12)
+        assert pad.assembled_clearance == pytest.approx(same.assembled_clearance, abs=1e-12)
+    given = run(rocker, options=Options(growth=Growth(journal=felt)))
+    np.testing.assert_allclose(given.h, p.h, rtol=1e-5, atol=1e-5 * np.abs(p.h).max())
+    assert given.equilibrium.journal_temperature == pytest.approx(felt, abs=1e-3)
