@@ -47,8 +47,8 @@ Thermal = Annotated[
     str,
     typer.Option(
         "--thermal",
-        help="isothermal, adiabatic, tehd (pads bend) or thd (heat as it goes: what leaves a pad is there for the next, "
-        "lambda 1, unless the effect hot_oil_carryover says less; the file's clearances hold at 20 degC).",
+        help="isothermal, adiabatic, tehd (pads bend) or thd (heat as it goes: what leaves a pad is there for the next "
+        "one, lambda 1, unless the effect hot_oil_carryover says less; the file's clearances hold at 20 degC).",
         autocompletion=one_of("isothermal", "adiabatic", "tehd", "thd"),
     ),
 ]
