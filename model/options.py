@@ -35,6 +35,9 @@ class Options:
     perturbed_heat : bool
         In the dynamics the films' temperature and viscosity follow the motion (`adiabatic`, `tehd`) instead of staying
         what they are at rest; see `model.film.following_heat`. What enters a pad keeps its temperature.
+    perturbed_bending : bool
+        In the dynamics pads that deform (`tehd`, `thd`) bend with the motion, instead of moving as rigid bodies; see
+        `model.dynamics.flexing_pads`.
     """
 
     conduction: bool = False
@@ -43,6 +46,7 @@ class Options:
     cavitation: str = "swift-stieber"
     turbulence: str = "none"
     perturbed_heat: bool = False
+    perturbed_bending: bool = False
 
     def __post_init__(self) -> None:
         check_known("cavitation", self.cavitation, FILM_MODELS)
@@ -51,5 +55,8 @@ class Options:
             raise OptionError(f"a turbulent film ruptures by swift-stieber, not by {self.cavitation!r}")
         if self.perturbed_heat and (self.cavitation, self.turbulence) != ("swift-stieber", "none"):
             raise OptionError("perturbed_heat is for laminar films that rupture by swift-stieber")
+        plain = (self.cavitation, self.turbulence, self.perturbed_heat) == ("swift-stieber", "none", False)
+        if self.perturbed_bending and not plain:
+            raise OptionError("perturbed_bending is for laminar films that rupture by swift-stieber, their heat frozen")
         if not (self.growth is None or isinstance(self.growth, Growth)):
             raise OptionError(f"growth must be a Growth or None, got {self.growth!r}")

@@ -15,6 +15,7 @@ import numpy as np
 
 from model.arrays import ComplexArray, FloatArray
 from model.conditions import Condition
+from model.dynamics.flexing_pads import flexing_impedance
 from model.dynamics.pivot_friction import friction_impedance
 from model.film.following_heat import heat_impedance
 from model.setup import Setup
@@ -234,14 +235,28 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
     beside = None
     if setup.options.perturbed_heat and setup.thermal != "isothermal":
         beside = [_heat_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
+    elif setup.options.perturbed_bending and setup.flexible_pads:
+        beside = [_bending_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
     return with_structure(setup, reduce_pads(pads, omega, setup.vibration, beside), omega)
+
+
+def _frames(setup: Setup, film: PadFilm) -> tuple[FloatArray, FloatArray]:
+    """`pad_frames` of a pad as it stands."""
+    assert film.forces is not None
+    smooth = setup.change(friction=0.0) if setup.friction else setup
+    return pad_frames(film, tilt_hold(smooth, film.tilt, float(film.forces.force[0])).arm)
+
+
+def _bending_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
+    """What bending with the motion adds to a pad's film, (n, 4, 4)."""
+    frame, moments = _frames(setup, film)
+    flexing = flexing_impedance(film, equilibrium.position, omega, setup.bending_factor)
+    return np.asarray(moments.T @ flexing @ frame, dtype=np.complex128)
 
 
 def _heat_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
     """What a temperature that follows the motion adds to a pad's film, (n, 4, 4)."""
-    assert film.forces is not None
-    smooth = setup.change(friction=0.0) if setup.friction else setup
-    frame, moments = pad_frames(film, tilt_hold(smooth, film.tilt, float(film.forces.force[0])).arm)
+    frame, moments = _frames(setup, film)
     oil, wedge = setup.bearing.oil, (film.pad.pad_clearance, *film.approach(equilibrium.position))
     heat, given = (oil.specific_heat / film.kept, oil.conductivity / film.kept), oil_constants(oil)
     speed = equilibrium.surface_speed

@@ -204,6 +204,33 @@ def shape_slopes(
 
 
 @compiled
+def squeeze_slopes(grid: FilmGrid, work: FilmWork, shapes: FloatArray) -> FloatArray:
+    """Derivatives of the pressure by the rates of shapes that are added to the film thickness; as `shape_slopes`.
+
+    Parameters
+    ----------
+    grid, work, shapes
+        As there.
+
+    Returns
+    -------
+    (unknowns, m) ndarray
+        [Pa s per unit]; zero where the film is ruptured.
+    """
+    nt, nz, count = work.flow_x.shape[0], work.flow_z.shape[1], shapes.shape[2]
+    rhs = np.empty((work.unknown.shape[0], count))
+    for i in range(1, nt):
+        for j in range(grid.first, nz):
+            k = (i - 1) * (nz - grid.first) + j - grid.first
+            squeeze = work.density[i, j] * grid.dx * grid.height[j]
+            for m in range(count):
+                rhs[k, m] = -squeeze * shapes[i, j, m]
+    keep_ruptured(work, grid.first, rhs)
+    substitute_many(work.band, rhs)
+    return rhs
+
+
+@compiled
 def pressure_change(
     grid: FilmGrid, work: FilmWork, speed: float, oil: tuple[float, float, float, float], change: FloatArray
 ) -> FloatArray:

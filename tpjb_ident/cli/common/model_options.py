@@ -17,6 +17,7 @@ PHYSICS = {
     "growth": "clearances follow the temperatures of journal, housing and pads",
     "jfo": "mass-conserving cavitation",
     "perturbed-heat": "in the dynamics the films' temperature and viscosity follow the motion",
+    "perturbed-bending": "in the dynamics pads that deform (tehd, thd) bend with the motion",
     "turbulence": "films turn turbulent above a local Reynolds number of 500 to 1,000 (Ng and Pan)",
 }
 Physics = Annotated[
@@ -74,4 +75,5 @@ def parse_physics(names: str | None, housing: str | None) -> Any:
         cavitation="jfo" if "jfo" in chosen else "swift-stieber",
         turbulence="ng-pan" if "turbulence" in chosen else "none",
         perturbed_heat="perturbed-heat" in chosen,
+        perturbed_bending="perturbed-bending" in chosen,
     )
