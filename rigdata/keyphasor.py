@@ -7,8 +7,8 @@ import numpy as np
 from rigdata.arrays import FloatArray
 
 
-def speed_from_pulses(readings: FloatArray, time: FloatArray) -> FloatArray:
-    """Shaft speed at every sample [rad/s]; NaN where fewer than two pulses tell it.
+def pulse_times(readings: FloatArray, time: FloatArray) -> FloatArray:
+    """Times of the rising edges of once-per-revolution pulses [s], (m,).
 
     Parameters
     ----------
@@ -17,10 +17,9 @@ def speed_from_pulses(readings: FloatArray, time: FloatArray) -> FloatArray:
     time : (n,) ndarray
         [s]
     """
-    nothing = np.full(len(readings), np.nan)
     known = readings[np.isfinite(readings)]
     if len(known) < 4:
-        return nothing
+        return np.empty(0)
     low, high = (float(q) for q in np.quantile(known, (0.001, 0.999)))
     level = 0.5 * (low + high)
     above = np.nan_to_num(readings, nan=low) > level
@@ -32,10 +31,23 @@ def speed_from_pulses(readings: FloatArray, time: FloatArray) -> FloatArray:
         if last < 0 or armed[last : k + 1].any():
             kept.append(int(k))
             last = int(k) + 1
-    if len(kept) < 2:
-        return nothing
-    at = np.array(kept)
+    at = np.array(kept, dtype=int)
     share = (level - readings[at]) / (readings[at + 1] - readings[at])
-    pulses = time[at] + share * (time[at + 1] - time[at])
+    return np.asarray(time[at] + share * (time[at + 1] - time[at]))
+
+
+def speed_from_pulses(readings: FloatArray, time: FloatArray) -> FloatArray:
+    """Shaft speed at every sample [rad/s]; NaN where fewer than two pulses tell it.
+
+    Parameters
+    ----------
+    readings : (n,) ndarray
+        Of the pulse channel.
+    time : (n,) ndarray
+        [s]
+    """
+    pulses = pulse_times(readings, time)
+    if len(pulses) < 2:
+        return np.full(len(readings), np.nan)
     speeds = 2 * np.pi / np.diff(pulses)
     return np.asarray(np.interp(time, 0.5 * (pulses[1:] + pulses[:-1]), speeds))

@@ -38,7 +38,7 @@ class ConditionKind:
 #: With one of these a number is not to be trusted: the command ends with exit code 3.
 ERRORS = {
     "1X on excitation line": "The excitation stands on the running speed: unbalance and runout cannot be told "
-    "from it. Excite beside the running speed.",
+    "from it. Excite beside the running speed, or record a keyphasor.",
     "2X on excitation line": "The excitation stands on twice the running speed: runout cannot be told from it. "
     "Excite beside it.",
     "3X on excitation line": "The excitation stands on three times the running speed: runout cannot be told from it. "
@@ -170,6 +170,8 @@ NOTES = {
     "curves hold it as well as the pivots.",
     "zero amplitude": "The runs have several amplitudes: K and C were extrapolated to none, where they are those of "
     "small motion.",
+    "shaft lines fitted": "The drive turns with the shaft: what the shaft itself brings into the readings (runout, "
+    "unbalance) was told from the motion by the shaft's phase in runs of different directions, and taken off.",
     "speed drifts": "The shaft speed moved during the record; its lines were followed window by window.",
     "unexpected lines": "The records hold lines that the manifest does not explain; they were fitted along.",
 }

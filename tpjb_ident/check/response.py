@@ -20,6 +20,7 @@ from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.run_gains import check_gains, point_readings, probe_centres
 from tpjb_ident.check.set_points import excited, to_plane
 from tpjb_ident.check.wiring import name_fault
+from tpjb_ident.dynamic.records.shaft_phase import shaft_order
 
 #: Where half of the runs differ by more than this share there is no one answer to judge.
 _NO_ANSWER = 0.08
@@ -41,6 +42,9 @@ def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[O
     """
     groups: dict[object, list[Answer]] = {}
     for seen in runs:
+        point = seen.run.point
+        if shaft_order(point.excitation_hz, point.shaft_speed_hz):  # runout answers there too, as no film does
+            continue
         answer = answer_of(seen, mass)
         if answer is not None:
             names = tuple(c.name for c in answer.channels)

@@ -19,6 +19,7 @@ from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, ap
 from tpjb_ident.dynamic.corrections.cell_zero import cell_zero_uncertainty
 from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
 from tpjb_ident.dynamic.corrections.mains import MAINS_ON_LINE, force_pickup, force_pickup_spread
+from tpjb_ident.dynamic.corrections.synchronous import freed
 from tpjb_ident.dynamic.corrections.systematic_sources import SystematicSources, systematic_sources
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
@@ -146,7 +147,7 @@ def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySetti
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
     sweeps = swept_probes(campaign)
     tell("estimating", 0, len(sources))
-    first = [first_estimate(source.load(), settings) for source in sources]
+    first = [first_estimate(freed(source.load()), settings) for source in sources]
     mains = [digest.mains for digest in digests]
     in_cells = [digest.mains_force for digest in digests]
     corrections = find_corrections(sources, mains, axes, first, cell_zero_uncertainty(campaign), in_cells)
@@ -190,9 +191,9 @@ class _Points:
 
     def finish(self, source: PointSource, correction: Correction) -> tuple[PointResult, FloatArray]:
         """One point with all its uncertainties, and what the draws of the systematic ones do to it."""
-        settings, data = self.settings, source.load()
+        settings, recorded = self.settings, source.load()
         used = correction if settings.correct else correction.measured_only()
-        corrected = used.apply(data)
+        data, corrected = freed(recorded), freed(used.apply(recorded))
         figures = point_figures(corrected, settings, self.differ)
         first = figures.by_method[settings.method]
         film = film_change_at(source, first)
@@ -215,9 +216,11 @@ class _Points:
         bent = change_conditions(film, uncertain, with_both[settings.method], figures.amplitude, settings.clearance)
         bent += () if none is None else none.conditions()
         found = (used.conditions, self.findings.conditions(data), source.baseline.missing(data), bent)
-        doubts = (gain_doubts(data, self.pairs), *found, check_conditions(self.checked, [run.run for run in data.runs]))
+        gains = gain_doubts(data, self.pairs) if data.shaft is None else ()
+        doubts = (gains, *found, check_conditions(self.checked, [run.run for run in recorded.runs]))
         completion = Completion(with_both, merged(*doubts), used.miss, {**used.budget(before), **systematic})
-        finished = point_result(corrected, figures, completion, self.temperatures, settings)
+        whole = corrected if data.shaft is None else recorded
+        finished = point_result(whole, figures, completion, self.temperatures, settings)
         return finished, np.sum(list(changes.values()), axis=0)
 
 

@@ -27,7 +27,7 @@ def write_campaign(
             group = file.create_group(f"runs/{plan.id}")
             group.attrs["sample_rate_hz"] = rig.rate
             for name, values in record(rig, plan, rng).items():
-                group.create_dataset(name, data=values * _SCALE[CHANNELS[name][0]])
+                group.create_dataset(name, data=values * (_SCALE[CHANNELS[name][0]] if name in CHANNELS else 1.0))
 
 
 def manifest_text(rig: Rig, plans: Sequence[Plan], extra: Mapping[str, Mapping[str, str]]) -> str:
@@ -46,6 +46,7 @@ def manifest_text(rig: Rig, plans: Sequence[Plan], extra: Mapping[str, Mapping[s
         if "uncertainty" not in extra.get(name, {}):
             lines += ['uncertainty = "0 %"']
         lines += more(name)
+    lines += ["[channels.KEY]", 'quantity = "keyphasor"', 'unit = "V"'] if rig.keyphasor else []
     for plan in plans:
         kind, speed = ("baseline", 0.0) if plan.dry else ("dynamic", rig.shaft)
         lines += ["[[runs]]", f'id = "{plan.id}"', f'kind = "{kind}"', f'shaft_speed = "{speed} Hz"']

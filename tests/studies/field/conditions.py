@@ -161,13 +161,20 @@ def _lines() -> list[Row]:
         Row("50 Hz mains on a 50 Hz line, only one", replace(base, pickup=strong),
             plans_of(loads=(2500.0, 5000.0, 8750.0), frequencies=(50.0,)), wish="told"),
     ]  # fmt: skip
+    turning = replace(base, locked=True, runout=(6e-6, 2e-6, 1e-6))
     found += [
-        Row(f"drive locked to {n}X", replace(base, locked=True, runout=(6e-6, 2e-6, 1e-6)),
-            plans_of(frequencies=(22.0 * n,)), wish="told")
+        Row(f"drive locked to {n}X", turning, plans_of(frequencies=(22.0 * n,)), wish="told" if n == 1 else "right")
         for n in (1, 2, 3)
-    ]  # fmt: skip
+    ]
     found += [
+        Row(f"drive locked to {n}X, keyphasor", replace(turning, keyphasor=True), plans_of(frequencies=(22.0 * n,)))
+        for n in (1, 2, 3)
+    ]
+    found += [
+        Row("drive locked to 1X, keyphasor, two directions", replace(turning, keyphasor=True),
+            plans_of(frequencies=(22.0,), directions=2, repeats=2), wish="told"),
         Row("1X on the line, not locked", replace(base, shaft=25.0), wish="told"),
+        Row("1X on the line, not locked, keyphasor", replace(base, shaft=25.0, keyphasor=True)),
         Row("1X half a Hz beside the line", replace(base, shaft=24.5)),
         Row("speed drifts 0.1 Hz, 2 s", replace(base, speed_drift=0.1, seconds=2.0)),
         Row("speed drifts 0.3 Hz, 2 s", replace(base, speed_drift=0.3, seconds=2.0)),

@@ -65,6 +65,7 @@ class Rig:
     runout: tuple[float, ...] = (3e-6, 1e-6)
     unbalance: float = 20.0
     locked: bool = False
+    keyphasor: bool = False
     mains: float = 50.0
     pickup: Mapping[str, float] = field(default_factory=lambda: {"displacement": 0.03e-6, "force": 1.0})
     amplitude: float = 0.1
@@ -134,6 +135,9 @@ def record(rig: Rig, plan: Plan, rng: np.random.Generator) -> dict[str, np.ndarr
 
         values = _sampled(at, device, n, rig.rate, rng)
         found[name] = values if device.reading is None else device.reading(values, plan.id, rng)
+    if rig.keyphasor:
+        turn = shaft.angle(np.arange(n) / rig.rate) / (2 * np.pi) % 1.0
+        found["KEY"] = 5.0 * np.clip(20 * (0.05 - np.abs(turn - 0.3)), 0, 1) + 0.05 * rng.standard_normal(n)
     return found
 
 
@@ -144,9 +148,13 @@ class _Shaft:
         self.rig, self.phase = rig, 0.7 if rig.locked else rng.uniform(0, 2 * np.pi)
         self.start = rig.shaft - 0.5 * rig.speed_drift
 
-    def seen(self, quantity: str, u: np.ndarray, t: np.ndarray) -> np.ndarray:
+    def angle(self, t: np.ndarray) -> np.ndarray:
+        """Of the shaft [rad]."""
         slope = self.rig.speed_drift / self.rig.seconds
-        angle = 2 * np.pi * (self.start * t + 0.5 * slope * t**2) + self.phase
+        return 2 * np.pi * (self.start * t + 0.5 * slope * t**2) + self.phase
+
+    def seen(self, quantity: str, u: np.ndarray, t: np.ndarray) -> np.ndarray:
+        angle = self.angle(t)
         turned = np.arctan2(u[1], u[0])
         if quantity == "displacement":
             return np.sum([a * np.cos(k * (angle - turned)) for k, a in enumerate(self.rig.runout, 1)], axis=0)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
@@ -59,6 +61,9 @@ class RunPhasors:
     speeds : (n,) ndarray
         Shaft speed in every window by the tachometer [Hz]; NaN where there is none.
     conditions : tuple of Condition
+    shaft_phase : (n_lines,) complex ndarray
+        Unit phasor of what turns with the shaft at every excitation line that stands on 1X, 2X or 3X; NaN elsewhere,
+        and where it is not known.
     """
 
     run: str
@@ -73,6 +78,7 @@ class RunPhasors:
     housing_mass: float
     speeds: FloatArray
     conditions: tuple[Condition, ...] = ()
+    shaft_phase: ComplexArray = field(default_factory=lambda: np.empty(0, complex))
 
     def oil_force(self, line: int = 0) -> ComplexArray:
         """Oil-force phasors at one line, shape (n, 2) [N].

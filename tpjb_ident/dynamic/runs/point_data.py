@@ -27,6 +27,8 @@ class PointData:
         Windows of one run are repeats of one excitation.
     found : float
         Excitation frequency that the runs show, where it is not the set one [rad/s]; else 0.
+    shaft : (n_runs,) complex ndarray or None
+        Unit phasor of the shaft in every run, where the excitation turns with it and the runs tell the two apart.
     """
 
     point: OperatingPoint
@@ -37,6 +39,7 @@ class PointData:
     A: ComplexArray
     run_index: IntArray
     found: float = 0.0
+    shaft: ComplexArray | None = None
 
     @property
     def omega(self) -> float:

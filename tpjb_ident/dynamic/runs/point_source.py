@@ -8,6 +8,7 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arrays import FloatArray
+from tpjb_ident.dynamic.corrections.synchronous import without_shaft
 from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.clock_rates import ClockRates
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns, RunDigest
@@ -40,14 +41,14 @@ class PointSource:
     _loaded: list[PointData] = field(init=False, default_factory=list, repr=False, compare=False)
 
     def load(self) -> PointData:
-        """All windows of the point, as if one clock had recorded them, and without the rig's own stiffness.
+        """All windows of the point, as if one clock had recorded them, without the rig's and the shaft's own part.
 
         They are kept where the runs themselves are in memory.
         """
         if self._loaded:
             return self._loaded[0]
         recorded = point_data(self.point, [(self.finished.take(k), i) for k, i in self.members])
-        data = self.baseline.taken_off(self.clocks.apply(recorded))
+        data = without_shaft(self.baseline.taken_off(self.clocks.apply(recorded)))
         if self.finished.all_in_memory:
             self._loaded.append(data)
         return data

@@ -20,6 +20,7 @@ from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.records.kept_readings import beginning_of, with_kept_beginning
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
+from tpjb_ident.dynamic.records.shaft_phase import shaft_phases
 from tpjb_ident.dynamic.runs.dead_channels import dead_accelerometers
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 from tpjb_ident.dynamic.runs.kept_observation import of_run
@@ -165,7 +166,7 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResul
         except RecordTooShortError as error:
             raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
         conditions = merged(phasors.conditions, dead_accelerometers(kept, phasors), _mended(run))
-        result = replace(phasors, conditions=conditions)
+        result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(kept, phasors))
         return RunResult(result, mean_temperatures(kept), _seen(run, kept, phasors))
 
 

@@ -103,7 +103,7 @@ class RunStore:
         result : RunResult
         """
         phasors = result.phasors
-        arrays: dict[str, Any] = {"start": phasors.start, "speeds": phasors.speeds}
+        arrays: dict[str, Any] = {"start": phasors.start, "speeds": phasors.speeds, "shaft_phase": phasors.shaft_phase}
         for name in _BLOCKS:
             block = getattr(phasors, name)
             if block is not None:
@@ -155,6 +155,7 @@ class RunStore:
             housing_mass,
             arrays["speeds"],
             _unpacked_conditions(meta["conditions"]),
+            arrays["shaft_phase"],
         )
         seen = tuple(unpacked(each, run) for each in meta["seen"])
         return RunResult(phasors, {int(pad): value for pad, value in meta["temperatures"].items()}, seen)
