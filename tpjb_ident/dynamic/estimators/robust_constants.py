@@ -7,10 +7,12 @@ a chi distribution with 2 q degrees of freedom; everything below is an expectati
 from __future__ import annotations
 
 import functools
+from math import comb
 
 import numpy as np
-from scipy import integrate, optimize
-from scipy.stats import chi, chi2
+from scipy import optimize
+from scipy.special import chdtr
+from scipy.stats import chi2
 
 from tpjb_ident.arrays import FloatArray
 
@@ -54,17 +56,16 @@ def efficiency_constant(dimension: int, efficiency: float = 0.95) -> float:
         0 to 1.
     """
 
+    def moment(k: int, c: float) -> float:
+        """E[u^2k; u < c]: the chi-square's recursion x^k p_d(x) ~ p_(d + 2 k)(x)."""
+        rising = float(np.prod(dimension + 2.0 * np.arange(k)))
+        return rising * float(chdtr(dimension + 2 * k, c**2))
+
     def shortfall(c: float) -> float:
-        def psi2(u: float) -> float:
-            return float(u**2 * (1 - (u / c) ** 2) ** 4 * chi.pdf(u, dimension))
-
-        def slope(u: float) -> float:
-            v = (u / c) ** 2
-            weight = (1 - v) ** 2
-            return float((weight - 4 * v * (1 - v) / dimension) * chi.pdf(u, dimension))
-
-        a = integrate.quad(psi2, 0, c)[0] / dimension
-        b = integrate.quad(slope, 0, c)[0]
+        # psi^2 = u^2 (1 - v)^4 and the mean slope (1 - v)^2 - 4 v (1 - v) / d, with v = (u / c)^2
+        a = sum(comb(4, j) * (-1) ** j * moment(j + 1, c) / c ** (2 * j) for j in range(5)) / dimension
+        more = 4 / dimension
+        b = moment(0, c) - (2 + more) * moment(1, c) / c**2 + (1 + more) * moment(2, c) / c**4
         return float(b**2 / a - efficiency)
 
     return float(optimize.brentq(shortfall, 2.0, 30.0))
@@ -92,12 +93,12 @@ def trimming_limits(dimension: int, begin: float = 0.99, end: float = 0.9999) ->
     """
     lower, upper = float(chi2.ppf(begin, dimension)), float(chi2.ppf(end, dimension))
 
-    def weight(u2: float) -> float:
-        return float(trimming_weight(np.asarray(u2), lower, upper))
-
-    mass = integrate.quad(lambda x: weight(x) * chi2.pdf(x, dimension), 0, upper, points=[lower])[0]
-    moment = integrate.quad(lambda x: weight(x) * x * chi2.pdf(x, dimension), 0, upper, points=[lower])[0]
-    return lower, upper, float(moment / (dimension * mass))
+    nodes, width = np.polynomial.legendre.leggauss(40)
+    x = lower + 0.5 * (upper - lower) * (nodes + 1)
+    part = 0.5 * (upper - lower) * width * trimming_weight(x, lower, upper) * chi2.pdf(x, dimension)
+    mass = float(chdtr(dimension, lower) + part.sum())
+    moment = float(dimension * chdtr(dimension + 2, lower) + (part * x).sum())
+    return lower, upper, moment / (dimension * mass)
 
 
 def trimming_weight(u2: FloatArray, lower: float, upper: float) -> FloatArray:
