@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from rigdata.calibration import Channel
 
 #: Two directions whose sine is not above this (3 deg) count as one.
 COLLINEAR_SINE = 0.05
@@ -57,3 +59,19 @@ def solve_vector(axes: FloatArray, values: FloatArray) -> FloatArray:
         rows = which.ravel() == index
         result[rows] = values[np.ix_(rows, pattern)] @ inverse_directions(tuple(axes[pattern])).T
     return result
+
+
+def zero_uncertainty(channels: Iterable[Channel], quantity: str) -> FloatArray:
+    """Standard uncertainty of a quantity's zero along X and Y (2,), from what the manifest states of its channels [SI].
+
+    Parameters
+    ----------
+    channels : iterable of Channel
+    quantity : str
+        ``"displacement"`` or another that has a direction.
+    """
+    chosen = [c for c in channels if c.quantity == quantity and c.axis is not None]
+    if len(chosen) < 2:
+        return np.zeros(2)
+    back = inverse_directions(tuple(float(c.axis or 0.0) for c in chosen))
+    return np.asarray(np.sqrt(back**2 @ np.array([c.zero_uncertainty for c in chosen]) ** 2))

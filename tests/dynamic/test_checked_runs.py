@@ -7,8 +7,9 @@ import pytest
 
 from rigdata import load_campaign
 from rigdata.readers.hdf5.reader import Hdf5Reader
-from tests.studies.field.campaign_file import plans_of, write_campaign
-from tests.studies.field.rig import Device, Rig
+from rigdata.readers.text import csv
+from tests.studies.field.campaign_file import BEARING, manifest_text, plans_of, write_campaign
+from tests.studies.field.rig import Device, Rig, record
 from tpjb_ident.check.findings import Reporter, verdicts
 from tpjb_ident.check.observation import observe
 from tpjb_ident.dynamic.identify import identify
@@ -45,6 +46,30 @@ def test_the_beginning_of_a_record_is_read_once(campaign, monkeypatch):
     assert asked == [(run.id, 6, 1500) for run in campaign.of_kind("dynamic")]
 
 
+@pytest.mark.slow
+def test_a_csv_file_above_the_limit_gives_the_same_and_is_parsed_a_few_times_only(tmp_path, monkeypatch):
+    """Such a file is parsed by groups of channels; a look at its beginning must not cost one parse a channel."""
+    rig, plans = replace(QUICK, keyphasor=True), ONE_LOAD[:3]
+    rng = np.random.default_rng(4)
+    text = manifest_text(rig, plans, {})
+    for plan in plans:
+        text = text.replace(f'id = "{plan.id}"\n', f'id = "{plan.id}"\nfile = "{plan.id}.csv"\n')
+        columns = record(rig, plan, rng)
+        scaled = np.stack([v * (1e6 if n.startswith("D") else 1.0) for n, v in columns.items()], axis=1)
+        np.savetxt(tmp_path / f"{plan.id}.csv", scaled, "%.9g", ";", header=";".join(columns), comments="")
+    (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "rocker.toml").write_text(BEARING.read_text(encoding="utf-8"), encoding="utf-8")
+    small = identify(load_campaign(tmp_path), IdentifySettings(methods=()))
+    parsed = []
+    plain = csv.read_table
+    monkeypatch.setattr(csv, "_LARGE_FILE", 1000)
+    monkeypatch.setattr(csv, "read_table", lambda source, wanted: parsed.append(len(wanted)) or plain(source, wanted))
+    large = identify(load_campaign(tmp_path), IdentifySettings(methods=()))
+    np.testing.assert_array_equal(large.points[0].stiffness.h, small.points[0].stiffness.h)
+    assert large.points[0].quality == small.points[0].quality
+    assert len(parsed) <= 5 * len(plans)
+
+
 def test_kept_readings_are_those_of_the_file(campaign):
     run = campaign.runs[0]
     kept = with_kept_beginning(run)
@@ -79,6 +104,19 @@ def test_a_third_of_the_runs_share_a_finding(campaign):
     found = verdicts(reports)
     assert list(found.unusable) == [run.id for run in campaign.runs[:2]]
     assert list(found.shared) == list(found.doubtful) == [run.id for run in campaign.runs[2:5]]
+
+
+@pytest.mark.slow
+def test_the_probes_zero_stands_in_the_positions_errors(tmp_path):
+    path = tmp_path / "zero.h5"
+    write_campaign(
+        path, QUICK, ONE_LOAD, 3, {"D1": {"zero_uncertainty": '"3 um"'}, "D2": {"zero_uncertainty": '"4 um"'}}
+    )
+    (stated,) = identify(load_campaign(path), IdentifySettings(methods=())).points
+    (silent,) = identify(written(tmp_path / "none.h5", QUICK), IdentifySettings(methods=())).points
+    # probes at 45 and 135 deg: half of either variance along X and along Y
+    expected = np.hypot(silent.position_se, 5e-6 / np.sqrt(2))
+    np.testing.assert_allclose(stated.position_se, expected, rtol=1e-12)
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
+from rigdata.vector import zero_uncertainty
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, sentences
@@ -149,7 +150,9 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     drift = _drift(found, noise, centre)
     known = np.isfinite(drift.rate).all()
     drifts, drift_variance = (drift.rate, drift.variance) if known else (np.zeros(2), 0.0)
-    centre_covariance = np.zeros((2, 2)) if polygon is None else polygon.centre_covariance
+    # with the bearing's centre from the same probes their zero falls out
+    zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
+    centre_covariance = zero if polygon is None else polygon.centre_covariance
     points = []
     for order, record in zip(orders, read, strict=True):
         run = runs[order]

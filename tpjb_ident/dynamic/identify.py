@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from rigdata.campaign import Campaign
+from rigdata.vector import zero_uncertainty
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.check.redundant_channels import widened
@@ -92,11 +93,15 @@ def identify(
         rig = measured_baseline(campaign, settings.phasors, own_method(settings.method))
         bands = identify_bands(campaign, _band_settings(settings), tell, rig)
     if not sines.of_kind("dynamic"):
-        empty = Identification(campaign.id, settings.method, (), np.zeros((settings.n_calibration, 0)))
-        return empty if bands is None else _with_bands(empty, bands)
-    with all_runs(sines, settings.phasors, tell, workers, store) as finished:
-        found = assemble(sines, finished, settings, tell)
-    return found if bands is None else _with_bands(found, bands)
+        found = Identification(campaign.id, settings.method, (), np.zeros((settings.n_calibration, 0)))
+    else:
+        with all_runs(sines, settings.phasors, tell, workers, store) as finished:
+            found = assemble(sines, finished, settings, tell)
+    found = found if bands is None else _with_bands(found, bands)
+    zero = zero_uncertainty(campaign.channels.values(), "displacement")
+    if not zero.any():
+        return found
+    return replace(found, points=tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in found.points))
 
 
 def _with_bands(found: Identification, bands: IdentifiedBands) -> Identification:

@@ -43,7 +43,20 @@ def _refuse(file: str, place: str, what: str, cure: str, run: str | None = None)
 def open_readonly(path: Path, file: str, run: str | None = None, cache: int | None = None) -> Iterator[Any]:
     """Open an HDF5 file for reading; turn what h5py raises on a broken file into `RigDataError`.
 
-    `cache` is the number of bytes of unpacked chunks that the library keeps per dataset.
+    Parameters
+    ----------
+    path : Path
+    file : str
+        Its name as the user knows it.
+    run : str, optional
+        Whose record is wanted, for the message.
+    cache : int, optional
+        Bytes of unpacked chunks that the library keeps per dataset.
+
+    Raises
+    ------
+    RigDataError
+        The file is missing, damaged, being written, or no HDF5 file.
     """
     import h5py
 
@@ -214,8 +227,13 @@ class Hdf5Reader:
             yield
             return
         opened = ExitStack()
-        self.held[_GROUP] = opened.enter_context(self._group(self._cache_bytes()))
         try:
+            self.held[_GROUP] = opened.enter_context(self._group(_LEAST_CACHE))
+            needed = self._cache_bytes()
+            if needed > _LEAST_CACHE:  # the cache is given when a file is opened
+                self.held.clear()
+                opened.close()
+                self.held[_GROUP] = opened.enter_context(self._group(needed))
             yield
         finally:  # closed without the block's own errors, which are no faults of the file
             self.held.clear()
@@ -223,10 +241,11 @@ class Hdf5Reader:
 
     def _cache_bytes(self) -> int:
         """Two stored chunks of the largest of a few datasets; they are stored alike as a rule."""
-        if self._known().length * 8 <= _LEAST_CACHE:
-            return _LEAST_CACHE
         with self._group() as group:
-            largest = max(_chunk_bytes(group, name) for name in self._known().members[:4])
+            known = self._known(group)
+            if known.length * 8 <= _LEAST_CACHE:
+                return _LEAST_CACHE
+            largest = max(_chunk_bytes(group, name) for name in known.members[:4])
         return min(max(2 * largest, _LEAST_CACHE), _MOST_CACHE)
 
     def counted(self) -> bool:

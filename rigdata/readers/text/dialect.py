@@ -84,7 +84,8 @@ class DialectFinder:
         """
         encoding = text_encoding(self.path, self.spec.encoding)
         raw = head_lines(self.path, encoding)
-        lines = [line.decode(codec_of_bytes(encoding), "replace") for line, _ in raw]
+        codec = codec_of_bytes(encoding)
+        lines = [line.decode(codec, "replace") for line, _ in raw]
         if not any(line.strip() for line in lines):
             empty = self.path.stat().st_size < HEAD
             what = "the file is empty" if empty else f"no line ends within the first {HEAD >> 10} kB"
@@ -204,8 +205,8 @@ class DialectFinder:
 
     def _decimal(self, sample: list[list[str]]) -> str | None:
         cells = [c for row in sample for c in row]
-        comma = sum(is_number(c, ",") and "," in c for c in cells)
-        point = sum(is_number(c, ".") and "." in c for c in cells)
+        comma = sum("," in c and is_number(c, ",") for c in cells)
+        point = sum("." in c and is_number(c, ".") for c in cells)
         seen = "," if comma > point else "."
         if self.spec.decimal is not None and self.spec.decimal != seen and comma != point:
             example = next(c for c in cells if is_number(c, seen) and seen in c)
