@@ -199,13 +199,15 @@ class _Points:
         settings, recorded = self.settings, source.load()
         used = correction if settings.correct else correction.measured_only()
         data, corrected = freed(recorded), freed(used.apply(recorded))
-        figures = point_figures(corrected, settings, self.differ)
+        struck = source.found(MAINS_ON_LINE)
+        mains = float(np.linalg.norm(self.mains_force)) if struck else 0.0
+        figures = point_figures(corrected, settings, self.differ, mains)
         first = figures.by_method[settings.method]
         film = film_change_at(source, first)
         none = zero_amplitude(corrected, first.h, film.share) if settings.correct else None
         if none is not None:
             corrected = none.apply(corrected)
-            figures = point_figures(corrected, settings, self.differ)
+            figures = point_figures(corrected, settings, self.differ, mains)
         before = figures.by_method[settings.method]
         by_method = {name: used.widened(est) for name, est in figures.by_method.items()}
         best = by_method[settings.method]
@@ -213,7 +215,7 @@ class _Points:
         changes = {"calibration": apparent_change(data, best, self.draws), **self.sources.changes(data, best)}
         systematic = {name: np.cov(change.T, bias=True) for name, change in changes.items()}
         systematic |= self.findings.spreads(data, best) | source.baseline.spread(data) | amplitude_part
-        if source.found(MAINS_ON_LINE) and self.mains_force.any():
+        if struck and self.mains_force.any():
             systematic["mains on the cells"] = force_pickup_spread(data, self.mains_force)
         if not settings.keep_weights:
             by_method = {name: _counted_only(est) for name, est in by_method.items()}

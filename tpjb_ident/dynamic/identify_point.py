@@ -103,7 +103,7 @@ class Completion:
     budget: dict[str, FloatArray] = field(default_factory=dict)
 
 
-def point_figures(data: PointData, settings: IdentifySettings, differ: bool) -> Figures:
+def point_figures(data: PointData, settings: IdentifySettings, differ: bool, known: float = 0.0) -> Figures:
     """Every method's answer on the windows of a point, and what is said of the default one.
 
     Parameters
@@ -112,6 +112,8 @@ def point_figures(data: PointData, settings: IdentifySettings, differ: bool) -> 
     settings : IdentifySettings
     differ : bool
         Whether runs differ by more than their windows explain.
+    known : float, optional
+        Force of another phase in every run that the intervals allow for [N].
     """
     by_method = all_methods(data, settings, differ)
     best = by_method[settings.method]
@@ -119,7 +121,7 @@ def point_figures(data: PointData, settings: IdentifySettings, differ: bool) -> 
     figure = coherence(data.D, data.F, best.h, weights)
     size = amplitude(data, weights)
     linearity = amplitude_slope(data, best.h, weights)
-    patterns = (directional_pattern(data, weights), disagreeing_runs(data, best.h, weights))
+    patterns = (directional_pattern(data, weights), disagreeing_runs(data, best.h, weights, known))
     conditions = merged(
         *(run.conditions for run in data.runs),
         best.status,

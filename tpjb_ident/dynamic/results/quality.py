@@ -16,6 +16,8 @@ from tpjb_ident.dynamic.runs.point_data import PointData
 MAX_LOST = 0.6
 #: Share of the force that H leaves in the runs' means beyond which they have no H in common.
 MAX_DISAGREEMENT = 0.06
+#: What a few runs show of a force of random phase may be so many times its size.
+KNOWN_SCATTERS = 1.5
 
 
 def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatArray) -> float:
@@ -197,7 +199,7 @@ def directional_pattern(data: PointData, weights: FloatArray) -> Condition | Non
     return Condition("directional-rejection", f"rejected windows gather in {', '.join(named)}: look before discarding")
 
 
-def disagreeing_runs(data: PointData, h: ComplexArray, weights: FloatArray) -> Condition | None:
+def disagreeing_runs(data: PointData, h: ComplexArray, weights: FloatArray, known: float = 0.0) -> Condition | None:
     """Runs whose mean forces H does not explain: noise averages out of means, other faults do not.
 
     Parameters
@@ -206,11 +208,13 @@ def disagreeing_runs(data: PointData, h: ComplexArray, weights: FloatArray) -> C
     h : (2, 2) complex ndarray
     weights : (n,) ndarray
         Window weights.
+    known : float, optional
+        Force of another phase in every run that the intervals allow for [N].
     """
     if len(data.runs) < 3 or not np.isfinite(h).all():
         return None
     good = _complete(data) & (weights > 0)
-    shares = []
+    shares, sizes = [], []
     for i in range(len(data.runs)):
         mine = good & (data.run_index == i)
         if mine.any():
@@ -219,12 +223,13 @@ def disagreeing_runs(data: PointData, h: ComplexArray, weights: FloatArray) -> C
             first = np.linalg.eigh(gram)[1][:, -1]
             along = data.D[mine] @ first.conj()
             rest = (data.F[mine] - data.D[mine] @ h.T) * np.exp(-1j * np.angle(along))[:, None]
-            shares.append(float(np.linalg.norm(rest.mean(axis=0)) / np.linalg.norm(data.F[mine], axis=1).mean()))
+            sizes.append(float(np.linalg.norm(data.F[mine], axis=1).mean()))
+            shares.append(float(np.linalg.norm(rest.mean(axis=0))) / sizes[-1])
     if len(shares) < 3:
         return None
     # two runs fix H: what is left over is shared by all of them
     share = float(np.sqrt(np.mean(np.square(shares)) * len(shares) / (len(shares) - 2)))
-    if share <= MAX_DISAGREEMENT:
+    if share <= np.hypot(MAX_DISAGREEMENT, KNOWN_SCATTERS * known / float(np.mean(sizes))):
         return None
     told = f"the runs' mean forces are {100 * share:.0f} % away from one H (limit {100 * MAX_DISAGREEMENT:.0f} %)"
     return Condition("runs-disagree", told)
