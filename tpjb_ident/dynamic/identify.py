@@ -20,7 +20,6 @@ from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, ap
 from tpjb_ident.dynamic.corrections.cell_zero import cell_zero_uncertainty
 from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
 from tpjb_ident.dynamic.corrections.mains import MAINS_ON_LINE, force_pickup, force_pickup_spread
-from tpjb_ident.dynamic.corrections.synchronous import freed
 from tpjb_ident.dynamic.corrections.systematic_sources import SystematicSources, systematic_sources
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
@@ -42,6 +41,7 @@ from tpjb_ident.dynamic.runs.left_out import named_runs
 from tpjb_ident.dynamic.runs.point_source import PointSource, point_sources
 from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore
+from tpjb_ident.dynamic.runs.synchronous import freed
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.dynamic.spectral_lines.mains_frequency import mains_frequency
 from tpjb_ident.errors import BadInputError

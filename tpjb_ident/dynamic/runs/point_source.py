@@ -8,11 +8,11 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.dynamic.corrections.synchronous import without_shaft
 from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.clock_rates import ClockRates
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns, RunDigest
 from tpjb_ident.dynamic.runs.point_data import PointData, group, point_data
+from tpjb_ident.dynamic.runs.synchronous import without_shaft
 
 
 @dataclass(frozen=True)
