@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from rigdata.problem import Problem, RigDataError
@@ -72,3 +73,21 @@ def has_link(group: Any, name: str) -> bool:
         As the file has it.
     """
     return bool(group.id.links.exists(name.encode("utf-8", "surrogateescape")))
+
+
+def chunk_bytes(group: Any, name: str) -> int:
+    """Bytes of a stored chunk; zero of what is no chunked dataset, or leads out of the file.
+
+    Parameters
+    ----------
+    group : h5py.Group
+    name : str
+        Of a member.
+    """
+    import h5py
+
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        return 0
+    member = group[name]
+    chunk = member.chunks if isinstance(member, h5py.Dataset) else None
+    return 0 if chunk is None else math.prod(chunk) * member.dtype.itemsize

@@ -17,7 +17,7 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, rate_of_time, undescribed
 from rigdata.readers.hdf5.content_hash import TEXT, group_hash, is_plain
 from rigdata.readers.hdf5.heaps import broken_heap, too_long_text
-from rigdata.readers.hdf5.links import has_link, resolve
+from rigdata.readers.hdf5.links import chunk_bytes, has_link, resolve
 
 #: Filters that the HDF5 library brings along; any other would load foreign code.
 _FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}
@@ -52,11 +52,6 @@ def open_readonly(path: Path, file: str, run: str | None = None, cache: int | No
         Whose record is wanted, for the message.
     cache : int, optional
         Bytes of unpacked chunks that the library keeps per dataset.
-
-    Raises
-    ------
-    RigDataError
-        The file is missing, damaged, being written, or no HDF5 file.
     """
     import h5py
 
@@ -79,17 +74,6 @@ def _faults_told(file: str, run: str | None) -> Iterator[None]:
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError) as error:
         what = f"the file cannot be read as HDF5 ({_first_line(error)})"
         raise _refuse(file, "", what, "Copy it again from the rig, or check it with h5dump", run) from error
-
-
-def _chunk_bytes(group: Any, name: str) -> int:
-    """Bytes of a stored chunk; zero of what is no chunked dataset, or leads out of the file."""
-    import h5py
-
-    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-        return 0
-    member = group[name]
-    chunk = member.chunks if isinstance(member, h5py.Dataset) else None
-    return 0 if chunk is None else int(np.prod(chunk)) * member.dtype.itemsize
 
 
 def _first_line(error: BaseException) -> str:
@@ -245,7 +229,7 @@ class Hdf5Reader:
             known = self._known(group)
             if known.length * 8 <= _LEAST_CACHE:
                 return _LEAST_CACHE
-            largest = max(_chunk_bytes(group, name) for name in known.members[:4])
+            largest = max(chunk_bytes(group, name) for name in known.members[:4])
         return min(max(2 * largest, _LEAST_CACHE), _MOST_CACHE)
 
     def counted(self) -> bool:
