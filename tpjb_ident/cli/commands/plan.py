@@ -109,7 +109,7 @@ def _show(found: CampaignPlan) -> None:
     for row in found.to_frame().to_dict("records"):
         at = float(row["seen_from"])
         unit, scale = UNITS.get(row["unit"], (row["unit"], 1.0))
-        seen = "never" if math.isnan(at) else f"{at / scale:.3g} {unit}"
+        seen = "never" if math.isnan(at) else f"{at / scale:.4g} {unit}".replace(" °", "°")
         like = label_in_words(row["mistaken_for"]) or "-"
         rows.append([label_in_words(row["effect"]), f"{row['typical_size_sigma']:.1f}", seen, like])
     table("What this campaign could tell", ["effect", "sigma", "seen from", "like"], rows, (0, 3))
