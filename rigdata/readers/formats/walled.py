@@ -9,7 +9,9 @@ from __future__ import annotations
 import contextlib
 import importlib
 import json
+import math
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -21,8 +23,8 @@ import numpy as np
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.series import Series
 
-#: Seconds that any file may take, and bytes per second more.
-SECONDS, BYTES_PER_SECOND = 60.0, 2e6
+#: Seconds of processor time that any file may take, and bytes per second more; `PATIENCE` times that by the clock.
+SECONDS, BYTES_PER_SECOND, PATIENCE = 60.0, 2e6, 10.0
 #: Memory beyond what numpy has mapped that any file may take, and multiples of the file's size more [bytes].
 MEMORY, MULTIPLES = 2**30, 64
 _AGAIN = "Export or copy it again from the logger"
@@ -45,17 +47,26 @@ def read_walled(module: str, path: Path) -> list[Series]:
     # The child must find the same rigdata as this process, wherever that came from.
     home = str(Path(__file__).parents[3])
     around = {**os.environ, "PYTHONPATH": os.pathsep.join([home, os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)}
-    command = [sys.executable, "-m", "rigdata.readers.formats.walled", module, str(path)]
+    allowed = str(math.ceil(seconds))
+    command = [sys.executable, "-m", "rigdata.readers.formats.walled", module, str(path), allowed]
+    too_long = _refuse(f"took longer than {seconds:.0f} s to read, far beyond its size", _AGAIN)
     try:
         # asammdf mends a copy of a measurement that was cut short, and a child that dies cannot clear it away.
         with tempfile.TemporaryDirectory(prefix="tpjb-", ignore_cleanup_errors=True) as scratch:
             around |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), scratch)
             # What a library prints about a broken file is no message for people; its exception comes with the answer.
             done = subprocess.run(
-                command, stdin=subprocess.DEVNULL, capture_output=True, timeout=seconds, env=around, check=False
+                command,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                timeout=PATIENCE * seconds,
+                env=around,
+                check=False,
             )
     except subprocess.TimeoutExpired as error:
-        raise _refuse(f"took longer than {seconds:.0f} s to read, far beyond its size", _AGAIN) from error
+        raise too_long from error
+    if done.returncode == -getattr(signal, "SIGXCPU", 0) != 0:
+        raise too_long
     head, _, body = done.stdout.partition(b"\n")
     if done.returncode != 0 or not head:
         raise _refuse(f"made its library crash (exit status {done.returncode}): it is damaged", _AGAIN)
@@ -102,6 +113,14 @@ def _limit_memory(path: Path) -> None:
             resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
 
+def _limit_time(seconds: int) -> None:
+    """Allow so much processor time (not on Windows)."""
+    with contextlib.suppress(ImportError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, resource.getrlimit(resource.RLIMIT_CPU)[1]))
+
+
 def main(module: str, path: Path) -> None:
     """Read a file and write its channels to the standard output: one line of JSON, then the numbers.
 
@@ -128,4 +147,5 @@ def main(module: str, path: Path) -> None:
 
 
 if __name__ == "__main__":
+    _limit_time(int(sys.argv[3]))
     main(sys.argv[1], Path(sys.argv[2]))
