@@ -73,6 +73,7 @@ def usable_unit(unit: str) -> str:
         As written by the logger or in the manifest.
     """
     text = unit.strip().replace("°", "deg").replace("µ", "u").replace("μ", "u")
+    text = re.sub(r"\s*/\s*", "/", text)
     text = _SPELT.get(text, text)
     try:
         parse_unit(text)
