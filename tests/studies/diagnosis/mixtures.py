@@ -1,10 +1,11 @@
 """Mixtures: bearings within workshop tolerance of their drawings, with hidden effects, through the whole decision.
 
-    python -m tests.studies.diagnosis.mixtures [--bearing rocker] [--count 40] [--seed 0] [--rows FILE]
+    python -m tests.studies.diagnosis.mixtures [--bearing NAME] [--count 40] [--seed 0] [--rows FILE]
 
-Campaigns of the paper's plan are drawn from an emulator of the model (`emulated`): everything that may be off is drawn
-from its stated tolerance (cut off at two standard deviations), the model differs smoothly by 0.05 to 0.2 % (two
-programs that solve the same equations differ by that), noise is what the sample campaigns have. Kinds: ``scatter``
+Campaigns of the paper's plan (bearing `between`: another bearing and another plan, which nothing was developed on) are
+drawn from an emulator of the model (`emulated`): everything that may be off is drawn from its stated tolerance (cut off
+at two standard deviations), the model differs smoothly by 0.05 to 0.2 % (two programs that solve the same equations
+differ by that), noise is what the sample campaigns have. Kinds: ``scatter``
 (nothing hidden), ``clean`` (one effect of twelve standard deviations on a bearing as drawn), ``one``, ``two``,
 ``three`` (effects of the library), ``outside`` (an effect that is taken out of it, a cross-coupled stiffness, or growth
 in proportion to the load), ``beside`` (an effect of the library and one outside it). Rows go to a JSON-lines file;
@@ -45,9 +46,8 @@ from tpjb_ident.diagnose.search.search import baseline_fit
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.diagnose.verdict.verdict import Verdict
 
-BEARINGS = Path(__file__).parents[3] / "model" / "bearings"
-HZ = 2 * math.pi
-SPEED = HZ * 22
+HERE, BEARINGS = Path(__file__).parent, Path(__file__).parents[3] / "model" / "bearings"
+HZ, DOWN = 2 * math.pi, -math.pi / 2
 #: What the emulator does not hold.
 SKIPPED = frozenset({"pad_conduction", "pad_bending", "pivot_friction"})
 #: One campaign after the other; every kind comes early and often.
@@ -84,8 +84,32 @@ class Bench:
     seen: dict[str, float]
 
 
+def plan_of_the_paper() -> tuple[Layout, Layout]:
+    """One speed, one load direction on a pad; and points that no campaign holds."""
+    speed = HZ * 22
+    sweep = dynamic([5000.0], [HZ * f for f in (10, 20, 25, 30, 40, 50)], speed, DOWN, 5)
+    loads = dynamic([2500.0, 3750.0, 6250.0, 7500.0, 8750.0], [HZ * 25], speed, DOWN, 5)
+    new = dynamic([4375.0, 10000.0], [HZ * 25, HZ * 60], speed, DOWN, 0)
+    return Layout((*sweep, *loads), around(5000.0, 10, speed), dry(range(1, 6)), 200.0), Layout(new)
+
+
+def plan_between() -> tuple[Layout, Layout]:
+    """A plan that the diagnosis was not developed on, for the bearing `between.toml`: two speeds, fewer loads."""
+    slow, fast = HZ * 50, HZ * 75
+    tests = (
+        *dynamic([8000.0], [HZ * f for f in (20, 35, 55, 70)], slow, DOWN, 5),
+        *dynamic([4000.0, 12000.0, 16000.0], [HZ * 35], slow, DOWN, 5),
+        *dynamic([8000.0, 14000.0], [HZ * 35, HZ * 60], fast, DOWN, 5),
+    )
+    new = (
+        *dynamic([6000.0, 18000.0], [HZ * 35, HZ * 85], slow, DOWN, 0),
+        *dynamic([11000.0], [HZ * 45], fast, DOWN, 0),
+    )
+    return Layout(tests, around(8000.0, 8, slow), dry(range(1, 6)), 300.0), Layout(new)
+
+
 def bench(name: str, folder: Path | None, skip: frozenset[str] = SKIPPED) -> Bench:
-    """Pose the paper's plan for a bundled bearing, on an emulator whose table is kept in a folder, or on the model.
+    """Pose a bearing's plan, on an emulator whose table is kept in a folder, or on the model.
 
     Parameters
     ----------
@@ -96,12 +120,9 @@ def bench(name: str, folder: Path | None, skip: frozenset[str] = SKIPPED) -> Ben
     skip : frozenset of str
         Effects that are left out.
     """
-    bearing = load_bearing(BEARINGS / f"{name}.toml")
+    bearing = load_bearing((HERE if name == "between" else BEARINGS) / f"{name}.toml")
     setup = Setup(bearing, pivot_laws("kirk", bearing), mesh=MESH, accuracy=ACCURACY)
-    sweep = dynamic([5000.0], [HZ * f for f in (10, 20, 25, 30, 40, 50)], SPEED, -math.pi / 2, 5)
-    loads = dynamic([2500.0, 3750.0, 6250.0, 7500.0, 8750.0], [HZ * 25], SPEED, -math.pi / 2, 5)
-    layout = Layout((*sweep, *loads), around(5000.0, 10, SPEED), dry(range(1, 6)), 200.0)
-    new = Layout(dynamic([4375.0, 10000.0], [HZ * 25, HZ * 60], SPEED, -math.pi / 2, 0))
+    layout, new = plan_between() if name == "between" else plan_of_the_paper()
     observations = planned_observations(setup, layout)
     model = Forward(setup, layout, observations.elements)
     model()
@@ -237,13 +258,17 @@ def _measured(one: Bench, hidden: Sequence[Effect], size: FloatArray, growth: fl
     known = one.problem.nuisances
     value = predict(one.forward, hidden, known, size)
     if growth:  # the clearance grows in proportion to the load: no effect of the library
-        elements = one.problem.observations.elements
+        elements, layout = one.problem.observations.elements, one.problem.observations.layout
+        top = max(test.load for test in layout.dynamic)
         for load in sorted({e.place("load") for e in elements if e.family == "h"}):
             mine = np.array([e.family in {"h", "temperature"} and e.place("load") == load for e in elements])
-            more = (*hidden, Effect("thermal_growth", clearance_change=growth * load / 8750.0))
+            more = (*hidden, Effect("thermal_growth", clearance_change=growth * load / top))
             value = np.where(mine, predict(one.forward, more, known, size), value)
         mine = np.array([e.family in {"locus", "load"} for e in elements])
-        more = (*hidden, Effect("thermal_growth", clearance_change=growth * 5000.0 / 8750.0))
+        more = (
+            *hidden,
+            Effect("thermal_growth", clearance_change=growth * layout.locus[0].load / top),
+        )
         value = np.where(mine, predict(one.forward, more, known, size), value)
     return value
 
@@ -317,7 +342,7 @@ def _elsewhere(one: Bench, drawn: Drawn, named: Sequence[Effect]) -> dict[str, f
 def main() -> None:
     """Draw, diagnose, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--bearing", default="rocker")
+    parser.add_argument("--bearing", choices=("rocker", "spherical", "between"), default="rocker")
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rows", type=Path, default=Path("mixtures.jsonl"))
