@@ -1,13 +1,14 @@
 """Mixtures that another program computed: K and C by the ROSS fluid-film engine, diagnosed as tables.
 
     python -m tests.studies.diagnosis.peer_tables --python /path/to/an/environment/with/ross/bin/python
-        [--count 16] [--seed 0] [--rows FILE]
+        [--count 20] [--seed 0] [--rows FILE] [--again]
 
 The paper's rocker bearing with pivots of 5e8 N/m and an adiabatic film on ROSS's own mesh: ten points (six loads at
 25 Hz, four more frequencies at 5 kN). Every campaign's oil, inlet, clearances and pivots are drawn from the default
 tolerances, noise is 0.5 % of the direct coefficients; one or two effects are hidden, or a cross-coupled stiffness
 that no effect of the library does. A table holds no locus, no dry tests and no temperatures, so look-alikes that these
-would tell apart may stay *ambiguous*. Rows that are in the file are not computed again.
+would tell apart may stay *ambiguous*. What ROSS computed is kept in the rows: it is not computed again, and `--again`
+diagnoses it anew.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ import numpy as np
 import pandas as pd
 
 from model.effects import Effect
-from tests.studies.bench_ross import SPEED, VISCOSITY, bearing, peer_case
+from tests.studies.bench_ross import SPEED, bearing, peer_case
 from tpjb_ident.arrays import ComplexArray
 from tpjb_ident.diagnose.campaign import Baseline, diagnose_table
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
@@ -122,29 +123,33 @@ def write_table(path: Path, found: list[list[float]], hidden: list[Effect], outs
     pd.DataFrame(rows).to_csv(path, index=False)
 
 
-def run(python: str, kind: tuple[str, ...], seed: int) -> dict[str, Any]:
-    """Compute and diagnose one campaign; a row with what came out."""
+def run(python: str, kind: tuple[str, ...], seed: int, kept: list[list[float]] | None = None) -> dict[str, Any]:
+    """Compute (or take what is kept) and diagnose one campaign; a row with what came out."""
     rng = np.random.default_rng([seed, 20190761])
     hidden = draw(kind, rng)
     outside = float(rng.choice([-1, 1]) * rng.uniform(2e7, 4e7)) if "outside" in kind else 0.0
-    asked = json.dumps(cases(hidden, rng))
-    done = subprocess.run([python, "-c", CHILD], input=asked, capture_output=True, text=True, check=False)
-    found = [json.loads(line[4:]) for line in done.stdout.splitlines() if line.startswith("ROW ")]
-    row: dict[str, Any] = {"seed": seed, "kind": kind, "outside": outside}
-    row["truth"] = [{"name": e.name, **e.parameters} for e in hidden]
-    if len(found) != len(POINTS):
-        return row | {"verdict": "", "named": [], "alike": [], "why": done.stderr[-300:]}
-    one = bearing()
+    found = kept or computed(python, cases(hidden, rng))
     began = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "peer.csv"
         write_table(path, found, hidden, outside, seed)
-        result = diagnose_table(path, one, Baseline(PIVOTS), DiagnoseSettings(workers=1)).diagnosis.verdict
+        result = diagnose_table(path, bearing(), Baseline(PIVOTS), DiagnoseSettings(workers=1)).diagnosis.verdict
     named = [{"name": e.name, **{k: (p.value, p.lo, p.hi) for k, p in e.parameters.items()}} for e in result.effects]
-    return row | {
+    return {
+        "seed": seed, "kind": kind, "outside": outside, "truth": [{"name": e.name, **e.parameters} for e in hidden],
         "verdict": result.verdict, "named": named, "alike": [list(g) for g in result.indistinguishable],
         "behaves_like": [b.words for b in result.behaves_like], "seconds": time.process_time() - began, "peer": found,
     }  # fmt: skip
+
+
+def computed(python: str, asked: list[dict[str, Any]]) -> list[list[float]]:
+    """K and C of the peer at every point."""
+    text = json.dumps(asked)
+    done = subprocess.run([python, "-c", CHILD], input=text, capture_output=True, text=True, check=False)
+    found = [json.loads(line[4:]) for line in done.stdout.splitlines() if line.startswith("ROW ")]
+    if len(found) != len(asked):
+        raise SystemExit(f"ROSS gave {len(found)} of {len(asked)} points: {done.stderr[-300:]}")
+    return found
 
 
 def table(rows: list[dict[str, Any]]) -> str:
@@ -155,7 +160,7 @@ def table(rows: list[dict[str, Any]]) -> str:
         truth += f"; cross-coupled {row['outside']:.3g} N/m" * bool(row["outside"])
         said = "; ".join(_words(e) for e in row["named"]) or "; ".join(row.get("behaves_like", []))
         alike = " or ".join("/".join(g) for g in row["alike"])
-        lines.append(f"| {truth} | *{row['verdict'] or row['why']}* | {said}{f' ({alike})' if alike else ''} |")
+        lines.append(f"| {truth} | *{row['verdict']}* | {said}{f' ({alike})' if alike else ''} |")
     return "\n".join(lines)
 
 
@@ -175,15 +180,18 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=2 * len(KINDS))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rows", type=Path, default=Path("peer_tables.jsonl"))
+    parser.add_argument("--again", action="store_true", help="diagnose what is kept anew")
     asked = parser.parse_args()
-    rows = [json.loads(t) for t in asked.rows.read_text("utf-8").splitlines()] if asked.rows.exists() else []
-    done = {row["seed"] for row in rows}
+    kept = [json.loads(t) for t in asked.rows.read_text("utf-8").splitlines()] if asked.rows.exists() else []
+    known = {row["seed"]: row for row in kept}
     for number in range(asked.count):
-        if asked.seed + number not in done:
-            rows.append(run(asked.python, KINDS[number % len(KINDS)], asked.seed + number))
-            with asked.rows.open("a", encoding="utf-8") as out:
-                out.write(json.dumps(rows[-1], default=float) + "\n")
-    print(f"isoviscous reference {VISCOSITY} Pa s at 40 degC, {len(rows)} campaigns\n\n{table(rows)}")
+        seed, kind = asked.seed + number, KINDS[number % len(KINDS)]
+        if asked.again and seed in known:
+            known[seed] = run(asked.python, kind, seed, known[seed]["peer"])
+        elif seed not in known:
+            known[seed] = run(asked.python, kind, seed)
+        asked.rows.write_text("".join(json.dumps(row, default=float) + "\n" for row in known.values()), "utf-8")
+    print(f"{len(known)} campaigns\n\n{table(list(known.values()))}")
 
 
 if __name__ == "__main__":
