@@ -3,7 +3,7 @@
     python -m tests.studies.diagnosis.peer_tables --python /path/to/an/environment/with/ross/bin/python
         [--count 20] [--seed 0] [--rows FILE] [--again]
 
-The paper's rocker bearing with pivots of 5e8 N/m and an adiabatic film on ROSS's own mesh: ten points (six loads at
+The paper's rocker bearing with pivots of 1e9 N/m and an adiabatic film on ROSS's own mesh: ten points (six loads at
 25 Hz, four more frequencies at 5 kN). Every campaign's oil, inlet, clearances and pivots are drawn from the default
 tolerances, noise is 0.5 % of the direct coefficients; one or two effects are hidden, or a cross-coupled stiffness
 that no effect of the library does. A table holds no locus, no dry tests and no temperatures, so look-alikes that these
@@ -33,7 +33,7 @@ from tpjb_ident.diagnose.campaign import Baseline, diagnose_table
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 
 HZ = 2 * math.pi
-PIVOTS, NOISE, MESH = 5e8, 0.005, (40, 20)
+PIVOTS, NOISE, MESH = 1e9, 0.005, (40, 20)
 POINTS = [(load, 25.0) for load in (2500.0, 3750.0, 5000.0, 6250.0, 7500.0, 8750.0)] + [
     (5000.0, f) for f in (10.0, 20.0, 40.0, 50.0)
 ]
