@@ -21,8 +21,9 @@ from tpjb_ident.diagnose.search.problem import Problem
 SHARES = (1.0, 0.1, 0.01, 0.001)
 #: Effects that solve the pads' own heat or bending: seconds a run, and nearly linear at any size that a rig has.
 SLOW = frozenset({"pad_bending", "pad_conduction"})
-#: Amplitudes at which curvature is told, in typical sizes.
-WIDE = 0.8
+#: Amplitudes at which a candidate's course is told, in typical sizes: the nearest where a rig is expected, the others
+#: where a large effect lies.
+ALONG = (0.8, -0.8, 2.4, -2.4)
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,8 @@ class Survey:
         Change of the prediction per unit of every amplitude, over a step of a size that one would expect.
     slopes : mapping of Candidate to (n, k) ndarray
         The same at the model itself where the curvature is known.
-    curved : mapping of Candidate to (n, 1) ndarray
-        Half the second derivatives, of candidates of one amplitude.
+    curved : mapping of Candidate to (n, m) ndarray
+        Coefficients of the second and higher powers of the amplitude, of candidates of one amplitude.
     """
 
     secants: Columns
@@ -67,7 +68,7 @@ class Survey:
 
 
 def survey(run: Map, model: Fit, pool: Sequence[Candidate]) -> Survey:
-    """Ask what every candidate does: slope and curvature over its amplitude where it has one.
+    """Ask what every candidate does: its course over its amplitude where it has one.
 
     A clearance that grows by a third of itself does not do three times what a ninth does: to first order a large
     effect explains little, and others would be fitted in its place.
@@ -90,35 +91,37 @@ def survey(run: Map, model: Fit, pool: Sequence[Candidate]) -> Survey:
 def _surveyed(
     forward: ForwardModel, problem: Problem, model: Start, y: FloatArray, candidate: Candidate
 ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-    """Secants, slopes, and the curvature where it can be told."""
+    """Secants, slopes, and what goes with higher powers where it can be told."""
     if len(candidate.steps) == 1 and candidate.name not in SLOW:
-        bent = _bent(forward, problem, model, y, candidate)
-        if bent is not None:
-            return bent
+        course = _course(forward, problem, model, y, candidate)
+        if course is not None:
+            return course
     parts = [_column(forward, problem, model, y, candidate, i) for i in range(len(candidate.steps))]
     found = np.column_stack(parts)
     return found, found, None
 
 
-def _bent(
+def _course(
     forward: ForwardModel, problem: Problem, model: Start, y: FloatArray, candidate: Candidate
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """A parabola through two amplitudes beside the neutral one; None where the model has no equilibrium there."""
+    """A polynomial through amplitudes beside the neutral one; None where the model has no equilibrium near it."""
     low, high = (float(v[0]) for v in candidate.limits)
-    around, step = candidate.neutral, WIDE * candidate.step
-    shares = [s for s in (1.0, -1.0, 2.0, -2.0) if low <= around + s * step <= high][:2]
-    rows = []
-    for share in shares:
+    around, step = candidate.neutral, candidate.step
+    shares, rows = [], []
+    for share in (s for s in ALONG if low <= around + s * step <= high):
         start = replace(model, candidates=(*model.candidates, candidate),
                         amplitudes=(*model.amplitudes, np.array([around + share * step])))  # fmt: skip
         other = attempt(forward, problem, start)
-        if other is None:
+        if other is None and len(rows) < 2:
             return None
-        rows.append((other - y) / (share * step))
+        if other is not None:
+            shares.append(share * step)
+            rows.append((other - y) / (share * step))
     if len(rows) < 2:
         return None
-    bend = (rows[0] - rows[1]) / ((shares[0] - shares[1]) * step)
-    return rows[0][:, None], (rows[0] - bend * shares[0] * step)[:, None], bend[:, None]
+    powers = np.vander(shares, increasing=True)
+    course = np.linalg.solve(powers / np.abs(powers).max(axis=0), np.array(rows)).T / np.abs(powers).max(axis=0)
+    return rows[0][:, None], course[:, :1], course[:, 1:]
 
 
 def columns(run: Map, model: Fit, pool: Sequence[Candidate]) -> dict[Candidate, FloatArray]:
@@ -159,7 +162,7 @@ def scores(
     model : Fit
     table : mapping of Candidate to (n, k) ndarray
     pairs : bool
-    curved : mapping of Candidate to (n, 1) ndarray, optional
+    curved : mapping of Candidate to (n, m) ndarray, optional
         See `Survey`.
     """
     levels = [_Level(problem, model, table, share, curved or {}) for share in SHARES]
@@ -211,29 +214,30 @@ class _Level:
         weighted = found.inverse @ unit
         self.gram, self.toward = unit.T @ weighted, weighted.T @ residual
         self.width = np.concatenate(width)
-        self.bent: dict[Candidate, tuple[float, float, float]] = {}
+        self.courses: dict[Candidate, tuple[FloatArray, FloatArray]] = {}
         for c in table.keys() & curved.keys():
-            bend = problem.scaled(curved[c])[:, 0] * float(c.width[0]) ** 2
-            heavy = found.inverse @ bend
-            slope_ = unit[:, self.at[c].start]
-            self.bent[c] = float(heavy @ residual), float(heavy @ slope_), float(heavy @ bend)
+            course = np.column_stack([table[c], curved[c]]) * c.width[0] ** np.arange(1, curved[c].shape[1] + 2)
+            whole = problem.scaled(course)
+            weighed = found.inverse @ whole
+            self.courses[c] = weighed.T @ residual, whole.T @ weighed
 
-    def _curved(self, c: Candidate) -> Score:
-        """Score of one amplitude along its parabola: the best of a grid, and the Gaussian there."""
+    def _along(self, c: Candidate) -> Score:
+        """Score of one amplitude along its course: the best of a grid, and the Gaussian there."""
         at = self.at[c].start
+        toward, gram = self.courses[c]
         low, high = ((float(v[0]) - c.neutral) / self.width[at] for v in c.limits)
         t = np.linspace(max(low, -1.0), min(high, 1.0), 81)
-        toward, cross, square = self.bent[c]
-        inner = 1.0 + self.gram[at, at] + 4.0 * t * cross + 4.0 * t**2 * square
-        gain = t * self.toward[at] + t**2 * toward
-        gain -= 0.5 * (t**2 * (1.0 + self.gram[at, at]) + 2.0 * t**3 * cross + t**4 * square)
-        gain -= 0.5 * np.log(np.maximum(inner, 1.0))
+        power = np.arange(1, len(toward) + 1)
+        course = t[:, None] ** power
+        slopes = power * t[:, None] ** (power - 1)
+        gain = course @ toward - 0.5 * (t**2 + np.einsum("ti,ij,tj->t", course, gram, course))
+        gain -= 0.5 * np.log1p(np.einsum("ti,ij,tj->t", slopes, gram, slopes))
         best = int(np.argmax(gain))
         return Score((c,), float(gain[best]) + self.offset, (np.array([c.neutral + t[best] * self.width[at]]),))
 
     def score(self, chosen: tuple[Candidate, ...]) -> Score:
-        if len(chosen) == 1 and chosen[0] in self.bent:
-            return self._curved(chosen[0])
+        if len(chosen) == 1 and chosen[0] in self.courses:
+            return self._along(chosen[0])
         rows = np.concatenate([np.arange(self.at[c].start, self.at[c].stop) for c in chosen])
         inner = self.gram[np.ix_(rows, rows)] + np.eye(len(rows))
         moved = np.linalg.solve(inner, self.toward[rows])
@@ -264,12 +268,15 @@ def with_model(model: Fit, score: Score, table: Columns, curved: Columns | None 
     table : mapping of Candidate to array
         Derivatives by candidate, (n, k) each.
     curved : mapping, optional
-        The same with the curvature over the step that was scored.
+        Higher powers of their amplitudes; see `Survey`.
     """
     parts = []
     for c, amplitudes in zip(score.candidates, score.amplitudes, strict=True):
-        bend = (curved or {}).get(c)
-        parts.append(table[c] if bend is None else table[c] + 2.0 * bend * (amplitudes[0] - c.neutral))
+        course = (curved or {}).get(c)
+        parts.append(table[c])
+        if course is not None:
+            power = np.arange(2, course.shape[1] + 2)
+            parts[-1] = table[c] + (course @ (power * (amplitudes[0] - c.neutral) ** (power - 1)))[:, None]
     jacobian = np.column_stack([model.jacobian, *parts])
     return Start((*model.candidates, *score.candidates), (*model.amplitudes, *score.amplitudes), jacobian,
                  model.nuisance, model.columns)  # fmt: skip
