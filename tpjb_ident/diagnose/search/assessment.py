@@ -25,7 +25,11 @@ from tpjb_ident.arrays import FloatArray, IntArray
 from tpjb_ident.diagnose.observations.folds import Fold
 from tpjb_ident.diagnose.search.components import Component
 
-STEPS = 12
+#: Most steps of the scales: with 12 a baseline ended 7 nats short of its best, and what was fitted from there led.
+STEPS = 40
+#: A step that has helped may be so many times as long the next time: residuals far below a scale bring it down by a
+#: factor of e a step.
+LONGEST = 8.0
 #: Change of the log scales at which they count as found.
 FOUND = 0.05
 
@@ -195,13 +199,17 @@ def assess(basis: Basis, linear: Linear, start: FloatArray | None = None, fixed:
     spread = linear.spread
     value, factor = _evidence(basis, linear, spread, logs)
     inverse = _inverse(factor)
-    damping = 1e-3
+    damping, stride = 1e-3, 1.0
     lowest, highest = np.array([(one.lowest, one.highest) for one in basis.components]).T
     for _ in range(0 if fixed else STEPS):
         gradient, fisher = _slopes(basis, linear, inverse, logs)
         moved = np.linalg.solve(fisher + damping * np.diag(np.diag(fisher)) + 1e-9 * np.eye(len(logs)), gradient)
-        new = np.clip(logs + np.clip(moved, -3.0, 3.0), lowest, highest)
-        trial, factor = _evidence(basis, linear, spread, new)
+        for share in dict.fromkeys((stride, 1.0)):
+            new = np.clip(logs + np.clip(share * moved, -3.0, 3.0), lowest, highest)
+            trial, factor = _evidence(basis, linear, spread, new)
+            if trial >= value:
+                break
+        stride = min(2.0 * share, LONGEST) if trial >= value else 1.0
         if trial < value:
             damping = max(10.0 * damping, 0.1)
             if damping > 1e4:
