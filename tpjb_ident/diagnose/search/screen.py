@@ -107,7 +107,8 @@ def _course(
     """A polynomial through amplitudes beside the neutral one; None where the model has no equilibrium near it."""
     low, high = (float(v[0]) for v in candidate.limits)
     around, step = candidate.neutral, candidate.step
-    shares, rows = [], []
+    shares: list[float] = []
+    rows: list[FloatArray] = []
     for share in (s for s in ALONG if low <= around + s * step <= high):
         start = replace(model, candidates=(*model.candidates, candidate),
                         amplitudes=(*model.amplitudes, np.array([around + share * step])))  # fmt: skip
