@@ -36,6 +36,7 @@ KERNELS = (
     "film/slopes.py",
     "film/turbulence.py",
     "statics/compiled/anderson.py",
+    "statics/compiled/bending.py",
     "statics/compiled/carrying.py",
     "statics/compiled/constants.py",
     "statics/compiled/elimination.py",

@@ -21,11 +21,19 @@ from model.film.slopes import pressure_change
 #: back there; what the journal drags in mixes with what returns, so that the net flow is no measure of the heat
 #: carried along, and with less than this the temperature there runs away. Bearings as they are run stay above it.
 LEAST_FLOW = 0.2
+#: Below, an oil does not thin [1/K].
+LEAST_THINNING = 1e-6
 
 
 @compiled
 def solve_energy(
-    grid: FilmGrid, work: FilmWork, inlet: float, speed: float, heat: tuple[float, float], temperature: FloatArray
+    grid: FilmGrid,
+    work: FilmWork,
+    inlet: float,
+    speed: float,
+    heat: tuple[float, float],
+    thinning: float,
+    temperature: FloatArray,
 ) -> float:
     """March the film temperature from the leading edge.
 
@@ -39,6 +47,9 @@ def solve_energy(
         Surface speed of the journal [m/s].
     heat : tuple of float
         Specific heat [J/kg/K] and conductivity [W/m/K] of the oil.
+    thinning : float
+        Share of the viscosity that a kelvin takes [1/K], for heat that is made at the new temperature, to first order
+        about `work.temperature`; 0 for heat that is made at that one.
     temperature : (nt + 1, nz + 1) ndarray
         Overwritten with the new temperature [degC].
 
@@ -53,31 +64,42 @@ def solve_energy(
     rho c h (u T_x + w T_z) = k h T_zz + mu U^2 / h + h^3 / (12 mu) (p_x^2 + p_z^2) - exchange T + gained;
     the last two are what pad and journal take and give (`model.statics.heat_paths`), zero in the adiabatic baseline.
     """
-    fields = temperature.reshape((1, temperature.shape[0], temperature.shape[1]))
-    sources = np.empty((1, temperature.shape[0], temperature.shape[1]))
-    made = dissipation(grid, work, speed)
-    for i in range(temperature.shape[0]):
-        for j in range(temperature.shape[1]):
-            sources[0, i, j] = made[i, j] + work.gained[i, j]
-    for j in range(temperature.shape[1]):
+    rows, columns = temperature.shape
+    fields = temperature.reshape((1, rows, columns))
+    loss, sources = np.empty((rows, columns)), np.empty((1, rows, columns))
+    _made(grid, work, speed, sources[0], loss)
+    for i in range(rows):
+        for j in range(columns):
+            less = thinning * loss[i, j]
+            sources[0, i, j] += work.gained[i, j] + less * work.temperature[i, j]
+            loss[i, j] = work.exchange[i, j] + less
+    for j in range(columns):
         temperature[0, j] = inlet
-    return march(grid, work, speed, heat, fields, sources)
+    return march(grid, work, speed, heat, loss, fields, sources)
 
 
 @compiled
 def march(
-    grid: FilmGrid, work: FilmWork, speed: float, heat: tuple[float, float], fields: FloatArray, sources: FloatArray
+    grid: FilmGrid,
+    work: FilmWork,
+    speed: float,
+    heat: tuple[float, float],
+    loss: FloatArray,
+    fields: FloatArray,
+    sources: FloatArray,
 ) -> float:
     """March any number of temperature fields that differ in their inlet and sources: the equation is linear.
 
     Parameters
     ----------
     grid, work, speed, heat
-        As for `solve_energy`; `work.exchange` is what every kelvin loses [W/K].
+        As for `solve_energy`.
+    loss : (nt + 1, nz + 1) ndarray
+        What every kelvin loses per station of length dx and control-volume height [W/K].
     fields : (m, nt + 1, nz + 1) ndarray
         Row 0 holds the temperature at the leading edge; the rest is overwritten [degC].
     sources : (m, nt + 1, nz + 1) ndarray
-        Heat per station of length dx and control-volume height [W].
+        Heat per station [W].
 
     Returns
     -------
@@ -88,9 +110,10 @@ def march(
     count = fields.shape[0]
     limited = 0.0
     lower, main, upper = np.zeros(nz + 1), np.zeros(nz + 1), np.zeros(nz + 1)
-    right = np.zeros((nz + 1, count))
+    right, conduct = np.zeros((nz + 1, count)), np.empty(nz)
     h, flow_x, flow_z, density = work.thickness, work.flow_x, work.flow_z, work.density
-    conduct = heat[1] * grid.dx
+    for j in range(nz):
+        conduct[j] = 0.25 * heat[1] * grid.dx / grid.dz[j]
     for i in range(work.flow_x.shape[0]):
         for j in range(nz + 1):
             couette = 0.25 * speed * (h[i, j] * density[i, j] + h[i + 1, j] * density[i + 1, j]) * grid.height[j]
@@ -102,21 +125,21 @@ def march(
             low = high = 0.0
             if j > 0:
                 south = 0.5 * (flow_z[i, j - 1] + flow_z[i + 1, j - 1])
-                film = 0.25 * (h[i, j] + h[i, j - 1] + h[i + 1, j] + h[i + 1, j - 1])
-                low = -0.5 * (0.5 * heat[0] * south + conduct / grid.dz[j - 1] * film)
+                film = h[i, j] + h[i, j - 1] + h[i + 1, j] + h[i + 1, j - 1]
+                low = -0.5 * (0.5 * heat[0] * south + conduct[j - 1] * film)
                 if j == nz:  # the edge is upwind: what leaves takes its temperature along
                     low = -0.25 * heat[0] * max(south, 0.0)
             if j < nz:
                 north = 0.5 * (flow_z[i, j] + flow_z[i + 1, j])
-                film = 0.25 * (h[i, j] + h[i, j + 1] + h[i + 1, j] + h[i + 1, j + 1])
-                high = -0.5 * (-0.5 * heat[0] * north + conduct / grid.dz[j] * film)
+                film = h[i, j] + h[i, j + 1] + h[i + 1, j] + h[i + 1, j + 1]
+                high = -0.5 * (-0.5 * heat[0] * north + conduct[j] * film)
                 if j == 0 and grid.first == 1:
                     high = -0.25 * heat[0] * max(-north, 0.0)
             advect = heat[0] * flow
-            lower[j], main[j], upper[j] = low, advect - low - high + 0.5 * work.exchange[i + 1, j], high
+            lower[j], main[j], upper[j] = low, advect - low - high + 0.5 * loss[i + 1, j], high
             for m in range(count):
                 t = fields[m]
-                value = (advect + low + high - 0.5 * work.exchange[i, j]) * t[i, j]
+                value = (advect + low + high - 0.5 * loss[i, j]) * t[i, j]
                 value += 0.5 * (sources[m, i, j] + sources[m, i + 1, j])
                 if j > 0:
                     value -= low * t[i, j - 1]
@@ -161,7 +184,7 @@ def heat_step(
     """
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     new = np.empty((nt + 1, nz + 1))
-    limited = solve_energy(grid, work, thermal[0], speed, heat, new)
+    limited = solve_energy(grid, work, thermal[0], speed, heat, oil[1], new)
     change = 0.0
     for i in range(nt + 1):
         for j in range(nz + 1):
@@ -172,6 +195,47 @@ def heat_step(
             work.temperature[i, j] += share * (new[i, j] - work.temperature[i, j])
     force = pressure_change(grid, work, speed, oil, shift)
     return change, limited, force[0], force[1]
+
+
+@compiled
+def heat_by_drag(
+    grid: FilmGrid,
+    work: FilmWork,
+    wedge: tuple[float, float, float],
+    speed: float,
+    oil: tuple[float, float, float, float],
+    heat: float,
+    inlet: float,
+) -> None:
+    """Temperature of a film whose oil is dragged along and not pressed: a start for the search.
+
+    With m = rho U h / 2 along and mu(T) = mu_in exp(-kappa (T - T_in)), m c T_x = mu U^2 / h is
+    kappa (T - T_in) = ln(1 + kappa (2 mu_in U / (rho c)) int dx / h^2).
+
+    Parameters
+    ----------
+    grid : FilmGrid
+    work : FilmWork
+        Its temperature is overwritten.
+    wedge : tuple of float
+        Cp, a, b [m].
+    speed : float
+        Surface speed of the journal [m/s].
+    oil : tuple of float
+        See `model.statics.pad_film.oil_constants`.
+    heat : float
+        Specific heat [J/kg/K].
+    inlet : float
+        [degC]
+    """
+    fluid = oil[0] * np.exp(oil[1] * (40.0 - inlet)) / (oil[2] * (1.0 + oil[3] * (40.0 - inlet)))
+    along = 0.0
+    for i in range(work.temperature.shape[0]):
+        if i > 0:
+            h = wedge[0] - wedge[1] * grid.cos_face[i - 1] - wedge[2] * grid.sin_face[i - 1]
+            along += grid.dx / h**2
+        rise = 2.0 * fluid * speed / heat * along  # of oil that does not thin
+        work.temperature[i] = inlet + (np.log(1.0 + oil[1] * rise) / oil[1] if oil[1] > LEAST_THINNING else rise)
 
 
 @compiled
@@ -187,9 +251,16 @@ def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
     speed : float
         Surface speed of the journal [m/s].
     """
+    out, less = np.empty(work.pressure.shape), np.empty(work.pressure.shape)
+    _made(grid, work, speed, out, less)
+    return out
+
+
+@compiled
+def _made(grid: FilmGrid, work: FilmWork, speed: float, made: FloatArray, less: FloatArray) -> None:
+    """Heat made per station [W], and how much less of it for every unit by which the viscosity falls, as a share."""
     p, h, mu = work.pressure, work.thickness, work.viscosity
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    out = np.empty((nt + 1, nz + 1))
     for i in range(nt + 1):
         for j in range(nz + 1):
             # mean of the squared slopes on both sides: what the box between two stations sees, to second order
@@ -208,20 +279,22 @@ def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
                 slope = (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1])
             shear = mu[i, j] * speed**2 / h[i, j]
             pressed = h[i, j] ** 3 / (12.0 * mu[i, j]) * (squared / sides + slope**2)
-            out[i, j] = (shear + pressed) * grid.dx * grid.height[j]
-    return out
+            station = grid.dx * grid.height[j]
+            made[i, j], less[i, j] = (shear + pressed) * station, max(shear - pressed, 0.0) * station
 
 
 @compiled
 def _tridiagonal(lower: FloatArray, main: FloatArray, upper: FloatArray, right: FloatArray) -> None:
     """Thomas' algorithm in place for the columns of `right`, (n, m); the solutions are left there."""
     n, count = right.shape
-    for j in range(1, n):
-        factor = lower[j] / main[j - 1]
-        main[j] -= factor * upper[j - 1]
-        for m in range(count):
-            right[j, m] -= factor * right[j - 1, m]
+    for j in range(n):
+        if j > 0:
+            factor = lower[j] * main[j - 1]
+            main[j] -= factor * upper[j - 1]
+            for m in range(count):
+                right[j, m] -= factor * right[j - 1, m]
+        main[j] = 1.0 / main[j]
     for m in range(count):
-        right[n - 1, m] /= main[n - 1]
+        right[n - 1, m] *= main[n - 1]
         for j in range(n - 2, -1, -1):
-            right[j, m] = (right[j, m] - upper[j] * right[j + 1, m]) / main[j]
+            right[j, m] = (right[j, m] - upper[j] * right[j + 1, m]) * main[j]

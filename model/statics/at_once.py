@@ -11,9 +11,11 @@ from model.arrays import FloatArray, IntArray
 from model.film.loaded_attitude import Branch, LoadedAttitude
 from model.film.reynolds import FilmForces
 from model.options import Options
-from model.setup import BENDING, Setup
+from model.pad.bending import SHAPES
+from model.setup import Setup
 from model.statics import conditions
 from model.statics.carrying import attitude_of
+from model.statics.compiled.bending import BodyStack, stacked_bodies
 from model.statics.compiled.carrying import Case
 from model.statics.compiled.iteration import BOUNDLESS_HEAT, FILM_LOST, RESTARTING, SETTLED, SINGULAR, iterate
 from model.statics.compiled.laws import encoded
@@ -28,7 +30,7 @@ from model.statics.tilt_hold import rolling_radius
 #: its default.
 _KNOWN = frozenset({
     "bearing", "pivots", "thermal", "mesh", "supply_change", "options", "rotational_stiffness", "pivot_damping",
-    "misalignment", "starvation", "rolling", "vibration", "heat_loss", "series_compliance", "added_mass",
+    "misalignment", "starvation", "rolling", "vibration", "heat_loss", "bending", "series_compliance", "added_mass",
     "parallel_stiffness", "parallel_damping", "instruments", "clearance_change", "accuracy", "grown",
 })  # fmt: skip
 _DEFAULTS = {
@@ -44,7 +46,7 @@ def able(setup: Setup) -> bool:
     ----------
     setup : Setup
     """
-    if setup.thermal in BENDING or _felt(setup) != _PLAIN:
+    if setup.thermal == "thd" or _felt(setup) != _PLAIN:
         return False
     if any(getattr(setup, name) != value for name, value in _DEFAULTS.items()):
         return False
@@ -87,7 +89,8 @@ def iterate_at_once(search: Search, cold: bool) -> Equilibrium:
         (float(setup.rotational_stiffness), roll), size, setup.accuracy, setup.thermal == "isothermal",
     )  # fmt: skip
     grids = stacked_grids(tuple(f.grid for f in films))
-    code, iterations, residual, heat, limited = iterate(grids, pads, search.works, state, case, cold)
+    bodies = _bodies(search)
+    code, iterations, residual, heat, limited = iterate(grids, pads, search.works, state, case, bodies, cold)
     _take_over(search, state)
     search.limited = limited
     figures = iterations, residual, heat
@@ -111,7 +114,21 @@ def _pads(search: Search) -> PadStack:
         frame[m, 0], frame[m, 1] = f.normal, f.tangent
     numbers = [(f.preload_distance, f.pivot_radius, f.pad.pad_clearance, f.inlet) for f in films]
     preload, radius, clearance, inlet = np.array(numbers, dtype=float).T.copy()
-    return PadStack(frame, preload, radius, clearance, inlet, *known, attitudes, rows)
+    pivot = np.array([_pivot_station(f.grid.angle) for f in films])
+    return PadStack(frame, preload, radius, clearance, inlet, pivot, *known, attitudes, rows)
+
+
+def _pivot_station(angle: FloatArray) -> tuple[float, float]:
+    """Station before the pivot, at angle 0, and how far along to the next one it is; the nearest end where it is none."""
+    before = min(max(int(np.searchsorted(angle, 0.0, side="right")) - 1, 0), len(angle) - 2)
+    return before, min(max(-angle[before] / (angle[before + 1] - angle[before]), 0.0), 1.0)
+
+
+def _bodies(search: Search) -> BodyStack:
+    films, setup = search.films, search.setup
+    given = tuple(f.deformation for f in films if f.deformation is not None and setup.flexible_pads)
+    grid = films[0].grid
+    return stacked_bodies(given, (grid.first, len(grid.z)), setup.bending_factor, setup.inlet_temperature)
 
 
 @lru_cache(maxsize=64)
@@ -126,6 +143,7 @@ def _tables(attitudes: tuple[LoadedAttitude, ...]) -> tuple[FloatArray, IntArray
 def _state(search: Search, longest: int) -> PadState:
     films = search.films
     n = len(films)
+    bent = np.array([f.bent for f in films]) if search.setup.flexible_pads else np.zeros((n, 0, 0))
     return PadState(
         position=np.array(search.position, dtype=float),
         tilt=np.array([f.tilt for f in films], dtype=float),
@@ -135,6 +153,7 @@ def _state(search: Search, longest: int) -> PadState:
         changes=np.array([f.load_changes for f in films], dtype=np.int64),
         branch=np.zeros((n, 4, longest)),
         length=np.zeros(n, dtype=np.int64),
+        wedge=np.zeros((n, 2)),
         force=np.zeros((n, 2)),
         corrected=np.zeros((n, 2)),
         stiffness=np.zeros((n, 2, 2)),
@@ -143,6 +162,11 @@ def _state(search: Search, longest: int) -> PadState:
         steps=np.zeros(n, dtype=np.int64),
         heating=np.full(n, np.inf),
         shift=search.shifts,
+        felt=np.zeros((n, 2)),
+        felt_stiffness=np.zeros((n, 2, 2)),
+        bent=bent,
+        mismatch=np.zeros_like(bent),
+        amplitude=np.zeros((n, SHAPES, 3)),
     )
 
 
@@ -159,6 +183,8 @@ def _take_over(search: Search, state: PadState) -> None:
     ):
         f.tilt, f.deflection, f.idle, f.load_changes, f.temperature_change = tilt, give, idle, changes, heating
         f.forces = f.corrected = None
+        if search.setup.flexible_pads:
+            f.bent = state.bent[m]
         if solved:
             f.forces = FilmForces(state.force[m], state.stiffness[m], state.damping[m], least, steps)
             f.corrected = f.forces._replace(force=state.corrected[m])

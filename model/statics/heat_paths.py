@@ -175,7 +175,7 @@ class FilmHeat:
     def _march(self, film: PadFilm, fields: FloatArray, sources: FloatArray) -> None:
         oil = self.setup.bearing.oil
         heat = (oil.specific_heat, oil.conductivity)
-        limited = march(film.grid, film.work, self.surface_speed, heat, fields, sources)
+        limited = march(film.grid, film.work, self.surface_speed, heat, film.work.exchange, fields, sources)
         self.limited = max(self.limited, limited)
 
 

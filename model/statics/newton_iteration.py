@@ -55,7 +55,7 @@ def iterate(search: Search) -> Equilibrium:
     isothermal = setup.thermal == "isothermal" and not setup.flexible_pads
     # a film with temperatures across knows that it makes less heat when it is hotter: it does not swing
     relaxed, slow = (1.0, SLOW_ACROSS) if setup.thermal == "thd" else (RELAXATION, SLOW)
-    search.relaxation = relaxed
+    search.relaxation = 1.0 if search.warm else relaxed
     for iteration in range(1, MAX_ITERATIONS + 1):
         if update_carrying(setup, search.films, search.position, search.surface_speed):
             memory.reset()

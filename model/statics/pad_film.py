@@ -16,7 +16,7 @@ from model.film.mesh import FilmGrid, FilmWork, film_grid
 from model.film.models import FilmSolver, film_solver
 from model.film.oil_state import set_viscosity
 from model.film.resting import RestingFilm, resting_film
-from model.film.reynolds import FilmForces, solve_film
+from model.film.reynolds import FilmForces
 from model.film.slopes import pressure_change
 from model.film.turbulence import solve_turbulent_film
 from model.pad.bending import BendingStep, PadDeformation, pad_deformation
@@ -67,8 +67,8 @@ class PadFilm:
         What the last step asked for [K].
     kept : float
         Share of the dissipation that stays in the film.
-    solver : callable
-        Solves the film's pressure, with or without its mass conserved.
+    rupture : str
+        Which solver finds the film's pressure: one of `model.film.models.FILM_MODELS`, or "turbulent".
     resting : RestingFilm or None
         What an idle pad's film does.
     cross : CrossFilm or None
@@ -101,11 +101,16 @@ class PadFilm:
     load_changes: int = 0
     temperature_change: float = field(default=math.inf)
     kept: float = 1.0
-    solver: FilmSolver = solve_film
+    rupture: str = "swift-stieber"
     resting: RestingFilm | None = None
     cross: CrossFilm | None = None
     outlet: float = math.nan
     closing: float = 0.0
+
+    @property
+    def solver(self) -> FilmSolver:
+        """Solves the film's pressure, with or without its mass conserved."""
+        return solve_turbulent_film if self.rupture == "turbulent" else film_solver(self.rupture)
 
     @property
     def heat_state(self) -> tuple[FloatArray, ...]:
@@ -277,7 +282,7 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FloatArray]:
     angle, toward = setup.misalignment
     films = []
     laminar = setup.options.turbulence == "none"
-    solver = film_solver(setup.options.cavitation) if laminar else solve_turbulent_film
+    rupture = setup.options.cavitation if laminar else "turbulent"
     grids = [_grid(setup, pad, symmetric) for pad in bearing.pads]
     works, each = film_works(grids, setup.inlet_temperature)
     shifts = np.zeros_like(works.unknown)
@@ -301,7 +306,7 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FloatArray]:
                 pressure_change=shifts[k],
                 deformation=pad_deformation(pad, bearing, grid) if solid else None,
                 kept=1.0 - setup.heat_loss,
-                solver=solver,
+                rupture=rupture,
                 cross=cross_film(work, setup.inlet_temperature) if across else None,
             )
         )

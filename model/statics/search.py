@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from model.arrays import FloatArray
+from model.film.energy import heat_by_drag
 from model.film.mesh import FilmWork
 from model.growth import grown
 from model.setup import Setup
@@ -16,7 +17,7 @@ from model.statics.compiled.constants import FIRST_HEATING, HEATING_STEP, MICROM
 from model.statics.compiled.first_position import first_position
 from model.statics.equilibrium import Equilibrium, mean_temperature
 from model.statics.heat_paths import couples_heat
-from model.statics.pad_film import PadFilm, pad_films
+from model.statics.pad_film import PadFilm, oil_constants, pad_films
 
 #: A change of the clearance by more than this share asks for the table of a pad's loaded attitudes anew.
 NEW_TABLE = 1e-3
@@ -42,6 +43,8 @@ class Search:
         The journal's temperature [degC]; NaN where it takes no heat.
     relaxation : float
         Share of a change of temperature that is made.
+    warm : bool
+        Whether it stands at a neighbour's state.
     heat : float
         Share of the films' heat that is made, 1 but on the way to an equilibrium.
     warmth : float
@@ -62,6 +65,7 @@ class Search:
     limited: float = 0.0
     journal: float = math.nan
     relaxation: float = 1.0
+    warm: bool = False
     heat: float = 1.0
     warmth: float = field(init=False)
     warming: float = 0.0
@@ -90,6 +94,7 @@ class Search:
         self.films, self.works, self.shifts = pad_films(setup)
         for film in self.films:
             film.kept *= self.heat
+        self.warm = False
 
     def warm_up(self) -> float:
         """Say what the journal's temperature will take from the clearances; returns the change asked for [K]."""
@@ -159,7 +164,7 @@ class Search:
             if self.setup.flexible_pads:
                 film.bent[:] = other.bent
                 film.work.extra[:] += other.bent
-        self.position = start.position.copy()
+        self.position, self.warm = start.position.copy(), True
         if coupled:
             self.journal = start.journal_temperature
         if self.setup.growth is not None:
@@ -167,12 +172,25 @@ class Search:
         return True
 
     def start_cold(self) -> None:
-        """Balance the load with the tabulated isothermal films, then put every pad on its loaded attitude."""
-        hotter = 0.0 if self.setup.thermal == "isothermal" else FIRST_HEATING
-        branches = []
+        """See `model.statics.compiled.iteration.start_cold`."""
         for film in self.films:
             for state in (film.work.temperature, *film.heat_state):
                 state[:] = film.inlet
+        isothermal, oil = self.setup.thermal == "isothermal", self.setup.bearing.oil
+        self._balance_films(0.0 if isothermal else FIRST_HEATING)
+        if isothermal or self.setup.thermal == "thd":
+            return
+        for film in self.films:
+            if not film.idle:
+                wedge, heat = (film.pad.pad_clearance, *film.approach(self.position)), oil.specific_heat / film.kept
+                speed = self.surface_speed
+                heat_by_drag(film.grid, film.work, wedge, speed, oil_constants(oil), heat, film.inlet)
+        self._balance_films(0.0)
+
+    def _balance_films(self, hotter: float) -> None:
+        """Put journal and pads where tabulated films, as warm as these or `hotter` [K] than that, carry the load."""
+        branches = []
+        for film in self.films:
             film.branch = find_branch(self.setup, film, self.surface_speed, hotter)
             branches.append(film.branch)
         normals = np.array([f.normal for f in self.films])

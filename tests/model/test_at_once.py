@@ -59,14 +59,14 @@ def test_a_law_of_ones_own_is_searched_step_by_step(rocker):
 def test_physics_that_the_compiled_search_does_not_know_is_searched_step_by_step(rocker):
     plain = Setup(rocker, (RigidPivot(),) * 5)
     assert able(plain)
-    for other in ({"bending": 1.0}, {"thermal": "tehd"}, {"carryover": 0.5}, {"friction": 0.1},
+    for other in ({"thermal": "thd"}, {"carryover": 0.5}, {"friction": 0.1},
                   {"options": Options(cavitation="jfo")}, {"options": Options(conduction=True)}):  # fmt: skip
         assert not able(plain.change(**other))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["rocker", "spherical"])
-@pytest.mark.parametrize("thermal", ["isothermal", "adiabatic"])
+@pytest.mark.parametrize("thermal", ["isothermal", "adiabatic", "tehd"])
 @pytest.mark.parametrize(
     "change",
     [{}, {"misalignment": (2e-4, 0.3)}, {"starvation": 0.1, "rolling": 0.5}, {"rotational_stiffness": 1e4},
@@ -83,8 +83,9 @@ def test_same_search_same_numbers(request, monkeypatch, name, thermal, change):
             stepwise = predict_setup(setup, *at)
         assert once.status == stepwise.status
         assert once.equilibrium.iterations == stepwise.equilibrium.iterations
-        np.testing.assert_allclose(once.h, stepwise.h, rtol=1e-9, atol=1e-9 * np.abs(stepwise.h).max())
-        np.testing.assert_allclose(once.position, stepwise.position, rtol=1e-9, atol=1e-15)
+        share = 1e-9 if thermal != "tehd" else 1e-6  # the pads' matrices are kept in single precision
+        np.testing.assert_allclose(once.h, stepwise.h, rtol=share, atol=share * np.abs(stepwise.h).max())
+        np.testing.assert_allclose(once.position, stepwise.position, rtol=share, atol=1e-15)
 
 
 def test_mixing_is_that_of_the_iteration_step_by_step():

@@ -154,7 +154,7 @@ def test_a_well_mixed_film_between_insulated_walls_is_the_adiabatic_one():
     across = fields[:, :, 0].reshape(cross.temperature.shape)
     assert np.ptp(across, axis=2).max() < 0.01
     adiabatic = np.empty_like(work.temperature)
-    solve_energy(grid, work, 40.0, SURFACE, (heat, mixing), adiabatic)
+    solve_energy(grid, work, 40.0, SURFACE, (heat, mixing), 0.0, adiabatic)
     assert np.ptp(adiabatic) > 2.0
     np.testing.assert_allclose(across.mean(axis=2), adiabatic, atol=1e-3)
 

@@ -41,7 +41,7 @@ def full_film(
     a, b = wedge
     assert solve_film(grid, work, (CLEARANCE, a * CLEARANCE, b * CLEARANCE), SURFACE, False).steps > 0
     temperature = np.empty_like(work.temperature)
-    assert solve_energy(grid, work, 40.0, SURFACE, (HEAT, conductivity), temperature) == 0.0
+    assert solve_energy(grid, work, 40.0, SURFACE, (HEAT, conductivity), 0.0, temperature) == 0.0
     return grid, work, temperature
 
 

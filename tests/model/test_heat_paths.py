@@ -75,7 +75,7 @@ def test_heat_that_pads_take_is_what_their_solid_says(rocker):
     work.gained[:] = -into_pad.reshape(work.gained.shape) * film.grid.dx * film.grid.height
     again = np.empty_like(work.temperature)
     heat = (oil.specific_heat, oil.conductivity)
-    solve_energy(film.grid, work, film.inlet, SPEED * rocker.journal_radius, heat, again)
+    solve_energy(film.grid, work, film.inlet, SPEED * rocker.journal_radius, heat, 0.0, again)
     np.testing.assert_allclose(again, work.temperature, atol=2e-3)
 
 

@@ -151,7 +151,7 @@ def errors(p: Prediction) -> dict[str, float]:
         heat = (bearing.oil.specific_heat, bearing.oil.conductivity)
         film.work.viscosity[:] = bearing.oil.viscosity(film.work.temperature)
         film.work.density[:] = bearing.oil.density(film.work.temperature)
-        solve_energy(film.grid, film.work, film.inlet, surface, heat, fresh)
+        solve_energy(film.grid, film.work, film.inlet, surface, heat, 0.0, fresh)
         if p.setup.thermal == "isothermal":
             fresh[:] = film.inlet
         out["heat"] = max(out["heat"], float(np.abs(fresh - film.work.temperature).max()))

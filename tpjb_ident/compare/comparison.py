@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from rigdata.campaign import Campaign
 from tpjb_ident.compare.coefficient_table import TableSource
-from tpjb_ident.compare.measured_pivots import measured_laws
+from tpjb_ident.compare.model_side import Asked, ModelSide, model_side
 from tpjb_ident.compare.pivot_effects import beside_measured, counted_twice
-from tpjb_ident.compare.predictions import ModelSettings, PointPrediction, Progress, predict_points
-from tpjb_ident.compare.static_tests import measure_static
+from tpjb_ident.compare.predictions import PointPrediction, Progress
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import TpjbError
@@ -74,6 +73,10 @@ class CompareSettings:
             Out of `VARIANTS`.
         """
         return self.effects if pivots != "measured" or self.from_measured else beside_measured(self.effects)
+
+    def asked(self) -> Asked:
+        """What the model is asked for."""
+        return Asked({name: self.effects_with(name) for name in self.variants}, self.thermal)
 
 
 @dataclass(frozen=True)
@@ -164,7 +167,7 @@ def compare_campaign(
     bearing: Bearing,
     settings: CompareSettings | None = None,
     progress: Progress | None = None,
-    before_predicting: Callable[[], object] | None = None,
+    ahead: Callable[[], ModelSide | None] | None = None,
 ) -> Comparison:
     """Identify a campaign, measure its pivots, locus and clearance, and predict the same with every pivot model.
 
@@ -176,8 +179,8 @@ def compare_campaign(
     settings : CompareSettings, optional
     progress : callable, optional
         Called as progress(text, done, total).
-    before_predicting : callable, optional
-        Called once between measuring and predicting, for instance to wait for `warm_up.warming_up`.
+    ahead : callable, optional
+        Gives what `model_side.model_beside` has found meanwhile.
 
     Returns
     -------
@@ -196,26 +199,22 @@ def compare_campaign(
     least = min(pad.assembled_clearance for pad in bearing.pads)
     chosen = replace(settings.identify, clearance=settings.identify.clearance or least)
     identification = identify(campaign, chosen, _labelled(tell, "identifying"))
-    tell("fitting pivot curves, clearance and locus", 0, 1)
-    static = measure_static(campaign, bearing, "measured" in settings.variants)
-    curves, clearance, locus = static.curves, static.clearance, static.locus
-    names, remarks = possible_variants(settings, curves, bearing)
-    remarks += [condition.sentence() for condition in static.left_out]
-    remarks += _left_out(settings, names)
-    if before_predicting is not None:
-        tell("compiling the film solver (once on a machine)", 0, 1)
-        before_predicting()
-    remarks += _not_run(clearance, locus)
-    points = [p.point for p in identification.points]
-    stations = [] if locus is None else [p.point for p in locus.points]
-    variants = []
-    for name in names:
-        pivots = measured_laws(curves, len(bearing.pads), campaign.id) if name == "measured" else name
-        model = ModelSettings(pivots, settings.thermal, settings.effects_with(name))
-        both = predict_points(bearing, [*points, *stations], model, _labelled(tell, f"predicting with {name} pivots"))
-        variants.append(Variant(name, both[: len(points)], both[len(points) :]))
+    points = tuple(p.point for p in identification.points)
+    tell("waiting for the model", 0, 1)
+    side = ahead() if ahead is not None else None
+    if side is None or not all(set(points) <= found.keys() for found in side.predicted.values()):
+        side = model_side(campaign, bearing, settings.asked(), points, tell)
+    static, names = side.static, list(side.predicted)
+    clearance, locus = static.clearance, static.locus
+    remarks = [*side.remarks, *(condition.sentence() for condition in static.left_out)]
+    remarks += _left_out(settings, names) + _not_run(clearance, locus)
+    stations = () if locus is None else tuple(p.point for p in locus.points)
+    variants = tuple(
+        Variant(name, tuple(found[p] for p in points), tuple(found[p] for p in stations))
+        for name, found in side.predicted.items()
+    )
     return Comparison(
-        campaign, bearing, settings, identification, curves, clearance, locus, tuple(variants), tuple(remarks)
+        campaign, bearing, settings, identification, static.curves, clearance, locus, variants, tuple(remarks)
     )
 
 
@@ -246,29 +245,3 @@ def _check(campaign: Campaign, settings: CompareSettings) -> None:
 
 def _labelled(progress: Progress, label: str) -> Progress:
     return lambda text, done, total: progress(f"{label}, {text}", done, total)
-
-
-def possible_variants(
-    settings: CompareSettings, curves: tuple[PivotCurve, ...], bearing: Bearing
-) -> tuple[list[str], list[str]]:
-    """Pivot models that a campaign and a bearing allow, and remarks about the others.
-
-    Parameters
-    ----------
-    settings : CompareSettings
-    curves : tuple of PivotCurve
-        From its dry tests.
-    bearing : Bearing
-    """
-    names, remarks = list(settings.variants), []
-    missing = sorted(set(range(1, len(bearing.pads) + 1)) - {c.pad for c in curves})
-    if "measured" in names and missing:
-        names.remove("measured")
-        pads = ", ".join(f"#{n}" for n in missing)
-        remarks.append(f"Measured pivots are left out: no dry test of pad {pads}.")
-    if bearing.pivot.kind == "rigid":
-        printed = [name for name in names if name.startswith("kirk")]
-        names = [name for name in names if name not in printed]
-        if printed:
-            remarks.append("The bearing file says rigid pivots: there is no printed formula to compare.")
-    return names or ["rigid"], remarks

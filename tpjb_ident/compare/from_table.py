@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.coefficient_table import TableRow, TableSource, read_coefficients
-from tpjb_ident.compare.comparison import CompareSettings, Comparison, Variant, possible_variants
+from tpjb_ident.compare.comparison import CompareSettings, Comparison, Variant
+from tpjb_ident.compare.model_side import possible_variants
 from tpjb_ident.compare.predictions import ModelSettings, predict_points
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.results.identification import Identification
@@ -52,9 +52,7 @@ def compare_table(
     settings = settings or CompareSettings()
     tell = progress or (lambda text, done, total: None)
     points = tuple(_point(row) for row in read_coefficients(path, reading_error))
-    names, remarks = possible_variants(
-        replace(settings, variants=tuple(v for v in settings.variants if v != "measured")), (), bearing
-    )
+    names, remarks = possible_variants(tuple(v for v in settings.variants if v != "measured"), (), bearing)
     if "measured" in settings.variants:
         remarks.append("Measured pivots are left out: a table holds no dry tests.")
     variants = []

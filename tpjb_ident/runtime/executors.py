@@ -13,6 +13,7 @@ with open_workers(count=4) as workers:   # of runtime.workers; or open_workers(s
 from __future__ import annotations
 
 import collections
+import functools
 import multiprocessing
 import os
 import pickle
@@ -24,6 +25,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for_end
 from typing import Any, Protocol
 
@@ -350,6 +352,51 @@ def local_workers(count: int, start: str | None = None, preload: Sequence[str] =
             yield pool
         finally:
             pool.close()
+
+
+@contextmanager
+def beside(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
+    """Run one job in a process of its own while the block goes on; the process is ended with the block.
+
+    Parameters
+    ----------
+    task : callable
+        Of a module, so that another process finds it.
+    *job : object
+        Its arguments.
+
+    Yields
+    ------
+    callable
+        Waits for the value; None if the job had an error or its process was lost: whoever needs the value works it out
+        again, and finds what was wrong. Called a second time, it gives the same.
+    """
+    context = multiprocessing.get_context("spawn")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_send_outcome, args=(sender, task, job), daemon=True)
+    with _one_thread_each():
+        process.start()
+    sender.close()
+
+    @functools.cache
+    def value() -> Any | None:
+        try:
+            outcome: Outcome = receiver.recv()
+        except EOFError:
+            return None
+        return outcome.get() if outcome.error is None else None
+
+    try:
+        yield value
+    finally:
+        receiver.close()
+        process.kill()
+        process.join()
+
+
+def _send_outcome(sender: Connection, task: Task, job: Job) -> None:
+    _begin_worker()
+    sender.send(_attempt(task, None, job))
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import numpy as np
 from model.arrays import FloatArray
 from model.compilation import compiled
 from model.film.mesh import FilmWork
-from model.statics.compiled.constants import EDGE, MAX_LOAD_CHANGES, NEAR_EDGE
+from model.statics.compiled.constants import CROWN, EDGE, MAX_LOAD_CHANGES, NEAR_EDGE
 from model.statics.compiled.laws import compliance, deflection
 from model.statics.compiled.stack import PadStack, PadState
 
@@ -89,7 +89,44 @@ def margin(pads: PadStack, state: PadState, m: int) -> float:
     m : int
         Pad, from 0.
     """
-    return (rigid_approach(pads, state, m) - state.branch[m, 0, 0]) / pads.clearance[m]
+    return (reach(pads, state, m) - state.branch[m, 0, 0]) / pads.clearance[m]
+
+
+@compiled
+def _bulge(pads: PadStack, state: PadState, m: int) -> float:
+    """How far the face of a pad that bends stands inward at its pivot [m]."""
+    if state.bent.size == 0:
+        return 0.0
+    before, share = int(pads.pivot[m, 0]), pads.pivot[m, 1]
+    return -((1.0 - share) * state.bent[m, before, 0] + share * state.bent[m, before + 1, 0])
+
+
+@compiled
+def reach(pads: PadStack, state: PadState, m: int) -> float:
+    """How near the journal is to a pad on a rigid pivot [m], counting by how much a warm pad's face stands inward.
+
+    Parameters
+    ----------
+    pads : PadStack
+    state : PadState
+    m : int
+        Pad, from 0.
+    """
+    return rigid_approach(pads, state, m) + _bulge(pads, state, m)
+
+
+@compiled
+def edge(pads: PadStack, state: PadState, m: int) -> float:
+    """Share of the clearance by which the table of rigid pads may be wrong about where a pad stops carrying.
+
+    Parameters
+    ----------
+    pads : PadStack
+    state : PadState
+    m : int
+        Pad, from 0.
+    """
+    return EDGE + CROWN * abs(_bulge(pads, state, m)) / pads.clearance[m]
 
 
 @compiled
@@ -207,7 +244,7 @@ def set_loaded(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None
     state.idle[m] = margin(pads, state, m) <= 0.0
     works.ruptured[m] = False
     if not state.idle[m]:
-        rigid, count = rigid_approach(pads, state, m), state.length[m]
+        rigid, count = reach(pads, state, m), state.length[m]
         a = interpolate(state.branch[m, 0], state.branch[m, 1], count, rigid)
         b = interpolate(state.branch[m, 0], state.branch[m, 2], count, rigid)
         state.deflection[m] = rigid - a
@@ -281,7 +318,7 @@ def update_carrying(case: Case, pads: PadStack, works: FilmWork, state: PadState
 
 @compiled
 def _keeps_its_load(case: Case, pads: PadStack, state: PadState, m: int, inside: float) -> bool:
-    if inside > 0.0 or inside < -EDGE or not state.solved[m]:
+    if inside > 0.0 or inside < -edge(pads, state, m) or not state.solved[m]:
         return inside > 0.0
     return is_stable(case, pads, state, m)
 
@@ -304,7 +341,7 @@ def leave_unstable(case: Case, pads: PadStack, works: FilmWork, state: PadState)
             continue
         found = True
         state.changes[m] += 1
-        if margin(pads, state, m) > EDGE and state.changes[m] < MAX_LOAD_CHANGES:
+        if margin(pads, state, m) > edge(pads, state, m) and state.changes[m] < MAX_LOAD_CHANGES:
             set_loaded(pads, works, state, m)
         else:
             let_idle(state, m)

@@ -8,20 +8,24 @@ import numpy as np
 
 from model.arrays import FloatArray
 from model.compilation import compiled
+from model.film.energy import heat_by_drag
 from model.film.mesh import FilmWork
 from model.statics.compiled.anderson import DEPTH, mixed
+from model.statics.compiled.bending import BodyStack
 from model.statics.compiled.carrying import (
     Case,
+    along,
+    edge,
     find_branch,
     leave_unstable,
     margin,
+    reach,
     rigid_approach,
     set_loaded,
     update_carrying,
 )
 from model.statics.compiled.constants import (
     BOUNDLESS,
-    EDGE,
     FIRST_HEATING,
     HEAT_PER_FORCE,
     MAX_ITERATIONS,
@@ -34,31 +38,48 @@ from model.statics.compiled.constants import (
     SLOW,
 )
 from model.statics.compiled.first_position import balance
-from model.statics.compiled.stack import GridStack, PadStack, PadState
-from model.statics.compiled.step import move, newton, solve_films, solve_pressure
+from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of, work_of
+from model.statics.compiled.step import bend, move, newton, solve_films, solve_pressure
 
 #: How an iteration ends.
 SETTLED, RESTARTING, FILM_LOST, BOUNDLESS_HEAT, SINGULAR, NOT_CONVERGED = range(6)
 
 
 @compiled
-def start_cold(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> None:
+def start_cold(grids: GridStack, case: Case, pads: PadStack, works: FilmWork, state: PadState) -> None:
     """Balance the load with the tabulated isothermal films, then put every pad on its loaded attitude.
+
+    Films that make heat are balanced twice: as hot as their oil gets where it is only dragged along is known then.
 
     Parameters
     ----------
+    grids : GridStack
     case : Case
     pads : PadStack
     works : FilmWork
         With a leading axis for the pad.
     state : PadState
     """
-    hotter = 0.0 if case.isothermal else FIRST_HEATING
+    for m in range(len(state.tilt)):
+        works.temperature[m] = pads.inlet[m]
+    _balance_films(case, pads, works, state, 0.0 if case.isothermal else FIRST_HEATING)
+    if case.isothermal:
+        return
+    for m in range(len(state.tilt)):
+        if not state.idle[m]:
+            a = rigid_approach(pads, state, m) - state.deflection[m]
+            wedge = (pads.clearance[m], a, along(pads, state, m) + pads.pivot_radius[m] * state.tilt[m])
+            heat_by_drag(grid_of(grids, m), work_of(works, m), wedge, case.speed, case.oil, case.heat[0], pads.inlet[m])
+    _balance_films(case, pads, works, state, 0.0)
+
+
+@compiled
+def _balance_films(case: Case, pads: PadStack, works: FilmWork, state: PadState, hotter: float) -> None:
+    """Put journal and pads where tabulated films, as warm as these or `hotter` [K] than that, carry the load."""
     n = len(state.tilt)
     distances = np.empty((n, 3))
     room = math.inf
     for m in range(n):
-        works.temperature[m] = pads.inlet[m]
         find_branch(case, pads, works, state, m, hotter)
         distances[m, 0], distances[m, 1] = pads.frame[m, 0, 0], pads.frame[m, 0, 1]
         distances[m, 2] = pads.preload[m]
@@ -71,7 +92,7 @@ def start_cold(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> 
 
 @compiled
 def iterate(
-    grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case, cold: bool
+    grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case, bodies: BodyStack, cold: bool
 ) -> tuple[int, int, float, float, float]:
     """Iterate from where the arrays stand, or from a cold start.
 
@@ -83,6 +104,7 @@ def iterate(
         With a leading axis for the pad.
     state : PadState
     case : Case
+    bodies : BodyStack
     cold : bool
         Start anew.
 
@@ -92,19 +114,20 @@ def iterate(
         How it ended, iterations, residual, change of temperature [K], limited share of a flow.
     """
     if cold:
-        start_cold(case, pads, works, state)
+        start_cold(grids, case, pads, works, state)
     best, residual, heat, stalled = math.inf, math.inf, math.inf, 0
-    left, best_left, limited, relaxation = math.inf, math.inf, 0.0, RELAXATION
-    count, size = 0, _size(works) if not case.isothermal else 0
+    left, best_left, limited, relaxation = math.inf, math.inf, 0.0, RELAXATION if cold else 1.0
+    mixes = not case.isothermal or len(bodies.which) > 0
+    count, size = 0, _size(works, state) if mixes else 0
     images, residuals = np.empty((DEPTH + 1, size)), np.empty((DEPTH + 1, size))
     before = np.empty(size)
     for iteration in range(1, MAX_ITERATIONS + 1):
         if update_carrying(case, pads, works, state):
             count = 0
-        kept = left > SLOW * best_left and not case.isothermal
+        kept = left > SLOW * best_left and mixes
         if kept:
             write_vector(pads, works, state, before)
-        heat, limited = solve_films(grids, pads, works, state, case, relaxation)
+        heat, limited = solve_films(grids, pads, works, state, case, bodies, relaxation)
         if not heat < BOUNDLESS:
             return FILM_LOST if _lost(state) else BOUNDLESS_HEAT, iteration, math.inf, heat, limited
         residual, shift, moves = newton(case, pads, state)
@@ -120,7 +143,7 @@ def iterate(
             continue
         stalled = 0 if residual < PROGRESS * best else stalled + 1
         best = min(best, residual)
-        whole = move(grids, pads, works, state, (shift, moves), 0.5 if stalled > PATIENCE else 1.0)
+        whole = move(grids, pads, works, state, bodies, (shift, moves), 0.5 if stalled > PATIENCE else 1.0)
         if kept and whole and near and left > SLOW * best_left:
             count = _remember(images, residuals, count)
             write_vector(pads, works, state, images[count - 1])
@@ -154,7 +177,7 @@ def _lost(state: PadState) -> bool:
 def _settled(grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case) -> int:
     """Derivatives once more, with the rupture line between the nodes, unless a pad can neither carry nor idle."""
     for m in range(len(state.tilt)):
-        if state.idle[m] and margin(pads, state, m) > EDGE and rigid_approach(pads, state, m) > 0.0:
+        if state.idle[m] and margin(pads, state, m) > edge(pads, state, m) and reach(pads, state, m) > 0.0:
             return RESTARTING
     for m in range(len(state.tilt)):
         if state.solved[m]:
@@ -163,14 +186,13 @@ def _settled(grids: GridStack, pads: PadStack, works: FilmWork, state: PadState,
 
 
 @compiled
-def _size(works: FilmWork) -> int:
-    count = works.temperature.shape[0]
-    return 2 + count * (2 + works.temperature[0].size)
+def _size(works: FilmWork, state: PadState) -> int:
+    return 2 + works.temperature.size + state.bent.size + 2 * len(state.tilt)
 
 
 @compiled
 def write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatArray) -> None:
-    """Journal, pads and film temperatures as one vector, in micrometres and kelvins.
+    """Journal, pads, film temperatures and deformations as one vector, in micrometres and kelvins.
 
     Parameters
     ----------
@@ -191,6 +213,10 @@ def write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatArr
         for i in range(warm.shape[0]):
             for j in range(warm.shape[1]):
                 out[at] = 0.0 if state.idle[m] else warm[i, j]
+                at += 1
+        for i in range(state.bent.shape[1]):
+            for j in range(state.bent.shape[2]):
+                out[at] = state.bent[m, i, j] / MICROMETRE
                 at += 1
 
 
@@ -219,3 +245,7 @@ def read_vector(pads: PadStack, works: FilmWork, state: PadState, vector: FloatA
                 if not state.idle[m]:
                     warm[i, j] = vector[at]
                 at += 1
+        if state.bent.size > 0:
+            bent = vector[at : at + warm.size].reshape(warm.shape) * MICROMETRE
+            bend(works, state, m, bent - state.bent[m])
+            at += warm.size

@@ -41,6 +41,8 @@ class PadStack(NamedTuple):
         R_P and Cp [m].
     inlet : (n,) ndarray
         [degC]
+    pivot : (n, 2) ndarray
+        Station before the pivot, and the pivot's place between it and the next one.
     laws : (n, 4) ndarray
         The pivots, see `model.statics.compiled.laws`.
     curves : (n, 5, m) ndarray
@@ -56,6 +58,7 @@ class PadStack(NamedTuple):
     pivot_radius: FloatArray
     clearance: FloatArray
     inlet: FloatArray
+    pivot: FloatArray
     laws: FloatArray
     curves: FloatArray
     attitudes: FloatArray
@@ -79,6 +82,8 @@ class PadState(NamedTuple):
         Rigid approach, approach, wedge and load, see `model.film.loaded_attitude.Branch`.
     length : (n,) ndarray of int
         How many of the r there are; 0 before the first.
+    wedge : (n, 2) ndarray
+        (a, b) that the pressure was solved with [m].
     force, corrected : (n, 2) ndarray
         As the pressure was solved, and at the temperature found since [N].
     stiffness, damping : (n, 2, 2) ndarray
@@ -91,6 +96,14 @@ class PadState(NamedTuple):
         Largest change of temperature that the last step asked for [K].
     shift : (n, unknowns) ndarray
         See `model.statics.pad_film.PadFilm.pressure_change`.
+    felt : (n, 2) ndarray
+        `corrected`, and ...
+    felt_stiffness : (n, 2, 2) ndarray
+        ... `stiffness` with the pad giving way: what journal and pivot feel.
+    bent, mismatch : (n, nt + 1, nz + 1) ndarray
+        Deformation; what is missing of it besides the shapes of the Newton step [m]. Empty for rigid pads.
+    amplitude : (n, shapes, 3) ndarray
+        Change of their amplitudes at rest, and per metre of a and b.
     """
 
     position: FloatArray
@@ -101,6 +114,7 @@ class PadState(NamedTuple):
     changes: IntArray
     branch: FloatArray
     length: IntArray
+    wedge: FloatArray
     force: FloatArray
     corrected: FloatArray
     stiffness: FloatArray
@@ -109,6 +123,11 @@ class PadState(NamedTuple):
     steps: IntArray
     heating: FloatArray
     shift: FloatArray
+    felt: FloatArray
+    felt_stiffness: FloatArray
+    bent: FloatArray
+    mismatch: FloatArray
+    amplitude: FloatArray
 
 
 def stacked_grids(grids: tuple[FilmGrid, ...]) -> GridStack:

@@ -12,8 +12,9 @@ from model.film.energy import heat_step
 from model.film.mesh import FilmWork
 from model.film.oil_state import least_share, set_viscosity
 from model.film.reynolds import solve_film
+from model.statics.compiled.bending import BodyStack, bend_pads, change_of_shape
 from model.statics.compiled.carrying import Case, along, hold_of, rigid_approach, set_loaded
-from model.statics.compiled.constants import HEATING_STEP, LONGEST_STEP, SHRINK
+from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, LONGEST_STEP, SHRINK
 from model.statics.compiled.elimination import PadEquations, eliminate
 from model.statics.compiled.laws import compliance, deflection
 from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of, work_of
@@ -44,6 +45,7 @@ def solve_pressure(
     a = rigid_approach(pads, state, m) - state.deflection[m]
     b = along(pads, state, m) + pads.pivot_radius[m] * state.tilt[m]
     found = solve_film(grid, work, (pads.clearance[m], a, b), case.speed, sharp)
+    state.wedge[m, 0], state.wedge[m, 1] = a, b
     state.solved[m] = True
     state.stiffness[m], state.damping[m] = found.stiffness, found.damping
     state.force[m], state.least[m], state.steps[m] = found.force, found.min_film, found.steps
@@ -53,9 +55,9 @@ def solve_pressure(
 
 @compiled
 def solve_films(
-    grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case, relaxation: float
+    grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case, bodies: BodyStack, relaxation: float
 ) -> tuple[float, float]:
-    """Solve every film that carries once: pressure, then temperature.
+    """Solve every film that carries once: pressure, then temperature, then what the pads' deformation asks.
 
     Parameters
     ----------
@@ -65,13 +67,15 @@ def solve_films(
         With a leading axis for the pad.
     state : PadState
     case : Case
+    bodies : BodyStack
     relaxation : float
         Of a change of temperature.
 
     Returns
     -------
     tuple of float
-        Largest temperature change asked for [K], infinite if a film is lost; limited share of a flow.
+        Largest temperature change asked for [K], or change of shape of the same weight, infinite if a film is lost;
+        limited share of a flow.
     """
     lost = False
     for m in range(len(state.tilt)):
@@ -103,6 +107,9 @@ def solve_films(
                 limited = max(limited, cut)
                 if not change >= asked:  # a NaN is not to be lost
                     change = asked
+    state.felt[:], state.felt_stiffness[:] = state.corrected, state.stiffness
+    if len(bodies.which) > 0 and change < BOUNDLESS:
+        change = max(change, HEAT_PER_FORCE * bend_pads(grids, pads, works, state, bodies))
     return change, limited
 
 
@@ -134,8 +141,8 @@ def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArr
     for m in range(len(state.tilt)):
         if not state.solved[m]:
             continue
-        radial, radius = state.corrected[m, 0], pads.pivot_radius[m]
-        rows.frame[k], rows.force[k], rows.stiffness[k] = pads.frame[m], state.corrected[m], state.stiffness[m]
+        radial, radius = state.felt[m, 0], pads.pivot_radius[m]
+        rows.frame[k], rows.force[k], rows.stiffness[k] = pads.frame[m], state.felt[m], state.felt_stiffness[m]
         rows.pivot_radius[k] = radius
         stiffness, arm = hold_of(case, state, m, radial)
         rows.holding_force[k] = stiffness * state.tilt[m] / radius
@@ -156,8 +163,8 @@ def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArr
 
 @compiled
 def move(
-    grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, step: tuple[FloatArray, FloatArray],
-    damping: float,
+    grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, bodies: BodyStack,
+    step: tuple[FloatArray, FloatArray], damping: float,
 ) -> bool:  # fmt: skip
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way.
 
@@ -168,6 +175,7 @@ def move(
     works : FilmWork
         With a leading axis for the pad.
     state : PadState
+    bodies : BodyStack
     step : tuple
         Shift of the journal and moves of the pads, see `newton`.
     damping : float
@@ -176,12 +184,14 @@ def move(
     shift, moves = step
     longest = LONGEST_STEP * pads.clearance.min() / max(math.hypot(shift[0], shift[1]), 1e-30)
     scale = min(damping, longest)
-    rigid = np.empty((0, 0))
+    rigid, bending = np.empty((0, 0)), len(bodies.which) > 0
     for m in range(len(state.tilt)):
         if state.solved[m]:
             da = pads.frame[m, 0, 0] * shift[0] + pads.frame[m, 0, 1] * shift[1] - moves[m, 1]
             db = pads.frame[m, 1, 0] * shift[0] + pads.frame[m, 1, 1] * shift[1] + pads.pivot_radius[m] * moves[m, 0]
-            worst = least_share(grid_of(grids, m), work_of(works, m), da, db, rigid)
+            if bending:
+                state.mismatch[m] = change_of_shape(state, bodies, m, da, db)
+            worst = least_share(grid_of(grids, m), work_of(works, m), da, db, state.mismatch[m] if bending else rigid)
             if worst * damping < SHRINK - 1.0:
                 scale = min(scale, (SHRINK - 1.0) / worst)
     state.position[0] += scale * shift[0]
@@ -189,4 +199,24 @@ def move(
     for m in range(len(state.tilt)):
         state.tilt[m] += scale * moves[m, 0]
         state.deflection[m] += scale * moves[m, 1]
+        if bending and state.solved[m]:
+            bend(works, state, m, scale * state.mismatch[m])
     return scale == 1.0
+
+
+@compiled
+def bend(works: FilmWork, state: PadState, m: int, change: FloatArray) -> None:
+    """Change a pad's deformation.
+
+    Parameters
+    ----------
+    works : FilmWork
+        With a leading axis for the pad.
+    state : PadState
+    m : int
+        Pad, from 0.
+    change : (nt + 1, nz + 1) ndarray
+        [m]
+    """
+    state.bent[m] += change
+    works.extra[m] += change

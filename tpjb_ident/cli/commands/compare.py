@@ -81,6 +81,7 @@ def _from_campaign(
     target: Path,
 ) -> None:  # fmt: skip
     from tpjb_ident.compare.comparison import compare_campaign
+    from tpjb_ident.compare.model_side import model_beside
 
     source = open_campaign(campaign)
     settings = replace(settings, identify=identify_settings(source, options["method"], options["norm"]))
@@ -88,8 +89,8 @@ def _from_campaign(
     options = {**options, "bearing": bearing or source.bearing_name}
     inputs = source.fingerprint() | given | files
     with output_folder(target, "compare", (campaign,)) as folder:
-        with progress("comparing") as show:
-            result = compare_campaign(source, drawn, settings, show)
+        with progress("comparing") as show, model_beside(source, drawn, settings.asked()) as ahead:
+            result = compare_campaign(source, drawn, settings, show, ahead)
             write_comparison(folder, result, options, inputs, show)
         write_record(folder, target, "compare", options, inputs)
     show_comparison(result, next_command(result, str(campaign), bearing))

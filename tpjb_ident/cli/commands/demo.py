@@ -31,21 +31,22 @@ def demo(out: Out = None) -> None:
     from model.bearing_file import parse_bearing
     from rigdata import load_campaign
     from tpjb_ident.check.campaign import check_campaign
-    from tpjb_ident.compare.comparison import compare_campaign
+    from tpjb_ident.compare.comparison import CompareSettings, compare_campaign
+    from tpjb_ident.compare.model_side import model_beside
     from tpjb_ident.compare.predictions import prediction_frame
-    from tpjb_ident.compare.warm_up import warming_up
 
     path = sample("demo.h5")
     target = out_folder(out, "demo")
     options = {"campaign": path, "thermal": "adiabatic", "pivots": ["rigid", "kirk", "measured"], "method": "mm-eiv"}
     with output_folder(target, "demo") as folder:
         campaign = load_campaign(path)
-        with progress("demo") as show, warming_up(campaign.bearing_text) as compiled:
+        bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
+        asked = CompareSettings().asked()
+        with progress("demo") as show, model_beside(campaign, bearing, asked) as ahead:
             show("reading and checking every record", 0, 1)
             summary = check_summary(path, check_campaign(path), campaign)
             write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")
-            bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
-            result = compare_campaign(campaign, bearing, progress=show, before_predicting=compiled)
+            result = compare_campaign(campaign, bearing, progress=show, ahead=ahead)
             write_table(folder, "prediction", prediction_frame(result.variant("measured").points))
             inputs = summary["files_sha256"]
             write_comparison(folder, result, options, inputs, show)

@@ -1,0 +1,144 @@
+"""What a comparison asks of the static tests and of the model, here or in another process while this one identifies.
+
+Nothing of it depends on what is identified, but for the operating points, which the manifest names. On a fresh machine
+the other process compiles the film solver as well, which takes half a minute.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rigdata.campaign import Campaign
+from rigdata.operating_point import OperatingPoint
+from tpjb_ident.compare.measured_pivots import measured_laws
+from tpjb_ident.compare.predictions import ModelSettings, PointPrediction, Progress, predict_points
+from tpjb_ident.compare.static_tests import StaticTests, measure_static
+from tpjb_ident.runtime.executors import beside, cores
+
+if TYPE_CHECKING:
+    from model.bearing import Bearing
+    from model.effects import Effect
+    from tpjb_ident.pivot import PivotCurve
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Pivot models, each with the effects that are switched on with it, and the heat model.
+
+    Attributes
+    ----------
+    effects : dict
+        Tuple of effects by pivot model, in the order of the tables.
+    thermal : {"isothermal", "adiabatic", "tehd", "thd"}
+    """
+
+    effects: dict[str, tuple[Effect, ...]]
+    thermal: str
+
+
+@dataclass(frozen=True)
+class ModelSide:
+    """Static tests, and predictions with every pivot model.
+
+    Attributes
+    ----------
+    static : StaticTests
+    remarks : tuple of str
+        About pivot models that are left out.
+    predicted : dict
+        By pivot model: prediction by operating point.
+    """
+
+    static: StaticTests
+    remarks: tuple[str, ...]
+    predicted: dict[str, dict[OperatingPoint, PointPrediction]]
+
+
+def model_side(
+    campaign: Campaign,
+    bearing: Bearing,
+    asked: Asked,
+    points: tuple[OperatingPoint, ...],
+    progress: Progress | None = None,
+) -> ModelSide:
+    """Measure the static tests and predict points and locus with every pivot model.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    bearing : Bearing
+    asked : Asked
+    points : tuple of OperatingPoint
+    progress : callable, optional
+        Called as progress(text, done, total).
+    """
+    tell = progress or (lambda text, done, total: None)
+    tell("fitting pivot curves, clearance and locus", 0, 1)
+    static = measure_static(campaign, bearing, "measured" in asked.effects)
+    names, remarks = possible_variants(tuple(asked.effects), static.curves, bearing)
+    stations = () if static.locus is None else tuple(p.point for p in static.locus.points)
+    wanted = tuple(dict.fromkeys(points + stations))
+    predicted = {}
+    for name in names:
+        pivots = measured_laws(static.curves, len(bearing.pads), campaign.id) if name == "measured" else name
+        model = ModelSettings(pivots, asked.thermal, asked.effects[name])
+
+        def show(text: str, done: int, total: int, name: str = name) -> None:
+            tell(f"predicting with {name} pivots, {text}", done, total)
+
+        predicted[name] = {p.point: p for p in predict_points(bearing, wanted, model, show)}
+    return ModelSide(static, tuple(remarks), predicted)
+
+
+@contextmanager
+def model_beside(campaign: Campaign, bearing: Bearing, asked: Asked) -> Iterator[Callable[[], ModelSide | None] | None]:
+    """Let another process work out the model's side for the points that the manifest names, while the block runs.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    bearing : Bearing
+    asked : Asked
+
+    Yields
+    ------
+    callable or None
+        Waits for the answer; None where there is none: whatever went wrong is found, and said, by whoever works it out
+        again. None instead of a callable where there is but one core.
+    """
+    if cores() < 2:
+        yield None
+        return
+    points = tuple(sorted({run.point for run in campaign.of_kind("dynamic")}))
+    with beside(model_side, campaign, bearing, asked, points) as answer:
+        yield answer
+
+
+def possible_variants(
+    variants: tuple[str, ...], curves: tuple[PivotCurve, ...], bearing: Bearing
+) -> tuple[list[str], list[str]]:
+    """Pivot models that a campaign and a bearing allow, and remarks about the others.
+
+    Parameters
+    ----------
+    variants : tuple of str
+        Those asked for.
+    curves : tuple of PivotCurve
+        From its dry tests.
+    bearing : Bearing
+    """
+    names, remarks = list(variants), []
+    missing = sorted(set(range(1, len(bearing.pads) + 1)) - {c.pad for c in curves})
+    if "measured" in names and missing:
+        names.remove("measured")
+        pads = ", ".join(f"#{n}" for n in missing)
+        remarks.append(f"Measured pivots are left out: no dry test of pad {pads}.")
+    if bearing.pivot.kind == "rigid":
+        printed = [name for name in names if name.startswith("kirk")]
+        names = [name for name in names if name not in printed]
+        if printed:
+            remarks.append("The bearing file says rigid pivots: there is no printed formula to compare.")
+    return names or ["rigid"], remarks
