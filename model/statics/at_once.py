@@ -119,7 +119,7 @@ def _pads(search: Search) -> PadStack:
 
 
 def _pivot_station(angle: FloatArray) -> tuple[float, float]:
-    """Station before the pivot, at angle 0, and how far along to the next one it is; the nearest end where it is none."""
+    """Station before the pivot, at angle 0, and how far on to the next one it is; the nearest end where none is."""
     before = min(max(int(np.searchsorted(angle, 0.0, side="right")) - 1, 0), len(angle) - 2)
     return before, min(max(-angle[before] / (angle[before + 1] - angle[before]), 0.0), 1.0)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 import warnings
 from concurrent.futures import Executor, Future
 from pathlib import Path
@@ -11,7 +12,14 @@ from pathlib import Path
 import numpy  # noqa: F401  (has to be loaded)
 import pytest
 
-from tpjb_ident.runtime.executors import InProcessWorkers, LostJobsError, PoolWorkers, in_order, local_workers
+from tpjb_ident.runtime.executors import (
+    InProcessWorkers,
+    LostJobsError,
+    PoolWorkers,
+    beside,
+    in_order,
+    local_workers,
+)
 from tpjb_ident.runtime.threads import _loaded, limited_threads
 from tpjb_ident.runtime.workers import open_workers
 
@@ -146,3 +154,20 @@ def test_linear_algebra_that_is_loaded_takes_one_thread_in_workers_and_beside_th
             assert set(next(in_order(workers, _threads, [()]))) == {1}
             assert set(_threads()) == {1}
         assert set(_threads()) == {2}
+
+
+@pytest.mark.slow
+def test_a_job_beside_gives_its_value_or_nothing(tmp_path):
+    with beside(doubled, 4) as value:
+        assert value() == value() == 8
+    with beside(refused, 3) as value:  # whoever needs the value works it out again, and finds what was wrong
+        assert value() is None
+    with beside(dies_once, str(tmp_path), 4) as value:
+        assert value() is None
+
+
+@pytest.mark.slow
+def test_a_job_beside_ends_with_its_block():
+    with beside(time.sleep, 600.0):
+        began = time.monotonic()
+    assert time.monotonic() - began < 60.0

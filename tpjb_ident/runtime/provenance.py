@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import importlib.metadata
-import importlib.util
 import json
 import platform
 from pathlib import Path
@@ -15,6 +13,8 @@ PACKAGES = ("tpjb-ident", "numpy", "scipy", "pandas", "statsmodels", "h5py", "nu
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that results depend on."""
+    import importlib.metadata  # with the mail parser behind it, an eighth of what help waits for
+
     found = {"python": platform.python_version(), "platform": platform.system()}
     for package in PACKAGES:
         try:
@@ -44,6 +44,8 @@ def source_stamp(packages: tuple[str, ...] = ("rigdata", "tpjb_ident")) -> str:
     packages : tuple of str
         Whose sources count.
     """
+    import importlib.util
+
     digest = hashlib.sha256(json.dumps(versions(), sort_keys=True).encode())
     for package in packages:
         found = importlib.util.find_spec(package)

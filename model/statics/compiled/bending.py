@@ -87,11 +87,15 @@ def _stacked(bodies: tuple[PadDeformation, ...], unknown: tuple[int, int], facto
     )
 
 
+_NOTHING = np.zeros((0, 0, 0))
 _RIGID = BodyStack(
     np.zeros(0, dtype=np.int64),
-    *(np.zeros((0, 0, 0), dtype=np.float32) for _ in range(2)),
+    _NOTHING.astype(np.float32),
+    _NOTHING.astype(np.float32),
     np.zeros((0, 0, 0, 0)),
-    *(np.zeros((0, 0, 0)) for _ in range(3)),
+    _NOTHING,
+    _NOTHING,
+    _NOTHING,
     0.0,
 )
 
