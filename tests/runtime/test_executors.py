@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy  # noqa: F401  (has to be loaded)
 import pytest
 
+from tpjb_ident.runtime.beside import beside
 from tpjb_ident.runtime.executors import (
     InProcessWorkers,
     LostJobsError,
     PoolWorkers,
-    beside,
     in_order,
     local_workers,
 )

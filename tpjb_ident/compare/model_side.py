@@ -16,7 +16,8 @@ from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.measured_pivots import measured_laws
 from tpjb_ident.compare.predictions import ModelSettings, PointPrediction, Progress, predict_points
 from tpjb_ident.compare.static_tests import StaticTests, measure_static
-from tpjb_ident.runtime.executors import beside, cores
+from tpjb_ident.runtime.beside import beside
+from tpjb_ident.runtime.executors import cores
 
 if TYPE_CHECKING:
     from model.bearing import Bearing

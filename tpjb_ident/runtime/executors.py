@@ -13,7 +13,6 @@ with open_workers(count=4) as workers:   # of runtime.workers; or open_workers(s
 from __future__ import annotations
 
 import collections
-import functools
 import multiprocessing
 import os
 import pickle
@@ -25,7 +24,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for_end
 from typing import Any, Protocol
 
@@ -245,7 +243,7 @@ class PoolWorkers:
             try:
                 if self._executor is None:
                     self._executor = self._opened()
-                flying[self._executor.submit(_attempt, task, packed, entry[1])] = entry
+                flying[self._executor.submit(attempt, task, packed, entry[1])] = entry
             except Exception as error:  # broken since the last look, or closed
                 return [entry], error
         return [], None
@@ -269,8 +267,17 @@ class PoolWorkers:
             self.close(wait=False)
 
 
-def _attempt(task: Task, packed: bytes | None, job: Job) -> Outcome:
-    """Run a job on a worker; whatever it raises or warns of travels back as a value."""
+def attempt(task: Task, packed: bytes | None, job: Job) -> Outcome:
+    """Run a job on a worker; whatever it raises or warns of travels back as a value.
+
+    Parameters
+    ----------
+    task : callable
+    packed : bytes, optional
+        First argument, pickled.
+    job : tuple
+        The others.
+    """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("default")  # the process that asked decides what a warning means
         try:
@@ -302,7 +309,7 @@ def _portable(error: Exception) -> Exception:
     return error
 
 
-def _begin_worker() -> None:
+def begin_worker() -> None:
     """Leave Ctrl-C to the parent, and end with it; the cores are shared already."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     limit_threads()
@@ -346,8 +353,8 @@ def local_workers(count: int, start: str | None = None, preload: Sequence[str] =
     context = multiprocessing.get_context(start or ("forkserver" if "forkserver" in known else "spawn"))
     if context.get_start_method() == "forkserver":
         context.set_forkserver_preload(["tpjb_ident.runtime.executors", *preload])
-    pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker), count)
-    with _one_thread_each():
+    pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=begin_worker), count)
+    with one_thread_each():
         try:
             yield pool
         finally:
@@ -355,52 +362,7 @@ def local_workers(count: int, start: str | None = None, preload: Sequence[str] =
 
 
 @contextmanager
-def beside(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
-    """Run one job in a process of its own while the block goes on; the process is ended with the block.
-
-    Parameters
-    ----------
-    task : callable
-        Of a module, so that another process finds it.
-    *job : object
-        Its arguments.
-
-    Yields
-    ------
-    callable
-        Waits for the value; None if the job had an error or its process was lost: whoever needs the value works it out
-        again, and finds what was wrong. Called a second time, it gives the same.
-    """
-    context = multiprocessing.get_context("spawn")
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_send_outcome, args=(sender, task, job), daemon=True)
-    with _one_thread_each():
-        process.start()
-    sender.close()
-
-    @functools.cache
-    def value() -> Any | None:
-        try:
-            outcome: Outcome = receiver.recv()
-        except EOFError:
-            return None
-        return outcome.get() if outcome.error is None else None
-
-    try:
-        yield value
-    finally:
-        receiver.close()
-        process.kill()
-        process.join()
-
-
-def _send_outcome(sender: Connection, task: Task, job: Job) -> None:
-    _begin_worker()
-    sender.send(_attempt(task, None, job))
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
+def one_thread_each() -> Iterator[None]:
     """Processes share the cores already: linear algebra with threads of its own would only be in the way, here too."""
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
