@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -103,7 +104,14 @@ def test_one_frequency_leaves_an_empty_table_with_its_names(plain):
 def test_several_excitation_lines_of_each_record(tmp_path):
     points = [(5000.0, f) for f in (15.0, 25.0, 36.0)]
     write_campaign(tmp_path / "c.h5", rig(points, seed=3, joint_frequencies=True))
-    result = tpjb("identify", tmp_path / "c.h5", "--lines", "15, 25, 36 Hz", "--out", tmp_path / "out")
+    lines = ("--lines", "15, 25, 36 Hz")
+    result = tpjb("identify", tmp_path / "c.h5", *lines, "--out", tmp_path / "thrice")
+    assert result.exit_code == 3  # the file lists every record three times, once per frequency
+    assert "holds the very samples of run" in result.stderr
+    with h5py.File(tmp_path / "c.h5", "r+") as file:
+        for run in [name for name in file["runs"] if "-15-" not in name]:
+            del file["runs"][run]
+    result = tpjb("identify", tmp_path / "c.h5", *lines, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
     frame = pd.read_csv(tmp_path / "out" / "coefficients.csv")
     assert frame["excitation_Hz"].tolist() == [15.0, 25.0, 36.0]
