@@ -90,6 +90,8 @@ def test_a_repeated_direction_shows_the_drift(campaign):
     runs = campaign.of_kind("locus")
 
     class Repeated:
+        channels = campaign.channels
+
         def of_kind(self, kind):
             return (*runs, moved(runs[0])) if kind == "locus" else ()
 

@@ -107,7 +107,8 @@ def identify(
 def _with_bands(found: Identification, bands: IdentifiedBands) -> Identification:
     """The points of sines and those of bands together, sorted as ever."""
     points = [*found.points, *(p for band in bands.results for p in band.points)]
-    changes = np.concatenate([found.calibration_changes, bands.changes], axis=1).reshape(-1, len(points), 8)
+    joint = np.concatenate([found.calibration_changes, bands.changes], axis=1)
+    changes = joint.reshape(len(joint), len(points), 8)
     order = sorted(range(len(points)), key=lambda i: points[i].point)
     told = {c.sentence(): c for c in (*found.conditions, *bands.conditions)}
     return replace(
