@@ -581,3 +581,13 @@ def test_who_is_looked_at_once_more_and_who_can_judge():
     assert readmitted(dataclasses.replace(table, F=F), rejected(table, [3]))[table.direction == 3].sum() == 6
     five = moved(windows(19, g=5, n=12), 3, 2.0)
     np.testing.assert_array_equal(readmitted(five, rejected(five, [3])), rejected(five, [3]))
+
+
+def test_directions_that_contradict_one_another_a_million_times_have_wide_intervals():
+    """Noise of 1e-6 beside forces that no h explains: rounding made the covariance of repeats indefinite."""
+    rng = np.random.default_rng(3)
+    score, parts = complex_normal(rng, 6, 4), np.tile(np.eye(4, dtype=complex), (6, 1, 1))
+    repeat = np.diag([1e-7, 1e-7, 1e-7, -1e-9]).astype(complex)
+    spread = spread_of(score, parts, repeat, 1e6, 200.0)
+    assert np.linalg.eigvalsh(spread.covariance)[0] > 0
+    assert np.sqrt(np.diag(spread.covariance)).min() > 0.05  # as far as the directions differ

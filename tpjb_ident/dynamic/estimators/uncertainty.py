@@ -179,7 +179,7 @@ def spread_of(
     pooled : (8, 8) ndarray, optional
         Covariance of H by `pooled_effect`, which stands beside the jackknife where the directions are few.
     """
-    known = complex_to_real_covariance(repeat)
+    known = _positive(complex_to_real_covariance(repeat))
     g = len(score)
     spare = 4.0 * (g - 2)
     if g <= 2 or not (known_effect or chi_square > 1.0):
@@ -203,6 +203,15 @@ def spread_of(
     effective = np.maximum((moved**2).sum(axis=0) ** 2 / (moved**4).sum(axis=0) - 1.0, 1.0)
     dof = mixed_dof(np.diag(total), np.diag(known), dof_repeat, np.maximum(effective, 0.5 * (g - 1)))
     return Spread(0.5 * (total + total.T), dof)
+
+
+def _positive(covariance: FloatArray) -> FloatArray:
+    """A covariance without what rounding makes of it where directions contradict one another a million times."""
+    values, vectors = np.linalg.eigh(covariance)
+    least = 1e-9 * float(np.abs(values).max())
+    if values[0] >= least:
+        return covariance
+    return np.asarray((vectors * np.maximum(values, least)) @ vectors.T)
 
 
 def pooled_effect(residual: ComplexArray, means: DirectionMeans) -> FloatArray:
