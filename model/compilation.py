@@ -3,6 +3,8 @@
 numba keeps machine code per source file. A loop that was inlined into another file's loop changes without that file
 noticing: after an edit or an upgrade the old code would go on running, without a word. Here every compiled function is
 stamped with the sources of all of them.
+
+numba itself is imported at the first call of a loop: a process that only reads, draws or unpickles does without.
 """
 
 from __future__ import annotations
@@ -14,8 +16,6 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
-
-from numba import config, njit
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -51,46 +51,136 @@ OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"contract", "reassoc", "arcp", "nsz"},
     "nogil": True,
+    "no_cfunc_wrapper": True,
 }
 #: Where nothing can be written: a read-only installation and a user without a home, as services and containers have.
 _NO_PLACE = (
     "there is no folder to keep the model's machine code in, so every process compiles it again, which takes half a "
     "minute: set TPJB_CACHE to a folder that can be written"
 )
+#: Loops that numba has not been told of yet.
+_untold: list[Callable[..., Any]] = []
 
 
-def _place() -> None:
-    """Keep machine code under TPJB_CACHE where that is set, as pad solutions are, and NUMBA_CACHE_DIR is not."""
+class Kernel:
+    """A loop that is compiled at its first call, or taken from the disk; inside other loops it is part of them."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        functools.update_wrapper(self, function)
+        self._function = function
+
+    def __call__(self, *values: Any) -> Any:
+        """What the loop answers to these values."""
+        return self.dispatcher(*values)
+
+    def __reduce__(self) -> str:
+        return self._function.__qualname__  # pickled as functions are, by name
+
+    @functools.cached_property
+    def dispatcher(self) -> Any:
+        """Numba's."""
+        return _dispatcher(_compiler(), self._function)
+
+
+@functools.cache
+def _compiler() -> Any:
+    """numba, with its machine code where we want it, and told that a kernel stands for its dispatcher."""
+    import numba
+    import numba.extending
+
     folder = os.environ.get("TPJB_CACHE", "").strip()
-    if folder.lower() not in ("", "off") and "NUMBA_CACHE_DIR" not in os.environ:
-        config.CACHE_DIR = str(Path(folder) / "compiled")  # type: ignore[attr-defined]
+    if folder.lower() not in ("", "off") and "NUMBA_CACHE_DIR" not in os.environ:  # as pad solutions are
+        numba.config.CACHE_DIR = str(Path(folder) / "compiled")  # type: ignore[attr-defined]
+
+    @numba.extending.typeof_impl.register(Kernel)
+    def type_of(kernel: Kernel, context: Any) -> Any:
+        return numba.typeof(kernel.dispatcher)
+
+    return numba
 
 
-_place()
-
-
-def _stamp() -> str:
+@functools.cache
+def stamp() -> str:
+    """Of the sources of all kernels."""
     digest = hashlib.sha256()
     for name in KERNELS:
         digest.update((Path(__file__).parent / name).read_bytes())
     return digest.hexdigest()
 
 
-STAMP = _stamp()
-
-
 @functools.cache  # once, not for every loop
 def _tell(what: str) -> None:
-    warnings.warn(what, RuntimeWarning, stacklevel=3)
+    warnings.warn(what, RuntimeWarning, stacklevel=4)
 
 
-def compiled(function: Function) -> Function:
-    """Compile with numba, cached on disk under the stamp of all kernels.
+@functools.cache
+def _cache_type() -> Any:
+    from numba.core.caching import FunctionCache
+    from numba.core.runtime import rtsys
+
+    class Cache(FunctionCache):  # type: ignore[misc]  # numba has no types
+        """Loads machine code without what only a compiler needs: half of numba, and scipy's linear algebra with it."""
+
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            rtsys.initialize(target_context)  # allocation of arrays
+            loaded = None
+            with self._guard_against_spurious_io_errors():
+                loaded = self._load_overload(sig, target_context)
+            if loaded is None:
+                _tell_of_inner_loops()
+            return loaded
+
+    return Cache
+
+
+def _tell_of_inner_loops() -> None:
+    numba = _compiler()
+    while _untold:
+        numba.extending.register_jitable(**OPTIONS)(_untold.pop())
+
+
+def _dispatcher(numba: Any, function: Callable[..., Any]) -> Any:
+    try:
+        dispatcher = numba.njit(cache=True, **OPTIONS)(function)
+    except RuntimeError as error:
+        if "cannot cache" not in str(error):
+            raise
+        _tell(_NO_PLACE)
+        return _not_kept(numba, function)
+    store: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    if not hasattr(store, "_source_stamp"):  # a cache that is built otherwise: compile in every process, trust nothing
+        return _not_kept(numba, function)
+    store._source_stamp = stamp()
+    dispatcher._cache.__class__ = _cache_type()
+    return dispatcher
+
+
+def _not_kept(numba: Any, function: Callable[..., Any]) -> Any:
+    _tell_of_inner_loops()
+    return numba.njit(**OPTIONS)(function)
+
+
+def inner(function: Function) -> Function:
+    """Leave a loop to the compiled functions that call it: it becomes part of each, and has no machine code of its own.
+
+    Such a one costs nothing where a process starts, and neither a way in from Python nor a file is made for it.
 
     Parameters
     ----------
     function : callable
-        A loop that numba understands.
+        A loop that numba understands; called from Python it runs as Python, correctly and slowly.
+    """
+    _untold.append(function)
+    return function
+
+
+def compiled(function: Function) -> Function:
+    """Compile with numba, cached on disk under the stamp of all kernels: a way in from Python.
+
+    Parameters
+    ----------
+    function : callable
+        A loop that numba understands, called from Python; otherwise take `inner`.
 
     Returns
     -------
@@ -100,20 +190,7 @@ def compiled(function: Function) -> Function:
     Warns
     -----
     RuntimeWarning
-        Neither the sources' folder nor the user's own can be written: every process compiles anew.
+        At that call: neither the sources' folder nor the user's own can be written; every process compiles anew.
     """
-    dispatcher: Any
-    try:
-        dispatcher = njit(cache=True, **OPTIONS)(function)
-    except RuntimeError as error:
-        if "cannot cache" not in str(error):
-            raise
-        _tell(_NO_PLACE)
-        dispatcher = njit(**OPTIONS)(function)
-    store = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
-    if store is not None and hasattr(store, "_source_stamp"):
-        store._source_stamp = STAMP
-    else:  # a numba whose cache is built otherwise: compile in every process rather than trust it
-        dispatcher = njit(**OPTIONS)(function)
-    kept: Function = dispatcher
-    return kept
+    kept: Any = Kernel(function)
+    return kept  # type: ignore[no-any-return]

@@ -26,7 +26,7 @@ from __future__ import annotations
 import numpy as np
 
 from model.arrays import BoolArray, FloatArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.cavitation_matrix import (
     FaceFlows,
     assemble_columns,
@@ -125,7 +125,7 @@ def _conserve(
     return steps, force, stiffness, damping
 
 
-@compiled
+@inner
 def _any_ruptured(ruptured: BoolArray) -> bool:
     for i in range(1, ruptured.shape[0]):
         for j in range(ruptured.shape[1]):
@@ -134,7 +134,7 @@ def _any_ruptured(ruptured: BoolArray) -> bool:
     return False
 
 
-@compiled
+@inner
 def _pivot(grid: FilmGrid, work: FilmWork, faces: FaceFlows, space: tuple[FloatArray, FloatArray]) -> int:
     """Solve F(x) = 0 by block principal pivoting; returns the number of factorisations, -2 if it did not settle."""
     band, x = space
@@ -159,7 +159,7 @@ def _pivot(grid: FilmGrid, work: FilmWork, faces: FaceFlows, space: tuple[FloatA
     return -2
 
 
-@compiled
+@inner
 def _starved(work: FilmWork, faces: FaceFlows) -> int:
     """Mark where the gap behind the leading edge takes more than the supply; returns how many marks changed.
 
@@ -175,7 +175,7 @@ def _starved(work: FilmWork, faces: FaceFlows) -> int:
     return changed
 
 
-@compiled
+@inner
 def _drag(faces: FaceFlows, ruptured: BoolArray, first: int, x: FloatArray) -> None:
     """Right-hand side: what the journal drags into each control volume of a full film less what it drags out."""
     couette = faces.couette
@@ -186,7 +186,7 @@ def _drag(faces: FaceFlows, ruptured: BoolArray, first: int, x: FloatArray) -> N
             x[(i - 1) * width + j - first, 0] = into - couette[i, j]
 
 
-@compiled
+@inner
 def _misplaced(x: FloatArray, ruptured: BoolArray, first: int) -> int:
     """Wet nodes that pull and ruptured nodes that are more than full."""
     nt, nz = ruptured.shape[0] - 1, ruptured.shape[1] - 1
@@ -199,7 +199,7 @@ def _misplaced(x: FloatArray, ruptured: BoolArray, first: int) -> int:
     return count
 
 
-@compiled
+@inner
 def _change_sides(x: FloatArray, ruptured: BoolArray, first: int, single: bool) -> None:
     """Move the nodes that are on the wrong side, or of them the last one only (Murty's rule: this cannot cycle)."""
     nt, nz = ruptured.shape[0] - 1, ruptured.shape[1] - 1
@@ -212,7 +212,7 @@ def _change_sides(x: FloatArray, ruptured: BoolArray, first: int, single: bool) 
                     return
 
 
-@compiled
+@inner
 def _read(work: FilmWork, x: FloatArray, first: int) -> None:
     """Pressure at the nodes and at the unknowns; zero where ruptured."""
     nt, nz = work.pressure.shape[0] - 1, work.pressure.shape[1] - 1
@@ -223,7 +223,7 @@ def _read(work: FilmWork, x: FloatArray, first: int) -> None:
             work.pressure[i, j] = work.unknown[k]
 
 
-@compiled
+@inner
 def _leave_behind(grid: FilmGrid, work: FilmWork, faces: FaceFlows, slopes: FloatArray) -> None:
     """Factor and slopes of the film that is full now, for those who go on with them (heat, pads that bend)."""
     assemble(work.band, faces.along, faces.across, work.ruptured, grid.first)
@@ -236,7 +236,7 @@ def _leave_behind(grid: FilmGrid, work: FilmWork, faces: FaceFlows, slopes: Floa
                 work.slopes[k, m] = 0.0 if work.ruptured[i, j] else slopes[k, m]
 
 
-@compiled
+@inner
 def _integrate(
     grid: FilmGrid,
     work: FilmWork,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.arrays import BoolArray, FloatArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import conductances
 
@@ -75,7 +75,7 @@ def face_flows(
     return FaceFlows(along, across, couette, height, supply)
 
 
-@compiled
+@inner
 def assemble_columns(band: FloatArray, faces: FaceFlows, ruptured: BoolArray, first: int) -> None:
     """Fill the band: entry (row, column) stands at ``band[row, width + column - row]``.
 
@@ -115,7 +115,7 @@ def assemble_columns(band: FloatArray, faces: FaceFlows, ruptured: BoolArray, fi
                     band[k - 1, width + 1] -= gz[i, j - 1]
 
 
-@compiled
+@inner
 def factorise_columns(band: FloatArray) -> None:
     """L U in place, without pivoting.
 
@@ -135,7 +135,7 @@ def factorise_columns(band: FloatArray) -> None:
                     band[k + r, width - r + s] -= factor * band[k, width + s]
 
 
-@compiled
+@inner
 def substitute_columns(band: FloatArray, x: FloatArray) -> None:
     """Solve for the right-hand sides (n, m) in place.
 

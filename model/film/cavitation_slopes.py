@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import inner
 from model.film.cavitation_matrix import FaceFlows, assemble_columns, factorise_columns, substitute_columns
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import net_inflow
 
 
-@compiled
+@inner
 def jfo_slopes(
     grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, sharp: bool
 ) -> tuple[FloatArray, FloatArray]:
@@ -56,7 +56,7 @@ def jfo_slopes(
     return weight, slopes
 
 
-@compiled
+@inner
 def _rupture_line(grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, band: FloatArray) -> FloatArray:
     """Where between two nodes the film ruptures: as in `model.film.reynolds`; here what flows is kept in balance."""
     nt, nz = faces.along.shape[0], faces.across.shape[1]
@@ -80,7 +80,7 @@ def _rupture_line(grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArra
     return weight
 
 
-@compiled
+@inner
 def _behind_front(faces: FaceFlows, work: FilmWork, x: FloatArray, k: int, width: int) -> float:
     """How many steps behind the front where a film forms again its first wet node lies: the pressure jumps in slope."""
     i, j = k // width + 1, k % width + faces.across.shape[1] - width
@@ -88,7 +88,7 @@ def _behind_front(faces: FaceFlows, work: FilmWork, x: FloatArray, k: int, width
     return backward / (backward - faces.couette[i - 1, j] * x[k - width, 0])
 
 
-@compiled
+@inner
 def _displaced(grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, rhs: FloatArray) -> None:
     """What more flows into a control volume when a or b grows and pressure and filling stay."""
     p, h = work.pressure, work.thickness
@@ -113,7 +113,7 @@ def _displaced(grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, 
     net_inflow(along, across, grid.first, rhs)
 
 
-@compiled
+@inner
 def _stored(
     grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, static: FloatArray, rhs: FloatArray
 ) -> None:
@@ -141,7 +141,7 @@ def _stored(
                 rhs[k, 1] += mass * grid.sin[0]
 
 
-@compiled
+@inner
 def _flows(work: FilmWork, faces: FaceFlows) -> None:
     p = work.pressure
     for i in range(faces.along.shape[0]):

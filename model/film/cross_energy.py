@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.cross_film import CrossFilm
 from model.film.mesh import FilmGrid, FilmWork
 
@@ -116,7 +116,7 @@ def cross_operator(
     return CrossOperator(factor, before, journal, made, carried), back
 
 
-@compiled
+@inner
 def _shared_flow(
     grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float, i: int, j: int, flow: FloatArray
 ) -> None:
@@ -150,7 +150,7 @@ def _shared_flow(
         flow[m] += missing * (edges[m + 1] - edges[m]) * 0.5 * (edges[m] + edges[m + 1]) / driven
 
 
-@compiled
+@inner
 def _side_shares(cross: CrossFilm, i: int, j: int, shares: FloatArray) -> None:
     """Share of every cell in a flow that pressure drives, between lines j and j + 1 and stations i and i + 1."""
     edges, cells = cross.edges, len(cross.edges) - 1
@@ -187,7 +187,7 @@ class _Space(NamedTuple):
     shares: FloatArray
 
 
-@compiled
+@inner
 def _space(lines: int, cells: int) -> _Space:
     shape = (lines, cells)
     return _Space(
@@ -203,7 +203,7 @@ def _space(lines: int, cells: int) -> _Space:
     )
 
 
-@compiled
+@inner
 def _box(
     grid: FilmGrid,
     work: FilmWork,
@@ -251,7 +251,7 @@ def _box(
             theta[j, m] = max(0.5, 1.0 - carried[j, m] / max(whole, 1e-300))
 
 
-@compiled
+@inner
 def _upward(flows: FloatArray, beside: FloatArray, first: int, i: int, j: int, up: FloatArray) -> None:
     """Oil that crosses the cells' upper faces between two stations, from what enters and leaves at their sides.
 
@@ -277,7 +277,7 @@ def _upward(flows: FloatArray, beside: FloatArray, first: int, i: int, j: int, u
     up[cells] = 0.0
 
 
-@compiled
+@inner
 def _set_rows(space: _Space, factor: FloatArray, before: FloatArray) -> None:
     """Rows of the balances: later station into the band, earlier one beside it."""
     low, high, first, last = space.low, space.high, space.first, space.last
@@ -311,7 +311,7 @@ def _set_rows(space: _Space, factor: FloatArray, before: FloatArray) -> None:
             before[k, 0] -= before[k, 1] + before[k, 2] + before[k, 3] + before[k, 4]
 
 
-@compiled
+@inner
 def _dissipation(grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float, i: int, made: FloatArray) -> None:
     """Heat made in the cells of a station, per length dx and control-volume height [W], full film."""
     p, edges = work.pressure, cross.edges
@@ -336,7 +336,7 @@ def _dissipation(grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float,
             made[j * cells + m] = squared * cross.fluidity[i, j, m] * wide * station
 
 
-@compiled
+@inner
 def _factorise(band: FloatArray, width: int) -> None:
     """L U in place without pivoting: the balances are diagonally dominant but for the flow across."""
     n = band.shape[0]

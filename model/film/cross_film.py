@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import change_by_oil
 
@@ -112,7 +112,7 @@ def set_cross_viscosity(cross: CrossFilm, work: FilmWork, oil: tuple[float, floa
             work.viscosity[i, j] = 1.0 / (12.0 * f2)
 
 
-@compiled
+@inner
 def _integrals(
     cross: CrossFilm, i: int, j: int, oil: tuple[float, float, float, float]
 ) -> tuple[float, float, float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.cross_energy import CrossOperator
 from model.film.mesh import FilmWork
 
@@ -108,7 +108,7 @@ def march_one(operator: CrossOperator, field: FloatArray, sources: FloatArray) -
     return taken
 
 
-@compiled
+@inner
 def _substitute(band: FloatArray, width: int, x: FloatArray) -> None:
     n, count = x.shape
     for k in range(n):

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import pressure_change
 
@@ -256,7 +256,7 @@ def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
     return out
 
 
-@compiled
+@inner
 def _made(grid: FilmGrid, work: FilmWork, speed: float, made: FloatArray, less: FloatArray) -> None:
     """Heat made per station [W], and how much less of it for every unit by which the viscosity falls, as a share."""
     p, h, mu = work.pressure, work.thickness, work.viscosity
@@ -283,7 +283,7 @@ def _made(grid: FilmGrid, work: FilmWork, speed: float, made: FloatArray, less: 
             made[i, j], less[i, j] = (shear + pressed) * station, max(shear - pressed, 0.0) * station
 
 
-@compiled
+@inner
 def _tridiagonal(lower: FloatArray, main: FloatArray, upper: FloatArray, right: FloatArray) -> None:
     """Thomas' algorithm in place for the columns of `right`, (n, m); the solutions are left there."""
     n, count = right.shape

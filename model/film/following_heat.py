@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from model.arrays import ComplexArray, FloatArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.matrix import substitute
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import conductances
@@ -97,14 +97,14 @@ def heat_impedance(
     return out
 
 
-@compiled
+@inner
 def _lighter(work: FilmWork, oil: tuple[float, float, float, float], i: int, j: int) -> tuple[float, float]:
     """Relative change of the density, and of density over viscosity, per kelvin."""
     density = -oil[2] * oil[3] / work.density[i, j]
     return density, density + oil[1]
 
 
-@compiled
+@inner
 def _pressure(
     grid: FilmGrid,
     work: FilmWork,
@@ -138,7 +138,7 @@ def _pressure(
     substitute(work.band, given)
 
 
-@compiled
+@inner
 def _face(
     grid: FilmGrid,
     work: FilmWork,
@@ -158,7 +158,7 @@ def _face(
     return couette, denser, ratio
 
 
-@compiled
+@inner
 def _side(work: FilmWork, oil: tuple[float, float, float, float], warmer: ComplexArray, i: int, j: int) -> complex:
     """Relative change of density over viscosity at a face across."""
     light = work.density[i, j] / work.viscosity[i, j]
@@ -167,7 +167,7 @@ def _side(work: FilmWork, oil: tuple[float, float, float, float], warmer: Comple
     return complex((light * here * warmer[i, j] + other * there * warmer[i, j + 1]) / (light + other))
 
 
-@compiled
+@inner
 def _local_loss(
     grid: FilmGrid,
     work: FilmWork,
@@ -189,7 +189,7 @@ def _local_loss(
     return out
 
 
-@compiled
+@inner
 def _steepness(grid, p, q, i, j):  # type: ignore[no-untyped-def]
     """Product of the gradients of p and q at a node, as `model.film.energy.dissipation` takes them."""
     nt, nz = p.shape[0] - 1, p.shape[1] - 1
@@ -211,7 +211,7 @@ def _steepness(grid, p, q, i, j):  # type: ignore[no-untyped-def]
     return total
 
 
-@compiled
+@inner
 def _temperature(
     grid: FilmGrid,
     work: FilmWork,
@@ -289,7 +289,7 @@ def _temperature(
     return out
 
 
-@compiled
+@inner
 def _made(
     grid: FilmGrid,
     work: FilmWork,
@@ -311,7 +311,7 @@ def _made(
         made[j] = density * grid.dx * grid.height[j]
 
 
-@compiled
+@inner
 def _sides(
     work: FilmWork,
     oil: tuple[float, float, float, float],

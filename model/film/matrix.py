@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from model.arrays import BoolArray, FloatArray
-from model.compilation import compiled
+from model.compilation import inner
 
 
-@compiled
+@inner
 def assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArray, first: int) -> None:
     """Lower band of the matrix: row k holds its diagonal and the entries below it; ruptured nodes stand alone.
 
@@ -48,7 +48,7 @@ def assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArr
 def _factoriser(width: int) -> Any:
     """`factorise` for one width: what the compiler knows, it keeps in registers."""
 
-    @compiled
+    @inner
     def factorise_unrolled(band: FloatArray) -> None:
         n = band.shape[0]
         for k in range(n):
@@ -72,7 +72,7 @@ def _factoriser(width: int) -> Any:
 def _substitution(width: int) -> Any:
     """`substitute` for one width: an unknown's nearest neighbour comes last, so that nothing waits for memory."""
 
-    @compiled
+    @inner
     def substitute_unrolled(band: FloatArray, x: FloatArray) -> None:
         n = band.shape[0]
         for k in range(1, n):
@@ -102,7 +102,7 @@ def _substitution(width: int) -> Any:
 def _substitution_of_four(width: int) -> Any:
     """`substitute_four` for one width, see `_substitution`."""
 
-    @compiled
+    @inner
     def substitute_four_unrolled(band: FloatArray, x: FloatArray) -> None:
         n = band.shape[0]
         for k in range(1, n):
@@ -131,7 +131,7 @@ _factorise_6, _substitute_6, _substitute_four_6 = _factoriser(6), _substitution(
 _factorise_4, _substitute_4, _substitute_four_4 = _factoriser(4), _substitution(4), _substitution_of_four(4)
 
 
-@compiled
+@inner
 def factorise(band: FloatArray) -> None:
     """L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k].
 
@@ -158,7 +158,7 @@ def factorise(band: FloatArray) -> None:
             band[k, r] /= pivot
 
 
-@compiled
+@inner
 def substitute(band: FloatArray, x: FloatArray) -> None:
     """Solve for one right-hand side in place, with the factor from `factorise`.
 
@@ -186,7 +186,7 @@ def substitute(band: FloatArray, x: FloatArray) -> None:
         x[k] = total
 
 
-@compiled
+@inner
 def substitute_four(band: FloatArray, x: FloatArray) -> None:
     """`substitute` for the four derivatives side by side (n, 4): the inner loop fills a vector register.
 
@@ -219,7 +219,7 @@ def substitute_four(band: FloatArray, x: FloatArray) -> None:
                 x[k, m] -= factor * x[k + r, m]
 
 
-@compiled
+@inner
 def add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
     """Add to the diagonal, mesh shape (nt + 1, nz + 1), before factorising.
 
@@ -238,7 +238,7 @@ def add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
             band[(i - 1) * (nz - first) + j - first, 0] += diagonal[i, j]
 
 
-@compiled
+@inner
 def substitute_many(band: FloatArray, x: FloatArray) -> None:
     """`substitute` for any number of right-hand sides, (n, m).
 

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.arrays import BoolArray, FloatArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.matrix import add_diagonal, assemble, factorise, substitute
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import derivatives, rupture_line
@@ -102,7 +102,7 @@ def solve_film(
     return FilmForces(force, stiffness, damping, min_film, steps)
 
 
-@compiled
+@inner
 def _thickness(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float) -> float:
     h = work.thickness
     low = np.inf
@@ -153,7 +153,7 @@ def conductances(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: 
     return gx, gz
 
 
-@compiled
+@inner
 def _source(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float, speed: float) -> FloatArray:
     """Couette inflow minus outflow of each control volume (the right-hand side f of A p = f)."""
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
@@ -170,7 +170,7 @@ def _source(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float
     return source
 
 
-@compiled
+@inner
 def _active_set(grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, source: FloatArray) -> int:
     """Solve the complementarity problem; returns the number of factorisations, -2 if it did not settle."""
     p, ruptured = work.pressure, work.ruptured
@@ -194,7 +194,7 @@ def _active_set(grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, 
     return -2
 
 
-@compiled
+@inner
 def _update_active_set(
     p: FloatArray, ruptured: BoolArray, gx: FloatArray, gz: FloatArray, source: FloatArray, first: int
 ) -> int:
@@ -215,7 +215,7 @@ def _update_active_set(
     return changed
 
 
-@compiled
+@inner
 def _integrate(grid: FilmGrid, work: FilmWork, weight: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Forces and their derivatives; `weight` is the area that a node's perturbed pressure stands for."""
     force = np.zeros(2)

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.matrix import substitute, substitute_four, substitute_many
 from model.film.mesh import FilmGrid, FilmWork
 
 
-@compiled
+@inner
 def net_inflow(along: FloatArray, across: FloatArray, first: int, inflow: FloatArray) -> None:
     """What flows into every control volume less what flows out.
 
@@ -40,7 +40,7 @@ def net_inflow(along: FloatArray, across: FloatArray, first: int, inflow: FloatA
                 inflow[k, m] = value
 
 
-@compiled
+@inner
 def keep_ruptured(work: FilmWork, first: int, inflow: FloatArray) -> None:
     """Ruptured nodes keep their pressure: their rows have no right-hand side.
 
@@ -61,7 +61,7 @@ def keep_ruptured(work: FilmWork, first: int, inflow: FloatArray) -> None:
                     inflow[k, m] = 0.0
 
 
-@compiled
+@inner
 def rupture_line(
     grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, source: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -113,7 +113,7 @@ def rupture_line(
     return diagonal, area
 
 
-@compiled
+@inner
 def derivatives(
     grid: FilmGrid,
     work: FilmWork,
@@ -256,7 +256,7 @@ def pressure_change(
     return change_by_oil(grid, work, speed, _fluidity(work, oil), change)
 
 
-@compiled
+@inner
 def change_by_oil(
     grid: FilmGrid,
     work: FilmWork,
@@ -300,7 +300,7 @@ def change_by_oil(
     return _force(grid, change, nt, nz)
 
 
-@compiled
+@inner
 def _fluidity(work: FilmWork, oil: tuple[float, float, float, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Density over viscosity as the pressure was solved with and at the new temperature; change of the density."""
     rows, columns = work.temperature.shape
@@ -314,7 +314,7 @@ def _fluidity(work: FilmWork, oil: tuple[float, float, float, float]) -> tuple[F
     return old, new, denser
 
 
-@compiled
+@inner
 def _force(grid: FilmGrid, pressure: FloatArray, nt: int, nz: int) -> FloatArray:
     """Radial and tangential force of the pressure at the unknown nodes."""
     force = np.zeros(2)

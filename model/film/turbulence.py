@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.matrix import add_diagonal, assemble, factorise, substitute_four
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, _active_set, _integrate, _source, _thickness, conductances
@@ -104,7 +104,7 @@ def solve_turbulent_film(
     return FilmForces(force, stiffness, damping, min_film, steps)
 
 
-@compiled
+@inner
 def _resist(
     grid: FilmGrid,
     work: FilmWork,
@@ -138,7 +138,7 @@ def _resist(
     return px, pz
 
 
-@compiled
+@inner
 def _derivatives(
     grid: FilmGrid,
     work: FilmWork,
@@ -176,7 +176,7 @@ def _derivatives(
     substitute_four(work.band, rhs)
 
 
-@compiled
+@inner
 def _heat_beyond(grid: FilmGrid, work: FilmWork, speed: float) -> None:
     """Heat beyond that of a laminar film per station of length dx and control-volume height [W]."""
     p, h, mu = work.pressure, work.thickness, work.viscosity

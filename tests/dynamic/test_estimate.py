@@ -207,6 +207,22 @@ def test_rlm_is_what_statsmodels_says(norm: str):
         np.testing.assert_allclose(est.standard_error[[2 * axis, 2 * axis + 1]], own.bse[:2] * f / d, rtol=1e-10)
 
 
+@pytest.mark.parametrize(("norm", "name"), [("huber", "HuberT"), ("tukey", "TukeyBiweight")])
+def test_without_statsmodels_it_is_statsmodels_to_the_last_bit(norm: str, name: str):
+    from statsmodels.robust import norms
+    from statsmodels.robust.robust_linear_model import RLM
+
+    rng = np.random.default_rng(4)
+    for n, noise, bad in ((6, 1e-3, 0.0), (40, 0.1, 0.1), (161, 1.0, 0.2)):
+        design = rng.standard_normal((n, 4))
+        response = design @ rng.standard_normal(4) + noise * rng.standard_normal(n) * (1 + 20 * (rng.random(n) < bad))
+        found = solve_rlm(design, response, RlmSettings(norm))
+        own = RLM(response, design, M=getattr(norms, name)()).fit(maxiter=200, tol=1e-10, conv="coefs")
+        for what, value in (("params", own.params), ("covariance", own.bcov_scaled), ("weights", own.weights)):
+            np.testing.assert_array_equal(getattr(found, what), value)
+        assert (found.scale, found.iterations) == (own.scale, own.fit_history["iteration"])
+
+
 def test_rlm_traps_are_guarded():
     D, F, _, _ = sample(15, noise=0.05)
     d, f = np.abs(D).max(), np.abs(F).max()

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import pickle
+import subprocess
+import sys
 from pathlib import Path
 
+import numba
 import numba.core.caching
 import pytest
 
@@ -17,7 +21,7 @@ FOLDER = Path(compilation.__file__).parent
 
 def test_list_of_kernels_is_complete():
     sources = {path.relative_to(FOLDER).as_posix(): path.read_text(encoding="utf-8") for path in FOLDER.rglob("*.py")}
-    using = {name for name, text in sources.items() if "\n@compiled\n" in text}
+    using = {name for name, text in sources.items() if "\n@compiled\n" in text or "\n@inner\n" in text}
     assert using | {"compilation.py", "statics/compiled/constants.py"} == set(compilation.KERNELS)
     assert not [name for name, text in sources.items() if "njit" in text and name != "compilation.py"]
 
@@ -26,13 +30,14 @@ def test_stamp_follows_every_source(tmp_path, monkeypatch):
     for name in compilation.KERNELS:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes((FOLDER / name).read_bytes())
+    known = compilation.stamp()
     monkeypatch.setattr(compilation, "__file__", str(tmp_path / "compilation.py"))
-    assert compilation._stamp() == compilation.STAMP
+    assert compilation.stamp.__wrapped__() == known
     for name in compilation.KERNELS:
         source = tmp_path / name
         kept = source.read_bytes()
         source.write_bytes(kept + b"\n")
-        assert compilation._stamp() != compilation.STAMP
+        assert compilation.stamp.__wrapped__() != known
         source.write_bytes(kept)
 
 
@@ -42,33 +47,51 @@ def test_cached_code_carries_the_stamp():
         model.film.energy.march,
         model.statics.compiled.elimination.eliminate,
     ):
-        assert function._cache._cache_file._source_stamp == compilation.STAMP
+        assert function.dispatcher._cache._cache_file._source_stamp == compilation.stamp()
+
+
+def _twice(x):
+    return 2.0 * x
+
+
+def test_a_compiled_loop_is_pickled_by_its_name():
+    found = pickle.loads(pickle.dumps(model.film.reynolds.solve_film))
+    assert found is model.film.reynolds.solve_film
+
+
+@pytest.mark.slow
+def test_nothing_is_compiled_or_loaded_until_a_loop_is_called():
+    asked = (
+        "import sys, model.predict, model.film.models; print(sorted({'numba', 'scipy', 'pandas'} & set(sys.modules)))"
+    )
+    told = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == "[]"
 
 
 def test_without_numbas_cache_the_code_is_compiled_anew(monkeypatch):
     def other(*args, **options):
         return lambda function: (function.__name__, options.get("cache", False))
 
-    monkeypatch.setattr(compilation, "njit", other)
-    assert compilation.compiled(compilation._stamp) == ("_stamp", False)
+    monkeypatch.setattr(numba, "njit", other)
+    assert compilation.compiled(_twice).dispatcher == ("_twice", False)
 
 
 def test_where_nothing_can_be_written_the_code_is_compiled_and_the_cure_is_told(monkeypatch):
     monkeypatch.setattr(numba.core.caching.CacheImpl, "_locator_classes", [])
     compilation._tell.cache_clear()
-    with pytest.warns(RuntimeWarning, match="TPJB_CACHE") as told:
-        twice, thrice = compilation.compiled(lambda x: 2.0 * x), compilation.compiled(lambda x: 3.0 * x)
-    assert (twice(3.0), thrice(3.0)) == (6.0, 9.0)
-    assert len(told) == 1
+    twice, thrice = compilation.compiled(lambda x: 2.0 * x), compilation.compiled(lambda x: 3.0 * x)
+    with pytest.warns(RuntimeWarning, match="TPJB_CACHE"):
+        assert twice(3.0) == 6.0
+    assert thrice(3.0) == 9.0  # and is not told again: warnings are errors here
 
 
 def test_other_troubles_of_the_compiler_are_not_taken_for_that(monkeypatch):
     def broken(**options):
         raise RuntimeError("another")
 
-    monkeypatch.setattr(compilation, "njit", broken)
+    monkeypatch.setattr(numba, "njit", broken)
     with pytest.raises(RuntimeError, match="another"):
-        compilation.compiled(compilation._stamp)
+        _ = compilation.compiled(_twice).dispatcher
 
 
 @pytest.mark.parametrize(
@@ -80,5 +103,5 @@ def test_one_variable_moves_the_machine_code_too(monkeypatch, tmp_path, chosen, 
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     if numbas:
         monkeypatch.setenv("NUMBA_CACHE_DIR", numbas)
-    compilation._place()
+    compilation._compiler.__wrapped__()
     assert (numba.config.CACHE_DIR or None) == (under and str(tmp_path / under))

@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from model.bearing_file import load_bearing
+from model.compilation import compiled
+from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import _active_set, _integrate, _source, _thickness, conductances
 from model.film.slopes import derivatives
 from model.predict import predict
@@ -28,17 +30,29 @@ ROCKER = Path(__file__).resolve().parents[2] / "model" / "bearings" / "rocker.to
 
 def film_force(film: PadFilm, now: tuple[float, float], rates: tuple[float, float], speed: float) -> np.ndarray:
     """Radial and tangential force, and the derivative of the latter by db/dt."""
-    grid, work, wedge = film.grid, film.work, (film.pad.pad_clearance, *now)
-    _thickness(grid, work, *wedge)
-    gx, gz = conductances(grid, work, *wedge)
-    source = _source(grid, work, *wedge, speed)
-    closing = rates[0] * grid.cos + rates[1] * grid.sin
-    source += work.density * grid.dx * grid.height[None, :] * closing[:, None]
-    if _active_set(grid, work, gx, gz, source) < 0:
+    radial, tangential, slope = _squeezed(film.grid, film.work, (film.pad.pad_clearance, *now), rates, speed)
+    if not np.isfinite(radial):
         raise ArithmeticError("the rupture line does not settle")
+    return np.array([radial, tangential, slope])
+
+
+@compiled
+def _squeezed(
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], rates: tuple[float, float], speed: float
+) -> tuple[float, float, float]:
+    clearance, a, b = wedge
+    _thickness(grid, work, clearance, a, b)
+    gx, gz = conductances(grid, work, clearance, a, b)
+    source = _source(grid, work, clearance, a, b, speed)
+    for i in range(source.shape[0]):
+        closing = rates[0] * grid.cos[i] + rates[1] * grid.sin[i]
+        for j in range(source.shape[1]):
+            source[i, j] += work.density[i, j] * grid.dx * grid.height[j] * closing
+    if _active_set(grid, work, gx, gz, source) < 0:
+        return np.nan, np.nan, np.nan
     derivatives(grid, work, wedge, (gx, gz))
     force, _, damping = _integrate(grid, work, grid.area)
-    return np.array([*force, damping[1, 1]])
+    return force[0], force[1], damping[1, 1]
 
 
 def followed(

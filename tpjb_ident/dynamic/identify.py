@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from rigdata.campaign import Campaign
 from rigdata.vector import zero_uncertainty
@@ -273,4 +273,4 @@ def directions_differ(first: list[DynamicStiffness]) -> bool:
     known = [est for est in first if np.isfinite(est.chi_square) and est.spare_equations > 0]
     dof = sum(est.spare_equations for est in known)
     total = sum(est.chi_square * est.spare_equations for est in known)
-    return dof > 0 and float(chi2.sf(total, dof)) < 1e-4
+    return dof > 0 and float(chdtrc(dof, total)) < 1e-4

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import inner
 
 #: Differences that are kept.
 DEPTH = 4
 
 
-@compiled
+@inner
 def mixed(images: FloatArray, residuals: FloatArray, count: int) -> FloatArray:
     """Next state of a fixed-point iteration.
 
@@ -53,7 +53,7 @@ def mixed(images: FloatArray, residuals: FloatArray, count: int) -> FloatArray:
     return last
 
 
-@compiled
+@inner
 def least_squares(matrix: FloatArray, right: FloatArray) -> FloatArray:
     """Least-squares solution of a symmetric system that may be singular, by Jacobi's rotations.
 
@@ -65,7 +65,9 @@ def least_squares(matrix: FloatArray, right: FloatArray) -> FloatArray:
         Eigenvalues below 1e-12 of the largest count as zero.
     """
     k = len(right)
-    vectors = np.eye(k)
+    vectors = np.zeros((k, k))
+    for i in range(k):
+        vectors[i, i] = 1.0
     for _ in range(30):
         off, scale = 0.0, 0.0
         for i in range(k):
@@ -93,7 +95,7 @@ def least_squares(matrix: FloatArray, right: FloatArray) -> FloatArray:
     return answer
 
 
-@compiled
+@inner
 def _rotate(matrix: FloatArray, vectors: FloatArray, p: int, q: int) -> None:
     """Turn rows and columns p and q so that their product vanishes (Golub, Van Loan, Matrix Computations, 8.5)."""
     ratio = (matrix[q, q] - matrix[p, p]) / (2.0 * matrix[p, q])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.arrays import FloatArray, IntArray
-from model.compilation import compiled
+from model.compilation import inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import conductances
 from model.film.slopes import shape_slopes
@@ -100,7 +100,7 @@ _RIGID = BodyStack(
 )
 
 
-@compiled
+@inner
 def bend_pads(grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, bodies: BodyStack) -> float:
     """Close the loop of pressure and deformation for every pad that carries.
 
@@ -120,29 +120,41 @@ def bend_pads(grids: GridStack, pads: PadStack, works: FilmWork, state: PadState
         Largest change of shape asked for, over the least film.
     """
     count = len(state.tilt)
-    unknowns, coarse = works.unknown.shape[1], bodies.to_coarse.shape[1]
+    unknowns, coarse, across = works.unknown.shape[1], bodies.to_coarse.shape[1], state.bent.shape[2]
     rise, given = np.zeros((count, state.bent[0].size)), np.zeros((count, unknowns + coarse))
     bends = np.zeros(count, dtype=np.bool_)
     for m in range(count):
         bends[m] = state.solved[m] and state.steps[m] > 0
         if bends[m]:
-            rise[m] = works.temperature[m].ravel() - bodies.supply
-            given[m, :unknowns] = works.unknown[m] + state.shift[m]
-    asked = np.empty((count, state.bent[0].size))
+            for q in range(rise.shape[1]):
+                rise[m, q] = works.temperature[m, q // across, q % across] - bodies.supply
+            for q in range(unknowns):
+                given[m, q] = works.unknown[m, q] + state.shift[m, q]
+    asked, change = np.empty((count, state.bent[0].size)), np.empty(state.bent.shape[1:])
+    same = np.empty(count, dtype=np.int64)
     for k in range(bodies.answer.shape[0]):
-        same = np.flatnonzero(bends & (bodies.which == k))
-        _times(bodies.to_coarse[k], rise, same, given[:, unknowns:])
-        _times(bodies.answer[k], given, same, asked)
+        some = 0
+        for m in range(count):
+            if bends[m] and bodies.which[m] == k:
+                same[some] = m
+                some += 1
+        _times(bodies.to_coarse[k], rise, same[:some], given[:, unknowns:])
+        _times(bodies.answer[k], given, same[:some], asked)
     share = 0.0
     for m in range(count):
         if bends[m]:
-            change = asked[m].reshape(state.bent[m].shape) - state.bent[m]
-            share = max(share, np.abs(change).max() / state.least[m])
+            largest = 0.0
+            for q in range(asked.shape[1]):
+                i, j = q // across, q % across
+                change[i, j] = asked[m, q] - state.bent[m, i, j]
+                if not largest >= abs(change[i, j]) and largest == largest:  # a NaN is not to be lost
+                    largest = abs(change[i, j])
+            share = max(share, largest / state.least[m])
             _close_loop(grid_of(grids, m), work_of(works, m), pads, state, bodies, m, change)
     return share
 
 
-@compiled
+@inner
 def _times(matrix: np.ndarray, given: FloatArray, rows: IntArray, out: FloatArray) -> None:
     """Product of a matrix with some rows of `given`, four at a time for every row of the matrix that is read."""
     some = len(rows)
@@ -164,7 +176,7 @@ def _times(matrix: np.ndarray, given: FloatArray, rows: IntArray, out: FloatArra
             out[rows[min(start + 3, some - 1)], i] = d
 
 
-@compiled
+@inner
 def _close_loop(
     grid: FilmGrid, work: FilmWork, pads: PadStack, state: PadState, bodies: BodyStack, m: int, change: FloatArray
 ) -> None:  # fmt: skip
@@ -176,11 +188,13 @@ def _close_loop(
     count, unknowns = response.shape
     matrix, right = np.zeros((count, count)), np.zeros((count, 3))
     felt = np.zeros((2, count))
-    flat = change.ravel()
     for r in range(count):
         matrix[r, r] = 1.0
-        for q in range(len(flat)):
-            right[r, 0] += amplitudes[r, q] * flat[q]
+        q = 0
+        for i in range(change.shape[0]):
+            for j in range(change.shape[1]):
+                right[r, 0] += amplitudes[r, q] * change[i, j]
+                q += 1
     own = right[:, 0].copy()
     for q in range(unknowns):
         for r in range(count):
@@ -207,7 +221,7 @@ def _close_loop(
             state.mismatch[m, i, j] = total
 
 
-@compiled
+@inner
 def _solve(matrix: FloatArray, right: FloatArray) -> None:
     """Gauss' elimination with the largest pivot of each column; the solutions replace the right-hand sides (n, q)."""
     n = len(matrix)
@@ -235,9 +249,9 @@ def _solve(matrix: FloatArray, right: FloatArray) -> None:
             right[k, j] = total / matrix[k, k]
 
 
-@compiled
-def change_of_shape(state: PadState, bodies: BodyStack, m: int, da: float, db: float) -> FloatArray:
-    """Change of a pad's deformation that belongs to a move of its film [m], (nt + 1, nz + 1).
+@inner
+def change_shape(state: PadState, bodies: BodyStack, m: int, da: float, db: float) -> None:
+    """Add to the change of a pad's deformation, `PadState.mismatch`, what belongs to a move of its film.
 
     Parameters
     ----------
@@ -250,10 +264,9 @@ def change_of_shape(state: PadState, bodies: BodyStack, m: int, da: float, db: f
     db : float
         Change of b [m].
     """
-    out, shapes = state.mismatch[m].copy(), bodies.shapes[bodies.which[m]]
+    out, shapes = state.mismatch[m], bodies.shapes[bodies.which[m]]
     for r in range(shapes.shape[2]):
         amount = state.amplitude[m, r, 0] + state.amplitude[m, r, 1] * da + state.amplitude[m, r, 2] * db
         for i in range(out.shape[0]):
             for j in range(out.shape[1]):
                 out[i, j] += amount * shapes[i, j, r]
-    return out

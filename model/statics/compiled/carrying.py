@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import inner
 from model.film.mesh import FilmWork
 from model.statics.compiled.constants import CROWN, EDGE, MAX_LOAD_CHANGES, NEAR_EDGE
 from model.statics.compiled.laws import compliance, deflection
@@ -50,7 +50,7 @@ class Case(NamedTuple):
     isothermal: bool
 
 
-@compiled
+@inner
 def rigid_approach(pads: PadStack, state: PadState, m: int) -> float:
     """Approach of a film if its pivot were rigid [m].
 
@@ -64,7 +64,7 @@ def rigid_approach(pads: PadStack, state: PadState, m: int) -> float:
     return pads.preload[m] + pads.frame[m, 0, 0] * state.position[0] + pads.frame[m, 0, 1] * state.position[1]
 
 
-@compiled
+@inner
 def along(pads: PadStack, state: PadState, m: int) -> float:
     """Journal's place across the pivot line [m].
 
@@ -78,7 +78,7 @@ def along(pads: PadStack, state: PadState, m: int) -> float:
     return pads.frame[m, 1, 0] * state.position[0] + pads.frame[m, 1, 1] * state.position[1]
 
 
-@compiled
+@inner
 def margin(pads: PadStack, state: PadState, m: int) -> float:
     """How far a pad is from where it stops carrying, as a share of its clearance; negative beyond.
 
@@ -92,7 +92,7 @@ def margin(pads: PadStack, state: PadState, m: int) -> float:
     return (reach(pads, state, m) - state.branch[m, 0, 0]) / pads.clearance[m]
 
 
-@compiled
+@inner
 def _bulge(pads: PadStack, state: PadState, m: int) -> float:
     """How far the face of a pad that bends stands inward at its pivot [m]."""
     if state.bent.size == 0:
@@ -101,7 +101,7 @@ def _bulge(pads: PadStack, state: PadState, m: int) -> float:
     return -((1.0 - share) * state.bent[m, before, 0] + share * state.bent[m, before + 1, 0])
 
 
-@compiled
+@inner
 def reach(pads: PadStack, state: PadState, m: int) -> float:
     """How near the journal is to a pad on a rigid pivot [m], counting by how much a warm pad's face stands inward.
 
@@ -115,7 +115,7 @@ def reach(pads: PadStack, state: PadState, m: int) -> float:
     return rigid_approach(pads, state, m) + _bulge(pads, state, m)
 
 
-@compiled
+@inner
 def edge(pads: PadStack, state: PadState, m: int) -> float:
     """Share of the clearance by which the table of rigid pads may be wrong about where a pad stops carrying.
 
@@ -129,7 +129,7 @@ def edge(pads: PadStack, state: PadState, m: int) -> float:
     return EDGE + CROWN * abs(_bulge(pads, state, m)) / pads.clearance[m]
 
 
-@compiled
+@inner
 def find_branch(case: Case, pads: PadStack, works: FilmWork, state: PadState, m: int, hotter: float) -> None:
     """Loaded attitudes of a pad at its film's mean temperature, or `hotter` [K] than that.
 
@@ -163,7 +163,7 @@ def find_branch(case: Case, pads: PadStack, works: FilmWork, state: PadState, m:
     for k in range(count):
         load[k] = scale * table[2, k] / (clearance / (1.0 + table[0, k])) ** 2
     # the pivot's give between the loads at which it is asked
-    asked = np.sort(load[::EVERY])
+    asked = _sorted(load)
     given = np.empty(len(asked))
     for k in range(len(asked)):
         given[k] = deflection(pads.laws[m], pads.curves[m], asked[k])
@@ -183,7 +183,21 @@ def find_branch(case: Case, pads: PadStack, works: FilmWork, state: PadState, m:
     state.length[m] = count - rising
 
 
-@compiled
+@inner
+def _sorted(load: FloatArray) -> FloatArray:
+    """Every so many loads, rising; they are nearly so as they come."""
+    count = (len(load) + EVERY - 1) // EVERY
+    out = np.empty(count)
+    for k in range(count):
+        value, place = load[k * EVERY], k
+        while place > 0 and out[place - 1] > value:
+            out[place] = out[place - 1]
+            place -= 1
+        out[place] = value
+    return out
+
+
+@inner
 def interpolate(x: FloatArray, y: FloatArray, count: int, at: float) -> float:
     """Straight between the first `count` points, constant beyond them.
 
@@ -212,7 +226,7 @@ def interpolate(x: FloatArray, y: FloatArray, count: int, at: float) -> float:
     return y[low] + (y[high] - y[low]) / (x[high] - x[low]) * (at - x[low])
 
 
-@compiled
+@inner
 def let_idle(state: PadState, m: int) -> None:
     """Let a pad carry nothing.
 
@@ -227,7 +241,7 @@ def let_idle(state: PadState, m: int) -> None:
     state.tilt[m] = 0.0
 
 
-@compiled
+@inner
 def set_loaded(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None:
     """Put a pad on its loaded attitude, or let it idle.
 
@@ -251,7 +265,7 @@ def set_loaded(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None
         state.tilt[m] = (b - along(pads, state, m)) / pads.pivot_radius[m]
 
 
-@compiled
+@inner
 def hold_of(case: Case, state: PadState, m: int, load: float) -> tuple[float, float]:
     """What holds a tilt back: its slope by the tilt [N m/rad] and by the pad's load [m].
 
@@ -268,7 +282,7 @@ def hold_of(case: Case, state: PadState, m: int, load: float) -> tuple[float, fl
     return stiffness, case.hold[1] * state.tilt[m] if load > 0.0 else 0.0
 
 
-@compiled
+@inner
 def is_stable(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
     """Whether film and pivot push a pad back from a small change of tilt and deflection.
 
@@ -288,7 +302,7 @@ def is_stable(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
     return turning * (1.0 + give * k[0, 0]) > give * (k[1, 0] + arm * k[0, 0]) * k[0, 1]
 
 
-@compiled
+@inner
 def update_carrying(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> bool:
     """Let pads take up or shed their load as the journal's position has it; True if any did.
 
@@ -316,14 +330,14 @@ def update_carrying(case: Case, pads: PadStack, works: FilmWork, state: PadState
     return changed
 
 
-@compiled
+@inner
 def _keeps_its_load(case: Case, pads: PadStack, state: PadState, m: int, inside: float) -> bool:
     if inside > 0.0 or inside < -edge(pads, state, m) or not state.solved[m]:
         return inside > 0.0
     return is_stable(case, pads, state, m)
 
 
-@compiled
+@inner
 def leave_unstable(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> bool:
     """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any.
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 
 
 class PadEquations(NamedTuple):
@@ -73,7 +73,8 @@ def eliminate(load: FloatArray, pads: PadEquations) -> tuple[float, FloatArray, 
     size = max(math.hypot(load[0], load[1]), 1.0)
     worst = 0.0
     missing = load.copy()
-    jacobian = np.eye(2)  # 1 N/m: a pad that only touches leaves a direction free, which keeps the matrix regular
+    jacobian = np.zeros((2, 2))
+    jacobian[0, 0] = jacobian[1, 1] = 1.0  # N/m: a pad that only touches leaves a direction free
     at_rest, by_shift = np.empty((n, 2)), np.empty((n, 2, 2))
     for m in range(n):
         frame, k = pads.frame[m], pads.stiffness[m]
@@ -108,13 +109,13 @@ def eliminate(load: FloatArray, pads: PadEquations) -> tuple[float, FloatArray, 
     return worst, shift, moves
 
 
-@compiled
+@inner
 def _force_change(stiffness: FloatArray, da: float, db: float) -> tuple[float, float]:
     """Change of the radial and tangential force for a change of (a, b)."""
     return stiffness[0, 0] * da + stiffness[0, 1] * db, stiffness[1, 0] * da + stiffness[1, 1] * db
 
 
-@compiled
+@inner
 def _pad_moves(pads: PadEquations, m: int, moment: float, deflection: float) -> tuple[float, float]:
     """Tilt and deflection with which pad m gains a moment over R_P [N] and a pivot deflection [m] that are wanted.
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from model.arrays import FloatArray, IntArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.loaded_attitude import Branch
 
 #: Share of the load that may be missing.
@@ -98,7 +98,7 @@ def balance(
     return position
 
 
-@compiled
+@inner
 def _missing(
     x: float, y: float, load: FloatArray, pads: FloatArray, rigid: FloatArray, carried: FloatArray, lengths: IntArray
 ) -> tuple[float, float]:

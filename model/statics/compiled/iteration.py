@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.energy import heat_by_drag
 from model.film.mesh import FilmWork
 from model.statics.compiled.anderson import DEPTH, mixed
@@ -39,13 +39,13 @@ from model.statics.compiled.constants import (
 )
 from model.statics.compiled.first_position import balance
 from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of, work_of
-from model.statics.compiled.step import bend, move, newton, solve_films, solve_pressure
+from model.statics.compiled.step import move, newton, solve_films, solve_pressure
 
 #: How an iteration ends.
 SETTLED, RESTARTING, FILM_LOST, BOUNDLESS_HEAT, SINGULAR, NOT_CONVERGED = range(6)
 
 
-@compiled
+@inner
 def start_cold(grids: GridStack, case: Case, pads: PadStack, works: FilmWork, state: PadState) -> None:
     """Balance the load with the tabulated isothermal films, then put every pad on its loaded attitude.
 
@@ -73,7 +73,7 @@ def start_cold(grids: GridStack, case: Case, pads: PadStack, works: FilmWork, st
     _balance_films(case, pads, works, state, 0.0)
 
 
-@compiled
+@inner
 def _balance_films(case: Case, pads: PadStack, works: FilmWork, state: PadState, hotter: float) -> None:
     """Put journal and pads where tabulated films, as warm as these or `hotter` [K] than that, carry the load."""
     n = len(state.tilt)
@@ -131,7 +131,7 @@ def iterate(
         if not heat < BOUNDLESS:
             return FILM_LOST if _lost(state) else BOUNDLESS_HEAT, iteration, math.inf, heat, limited
         residual, shift, moves = newton(case, pads, state)
-        if not (math.isfinite(residual) and np.isfinite(state.position + shift).all() and np.isfinite(moves).all()):
+        if not (math.isfinite(residual) and _finite(state.position, shift, moves)):
             return SINGULAR, iteration, math.inf, heat, limited
         best_left, left = min(best_left, left), max(residual, heat / HEAT_PER_FORCE)
         near = residual < NEAR and heat < NEAR_HEAT
@@ -147,14 +147,23 @@ def iterate(
         if kept and whole and near and left > SLOW * best_left:
             count = _remember(images, residuals, count)
             write_vector(pads, works, state, images[count - 1])
-            residuals[count - 1] = images[count - 1] - before
+            for q in range(size):
+                residuals[count - 1, q] = images[count - 1, q] - before[q]
             read_vector(pads, works, state, mixed(images, residuals, count))
         else:
             count = 0
     return NOT_CONVERGED, MAX_ITERATIONS, residual, heat, limited
 
 
-@compiled
+@inner
+def _finite(position: FloatArray, shift: FloatArray, moves: FloatArray) -> bool:
+    finite = math.isfinite(position[0] + shift[0]) and math.isfinite(position[1] + shift[1])
+    for m in range(len(moves)):
+        finite = finite and math.isfinite(moves[m, 0]) and math.isfinite(moves[m, 1])
+    return finite
+
+
+@inner
 def _remember(images: FloatArray, residuals: FloatArray, count: int) -> int:
     """Make room for one more; returns how many there are with it."""
     if count == DEPTH + 1:
@@ -165,7 +174,7 @@ def _remember(images: FloatArray, residuals: FloatArray, count: int) -> int:
     return count + 1
 
 
-@compiled
+@inner
 def _lost(state: PadState) -> bool:
     lost = False
     for m in range(len(state.tilt)):
@@ -173,7 +182,7 @@ def _lost(state: PadState) -> bool:
     return lost
 
 
-@compiled
+@inner
 def _settled(grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case) -> int:
     """Derivatives once more, with the rupture line between the nodes, unless a pad can neither carry nor idle."""
     for m in range(len(state.tilt)):
@@ -185,12 +194,12 @@ def _settled(grids: GridStack, pads: PadStack, works: FilmWork, state: PadState,
     return SETTLED
 
 
-@compiled
+@inner
 def _size(works: FilmWork, state: PadState) -> int:
     return 2 + works.temperature.size + state.bent.size + 2 * len(state.tilt)
 
 
-@compiled
+@inner
 def write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatArray) -> None:
     """Journal, pads, film temperatures and deformations as one vector, in micrometres and kelvins.
 
@@ -220,7 +229,7 @@ def write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatArr
                 at += 1
 
 
-@compiled
+@inner
 def read_vector(pads: PadStack, works: FilmWork, state: PadState, vector: FloatArray) -> None:
     """Undo `write_vector`.
 
@@ -246,6 +255,9 @@ def read_vector(pads: PadStack, works: FilmWork, state: PadState, vector: FloatA
                     warm[i, j] = vector[at]
                 at += 1
         if state.bent.size > 0:
-            bent = vector[at : at + warm.size].reshape(warm.shape) * MICROMETRE
-            bend(works, state, m, bent - state.bent[m])
-            at += warm.size
+            for i in range(state.bent.shape[1]):
+                for j in range(state.bent.shape[2]):
+                    change = vector[at] * MICROMETRE - state.bent[m, i, j]
+                    state.bent[m, i, j] += change
+                    works.extra[m, i, j] += change
+                    at += 1

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import inner
 from model.measured_pivot import MeasuredPivot
 from model.pivots import ConstantPivot, PivotLaw, RigidPivot, RockerPivot, ScaledPivot, SphericalPivot
 
@@ -67,7 +67,7 @@ def _row(law: PivotLaw) -> tuple[tuple[float, float, float, float], FloatArray] 
     return None
 
 
-@compiled
+@inner
 def deflection(law: FloatArray, curve: FloatArray, load: float) -> float:
     """Give of a pivot, delta(W) [m].
 
@@ -97,7 +97,7 @@ def deflection(law: FloatArray, curve: FloatArray, load: float) -> float:
     return give / law[3]
 
 
-@compiled
+@inner
 def compliance(law: FloatArray, curve: FloatArray, load: float) -> float:
     """Tangent d delta / dW [m/N]; zero for a rigid pivot.
 
@@ -119,12 +119,12 @@ def compliance(law: FloatArray, curve: FloatArray, load: float) -> float:
     return value / law[3]
 
 
-@compiled
+@inner
 def _logarithm(load_scale: float, load: float) -> float:
     return math.log(load_scale / min(max(load, 1e-9), load_scale / math.e))
 
 
-@compiled
+@inner
 def _piece(law: FloatArray, curve: FloatArray, load: float) -> tuple[int, float]:
     low, high = 0, int(law[1]) - 1
     while high - low > 1:
@@ -136,7 +136,7 @@ def _piece(law: FloatArray, curve: FloatArray, load: float) -> tuple[int, float]
     return low, load - curve[0, low]
 
 
-@compiled
+@inner
 def _measured_compliance(law: FloatArray, curve: FloatArray, load: float) -> float:
     i, s = _piece(law, curve, min(max(load, 0.0), curve[0, int(law[1]) - 1]))
     return max((3.0 * curve[1, i] * s + 2.0 * curve[2, i]) * s + curve[3, i], 1e-15)

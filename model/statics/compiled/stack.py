@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.arrays import BoolArray, FloatArray, IntArray
-from model.compilation import compiled
+from model.compilation import inner
 from model.film.mesh import FilmGrid, FilmWork
 
 
@@ -209,7 +209,7 @@ def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWor
     return stack, [FilmWork(*parts) for parts in zip(*stack, strict=True)]
 
 
-@compiled
+@inner
 def grid_of(grids: GridStack, m: int) -> FilmGrid:
     """One pad's mesh.
 
@@ -225,7 +225,7 @@ def grid_of(grids: GridStack, m: int) -> FilmGrid:
     )  # fmt: skip
 
 
-@compiled
+@inner
 def work_of(works: FilmWork, m: int) -> FilmWork:
     """One film's arrays.
 

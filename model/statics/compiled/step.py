@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from model.arrays import FloatArray
-from model.compilation import compiled
+from model.compilation import inner
 from model.film.energy import heat_step
 from model.film.mesh import FilmWork
 from model.film.oil_state import least_share, set_viscosity
 from model.film.reynolds import solve_film
-from model.statics.compiled.bending import BodyStack, bend_pads, change_of_shape
+from model.statics.compiled.bending import BodyStack, bend_pads, change_shape
 from model.statics.compiled.carrying import Case, along, hold_of, rigid_approach, set_loaded
 from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, LONGEST_STEP, SHRINK
 from model.statics.compiled.elimination import PadEquations, eliminate
@@ -20,7 +20,7 @@ from model.statics.compiled.laws import compliance, deflection
 from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of, work_of
 
 
-@compiled
+@inner
 def solve_pressure(
     grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case, m: int, sharp: bool
 ) -> None:
@@ -53,7 +53,7 @@ def solve_pressure(
         state.corrected[m] = found.force
 
 
-@compiled
+@inner
 def solve_films(
     grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case, bodies: BodyStack, relaxation: float
 ) -> tuple[float, float]:
@@ -107,13 +107,14 @@ def solve_films(
                 limited = max(limited, cut)
                 if not change >= asked:  # a NaN is not to be lost
                     change = asked
-    state.felt[:], state.felt_stiffness[:] = state.corrected, state.stiffness
+    for m in range(len(state.tilt)):
+        state.felt[m], state.felt_stiffness[m] = state.corrected[m], state.stiffness[m]
     if len(bodies.which) > 0 and change < BOUNDLESS:
         change = max(change, HEAT_PER_FORCE * bend_pads(grids, pads, works, state, bodies))
     return change, limited
 
 
-@compiled
+@inner
 def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArray, FloatArray]:
     """Solve the linearised equilibrium once.
 
@@ -161,7 +162,7 @@ def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArr
     return residual, shift, every
 
 
-@compiled
+@inner
 def move(
     grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, bodies: BodyStack,
     step: tuple[FloatArray, FloatArray], damping: float,
@@ -182,7 +183,10 @@ def move(
         Largest share of the step.
     """
     shift, moves = step
-    longest = LONGEST_STEP * pads.clearance.min() / max(math.hypot(shift[0], shift[1]), 1e-30)
+    least = math.inf
+    for m in range(len(state.tilt)):
+        least = min(least, pads.clearance[m])
+    longest = LONGEST_STEP * least / max(math.hypot(shift[0], shift[1]), 1e-30)
     scale = min(damping, longest)
     rigid, bending = np.empty((0, 0)), len(bodies.which) > 0
     for m in range(len(state.tilt)):
@@ -190,7 +194,7 @@ def move(
             da = pads.frame[m, 0, 0] * shift[0] + pads.frame[m, 0, 1] * shift[1] - moves[m, 1]
             db = pads.frame[m, 1, 0] * shift[0] + pads.frame[m, 1, 1] * shift[1] + pads.pivot_radius[m] * moves[m, 0]
             if bending:
-                state.mismatch[m] = change_of_shape(state, bodies, m, da, db)
+                change_shape(state, bodies, m, da, db)
             worst = least_share(grid_of(grids, m), work_of(works, m), da, db, state.mismatch[m] if bending else rigid)
             if worst * damping < SHRINK - 1.0:
                 scale = min(scale, (SHRINK - 1.0) / worst)
@@ -200,23 +204,9 @@ def move(
         state.tilt[m] += scale * moves[m, 0]
         state.deflection[m] += scale * moves[m, 1]
         if bending and state.solved[m]:
-            bend(works, state, m, scale * state.mismatch[m])
+            for i in range(state.bent.shape[1]):
+                for j in range(state.bent.shape[2]):
+                    change = scale * state.mismatch[m, i, j]
+                    state.bent[m, i, j] += change
+                    works.extra[m, i, j] += change
     return scale == 1.0
-
-
-@compiled
-def bend(works: FilmWork, state: PadState, m: int, change: FloatArray) -> None:
-    """Change a pad's deformation.
-
-    Parameters
-    ----------
-    works : FilmWork
-        With a leading axis for the pad.
-    state : PadState
-    m : int
-        Pad, from 0.
-    change : (nt + 1, nz + 1) ndarray
-        [m]
-    """
-    state.bent[m] += change
-    works.extra[m] += change

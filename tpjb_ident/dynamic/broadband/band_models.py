@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import f as f_distribution
-from scipy.stats import t as student_t
+from scipy.special import fdtrc, stdtrit
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.broadband.band_equations import Basis, RunSums, complex_h, k_c, k_c_m, line_sums
@@ -121,8 +120,8 @@ class BandModel:
             Probability content.
         """
         quantile = 0.5 + 0.5 * level
-        random = student_t.ppf(quantile, self.dof) * self.standard_error
-        return np.hypot(random, student_t.ppf(quantile, np.inf) * np.sqrt(np.diag(self.systematic)))
+        random = stdtrit(self.dof, quantile) * self.standard_error
+        return np.hypot(random, stdtrit(np.inf, quantile) * np.sqrt(np.diag(self.systematic)))
 
     def h(self, omega: FloatArray) -> ComplexArray:
         """Dynamic stiffness of the model, (n, 2, 2) [N/m].
@@ -318,7 +317,7 @@ def _held_against(parts: Sequence[BandPart], unknowns: int) -> tuple[float, int,
         squares.append((float(x @ x) - float(np.trace(part.covariance))) / size)
         noise_dof += nu
     misfit = float(np.sqrt(max(*squares, 0.0)))
-    probability = float(f_distribution.sf(total / spare, spare, noise_dof)) if spare > 0 else 1.0
+    probability = float(fdtrc(spare, noise_dof, total / spare)) if spare > 0 else 1.0
     return total, max(spare, 0), probability, misfit
 
 

@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import t as student_t
+from scipy.special import chdtrc, stdtrit
 
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
@@ -81,7 +80,7 @@ def run_scatter(fits: Sequence[LineFit], n: int) -> RunScatter:
     gain = np.sum([fit.apart.left for fit in fits], axis=0) / power
     noise = np.sum([fit.apart.variance for fit in fits], axis=0) / power**2
     spare = 2 * (n_runs - 2)
-    if not chi2.sf(float(np.sum(2 * np.abs(gain) ** 2 / noise)), spare) < DIFFERENT:
+    if not chdtrc(spare, float(np.sum(2 * np.abs(gain) ** 2 / noise))) < DIFFERENT:
         return RunScatter(0.0, draws)
     shown = left_of_gains(fits)
     # of gains with variance s^2 the residuals show s^2 tr(A^T A); Satterthwaite's degrees of freedom of that sum
@@ -91,7 +90,7 @@ def run_scatter(fits: Sequence[LineFit], n: int) -> RunScatter:
     found: tuple[Condition, ...] = ()
     if size > TOO_MUCH:
         found = (Condition("runs-disagree", f"runs differ by {100 * size:.1f} % in force over displacement"),)
-    return RunScatter(size * float(student_t.ppf(0.975, dof)) / 1.96, draws, found)
+    return RunScatter(size * float(stdtrit(dof, 0.975)) / 1.96, draws, found)
 
 
 def left_of_gains(fits: Sequence[LineFit]) -> FloatArray:

@@ -1,10 +1,11 @@
 """statsmodels' robust linear model on the stacked real rows of Eq. (15): the paper's choice.
 
-Kept as a reference with its traps guarded: complex input is refused (statsmodels takes it and
-returns false standard errors), the system is scaled before (``conv="coefs"`` has an absolute
-tolerance and never ends in SI units), and reaching the iteration limit is reported (statsmodels
-says nothing). What cannot be guarded: Re and Im of a row get weights of their own, and the
-M-estimator has no breakdown against bad displacements. `mm` exists for that.
+Huber's and Tukey's norms with the MAD scale are `irls.robust_fit`, equal to statsmodels to the last bit; for all
+others statsmodels itself is run. Kept as a reference with its traps guarded: complex input is refused (statsmodels
+takes it and returns false standard errors), the system is scaled before (``conv="coefs"`` has an absolute tolerance
+and never ends in SI units), and reaching the iteration limit is reported (statsmodels says nothing). What cannot be
+guarded: Re and Im of a row get weights of their own, and the M-estimator has no breakdown against bad displacements.
+`mm` exists for that.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ import numpy as np
 from rigdata.near_names import unknown_name
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.estimators.irls import NORMS as OWN_NORMS
+from tpjb_ident.dynamic.estimators.irls import RobustFit, robust_fit
 from tpjb_ident.dynamic.estimators.r_matrix import real_rows
 from tpjb_ident.errors import ArgumentError, TpjbError
 
@@ -107,30 +110,28 @@ def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | 
             "RLM solves real systems; complex data would come back with false standard errors. "
             "Stack real and imaginary parts first (tpjb_ident.dynamic.estimators.r_matrix.real_rows)"
         )
-    from statsmodels.robust.robust_linear_model import RLM
-
-    model = RLM(response, design, M=_norm(settings.norm))
-    fit = model.fit(
-        maxiter=settings.max_iterations,
-        tol=settings.tolerance,
-        conv="coefs",
-        scale_est=_scale(settings.scale),
-    )
+    fit = _fit(design, response, settings)
     conditions: list[Condition] = []
-    iterations = int(fit.fit_history["iteration"])
-    if iterations >= settings.max_iterations:
-        conditions.append(Condition("iteration-limit", f"RLM stopped after {iterations} iterations"))
+    if fit.iterations >= settings.max_iterations:
+        conditions.append(Condition("iteration-limit", f"RLM stopped after {fit.iterations} iterations"))
     size = float(np.abs(response).max(initial=0.0))
     if not fit.scale > 1e-14 * size:
         conditions.append(Condition("zero-scale", "more than half of the rows fit exactly; no standard errors exist"))
-    return RlmSolution(
-        np.asarray(fit.params),
-        np.asarray(fit.bcov_scaled),
-        np.asarray(fit.weights),
-        float(fit.scale),
-        iterations,
-        tuple(conditions),
+    return RlmSolution(fit.params, fit.covariance, fit.weights, fit.scale, fit.iterations, tuple(conditions))
+
+
+def _fit(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RobustFit:
+    if settings.norm in OWN_NORMS and settings.scale == "mad":
+        return robust_fit(design, response, settings.norm, settings.max_iterations, settings.tolerance)
+    from statsmodels.robust.robust_linear_model import RLM
+
+    fit = RLM(response, design, M=_norm(settings.norm)).fit(
+        maxiter=settings.max_iterations, tol=settings.tolerance, conv="coefs", scale_est=_scale(settings.scale)
     )
+    return RobustFit(
+        np.asarray(fit.params), np.asarray(fit.bcov_scaled), np.asarray(fit.weights), float(fit.scale),
+        int(fit.fit_history["iteration"]),
+    )  # fmt: skip
 
 
 def _norm(name: str) -> Any:

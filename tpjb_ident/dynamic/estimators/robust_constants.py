@@ -11,8 +11,7 @@ from math import comb
 
 import numpy as np
 from scipy import optimize
-from scipy.special import chdtr
-from scipy.stats import chi2
+from scipy.special import chdtr, gammaincinv, gammaln, xlogy
 
 from tpjb_ident.arrays import FloatArray
 
@@ -40,8 +39,7 @@ def half_shrinkage(dimension: int, share: float) -> float:
     share : float
         0 to 1.
     """
-    limit = chi2.ppf(share, dimension)
-    return float(chi2.cdf(limit, dimension + 2) / share)
+    return float(chdtr(dimension + 2, _quantile(share, dimension)) / share)
 
 
 @functools.cache
@@ -91,14 +89,25 @@ def trimming_limits(dimension: int, begin: float = 0.99, end: float = 0.9999) ->
     shrinkage : float
         E[w u^2] / (dimension E[w]): what a weighted covariance comes out too small by.
     """
-    lower, upper = float(chi2.ppf(begin, dimension)), float(chi2.ppf(end, dimension))
+    lower, upper = _quantile(begin, dimension), _quantile(end, dimension)
 
     nodes, width = np.polynomial.legendre.leggauss(40)
     x = lower + 0.5 * (upper - lower) * (nodes + 1)
-    part = 0.5 * (upper - lower) * width * trimming_weight(x, lower, upper) * chi2.pdf(x, dimension)
+    part = 0.5 * (upper - lower) * width * trimming_weight(x, lower, upper) * _density(x, dimension)
     mass = float(chdtr(dimension, lower) + part.sum())
     moment = float(dimension * chdtr(dimension + 2, lower) + (part * x).sum())
     return lower, upper, moment / (dimension * mass)
+
+
+def _quantile(share: float, dimension: int) -> float:
+    """Of the chi-square distribution."""
+    return float(2.0 * gammaincinv(dimension / 2, share))
+
+
+def _density(x: FloatArray, dimension: int) -> FloatArray:
+    """Of the chi-square distribution."""
+    half = dimension / 2.0
+    return np.asarray(np.exp(xlogy(half - 1.0, x) - x / 2.0 - gammaln(half) - np.log(2) * dimension / 2.0))
 
 
 def trimming_weight(u2: FloatArray, lower: float, upper: float) -> FloatArray:

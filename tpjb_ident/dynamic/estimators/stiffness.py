@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
@@ -116,10 +116,10 @@ class DynamicStiffness:
         if not 0.0 < level < 1.0:
             raise ArgumentError(f"level must lie in (0, 1), got {level}")
         quantile = 0.5 + 0.5 * level
-        random = student_t.ppf(quantile, self.dof) * self.standard_error
+        random = stdtrit(self.dof, quantile) * self.standard_error
         if not systematic or self.systematic is None:
             return np.asarray(random)
-        calibration = student_t.ppf(quantile, np.inf) * np.sqrt(np.diag(self.systematic))
+        calibration = stdtrit(np.inf, quantile) * np.sqrt(np.diag(self.systematic))
         return np.hypot(random, calibration)
 
     def interval(self, level: float = 0.95, systematic: bool = True) -> Interval:

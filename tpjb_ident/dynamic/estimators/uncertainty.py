@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri, gammaincinv
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable
@@ -111,7 +111,7 @@ def direction_effect(residual: ComplexArray, means: DirectionMeans, noise: Compl
     inverse_root = np.linalg.inv(root)
     white = inverse_root @ moment @ inverse_root.conj().T
     chi_square = float(np.trace(white).real / (2 * (g - 2)))
-    if chi_square * 4 * (g - 2) < chi2.isf(CLEAR, 4 * (g - 2)):
+    if chi_square * 4 * (g - 2) < chdtri(4 * (g - 2), CLEAR):
         return np.zeros((2, 2), dtype=complex), chi_square
     values, vectors = np.linalg.eigh(white - (g - 2) * np.eye(2))
     T_white = (vectors * np.maximum(values, 0.0)) @ vectors.conj().T / gain
@@ -184,7 +184,8 @@ def spread_of(
     spare = 4.0 * (g - 2)
     if g <= 2 or not (known_effect or chi_square > 1.0):
         return Spread(known, np.full(8, max(dof_repeat, 1.0)))
-    certain = min(1.0, (chi_square - 1.0) / (chi2.ppf(0.95, spare) / spare - 1.0)) if not known_effect else 1.0
+    limit = 2.0 * gammaincinv(spare / 2, 0.95) / spare
+    certain = min(1.0, (chi_square - 1.0) / (limit - 1.0)) if not known_effect else 1.0
     moved = np.linalg.solve(parts.sum(axis=0) - parts, score[:, :, None])[:, :, 0]
     moved = np.concatenate([moved.real, moved.imag], axis=1)
     jackknife = (g - 1) / g * moved.T @ moved

@@ -10,7 +10,7 @@ four others nobody can say which run is wrong: then all count, and the interval 
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import f as fisher_f
+from scipy.special import fdtri
 
 from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats, eiv_fit, repeats
@@ -73,4 +73,4 @@ def _explained(table: PhasorTable, core: BoolArray, others: Repeats) -> bool:
     spread = 2.0 * max(fit.chi_square, 1.0) * noise / count
     distance = float((residual.conj() @ np.linalg.solve(spread, residual)).real) / 2.0
     spare = 4.0 * (len(others.means) - 2)
-    return distance <= float(fisher_f.isf(SIGNIFICANCE, 4, spare))
+    return distance <= float(fdtri(4, spare, 1.0 - SIGNIFICANCE))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
@@ -39,7 +39,7 @@ class AmplitudeSlope:
     def significant(self) -> bool:
         """Whether it is more than noise."""
         dof = max(self.runs - 2, 1)
-        limit = float(student_t.isf(SIGNIFICANCE / 2, dof)) * self.standard_error
+        limit = -float(stdtrit(dof, SIGNIFICANCE / 2)) * self.standard_error
         return abs(self.stiffening) > max(limit, NOTABLE)
 
     def condition(self) -> tuple[Condition, ...]:

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtri
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
@@ -110,7 +110,7 @@ def _quadratic_share(kept: Sequence[tuple[LineMean, LineMean]], doubled: Complex
     left = float(np.sum(np.abs(bent - fitted) ** 2)) / (len(kept) - 3)
     unseen = 3 * (DISTINCT - 1) * left / len(kept)
     # what noise and mains leave by chance is taken off; what is more counts, also where it is not beyond doubt
-    chance = left * float(f_distribution.isf(CHANCE, 6, 2 * (len(kept) - 3)))
+    chance = left * float(fdtri(6, 2 * (len(kept) - 3), 1.0 - CHANCE))
     return max(3 * (explained - chance) / len(kept), 0.0), unseen
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from rigdata.near_names import unknown_name
 from tpjb_ident.arrays import FloatArray
@@ -101,7 +101,7 @@ def chance_of(chi_square: float, dof: int, noise_dof: tuple[float, ...]) -> floa
     noise_dof : tuple of float
         Of every point; infinite where its covariance is known.
     """
-    plain = float(chi2.sf(chi_square, dof))
+    plain = float(chdtrc(dof, chi_square)) if dof > 0 else np.nan
     finite = np.array([nu for nu in noise_dof if np.isfinite(nu) and nu < LARGE_DOF])
     if not len(finite) or plain > 0.5:
         return plain

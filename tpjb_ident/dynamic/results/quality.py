@@ -181,7 +181,7 @@ def directional_pattern(data: PointData, weights: FloatArray) -> Condition | Non
     weights : (n,) ndarray
         Of the windows.
     """
-    from scipy.stats import binom
+    from scipy.special import bdtrc
 
     whole = _complete(data)
     bad = (weights < REJECTED_WEIGHT) & whole
@@ -191,7 +191,7 @@ def directional_pattern(data: PointData, weights: FloatArray) -> Condition | Non
         mine = (data.run_index == i) & whole
         n, hits = int(mine.sum()), int(bad[mine].sum())
         others = (total - hits + 0.5) / (int(whole.sum()) - n + 1.0)
-        if hits >= 3 and hits > 0.4 * n and binom.sf(hits - 1, n, min(others, 1.0)) < 1e-3:
+        if hits >= 3 and hits > 0.4 * n and bdtrc(hits - 1, n, min(others, 1.0)) < 1e-3:
             angle = "" if run.direction is None else f" at {np.degrees(run.direction):.0f} deg"
             named.append(f"{run.run}{angle} ({hits} of {n})")
     if not named:

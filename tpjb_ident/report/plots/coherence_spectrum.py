@@ -60,9 +60,9 @@ def coherence_spectrum(
     for row, name, (colour, dashes) in zip(value, ("horizontal force", "vertical force"), STYLE, strict=True):
         axes.plot(frequency, row, color=LIGHT[colour], linestyle=dashes, linewidth=1.3, label=name)
     # under no coherence at all, two inputs and m averages: Beta(2, m - 2)
-    from scipy import stats
+    from scipy.special import betaincinv
 
-    chance = float(stats.beta.ppf(LEVEL, 2, max(averages - 2, 1)))
+    chance = float(betaincinv(2, max(averages - 2, 1), LEVEL))
     axes.axhline(chance, color=LIGHT["ink"], linestyle=(0, (4, 2)), linewidth=0.9, label="by chance, 95 %")
     if drive:
         axes.axvline(drive, color=LIGHT["grey"], linewidth=0.9)
