@@ -190,7 +190,7 @@ def functions() -> Iterator[tuple[str, Function]]:
 
 def is_compiled(node: Function) -> bool:
     """Tell whether numba compiles it: a kernel takes arrays, not objects, and stands whole where its loops are."""
-    return any("compiled" in ast.unparse(d) or "njit" in ast.unparse(d) for d in node.decorator_list)
+    return any(ast.unparse(d) in ("compiled", "inner") or "njit" in ast.unparse(d) for d in node.decorator_list)
 
 
 def parameters(node: Function) -> list[str]:
