@@ -55,6 +55,11 @@ class Basis:
         """Scales of a model that is as wrong as stated and no more, (c,)."""
         return np.array([1e-5 if one.name in {"scatter", "beyond"} else 1.0 for one in self.components])
 
+    @functools.cached_property
+    def coarse(self) -> Basis:
+        """The same, with every element off by its own `total_sigma` besides."""
+        return Basis(self.noise + np.eye(len(self.noise)), self.components, self.folds)
+
     def covariance(self, scales: FloatArray) -> FloatArray:
         """Noise and model error at scales t_k, (n, n).
 

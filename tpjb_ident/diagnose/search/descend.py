@@ -9,7 +9,7 @@ import numpy as np
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.forward import ForwardModel, NoEquilibriumError
 from tpjb_ident.diagnose.forward.nuisance import predict
-from tpjb_ident.diagnose.search.assessment import Assessment, assess
+from tpjb_ident.diagnose.search.assessment import Assessment, Basis, assess
 from tpjb_ident.diagnose.search.fit import Fit, Start, build, fitted, linear
 from tpjb_ident.diagnose.search.problem import Problem
 
@@ -47,8 +47,10 @@ def fit(forward: ForwardModel, problem: Problem, start: Start) -> Fit | None:
     """Fit amplitudes; nuisances follow to first order.
 
     First the effects alone have to do it: far from the answer nuisances, linear as they are here, would bend the way.
-    Then these are as free as stated, the model counting as wrong by what is stated and no more: where it may be wrong
-    by anything, nothing needs to move. Last by what the residual tells.
+    There every element may also be off by itself by as much as is stated: where pads come out of contact a campaign is
+    all cliffs to a weight that knows of smooth errors only. Then nuisances are as free as stated, the model counting as
+    wrong by what is stated and no more: where it may be wrong by anything, nothing needs to move. Last by what the
+    residual tells.
 
     Derivatives are corrected along every step (Broyden, Math. Comp. 19 (1965) 577): a step costs one run of the model.
 
@@ -66,26 +68,50 @@ def fit(forward: ForwardModel, problem: Problem, start: Start) -> Fit | None:
     y = attempt(forward, problem, start)
     if y is None:
         return None
-    here = _descended(forward, problem, Place(start, y), problem.basis.stated, TIGHT)
-    here = _descended(forward, problem, here, problem.basis.stated)
+    coarse, basis = problem.basis.coarse, problem.basis
+    here = _descended(forward, problem, Place(start, y), Weighing(coarse, basis.stated, TIGHT))
+    here = _descended(forward, problem, here, Weighing(basis, basis.stated, TIGHT))
+    here = _descended(forward, problem, here, Weighing(basis, basis.stated))
     found = fitted(problem, here.start, here.prediction)
-    there = _descended(forward, problem, here, found.assessment.scales)
+    there = _descended(forward, problem, here, Weighing(basis, found.assessment.scales))
     if there is here:
         return found
     other = fitted(problem, there.start, there.prediction, found.assessment.scales)
     return other if other.evidence > found.evidence else found
 
 
-def _descended(forward: ForwardModel, problem: Problem, here: Place, scales: FloatArray, slack: float = 1.0) -> Place:
+@dataclass(frozen=True)
+class Weighing:
+    """What a step is judged by.
+
+    Attributes
+    ----------
+    basis : Basis
+    scales : (c,) ndarray
+        Of the model's error.
+    slack : float
+        Share of their tolerances that nuisances have.
+    """
+
+    basis: Basis
+    scales: FloatArray
+    slack: float = 1.0
+
+    def assess(self, problem: Problem, start: Start, y: FloatArray) -> Assessment:
+        """What a place is worth."""
+        return assess(self.basis, linear(problem, start, y, self.slack), self.scales, fixed=True)
+
+
+def _descended(forward: ForwardModel, problem: Problem, here: Place, weighing: Weighing) -> Place:
     """Steps at fixed scales of the model's error until no amplitude moves."""
     for _ in range(MAX_STEPS if here.start.jacobian.shape[1] else 0):
-        found = assess(problem.basis, linear(problem, here.start, here.prediction, slack), scales, fixed=True)
+        found = weighing.assess(problem, here.start, here.prediction)
         now = np.concatenate(here.start.amplitudes)
         step = np.concatenate(here.start.split(_targets(here.start, found))) - now
         errors = np.sqrt(np.maximum(np.diag(found.covariance)[: len(now)], 0.0))
         if np.all(np.abs(step) < SETTLED * errors):
             break
-        moved = _improved(forward, problem, here, step, found, slack)
+        moved = _improved(forward, problem, here, step, (weighing, found))
         if moved is None:
             break
         here = moved
@@ -93,9 +119,10 @@ def _descended(forward: ForwardModel, problem: Problem, here: Place, scales: Flo
 
 
 def _improved(
-    forward: ForwardModel, problem: Problem, here: Place, step: FloatArray, found: Assessment, slack: float
+    forward: ForwardModel, problem: Problem, here: Place, step: FloatArray, judged: tuple[Weighing, Assessment]
 ) -> Place | None:
     """The place after a step, or after a part of it, that is better; None if none is."""
+    weighing, found = judged
     now = np.concatenate(here.start.amplitudes)
     for share in (1.0, 0.4, 0.1):
         trial = replace(here.start, amplitudes=here.start.split(now + share * step))
@@ -104,7 +131,7 @@ def _improved(
             continue
         taken = np.concatenate(trial.amplitudes) - now
         trial = replace(trial, jacobian=_corrected(here.start, y - here.prediction, taken))
-        told = assess(problem.basis, linear(problem, trial, y, slack), found.scales, fixed=True)
+        told = weighing.assess(problem, trial, y)
         if told.evidence > found.evidence:
             return Place(trial, y)
         if found.evidence - told.evidence < HARDLY:

@@ -13,7 +13,8 @@ from tpjb_ident.diagnose.forward.candidates import Candidate
 from tpjb_ident.diagnose.forward.forward import ForwardModel
 from tpjb_ident.diagnose.forward.workers import Map
 from tpjb_ident.diagnose.search.assessment import Linear, assess
-from tpjb_ident.diagnose.search.descend import TIGHT, attempt, slope
+from tpjb_ident.diagnose.search.course import NODES, Course, course_through
+from tpjb_ident.diagnose.search.descend import attempt, slope
 from tpjb_ident.diagnose.search.fit import Fit, Start
 from tpjb_ident.diagnose.search.problem import Problem
 
@@ -21,9 +22,6 @@ from tpjb_ident.diagnose.search.problem import Problem
 SHARES = (1.0, 0.1, 0.01, 0.001)
 #: Effects that solve the pads' own heat or bending: seconds a run, and nearly linear at any size that a rig has.
 SLOW = frozenset({"pad_bending", "pad_conduction"})
-#: Amplitudes at which a candidate's course is told, in typical sizes: the nearest where a rig is expected, the others
-#: where a large effect lies.
-ALONG = (0.8, -0.8, 2.4, -2.4)
 
 
 @dataclass(frozen=True)
@@ -46,6 +44,7 @@ class Score:
 
 
 Columns = Mapping[Candidate, FloatArray]
+Courses = Mapping[Candidate, Course]
 
 
 @dataclass(frozen=True)
@@ -58,13 +57,13 @@ class Survey:
         Change of the prediction per unit of every amplitude, over a step of a size that one would expect.
     slopes : mapping of Candidate to (n, k) ndarray
         The same at the model itself where the curvature is known.
-    curved : mapping of Candidate to (n, m) ndarray
-        Coefficients of the second and higher powers of the amplitude, of candidates of one amplitude.
+    courses : mapping of Candidate to Course
+        Of candidates of one amplitude.
     """
 
     secants: Columns
     slopes: Columns
-    curved: Columns
+    courses: Courses
 
 
 def survey(run: Map, model: Fit, pool: Sequence[Candidate]) -> Survey:
@@ -85,17 +84,19 @@ def survey(run: Map, model: Fit, pool: Sequence[Candidate]) -> Survey:
     order = sorted(pool, key=lambda c: c.name not in SLOW)
     found = dict(zip(order, run(_surveyed, [(slim, model.prediction, c) for c in order]), strict=True))
     secants, slopes = ({c: found[c][i] for c in pool} for i in range(2))
-    return Survey(secants, slopes, {c: found[c][2] for c in pool if found[c][2] is not None})
+    return Survey(secants, slopes, {c: course for c in pool if (course := found[c][2]) is not None})
 
 
 def _surveyed(
     forward: ForwardModel, problem: Problem, model: Start, y: FloatArray, candidate: Candidate
-) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-    """Secants, slopes, and what goes with higher powers where it can be told."""
+) -> tuple[FloatArray, FloatArray, Course | None]:
+    """Secants, slopes, and the course where it can be told."""
     if len(candidate.steps) == 1 and candidate.name not in SLOW:
         course = _course(forward, problem, model, y, candidate)
         if course is not None:
-            return course
+            nearest = int(np.argmin(np.where(course.at == 0.0, np.inf, np.abs(course.at - NODES[0] * candidate.step))))
+            secant = course.columns[:, nearest] / course.at[nearest]
+            return secant[:, None], course.neutral_slope[:, None], course
     parts = [_column(forward, problem, model, y, candidate, i) for i in range(len(candidate.steps))]
     found = np.column_stack(parts)
     return found, found, None
@@ -103,26 +104,22 @@ def _surveyed(
 
 def _course(
     forward: ForwardModel, problem: Problem, model: Start, y: FloatArray, candidate: Candidate
-) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """A polynomial through amplitudes beside the neutral one; None where the model has no equilibrium near it."""
+) -> Course | None:  # fmt: skip
+    """What the model says beside the neutral amplitude; None where it has no equilibrium near it."""
     low, high = (float(v[0]) for v in candidate.limits)
     around, step = candidate.neutral, candidate.step
-    shares: list[float] = []
-    rows: list[FloatArray] = []
-    for share in (s for s in ALONG if low <= around + s * step <= high):
+    asked: list[float] = []
+    changes: list[FloatArray] = []
+    for share in (s for s in NODES if low <= around + s * step <= high):
         start = replace(model, candidates=(*model.candidates, candidate),
                         amplitudes=(*model.amplitudes, np.array([around + share * step])))  # fmt: skip
         other = attempt(forward, problem, start)
-        if other is None and len(rows) < 2:
+        if other is None and len(changes) < 2:
             return None
         if other is not None:
-            shares.append(share * step)
-            rows.append((other - y) / (share * step))
-    if len(rows) < 2:
-        return None
-    powers = np.vander(shares, increasing=True)
-    course = np.linalg.solve(powers / np.abs(powers).max(axis=0), np.array(rows)).T / np.abs(powers).max(axis=0)
-    return rows[0][:, None], course[:, :1], course[:, 1:]
+            asked.append(share * step)
+            changes.append(other - y)
+    return course_through(asked, changes) if len(changes) > 1 else None
 
 
 def columns(run: Map, model: Fit, pool: Sequence[Candidate]) -> dict[Candidate, FloatArray]:
@@ -153,7 +150,7 @@ def _column(
 
 
 def scores(
-    problem: Problem, model: Fit, table: Columns, pairs: bool = False, curved: Columns | None = None
+    problem: Problem, model: Fit, table: Columns, pairs: bool = False, courses: Courses | None = None
 ) -> list[Score]:  # fmt: skip
     """Score candidates, or all pairs of them, beside a model; best first.
 
@@ -163,10 +160,9 @@ def scores(
     model : Fit
     table : mapping of Candidate to (n, k) ndarray
     pairs : bool
-    curved : mapping of Candidate to (n, m) ndarray, optional
-        See `Survey`.
+    courses : mapping of Candidate to Course, optional
     """
-    levels = [_Level(problem, model, table, share, curved or {}) for share in SHARES]
+    levels = [_Level(problem, model, table, share, courses or {}) for share in SHARES]
     pool = list(table)
     chosen: list[tuple[Candidate, ...]] = [(c,) for c in pool]
     if pairs:
@@ -175,33 +171,50 @@ def scores(
     return sorted(found, key=lambda s: -s.gain)
 
 
-def alone(problem: Problem, model: Fit, table: Columns, curved: Columns) -> list[Score]:
-    """Score candidates by what they do nearly alone, best first.
+def alone(problem: Problem, model: Fit, table: Columns, courses: Courses) -> list[Score]:
+    """Score candidates by how much of the squared gap they close with nothing else moved, best first.
 
-    Far from the answer nuisances, linear as they are, take up what a large effect does: here they are as good as known,
-    and the model is as wrong as stated, as in the first steps of a fit.
+    In units of noise and stated tolerance, element by element. What a large effect does is known between the sizes that
+    were asked for to some per cent only, and where a pad comes out of contact to less: correlated errors far below that
+    would hold it against the effect, and nuisances, linear as they are, would take up what it does.
 
     Parameters
     ----------
     problem : Problem
     model : Fit
-    table, curved : mapping of Candidate to (n, k) ndarray
-        See `Survey`.
+    table : mapping of Candidate to (n, k) ndarray
+    courses : mapping of Candidate to Course
     """
-    level = _Level(problem, model, table, None, curved)
-    return sorted((level.score((c,)) for c in table), key=lambda s: -s.gain)
+    gap = problem.scaled(problem.observations.value - model.prediction)
+    return sorted((_closing(problem, gap, c, table[c], courses.get(c)) for c in table), key=lambda s: -s.gain)
+
+
+def _closing(problem: Problem, gap: FloatArray, c: Candidate, column: FloatArray, course: Course | None) -> Score:
+    low, high = ((v - c.origin) / c.width for v in c.limits)
+    if course is None:
+        unit = problem.scaled(column) * c.width
+        moved = np.linalg.solve(unit.T @ unit + np.eye(unit.shape[1]), unit.T @ gap)
+        tried = np.clip(moved, np.maximum(low, -1.0), np.minimum(high, 1.0))[None, :]
+        change = tried @ unit.T
+    else:
+        tried = _grid(low[0], high[0])[:, None]
+        change = course.weights(tried[:, 0] * c.width[0]) @ problem.scaled(course.columns).T
+    left = np.sum((gap - change) ** 2, axis=1) + np.sum(tried**2, axis=1)
+    best = int(np.argmin(left))
+    return Score((c,), 0.5 * float(gap @ gap - left[best]), (c.origin + tried[best] * c.width,))
+
+
+def _grid(low: float, high: float) -> FloatArray:
+    """Amplitudes at which a course is looked at, in units of the prior's width, between bounds in the same."""
+    return np.linspace(max(low, -1.0), min(high, 1.0), 81)
 
 
 class _Level:
-    """Scores at one level of the error scales; at the stated ones, nuisances hardly free, where none is given."""
+    """Scores at one level of the error scales."""
 
-    def __init__(self, problem: Problem, model: Fit, table: Columns, share: float | None, curved: Columns) -> None:
+    def __init__(self, problem: Problem, model: Fit, table: Columns, share: float, courses: Courses) -> None:
         known = model.assessment.linear
-        if share is None:
-            known = replace(known, width=TIGHT * known.width)
-            found = assess(problem.basis, known, problem.basis.stated, fixed=True)
-        else:
-            found = assess(problem.basis, known, np.maximum(model.assessment.scales * share, 1e-5), fixed=True)
+        found = assess(problem.basis, known, np.maximum(model.assessment.scales * share, 1e-5), fixed=True)
         self.offset = found.evidence - model.evidence
         residual = model.assessment.linear.residual
         self.at: dict[Candidate, slice] = {}
@@ -215,26 +228,22 @@ class _Level:
         weighted = found.inverse @ unit
         self.gram, self.toward = unit.T @ weighted, weighted.T @ residual
         self.width = np.concatenate(width)
-        self.courses: dict[Candidate, tuple[FloatArray, FloatArray]] = {}
-        for c in table.keys() & curved.keys():
-            course = np.column_stack([table[c], curved[c]]) * c.width[0] ** np.arange(1, curved[c].shape[1] + 2)
-            whole = problem.scaled(course)
+        self.courses: dict[Candidate, tuple[Course, FloatArray, FloatArray]] = {}
+        for c in table.keys() & courses.keys():
+            whole = problem.scaled(courses[c].columns)
             weighed = found.inverse @ whole
-            self.courses[c] = weighed.T @ residual, whole.T @ weighed
+            self.courses[c] = courses[c], weighed.T @ residual, whole.T @ weighed
 
     def _along(self, c: Candidate) -> Score:
         """Score of one amplitude along its course: the best of a grid, and the Gaussian there."""
-        at = self.at[c].start
-        toward, gram = self.courses[c]
-        low, high = ((float(v[0]) - c.neutral) / self.width[at] for v in c.limits)
-        t = np.linspace(max(low, -1.0), min(high, 1.0), 81)
-        power = np.arange(1, len(toward) + 1)
-        course = t[:, None] ** power
-        slopes = power * t[:, None] ** (power - 1)
+        width = self.width[self.at[c].start]
+        known, toward, gram = self.courses[c]
+        t = _grid(*((float(v[0]) - c.neutral) / width for v in c.limits))
+        course, slopes = known.weights(t * width), known.slope_weights(t * width) * width
         gain = course @ toward - 0.5 * (t**2 + np.einsum("ti,ij,tj->t", course, gram, course))
         gain -= 0.5 * np.log1p(np.einsum("ti,ij,tj->t", slopes, gram, slopes))
         best = int(np.argmax(gain))
-        return Score((c,), float(gain[best]) + self.offset, (np.array([c.neutral + t[best] * self.width[at]]),))
+        return Score((c,), float(gain[best]) + self.offset, (np.array([c.neutral + t[best] * width]),))
 
     def score(self, chosen: tuple[Candidate, ...]) -> Score:
         if len(chosen) == 1 and chosen[0] in self.courses:
@@ -257,7 +266,7 @@ class _Level:
         return Score(chosen, gain + self.offset, tuple(amplitudes))
 
 
-def with_model(model: Fit, score: Score, table: Columns, curved: Columns | None = None) -> Start:
+def with_model(model: Fit, score: Score, table: Columns, courses: Courses | None = None) -> Start:
     """Start of a fit of a model with what was scored.
 
     Parameters
@@ -268,16 +277,12 @@ def with_model(model: Fit, score: Score, table: Columns, curved: Columns | None 
         What was scored beside the model.
     table : mapping of Candidate to array
         Derivatives by candidate, (n, k) each.
-    curved : mapping, optional
-        Higher powers of their amplitudes; see `Survey`.
+    courses : mapping of Candidate to Course, optional
     """
     parts = []
     for c, amplitudes in zip(score.candidates, score.amplitudes, strict=True):
-        course = (curved or {}).get(c)
-        parts.append(table[c])
-        if course is not None:
-            power = np.arange(2, course.shape[1] + 2)
-            parts[-1] = table[c] + (course @ (power * (amplitudes[0] - c.neutral) ** (power - 1)))[:, None]
+        course = (courses or {}).get(c)
+        parts.append(table[c] if course is None else course.slope(amplitudes[0] - c.neutral)[:, None])
     jacobian = np.column_stack([model.jacobian, *parts])
     return Start((*model.candidates, *score.candidates), (*model.amplitudes, *score.amplitudes), jacobian,
                  model.nuisance, model.columns)  # fmt: skip

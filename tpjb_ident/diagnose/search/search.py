@@ -14,12 +14,24 @@ from tpjb_ident.diagnose.forward.workers import Map
 from tpjb_ident.diagnose.search.descend import fit
 from tpjb_ident.diagnose.search.fit import Fit, Start, fitted
 from tpjb_ident.diagnose.search.problem import Problem
-from tpjb_ident.diagnose.search.screen import Columns, Score, alone, columns, instead, scores, survey, with_model
+from tpjb_ident.diagnose.search.screen import (
+    Columns,
+    Courses,
+    Score,
+    alone,
+    columns,
+    instead,
+    scores,
+    survey,
+    with_model,
+)
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.diagnose.search.settle import settle
 from tpjb_ident.diagnose.search.worth import STAND_IN, Worth, worth
 
 Progress = Callable[[str, float], None]
+#: Log evidence [nats] below which two fits of the same candidates are one.
+CLEARLY = 1.0
 #: How often another explanation may take the place of one effect of the model.
 SWAPS = 2
 #: How often a model takes derivatives of its own while the search goes on.
@@ -91,14 +103,14 @@ def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Pro
     # what is off by two tolerances at once acts no longer to first order: a bearing that is merely off must not need
     # an effect for that
     baseline = settle(run, problem, drawn)
-    hunt = _Hunt(run, problem, settings, drawn, [baseline], first.slopes, first.curved)
+    hunt = _Hunt(run, problem, settings, drawn, [baseline], first.slopes, first.courses)
     model, singles = hunt.forward(say)
     say("rivals", 0.8)
     rivals: tuple[tuple[Fit, ...], ...] = ()
     for _ in range(SWAPS):
         rivals = hunt.rivals(model, singles)
-        better = max((r for row in rivals for r in row), key=lambda f: f.evidence, default=model)
-        if better.evidence <= model.evidence + 1.0:
+        better = hunt.better(model, [r for row in rivals for r in row])
+        if better is None:
             break
         model = hunt.backward(hunt.refined(better))
     if model.candidates:
@@ -133,20 +145,27 @@ class _Hunt:
     drawn: Fit
     _nothing: list[Fit]
     first: Columns
-    curved: Columns
+    courses: Courses
     _known: dict[tuple[int, int], tuple[Fit, Worth]] = field(default_factory=dict, repr=False)
     _less: dict[tuple[int, int], tuple[Fit, Fit | None]] = field(default_factory=dict, repr=False)
+    _likeliest: dict[str, Fit] = field(default_factory=dict, repr=False)
 
     @property
     def baseline(self) -> Fit:
         """The likeliest model with nothing added that was met so far."""
         return self._nothing[0]
 
+    def likeliest(self, model: Fit) -> Fit:
+        """The likeliest fit of a model's candidates that was met so far; the model itself if none is much better."""
+        known = self._likeliest.get(model.label, model) if model.candidates else self.baseline
+        return known if known.evidence > model.evidence + CLEARLY else model
+
     def forward(self, say: Progress) -> tuple[Fit, tuple[Fit, ...]]:
         """Add what unseen points want, one at a time or two at once; drop what they do not want any more."""
         model, table = self.baseline, self.first
         singles: tuple[Fit, ...] = ()
-        for count in range(self.settings.most_effects):
+        count, again = 0, {""}
+        while count < self.settings.most_effects:
             say(f"fits, effect {count + 1}", 0.2 + 0.2 * count)
             tried = self.extended(model, table)
             if not count:
@@ -161,12 +180,20 @@ class _Hunt:
             singles = singles or tuple(self.best(tried))
             chosen = self.chosen(model, tried)
             if chosen is None:
-                break
+                likelier = self.likeliest(model)
+                if not count or likelier is model or model.label in again:
+                    break
+                # one effect more only showed where the others have their place
+                again.add(model.label)
+                model = settle(self.run, self.problem, likelier)
+                table = self.renewed(model)
+                continue
             chosen = chosen if any(chosen is f for f in near) else self.refined(chosen)
             model = self.backward(settle(self.run, self.problem, chosen))
             if len(model.candidates) <= count:
                 break
             table = self.renewed(model)
+            count += 1
         return model, singles
 
     def leading(self, model: Fit, first: Sequence[Fit]) -> list[Fit]:
@@ -179,17 +206,32 @@ class _Hunt:
         """The best that unseen points want; an effect of the library before a generic term that does no better."""
         best: Fit | None = None
         for f in sorted(tried, key=lambda f: -f.evidence):
-            if best is not None:
-                # three free numbers of a term take up part of what a second effect does
-                least = max(self.settings.alike, self.settings.spare * (best.evidence - model.evidence))
-                if f.evidence < best.evidence - least:
-                    break
+            # two effects that are each wanted beside the other may still explain less than the one that is there
+            if f.evidence <= self.likeliest(model).evidence:
+                break
+            if best is not None and f.evidence < best.evidence - self._spared(best, model):
+                break
             generic = bool(f.names & set(TERMS))
             if (best is None or not generic) and self.all_wanted(f, model):
                 if not generic:
                     return f
                 best = f
         return best
+
+    def _spared(self, found: Fit, model: Fit) -> float:
+        """Log evidence that an effect of the library may lack beside a fit with generic terms to be taken before it."""
+        # three free numbers of a term take up part of what a second effect does
+        return max(self.settings.alike, self.settings.spare * (found.evidence - model.evidence))
+
+    def better(self, model: Fit, rivals: Sequence[Fit]) -> Fit | None:
+        """The likeliest rival that explains more than a model, or as much with fewer generic terms."""
+        terms = sum(c.name in TERMS for c in model.candidates)
+        least = model.evidence - self._spared(model, self.baseline)
+        for r in sorted(rivals, key=lambda f: -f.evidence):
+            fewer = sum(c.name in TERMS for c in r.candidates) < terms
+            if r.evidence > (least if fewer else model.evidence + CLEARLY):
+                return r
+        return None
 
     def all_wanted(self, found: Fit, model: Fit) -> bool:
         """Whether unseen points want every candidate that is new in a fit."""
@@ -239,6 +281,8 @@ class _Hunt:
             model.nuisance, model.columns,
         )  # fmt: skip
         less = next(iter(self.run(fit, [(start,)])))
+        if keep and less is not None:
+            self._likeliest[less.label] = max(self._likeliest.get(less.label, less), less, key=lambda f: f.evidence)
         if keep or less is None:
             return less if keep else self.baseline
         if model.evidence - max(less.evidence, self.baseline.evidence) > HOPELESS:
@@ -281,19 +325,18 @@ class _Hunt:
     def extended(self, model: Fit, table: Columns) -> list[Fit]:
         """Fits of a model with one candidate more, best first."""
         free = {c: v for c, v in table.items() if c.label not in {o.label for o in model.candidates}}
-        every = scores(self.problem, model, free, curved=self.curved)
+        every = scores(self.problem, model, free, courses=self.courses)
         ranked = self.promising(every)
         if model is self.drawn:
             # a fit of a large effect may end on either side of a hill: it begins at both sizes that were proposed
             known = {s.candidates for s in ranked}
-            first = alone(self.problem, model, free, self.curved)[:ALONE]
+            first = alone(self.problem, model, free, self.courses)[:ALONE]
             names = {s.candidates for s in first} - known
             ranked = [*ranked, *first, *(s for s in every if s.candidates in names)]
-            return self.best(self.fits([with_model(model, s, free, self.curved) for s in ranked]))
-        starts = [with_model(model, s, free, self.curved) for s in ranked]
-        if model.candidates:
-            known = {s.candidates for s in ranked}
-            starts += [s for s in instead(self.problem, model, free, STAND_IN) if s.candidates[-1:] not in known]
+            return self.best(self.fits([with_model(model, s, free, self.courses) for s in ranked]))
+        starts = [with_model(model, s, free, self.courses) for s in ranked]
+        known = {s.candidates for s in ranked}
+        starts += [s for s in instead(self.problem, model, free, STAND_IN) if s.candidates[-1:] not in known]
         return self.fits(starts)
 
     def best(self, fits: Sequence[Fit]) -> list[Fit]:
@@ -349,7 +392,7 @@ class _Hunt:
         labels = {c.label for c in model.candidates}
         table = {c: v for c, v in self.first.items() if c.label not in labels}
         best = [
-            s.candidates[0] for s in scores(self.problem, model, table, curved=self.curved)[: 2 * self.settings.tried]
+            s.candidates[0] for s in scores(self.problem, model, table, courses=self.courses)[: 2 * self.settings.tried]
         ]
         return table | columns(self.run, model, best)
 
@@ -365,6 +408,9 @@ class _Hunt:
                 continue
             used = {gone.label, *(o.label for o in rest.candidates)}
             table = {c: v for c, v in self.first.items() if c.label not in used}
-            best = [s for s in scores(self.problem, rest, table, curved=self.curved) if s.gain > 0.0][:RIVALS]
-            out.append(tuple(self.fits([with_model(rest, s, table, self.curved) for s in best])))
+            best = [s for s in scores(self.problem, rest, table, courses=self.courses) if s.gain > 0.0][:RIVALS]
+            found = self.fits([with_model(rest, s, table, self.courses) for s in best])
+            if gone.name in TERMS:  # an effect that lies off its grid does not do what free numbers do
+                found = self.run.together([functools.partial(self.refined, f) for f in found])
+            out.append(tuple(found))
         return tuple(out)

@@ -1,0 +1,119 @@
+"""Course: what one amplitude does to the prediction, over all sizes that a rig may have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from tpjb_ident.arrays import FloatArray
+
+#: Amplitudes at which a course is asked for, in typical sizes: the nearest where a rig is expected, the others as far
+#: as the prior reaches (`candidates.PRIOR_WIDTH`).
+NODES = (0.8, -0.8, 1.6, -1.6, 3.0, -3.0)
+
+
+@dataclass(frozen=True)
+class Course:
+    """Change of a prediction along one amplitude: cubic pieces between amplitudes at which the model was asked.
+
+    Pieces that rise where their ends rise (Fritsch & Carlson, SIAM J. Numer. Anal. 17 (1980) 238): a pad that comes out
+    of contact lets K and C jump, at another amplitude for every load, and one polynomial through all of it is wrong
+    everywhere.
+
+    Attributes
+    ----------
+    at : (m,) ndarray
+        Amplitudes, counted from the neutral one, which is among them; rising.
+    columns : (n, 2 m) ndarray
+        Changes of the prediction there, then its derivatives.
+    """
+
+    at: FloatArray
+    columns: FloatArray
+
+    def weights(self, amplitudes: FloatArray) -> FloatArray:
+        """Weights of the columns in the change at some amplitudes, (k, 2 m); straight lines beyond the ends.
+
+        Parameters
+        ----------
+        amplitudes : (k,) ndarray
+        """
+        return self._pieces(amplitudes, _VALUE)
+
+    def slope_weights(self, amplitudes: FloatArray) -> FloatArray:
+        """Weights of the columns in the derivative at some amplitudes, (k, 2 m).
+
+        Parameters
+        ----------
+        amplitudes : (k,) ndarray
+        """
+        return self._pieces(amplitudes, _SLOPE)
+
+    def slope(self, amplitude: float) -> FloatArray:
+        """Derivative at an amplitude, (n,).
+
+        Parameters
+        ----------
+        amplitude : float
+        """
+        return np.asarray(self.columns @ self.slope_weights(np.array([amplitude]))[0])
+
+    @property
+    def neutral_slope(self) -> FloatArray:
+        """Derivative where nothing happens yet, of a parabola through the neighbours, (n,)."""
+        here = int(np.searchsorted(self.at, 0.0))
+        known = [i for i in (here - 1, here, here + 1) if 0 <= i < len(self.at)]
+        if len(known) < 3:
+            known = list(range(3)) if here == 0 else list(range(len(self.at) - 3, len(self.at)))
+        scale = float(np.abs(self.at[known]).max())
+        powers = np.vander(self.at[known] / scale, 3, increasing=True)
+        return np.asarray(np.linalg.solve(powers, self.columns[:, known].T)[1] / scale)
+
+    def _pieces(self, amplitudes: FloatArray, basis: FloatArray) -> FloatArray:
+        count = len(self.at)
+        inside = np.clip(amplitudes, self.at[0], self.at[-1])
+        left = np.clip(np.searchsorted(self.at, inside, side="right") - 1, 0, count - 2)
+        length = self.at[left + 1] - self.at[left]
+        u = (inside - self.at[left]) / length
+        # of value at left, value at right, derivative at left, derivative at right
+        parts = (u[:, None] ** np.arange(4)) @ basis
+        if basis is _VALUE:
+            parts[:, 2:] *= length[:, None]
+            parts += (amplitudes - inside)[:, None] * self._end(inside, length)
+        else:
+            parts[:, :2] /= length[:, None]
+        out = np.zeros((len(amplitudes), 2 * count))
+        rows = np.arange(len(amplitudes))
+        for column, at in enumerate((left, left + 1, count + left, count + left + 1)):
+            out[rows, at] = parts[:, column]
+        return out
+
+    def _end(self, inside: FloatArray, length: FloatArray) -> FloatArray:
+        u = (inside == self.at[-1]).astype(float)
+        parts = (u[:, None] ** np.arange(4)) @ _SLOPE
+        parts[:, :2] /= length[:, None]
+        return np.asarray(parts)
+
+
+#: Cubic Hermite pieces by powers of the place within the piece, rows 1, u, u^2, u^3.
+_VALUE = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [-3, 3, -2, -1], [2, -2, 1, 1]])
+_SLOPE = np.array([[0.0, 0, 1, 0], [-6, 6, -4, -2], [6, -6, 3, 3], [0, 0, 0, 0]])
+
+
+def course_through(amplitudes: Sequence[float], changes: Sequence[FloatArray]) -> Course:
+    """Lay a course through what the model said.
+
+    Parameters
+    ----------
+    amplitudes : sequence of float
+        Counted from the neutral one, which is not among them; two or more.
+    changes : sequence of (n,) ndarray
+        Of the prediction.
+    """
+    order = np.argsort([0.0, *amplitudes])
+    at = np.array([0.0, *amplitudes])[order]
+    values = np.array([np.zeros_like(changes[0]), *changes])[order]
+    return Course(at, np.hstack([values.T, PchipInterpolator(at, values, axis=0).derivative()(at).T]))
