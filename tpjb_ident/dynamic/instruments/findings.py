@@ -60,6 +60,9 @@ class InstrumentFindings:
         if self.start:
             late = Balance(est.omega * self.start)
             found["start of the clocks"] = late.spread(est)
+        doubt = self.clocks.doubt(data)
+        if doubt:
+            found["rate of the clocks"] = Balance(est.omega * doubt).spread(est)
         return found
 
     def _balance(self, data: PointData) -> Balance:

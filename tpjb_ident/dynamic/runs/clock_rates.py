@@ -69,6 +69,17 @@ class ClockRates:
         A = data.A * np.exp(-1j * self.acceleration * phase)[:, None]
         return replace(data, F=cells + mass * A, A=A)
 
+    def doubt(self, data: PointData) -> float:
+        """Standard deviation of the cells' lag [s] that the error of the rate leaves, in the middle of the windows.
+
+        Parameters
+        ----------
+        data : PointData
+        """
+        if not self.force:
+            return 0.0
+        return self.error * float(np.mean(np.concatenate([run.start + 0.5 * run.length for run in data.runs])))
+
     def conditions(self) -> tuple[Condition, ...]:
         """What to say of it at every point."""
         if not (self.force or self.acceleration):
