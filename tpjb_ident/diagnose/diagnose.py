@@ -22,7 +22,8 @@ from tpjb_ident.diagnose.observations.observe import Observations
 from tpjb_ident.diagnose.observations.thinned import thinned
 from tpjb_ident.diagnose.search.fit import Fit
 from tpjb_ident.diagnose.search.problem import Problem, loosened
-from tpjb_ident.diagnose.search.search import Progress, Search, search
+from tpjb_ident.diagnose.search.search import Search, search
+from tpjb_ident.diagnose.search.selection import Progress
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.diagnose.verdict.decide import decide
 from tpjb_ident.diagnose.verdict.verdict import Verdict

@@ -98,7 +98,15 @@ class Weighing:
     slack: float = 1.0
 
     def assess(self, problem: Problem, start: Start, y: FloatArray) -> Assessment:
-        """What a place is worth."""
+        """What a place is worth.
+
+        Parameters
+        ----------
+        problem : Problem
+        start : Start
+        y : (n,) ndarray
+            What the model predicts there.
+        """
         return assess(self.basis, linear(problem, start, y, self.slack), self.scales, fixed=True)
 
 

@@ -1,0 +1,394 @@
+"""Selection: effects are added forward and dropped backward as unseen points want it; rivals of all that stay."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.diagnose.forward.candidates import TERMS, Candidate
+from tpjb_ident.diagnose.forward.workers import Map
+from tpjb_ident.diagnose.search.descend import fit
+from tpjb_ident.diagnose.search.fit import Fit, Start, fitted
+from tpjb_ident.diagnose.search.problem import Problem
+from tpjb_ident.diagnose.search.screen import (
+    Columns,
+    Courses,
+    Score,
+    alone,
+    columns,
+    instead,
+    scores,
+    with_model,
+)
+from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+from tpjb_ident.diagnose.search.settle import settle
+from tpjb_ident.diagnose.search.worth import STAND_IN, Worth, worth
+
+Progress = Callable[[str, float], None]
+#: Log evidence [nats] below which two fits of the same candidates are one.
+CLEARLY = 1.0
+#: How often a model takes derivatives of its own while the search goes on.
+ROUNDS_ON_THE_WAY = 2
+#: Candidates of every round that are compared with derivatives of their own.
+FIRST = 3
+#: Of these, the ones that may yet be the best: derivatives from elsewhere mistake a fit by up to 25 nats where it rises
+#: by as many, and by a third of its rise where that is large (`docs/diagnosis.md`).
+NEAR, HALF = 30.0, 0.5
+#: Evidence [nats] that no tolerance makes up once an effect is taken away: 45 at the most in all samples.
+HOPELESS = 100.0
+#: Candidates that are fitted since they explain most by themselves, whatever else may be off.
+ALONE = 3
+#: Pairs of candidates that are fitted from the baseline: forward selection can begin with a compromise.
+PAIRS = 2
+#: Candidates that are fitted in the place of every effect of the model.
+RIVALS = 3
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Steps of a search, and what they have at hand.
+
+    Attributes
+    ----------
+    run : Map
+    problem : Problem
+    settings : DiagnoseSettings
+    drawn : Fit
+        The model as drawn, everything that may be off to first order.
+    first : dict of Candidate to (n, k) ndarray
+        Derivatives of every candidate there.
+    courses : dict of Candidate to Course
+    """
+
+    run: Map
+    problem: Problem
+    settings: DiagnoseSettings
+    drawn: Fit
+    _nothing: list[Fit]
+    first: Columns
+    courses: Courses
+    _known: dict[tuple[int, int], tuple[Fit, Worth]] = field(default_factory=dict, repr=False)
+    _less: dict[tuple[int, int], tuple[Fit, Fit | None]] = field(default_factory=dict, repr=False)
+    _places: dict[str, Fit] = field(default_factory=dict, repr=False)
+
+    @property
+    def baseline(self) -> Fit:
+        """The likeliest model with nothing added that was met so far."""
+        return self._nothing[0]
+
+    def _likeliest(self, model: Fit) -> Fit:
+        """The likeliest fit of a model's candidates that was met so far; the model itself if none is much better."""
+        known = self._places.get(model.label, model) if model.candidates else self.baseline
+        return known if known.evidence > model.evidence + CLEARLY else model
+
+    def forward(self, say: Progress) -> tuple[Fit, tuple[Fit, ...]]:
+        """Add what unseen points want, one at a time or two at once; drop what they do not want any more.
+
+        Parameters
+        ----------
+        say : callable
+            Called with a text and a share done.
+        """
+        model, table = self.baseline, self.first
+        singles: tuple[Fit, ...] = ()
+        count, again = 0, {""}
+        while count < self.settings.most_effects:
+            say(f"fits, effect {count + 1}", 0.2 + 0.2 * count)
+            tried = self._extended(model, table)
+            if not count:
+                tried = self._best([*tried, *self._extended(self.drawn, table)])
+            if count == 1:
+                tried = sorted([*tried, *self._pairs(singles)], key=lambda f: -f.evidence)
+            # what may be off acts otherwise beside a large effect, and a direction between those of the grid does not
+            # show its worth: the likeliest are told with derivatives and directions of their own
+            lead = self._leading(model, tried[:FIRST])
+            near = self.run.together([functools.partial(self.refined, f) for f in lead])
+            tried = [*near, *tried[len(near) :]]
+            singles = singles or tuple(self._best(tried))
+            chosen = self._chosen(model, tried)
+            if chosen is None:
+                likelier = self._likeliest(model)
+                if not count or likelier is model or model.label in again:
+                    break
+                # one effect more only showed where the others have their place
+                again.add(model.label)
+                model = settle(self.run, self.problem, likelier)
+                table = self._renewed(model)
+                continue
+            chosen = chosen if any(chosen is f for f in near) else self.refined(chosen)
+            model = self.backward(settle(self.run, self.problem, chosen))
+            if len(model.candidates) <= count:
+                break
+            table = self._renewed(model)
+            count += 1
+        return model, singles
+
+    def _leading(self, model: Fit, first: Sequence[Fit]) -> list[Fit]:
+        """Those of the first fits that may yet be the best."""
+        best = first[0].evidence if first else 0.0
+        least = best - max(NEAR, HALF * (best - model.evidence))
+        return [f for f in first if f.evidence > least]
+
+    def _chosen(self, model: Fit, tried: Sequence[Fit]) -> Fit | None:
+        """The best that unseen points want; an effect of the library before a generic term that does no better."""
+        best: Fit | None = None
+        for f in sorted(tried, key=lambda f: -f.evidence):
+            # two effects that are each wanted beside the other may still explain less than the one that is there
+            if f.evidence <= self._likeliest(model).evidence:
+                break
+            if best is not None and f.evidence < best.evidence - self._spared(best, model):
+                break
+            generic = bool(f.names & set(TERMS))
+            if (best is None or not generic) and self._all_wanted(f, model):
+                if not generic:
+                    return f
+                best = f
+        return best
+
+    def _spared(self, found: Fit, model: Fit) -> float:
+        """Log evidence that an effect of the library may lack beside a fit with generic terms to be taken before it."""
+        # three free numbers of a term take up part of what a second effect does
+        return max(self.settings.alike, self.settings.spare * (found.evidence - model.evidence))
+
+    def better(self, model: Fit, rivals: Sequence[Fit]) -> Fit | None:
+        """The likeliest rival that explains more than a model, or as much with fewer generic terms.
+
+        Parameters
+        ----------
+        model : Fit
+        rivals : sequence of Fit
+        """
+        terms = sum(c.name in TERMS for c in model.candidates)
+        least = model.evidence - self._spared(model, self.baseline)
+        for r in sorted(rivals, key=lambda f: -f.evidence):
+            fewer = sum(c.name in TERMS for c in r.candidates) < terms
+            if r.evidence > (least if fewer else model.evidence + CLEARLY):
+                return r
+        return None
+
+    def _all_wanted(self, found: Fit, model: Fit) -> bool:
+        """Whether unseen points want every candidate that is new in a fit."""
+        new = [c for c in found.candidates if c not in model.candidates]
+        if len(new) == 1 and set(found.candidates) - set(new) == set(model.candidates):
+            if not self._enough(worth(self.problem, found, model, new[0])):
+                return False
+            return self._enough(self.worth_in(found, found.candidates.index(new[0])))
+        return all(self._enough(self.worth_in(found, i)) for i in range(len(found.candidates)))
+
+    def _enough(self, value: Worth) -> bool:
+        """Whether an effect is worth its place."""
+        return value.unseen > self.settings.wanted and value.beside > self.settings.exceeds
+
+    def worth_in(self, model: Fit, index: int) -> Worth:
+        """What one candidate of a model is worth: the others are fitted again without it.
+
+        Parameters
+        ----------
+        model : Fit
+        index : int
+            Of the candidate.
+        """
+        known = self._known.get((id(model), index))
+        if known is None:
+            # the model is kept with the answer: its number must not be given to another one
+            known = self._known[(id(model), index)] = model, self._worth_in(model, index)
+        return known[1]
+
+    def _worth_in(self, model: Fit, index: int) -> Worth:
+        less = self.without(model, index)
+        if less is None:
+            return Worth(np.inf, np.inf)
+        value = worth(self.problem, model, less, model.candidates[index])
+        if self._enough(value) and less is not self.baseline and value.beside < HOPELESS:
+            # what may be off does without the effect all that it can, not to first order only, and from where it
+            # stands beside the effect too: else an effect is named for what a tolerance does
+            less = settle(self.run, self.problem, less, ROUNDS_ON_THE_WAY)
+            value = worth(self.problem, model, less, model.candidates[index])
+        return value
+
+    def without(self, model: Fit, index: int) -> Fit | None:
+        """A model without one of its candidates, the others fitted again.
+
+        Parameters
+        ----------
+        model : Fit
+        index : int
+            Of the candidate.
+        """
+        known = self._less.get((id(model), index))
+        if known is None:
+            known = self._less[(id(model), index)] = model, self._without(model, index)
+        return known[1] if len(model.candidates) > 1 else self.baseline
+
+    def _without(self, model: Fit, index: int) -> Fit | None:
+        keep = [i for i in range(len(model.candidates)) if i != index]
+        start = Start(
+            tuple(model.candidates[i] for i in keep), tuple(model.amplitudes[i] for i in keep),
+            np.column_stack([model.jacobian[:, :0], *(model.jacobian[:, model.slices[i]] for i in keep)]),
+            model.nuisance, model.columns,
+        )  # fmt: skip
+        less = next(iter(self.run(fit, [(start,)])))
+        if keep and less is not None:
+            self._places[less.label] = max(self._places.get(less.label, less), less, key=lambda f: f.evidence)
+        if keep or less is None:
+            return less if keep else self.baseline
+        if model.evidence - max(less.evidence, self.baseline.evidence) > HOPELESS:
+            return self.baseline
+        # the way from an effect back to nothing may end at a better place than the way from the drawing
+        self._nothing[:] = self._best([self.baseline, settle(self.run, self.problem, less)])[:1]
+        return self.baseline
+
+    def kept(self, model: Fit) -> Fit:
+        """The model itself, or less of it where its last derivatives take an effect's worth away.
+
+        Parameters
+        ----------
+        model : Fit
+        """
+        model = self.backward(model)
+        if len(model.candidates) == 1 and not self._enough(self.worth_in(model, 0)):
+            return self.baseline
+        return model
+
+    def named(self, model: Fit) -> Fit:
+        """A model without its generic terms.
+
+        Parameters
+        ----------
+        model : Fit
+        """
+        terms = [i for i, c in enumerate(model.candidates) if c.name in TERMS]
+        if not terms:
+            return model
+        if len(terms) == len(model.candidates):
+            return self.baseline
+        for i in reversed(terms):
+            model = self.without(model, i) or model
+        return settle(self.run, self.problem, model)
+
+    def backward(self, model: Fit) -> Fit:
+        """Drop what unseen points do not want once the others are there.
+
+        Parameters
+        ----------
+        model : Fit
+        """
+        while len(model.candidates) > 1:
+            values = [self.worth_in(model, i) for i in range(len(model.candidates))]
+            weak = [i for i, v in enumerate(values) if not self._enough(v)]
+            if not weak:
+                return model
+            less = self.without(model, min(weak, key=lambda i: values[i].unseen))
+            if less is None:
+                return model
+            model = settle(self.run, self.problem, less)
+        return model
+
+    def _extended(self, model: Fit, table: Columns) -> list[Fit]:
+        """Fits of a model with one candidate more, best first."""
+        free = {c: v for c, v in table.items() if c.label not in {o.label for o in model.candidates}}
+        every = scores(self.problem, model, free, courses=self.courses)
+        ranked = self._promising(every)
+        if model is self.drawn:
+            # a fit of a large effect may end on either side of a hill: it begins at both sizes that were proposed
+            known = {s.candidates for s in ranked}
+            first = alone(self.problem, model, free, self.courses)[:ALONE]
+            names = {s.candidates for s in first} - known
+            ranked = [*ranked, *first, *(s for s in every if s.candidates in names)]
+            return self._best(self._fits([with_model(model, s, free, self.courses) for s in ranked]))
+        starts = [with_model(model, s, free, self.courses) for s in ranked]
+        known = {s.candidates for s in ranked}
+        starts += [s for s in instead(self.problem, model, free, STAND_IN) if s.candidates[-1:] not in known]
+        return self._fits(starts)
+
+    def _best(self, fits: Sequence[Fit]) -> list[Fit]:
+        """The better fit of every set of candidates, best first."""
+        kept: dict[str, Fit] = {}
+        for f in sorted(fits, key=lambda f: -f.evidence):
+            kept.setdefault(f.label, f)
+        return list(kept.values())
+
+    def _promising(self, ranked: Sequence[Score]) -> list[Score]:
+        """The best, and the best of every other effect that promises a fair share: a first step can mislead."""
+        chosen = list(ranked[: self.settings.tried])
+        names = {s.candidates[0].name for s in chosen}
+        for s in ranked[self.settings.tried :]:
+            if s.gain > 0.3 * ranked[0].gain and s.candidates[0].name not in names:
+                chosen.append(s)
+                names.add(s.candidates[0].name)
+        # what it is worth is told by the fit
+        return [s for s in chosen if s.gain > 0.0]
+
+    def _pairs(self, singles: Sequence[Fit]) -> list[Fit]:
+        """Fits of two candidates at once from the baseline: what a compromise between two would hide."""
+        table = dict(self.first)
+        for f in singles:  # the secant of a fit tells more than the derivative at the baseline
+            (c,), (a,) = f.candidates, f.amplitudes
+            if len(a) == 1 and abs(a[0] - c.neutral) > 1e-3 * c.step:
+                alone = f.prediction - f.columns @ f.nuisance - self.problem.base
+                table[c] = alone[:, None] / (a[0] - c.neutral)
+        ranked = scores(self.problem, self.drawn, table, pairs=True)[:PAIRS]
+        return self._fits([with_model(self.drawn, s, table) for s in ranked])
+
+    def _fits(self, starts: Sequence[Start]) -> list[Fit]:
+        """Fits from their starts, best first."""
+        found = self.run(fit, [(start,) for start in starts])
+        return sorted((f for f in found if f is not None), key=lambda f: -f.evidence)
+
+    def refined(self, model: Fit) -> Fit:
+        """The same model with directions off their grid and derivatives of its own.
+
+        Parameters
+        ----------
+        model : Fit
+        """
+        swapped = tuple(c.refined() for c in model.candidates)
+        if swapped != model.candidates:
+            parts, amplitudes = [], []
+            for old, new, a, at in zip(model.candidates, swapped, model.amplitudes, model.slices, strict=True):
+                more = len(new.free) - len(old.free) if not new.form else 0
+                parts.append(np.column_stack([model.jacobian[:, at], np.zeros((len(model.prediction), more))]))
+                amplitudes.append(np.append(a, [new.about.get("direction", 0.0)] * more))
+            model = replace(model, candidates=swapped, amplitudes=tuple(amplitudes), jacobian=np.column_stack(parts))
+            start = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
+            model = fitted(self.problem, start, model.prediction, model.assessment.scales)
+        return settle(self.run, self.problem, model, ROUNDS_ON_THE_WAY)
+
+    def _renewed(self, model: Fit) -> dict[Candidate, FloatArray]:
+        """Derivatives at a model: new ones for the candidates that rank best by those of the baseline."""
+        labels = {c.label for c in model.candidates}
+        table = {c: v for c, v in self.first.items() if c.label not in labels}
+        best = [
+            s.candidates[0] for s in scores(self.problem, model, table, courses=self.courses)[: 2 * self.settings.tried]
+        ]
+        return table | columns(self.run, model, best)
+
+    def rivals(self, model: Fit, singles: Sequence[Fit]) -> tuple[tuple[Fit, ...], ...]:
+        """For every candidate of a model, fits in which another one takes its place.
+
+        Parameters
+        ----------
+        model : Fit
+        singles : sequence of Fit
+            Fits of one candidate each.
+        """
+        if len(model.candidates) == 1:
+            return (tuple(f for f in singles if f.label != model.label),)
+        out: list[tuple[Fit, ...]] = []
+        for index, gone in enumerate(model.candidates):
+            rest = self.without(model, index)
+            if rest is None:
+                out.append(())
+                continue
+            used = {gone.label, *(o.label for o in rest.candidates)}
+            table = {c: v for c, v in self.first.items() if c.label not in used}
+            best = [s for s in scores(self.problem, rest, table, courses=self.courses) if s.gain > 0.0][:RIVALS]
+            found = self._fits([with_model(rest, s, table, self.courses) for s in best])
+            if gone.name in TERMS:  # an effect that lies off its grid does not do what free numbers do
+                found = self.run.together([functools.partial(self.refined, f) for f in found])
+            out.append(tuple(found))
+        return tuple(out)
