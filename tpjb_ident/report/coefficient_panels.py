@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, Literal
 
 from tpjb_ident.report.figure import Panel, panel
@@ -36,6 +37,6 @@ def coefficient_panels(table: pd.DataFrame) -> list[Panel]:
         for names, kind in ((DIRECT, "Stiffness and damping"), (CROSS, "Cross-coupled stiffness and damping")):
             for name in names:
                 title = f"{name} ({KINDS[name[0]].quantity}) over {over}, at {where(series, over)}"
-                figure = coefficient(table, name, over=over)
+                figure = functools.partial(coefficient, table, name, over=over)
                 panels.append(panel(f"{name}-over-{over}", title, figure, f"{kind} over {over}"))
     return panels

@@ -11,7 +11,7 @@ import io
 import itertools
 import multiprocessing
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from tpjb_ident.runtime.tables import write_atomic, write_text
 
 PNG_DPI = 160
 _FONT = re.compile(r"font: (?:(italic|oblique) )?(?:(bold|\d+) )?([\d.]+)px [^;\"]*")
+_SIZE = re.compile(r'viewBox="0 0 ([\d.]+) ([\d.]+)"')
 _ID = re.compile(r"(\bid=\"|href=\"#|url\(#)([^\")]+)")
 
 
@@ -38,26 +39,37 @@ class Panel:
         File name without suffix, and anchor in the report.
     title : str
         What it shows, in words.
-    figure : Figure
+    drawing : callable
+        Makes the figure; not before somebody asks for it, so that several processes share that too.
     group : str
         Heading under which it stands.
     """
 
     name: str
     title: str
-    figure: Figure
+    drawing: Callable[[], Figure]
     group: str
 
+    @functools.cached_property
+    def figure(self) -> Figure:
+        """The picture, without its white ground: the page's own shows through."""
+        figure = self.drawing()
+        figure.patch.set_alpha(0.0)
+        return figure
 
-def is_wide(figure: Figure) -> bool:
+
+def is_wide(svg: str) -> bool:
     """Whether a picture holds several panels side by side and wants the whole width of a page.
 
     Parameters
     ----------
-    figure : Figure
+    svg : str
+        As `svg_text` gives it.
     """
-    width, height = figure.get_size_inches()
-    return bool(width > 1.35 * height and width > 6.5)
+    found = _SIZE.search(svg)
+    assert found is not None
+    width, height = float(found[1]), float(found[2])
+    return width > 1.35 * height and width > 6.5 * 72.0
 
 
 #: Panels from which on a second process draws too, and how many processes do at most.
@@ -67,8 +79,8 @@ _drawn: dict[int, tuple[Panel, ...]] = {}
 _numbers = itertools.count()
 
 
-def panel(name: str, title: str, figure: Figure, group: str) -> Panel:
-    """Make a panel of a picture, without its white ground: the page's own shows through.
+def panel(name: str, title: str, figure: Figure | Callable[[], Figure], group: str) -> Panel:
+    """Make a panel of a picture.
 
     Parameters
     ----------
@@ -76,12 +88,12 @@ def panel(name: str, title: str, figure: Figure, group: str) -> Panel:
         File name without suffix.
     title : str
         What it shows, in words.
-    figure : Figure
+    figure : Figure or callable
+        Or what makes it, once it is asked for.
     group : str
         Heading under which it stands.
     """
-    figure.patch.set_alpha(0.0)
-    return Panel(name, title, figure, group)
+    return Panel(name, title, figure if callable(figure) else lambda: figure, group)
 
 
 def svg_text(figure: Figure, name: str) -> str:
@@ -150,7 +162,7 @@ def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:
     number = next(_numbers)
     _drawn[number] = tuple(panels)
     try:
-        # forked: the figures are there already, and a few of them are not worth a second process
+        # forked: what is drawn is there already, and a few panels are not worth a second process
         alone = len(panels) < TOGETHER or "fork" not in multiprocessing.get_all_start_methods()
         with local_workers(1 if alone else min(cores(), MOST_HANDS), start="fork") as opened:
             jobs = [(number, index, folder) for index in range(len(panels))]

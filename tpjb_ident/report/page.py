@@ -112,7 +112,7 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
         lstrip_blocks=True,
     )
     script = environment.get_template("sort.js").render()
-    wide = {p.name for section in page.sections for p in section.panels if is_wide(p.figure)}
+    wide = {p.name for section in page.sections for p in section.panels if is_wide(svg[p.name])}
     drawn = {p.name: _element(svg[p.name], p) for section in page.sections for p in section.panels}
     return environment.get_template("report.html").render(
         page=page,

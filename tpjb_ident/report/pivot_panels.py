@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from tpjb_ident.report.figure import Panel, panel
@@ -31,7 +32,7 @@ def pivot_panels(curves: Sequence[PivotCurve], formula: Formula | None = None) -
     steps = "Load steps and fitted laws, pivot and housing together"
     across = "Load and displacement vectors, and what of them lies on each pad's direction"
     return [
-        panel("pivot-stiffness", bands, pivot_stiffness(curves, formula), GROUP),
-        panel("pivot-steps", steps, load_deflection(curves), GROUP),
-        panel("pivot-projection", across, pad_projection(curves), GROUP),
+        panel("pivot-stiffness", bands, partial(pivot_stiffness, curves, formula), GROUP),
+        panel("pivot-steps", steps, partial(load_deflection, curves), GROUP),
+        panel("pivot-projection", across, partial(pad_projection, curves), GROUP),
     ]

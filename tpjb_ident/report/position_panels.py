@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -43,5 +44,6 @@ def position_panels(
     if polygon is None and nothing:
         return []
     polygons = None if polygon is None else {"measured": polygon} | {f"run {p.run}": p for p in others}
-    figure = clearance_and_locus(polygons, None if nothing else measured, predicted, drawing=drawn)
+    shown = None if nothing else measured
+    figure = functools.partial(clearance_and_locus, polygons, shown, predicted, drawing=drawn)
     return [panel("locus-and-clearance", "Shaft centre locus inside the clearance polygon", figure, GROUP)]

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.drawing.picture import FONT_SIZE
-from tpjb_ident.report.figure import Panel, save_panels
+from tpjb_ident.report.figure import panel, save_panels
 from tpjb_ident.runtime.tables import printable
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def write_quick_look(folder: Path, title: str, series: Sequence[Series], looks: 
     looks : mapping of str to Look
         By channel name.
     """
-    save_panels([Panel("quick-look", title, quick_look(title, series, looks), "")], folder / "figures")
+    save_panels([panel("quick-look", title, quick_look(title, series, looks), "")], folder / "figures")
 
 
 def quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Figure:

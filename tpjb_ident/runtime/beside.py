@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from typing import Any
 
-from tpjb_ident.runtime.executors import Job, Outcome, Task, attempt, begin_worker, one_thread_each
+from tpjb_ident.runtime.executors import Job, Outcome, Task, attempt, begin_worker, forks, one_thread_each
 
 
 @contextmanager
@@ -29,7 +29,7 @@ def beside(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
         Waits for the value; None if the job had an error or its process was lost: whoever needs the value works it out
         again, and finds what was wrong. Called a second time, it gives the same.
     """
-    context = multiprocessing.get_context("spawn")
+    context: Any = multiprocessing.get_context("fork" if forks() else "spawn")  # a copy need not import anything again
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_send_outcome, args=(sender, task, job), daemon=True)
     with one_thread_each():

@@ -17,6 +17,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 import traceback
 import warnings
@@ -321,6 +322,11 @@ def begin_worker() -> None:
 def _end_with(sentinel: Any) -> None:
     wait_for_end([sentinel])
     os._exit(1)  # nobody is left to hear of it
+
+
+def forks() -> bool:
+    """Whether a process may begin as a copy of this one, with all that is loaded: on Linux, and without threads."""
+    return sys.platform.startswith("linux") and threading.active_count() == 1
 
 
 def cores() -> int:

@@ -11,7 +11,10 @@ from tpjb_ident.runtime.executors import Workers, cores, local_workers
 
 @contextmanager
 def open_workers(
-    count: int | None = None, scheduler: str | None = None, preload: Sequence[str] = ()
+    count: int | None = None,
+    scheduler: str | None = None,
+    preload: Sequence[str] = (),
+    start: str | None = None,
 ) -> Iterator[Workers]:
     """Open the workers that were asked for.
 
@@ -22,6 +25,8 @@ def open_workers(
     scheduler : str, optional
         Address of a Dask scheduler, ``"tcp://host:8786"``, or of the file that it wrote.
     preload : sequence of str
+        See `local_workers`.
+    start : str, optional
         See `local_workers`.
 
     Yields
@@ -34,7 +39,7 @@ def open_workers(
         There is no such scheduler, or its workers cannot do these jobs.
     """
     if scheduler is None:
-        with local_workers(cores() if count is None else count, preload=preload) as workers:
+        with local_workers(cores() if count is None else count, start, preload) as workers:
             yield workers
         return
     with dask_workers(scheduler) as workers:

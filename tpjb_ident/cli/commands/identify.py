@@ -37,6 +37,7 @@ from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import command_line, note_line, print_line, progress
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.runtime.executors import cores, forks
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.tables import write_table
 
@@ -49,8 +50,9 @@ if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.runs.run_store import RunStore
 
-#: Records [bytes] above which several processes are quicker than one.
-WORTH_PROCESSES = 100 * 2**20
+#: Records [bytes] above which several processes are quicker than one though each has to import everything, runs above
+#: which copies of this one are, and how many copies.
+WORTH_PROCESSES, WORTH_COPIES, MOST_COPIES = 100 * 2**20, 12, 4
 PlainWay = Annotated[
     bool, typer.Option("--plain", help="Also write plain.csv: Eq. (15) by statsmodels' RLM, nothing corrected.")
 ]
@@ -90,11 +92,11 @@ def identify(
     from tpjb_ident.dynamic.identify import identify as run_identification
     from tpjb_ident.runtime.workers import open_workers
 
-    count = worker_count(source, workers, scheduler)
+    count, start = worker_count(source, workers, scheduler)
     target = out_folder(out, "identify")
     with output_folder(target, "identify", (campaign,)) as folder:
         with (
-            open_workers(count, scheduler, PRELOAD) as team,
+            open_workers(count, scheduler, PRELOAD, start) as team,
             finished_runs(target) as store,
             progress("identifying") as show,
         ):
@@ -138,8 +140,8 @@ def finished_runs(target: Path) -> Iterator[RunStore]:
     store.clear()
 
 
-def worker_count(campaign: Campaign, asked: int | None, scheduler: str | None) -> int | None:
-    """Processes to use: as asked, else one per core where the records are long enough to pay for starting them.
+def worker_count(campaign: Campaign, asked: int | None, scheduler: str | None) -> tuple[int | None, str | None]:
+    """Processes to use, and how they begin: as asked, else one per core where the records pay for starting them.
 
     Parameters
     ----------
@@ -157,11 +159,14 @@ def worker_count(campaign: Campaign, asked: int | None, scheduler: str | None) -
     if scheduler is not None:
         if asked is not None:
             raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")
-        return None
+        return None, None
     if asked is not None:
-        return asked
+        return asked, None
     size = sum(path.stat().st_size for path in campaign.files.values() if path.is_file())
-    return None if size > WORTH_PROCESSES else 1
+    if size > WORTH_PROCESSES:
+        return None, None
+    copies = min(cores(), MOST_COPIES) if forks() and len(campaign.of_kind("dynamic")) > WORTH_COPIES else 1
+    return copies, "fork"
 
 
 def phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:

@@ -51,6 +51,7 @@ def coherence(identification: Identification | pd.DataFrame, *, title: str | Non
                       label=name)  # fmt: skip
     axes.axhline(1.0 - FLAGGED, color=LIGHT["ink"], linestyle=(0, (5, 2)), linewidth=1.0, label="flagged above")
     axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")  # powers of ten are set by a parser that takes longer than the picture
     axes.set_ylim(0.5 * float(left.min()), 1.0)
     ticks = [f"{w / 1e3:g}\n{f:g}" for w, f in zip(rows["static_load_N"], rows["excitation_Hz"], strict=True)]
     axes.set_xticks(at, ticks, fontsize=FONT_SIZE - 1.5)
