@@ -292,7 +292,7 @@ def test_workers_change_no_number_even_when_jobs_are_lost(campaign):
     settings = IdentifySettings(methods=())
     (plain,) = identify(few, settings).points
     (spread,) = identify(few, settings, workers=PoolWorkers(Pool, 2)).points
-    assert Pool.jobs == 8
+    assert Pool.jobs == 11  # six runs and two on their point, three of them lost at first
     np.testing.assert_array_equal(spread.stiffness.h, plain.stiffness.h)
     np.testing.assert_array_equal(spread.stiffness.covariance, plain.stiffness.covariance)
 

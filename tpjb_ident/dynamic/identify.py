@@ -45,7 +45,7 @@ from tpjb_ident.dynamic.runs.synchronous import freed
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.dynamic.spectral_lines.mains_frequency import mains_frequency
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.runtime.executors import Workers
+from tpjb_ident.runtime.executors import InProcessWorkers, Workers, in_order
 
 
 def identify(
@@ -64,7 +64,7 @@ def identify(
     progress : callable, optional
         Called as progress(text, done, total).
     workers : tpjb_ident.runtime.executors.Workers, optional
-        Processes or machines over which the reading of runs is spread; the numbers are the same.
+        Processes or machines over which the reading of runs and the points are spread; the numbers are the same.
     store : RunStore, optional
         Keeps finished runs, so that another call after a kill goes on where this one stopped.
 
@@ -96,7 +96,7 @@ def identify(
         found = Identification(campaign.id, settings.method, (), np.zeros((settings.n_calibration, 0)))
     else:
         with all_runs(sines, settings.phasors, tell, workers, store) as finished:
-            found = assemble(sines, finished, settings, tell)
+            found = assemble(sines, finished, settings, tell, workers)
     found = found if bands is None else _with_bands(found, bands)
     zero = zero_uncertainty(campaign.channels.values(), "displacement")
     if not zero.any():
@@ -134,8 +134,14 @@ def _with_mains(settings: IdentifySettings, campaign: Campaign) -> IdentifySetti
     return replace(settings, phasors=replace(settings.phasors, lines=replace(lines, mains=mains)))
 
 
-def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySettings, tell: Progress) -> Identification:
-    """Estimate all points from runs already turned to phasors, one point's windows in memory at a time.
+def assemble(
+    campaign: Campaign,
+    finished: FinishedRuns,
+    settings: IdentifySettings,
+    tell: Progress,
+    workers: Workers | None = None,
+) -> Identification:
+    """Estimate all points from runs already turned to phasors, a few points' windows in memory at a time.
 
     Parameters
     ----------
@@ -144,7 +150,10 @@ def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySetti
     settings : IdentifySettings
     tell : callable
         Called as tell(text, done, total).
+    workers : Workers, optional
+        Who estimates the points; the numbers are the same.
     """
+    workers = workers or InProcessWorkers()
     checked = check_finished(campaign, finished)
     digests = finished.digests
     findings, sources = look_at_instruments(point_sources(finished), delays_stated(campaign))
@@ -153,7 +162,7 @@ def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySetti
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
     sweeps = swept_probes(campaign)
     tell("estimating", 0, len(sources))
-    first = [first_estimate(freed(source.load()), settings) for source in sources]
+    first = list(in_order(workers, _first, [(source,) for source in sources], settings))
     mains = [digest.mains for digest in digests]
     in_cells = [digest.mains_force for digest in digests]
     corrections = find_corrections(sources, mains, axes, first, cell_zero_uncertainty(campaign), in_cells)
@@ -169,8 +178,7 @@ def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySetti
         checked,
     )
     points, changes = [], []
-    for source, correction in zip(sources, corrections):
-        point, change = work.finish(source, correction)
+    for point, change in in_order(workers, _finished, list(zip(sources, corrections)), work):
         points.append(point)
         changes.append(change)
         tell("estimating", len(points), len(sources))
@@ -179,6 +187,14 @@ def assemble(campaign: Campaign, finished: FinishedRuns, settings: IdentifySetti
     told = named_runs(left, len(digests) + len(left)) + lost_points(points, left, several)
     named = with_probe_doubts(sweeps, named_at_points(points, left, several), settings.clearance)
     return Identification(campaign.id, settings.method, named, joint, work.draws.conditions() + told)
+
+
+def _first(settings: IdentifySettings, source: PointSource) -> DynamicStiffness:
+    return first_estimate(freed(source.load()), settings)
+
+
+def _finished(work: _Points, source: PointSource, correction: Correction) -> tuple[PointResult, FloatArray]:
+    return work.finish(source, correction)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,10 @@ class PointSource:
     clocks: ClockRates = field(default_factory=ClockRates)
     baseline: Baseline = field(default_factory=Baseline)
     _loaded: list[PointData] = field(init=False, default_factory=list, repr=False, compare=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For a worker elsewhere: the windows themselves, not where they are."""
+        return {**self.__dict__, "finished": None, "_loaded": [self.load()]}
 
     def load(self) -> PointData:
         """All windows of the point, as if one clock had recorded them, without the rig's and the shaft's own part.
