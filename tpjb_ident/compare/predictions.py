@@ -183,7 +183,19 @@ def prediction_frame(predictions: Sequence[PointPrediction], mesh_error: bool = 
     """
     import pandas as pd
 
-    return pd.DataFrame([_row(one, mesh_error) for one in predictions])
+    return pd.DataFrame(prediction_rows(predictions, mesh_error))
+
+
+def prediction_rows(predictions: Sequence[PointPrediction], mesh_error: bool = True) -> list[dict[str, Any]]:
+    """Rows of `prediction_frame`, for a process that needs no table.
+
+    Parameters
+    ----------
+    predictions : sequence of PointPrediction
+    mesh_error : bool
+        See `prediction_frame`.
+    """
+    return [_row(one, mesh_error) for one in predictions]
 
 
 def _row(one: PointPrediction, mesh_error: bool) -> dict[str, Any]:

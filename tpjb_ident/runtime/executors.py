@@ -179,6 +179,12 @@ class PoolWorkers:
         self._opened, self.count, self._alive = opened, count, alive
         self._executor: Executor | None = None
 
+    def begin(self) -> None:
+        """Open the executor now: copies of a process are best made before it has threads, as a bar's."""
+        if self._executor is None:
+            self._executor = self._opened()
+            self._executor.submit(int).result()
+
     def close(self, wait: bool = True) -> None:
         """End the executor; with it the jobs that have not begun.
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from tpjb_ident.runtime.cluster import dask_workers
-from tpjb_ident.runtime.executors import Workers, cores, local_workers
+from tpjb_ident.runtime.executors import PoolWorkers, Workers, cores, local_workers
 
 
 @contextmanager
@@ -40,6 +40,8 @@ def open_workers(
     """
     if scheduler is None:
         with local_workers(cores() if count is None else count, start, preload) as workers:
+            if start == "fork" and isinstance(workers, PoolWorkers):
+                workers.begin()
             yield workers
         return
     with dask_workers(scheduler) as workers:

@@ -89,7 +89,7 @@ def _from_campaign(
     options = {**options, "bearing": bearing or source.bearing_name}
     inputs = source.fingerprint() | given | files
     with output_folder(target, "compare", (campaign,)) as folder:
-        with progress("comparing") as show, model_beside(source, drawn, settings.asked()) as ahead:
+        with model_beside(source, drawn, settings.asked()) as ahead, progress("comparing") as show:
             result = compare_campaign(source, drawn, settings, show, ahead)
             write_comparison(folder, result, options, inputs, show)
         write_record(folder, target, "compare", options, inputs)

@@ -42,7 +42,7 @@ def demo(out: Out = None) -> None:
         campaign = load_campaign(path)
         bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
         asked = CompareSettings().asked()
-        with progress("demo") as show, model_beside(campaign, bearing, asked) as ahead:
+        with model_beside(campaign, bearing, asked) as ahead, progress("demo") as show:
             show("reading and checking every record", 0, 1)
             summary = check_summary(path, check_campaign(path), campaign)
             write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -28,13 +28,24 @@ from tpjb_ident.cli.common.options import (
 )
 from tpjb_ident.cli.common.quantities import MAX_VALUES, parse_value, parse_values
 from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import print_line, progress, table
+from tpjb_ident.cli.common.terminal import Progress, print_line, progress, table
 from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.runtime.beside import beside
+from tpjb_ident.runtime.executors import cores, forks
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_table
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from model.bearing import Bearing
+    from rigdata.operating_point import OperatingPoint
+    from tpjb_ident.compare.predictions import ModelSettings
+
 NAMED_PIVOTS = ("rigid", "kirk", "kirk-secant")
+#: Points that take less time than a library to load.
+FEW = 20
 THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 
 
@@ -66,16 +77,13 @@ def predict(
     refuse_special(bearing)
     from model.bearing_file import load_bearing
     from tpjb_ident.compare.pivot_effects import refuse_counted_twice
-    from tpjb_ident.compare.predictions import predict_points, prediction_frame
 
     refuse_counted_twice(choice, settings.effects, effects)
     loaded = load_bearing(bearing)
     target = out_folder(out, "predict")
     inputs = {p.name: sha256(p) for p in (bearing, effects, choice) if isinstance(p, Path)}
     with output_folder(target, "predict") as folder:
-        with progress("predicting") as show:
-            predictions = predict_points(loaded, points, settings, show)
-            frame = prediction_frame(predictions)
+        frame = _predicted(loaded, points, settings)
         write_table(folder, "prediction", frame)
         write_record(folder, target, "predict", options, inputs)
     show_predictions(frame, loaded.name)
@@ -88,6 +96,31 @@ def predict(
     rough = float(frame["mesh_error"].max())
     if rough > 0.05:
         raise NotTrustedError(f"the mesh error reaches {100 * rough:.0f} % of a direct coefficient.")
+
+
+def _predicted(bearing: Bearing, points: list[OperatingPoint], settings: ModelSettings) -> pd.DataFrame:
+    """Table of all points. A few are solved in a copy of this process while pandas is loaded in this one."""
+    rows = None
+    if len(points) <= FEW and cores() > 1 and forks():
+        with beside(_rows, bearing, points, settings) as ahead, progress("predicting"):
+            import pandas as pd
+            import pyarrow.parquet  # noqa: F401  (what the table is written with)
+
+            rows = ahead()
+    if rows is None:
+        with progress("predicting") as show:
+            rows = _rows(bearing, points, settings, show)
+    import pandas as pd
+
+    return pd.DataFrame(rows)
+
+
+def _rows(
+    bearing: Bearing, points: list[OperatingPoint], settings: ModelSettings, show: Progress | None = None
+) -> list[dict[str, Any]]:
+    from tpjb_ident.compare.predictions import predict_points, prediction_rows
+
+    return prediction_rows(predict_points(bearing, points, settings, show))
 
 
 def operating_points(load: str, load_direction: str, speed: str, excitation: str | None) -> list[Any]:
