@@ -59,6 +59,56 @@ class CrossFilm(NamedTuple):
     centre: FloatArray
 
 
+class CrossOperator(NamedTuple):
+    """The heat balances of one film, factorised; n = (nz + 1) * cells unknowns per station, cells fastest.
+
+    Attributes
+    ----------
+    factor : (nt, n, 2 cells + 1) ndarray
+        L and U of the balances at the later station, with 1 / U on the diagonal [W/K].
+    before : (nt, n, 5) ndarray
+        What the earlier station adds: by the cell itself, the cells below and above, the lines before and after.
+    journal : (nt, nz + 1, 2) ndarray
+        Exchange with the journal at the earlier and the later station [W/K].
+    made : (nt, n) ndarray
+        Dissipation [W], and what the balances take from it per kelvin, at the present temperature.
+    carried : (nz + 1, cells) ndarray
+        Heat carried over the trailing edge per kelvin [W/K].
+    flows : (nt, nz + 1, cells) ndarray
+        Mass flow of the cells from station to station [kg/s].
+    """
+
+    factor: FloatArray
+    before: FloatArray
+    journal: FloatArray
+    made: FloatArray
+    carried: FloatArray
+    flows: FloatArray
+
+    @classmethod
+    def place(cls, rows: int, lines: int, cells: int) -> CrossOperator:
+        """Room for the balances of a film.
+
+        Parameters
+        ----------
+        rows, lines, cells : int
+            nt + 1, nz + 1, cells across.
+
+        Returns
+        -------
+        CrossOperator
+        """
+        nt, n = rows - 1, lines * cells
+        return cls(
+            np.zeros((nt, n, 2 * cells + 1)),
+            np.zeros((nt, n, 5)),
+            np.zeros((nt, lines, 2)),
+            np.zeros((nt, n)),
+            np.zeros((lines, cells)),
+            np.zeros((nt, lines, cells)),
+        )
+
+
 def cross_film(work: FilmWork, temperature: float, cells: int = CELLS) -> CrossFilm:
     """Lay out a film of one temperature.
 

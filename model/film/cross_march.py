@@ -1,4 +1,4 @@
-"""Temperatures across a film from its factorised heat balances: marched for many right-hand sides, or for one."""
+"""Temperatures across a film from its factorised heat balances: marched as answers, or for what a pad conducts."""
 
 from __future__ import annotations
 
@@ -6,60 +6,76 @@ import numpy as np
 
 from model.arrays import FloatArray
 from model.compilation import compiled, inner
-from model.film.cross_energy import CrossOperator
-from model.film.mesh import FilmWork
+from model.film.cross_film import CrossOperator
+from model.film.mesh import FilmGrid, FilmWork
+
+#: GMRES steps at most; what they leave contracts with the rest.
+STEPS = 12
+#: An answer beyond this is none [K^2].
+BOUNDLESS = 1e30
 
 
 @compiled
-def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray, journal: FloatArray) -> FloatArray:
-    """March temperature fields that differ in inlet, sources and journal: the equation is linear.
+def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray) -> FloatArray:
+    """March three temperature fields: of fresh oil at zero with sources, per kelvin of the inlet, and of the journal.
+
+    The equation is linear. Three numbers that do not wait for one another cost what one does.
 
     Parameters
     ----------
     operator : CrossOperator
-    fields : (nt + 1, n, m) ndarray
-        Station 0 holds the inlet; the rest is overwritten [degC].
-    sources : (nt, n, m) ndarray
-        Heat between two stations [W].
-    journal : (m,) ndarray
-        The journal's temperature [degC].
+    fields : (nt + 1, n, 3) ndarray
+        Station 0 holds the inlets; the rest is overwritten [degC].
+    sources : (nt, n) ndarray
+        Heat between two stations, for the first field [W].
 
     Returns
     -------
-    (m,) ndarray
-        Heat that the journal takes up [W].
+    (3,) ndarray
+        Heat that the journal takes up [W]; it is of 0, 0 and 1 degC.
     """
-    n, count = fields.shape[1], fields.shape[2]
-    cells = operator.carried.shape[1]
-    taken = np.zeros(count)
+    n, cells = fields.shape[1], operator.carried.shape[1]
+    taken = np.zeros(3)
     for i in range(operator.factor.shape[0]):
-        band, before = operator.factor[i], operator.before[i]
+        band, before, journal = operator.factor[i], operator.before[i], operator.journal[i]
         old, new = fields[i], fields[i + 1]
         for k in range(n):
-            m = k % cells
-            for q in range(count):
-                value = before[k, 0] * old[k, q] + sources[i, k, q]
-                if m > 0:
-                    value += before[k, 1] * old[k - 1, q]
-                if m < cells - 1:
-                    value += before[k, 2] * old[k + 1, q]
-                else:
-                    value += (before[k, 2] + operator.journal[i, k // cells, 1]) * journal[q]
-                if k >= cells:
-                    value += before[k, 3] * old[k - cells, q]
-                if k + cells < n:
-                    value += before[k, 4] * old[k + cells, q]
-                new[k, q] = value
-        _substitute(band, cells, new)
-        for j in range(operator.journal.shape[1]):
+            m, weight = k % cells, before[k, 0]
+            a, b, c = weight * old[k, 0] + sources[i, k], weight * old[k, 1], weight * old[k, 2]
+            if m > 0:
+                weight = before[k, 1]
+                a, b, c = a + weight * old[k - 1, 0], b + weight * old[k - 1, 1], c + weight * old[k - 1, 2]
+            weight = before[k, 2]
+            if m < cells - 1:
+                a, b, c = a + weight * old[k + 1, 0], b + weight * old[k + 1, 1], c + weight * old[k + 1, 2]
+            else:
+                c += weight + journal[k // cells, 1]
+            if k >= cells:
+                weight, r = before[k, 3], k - cells
+                a, b, c = a + weight * old[r, 0], b + weight * old[r, 1], c + weight * old[r, 2]
+            if k + cells < n:
+                weight, r = before[k, 4], k + cells
+                a, b, c = a + weight * old[r, 0], b + weight * old[r, 1], c + weight * old[r, 2]
+            for s in range(max(0, cells - k), cells):
+                weight, r = band[k, s], k - cells + s
+                a, b, c = a - weight * new[r, 0], b - weight * new[r, 1], c - weight * new[r, 2]
+            new[k, 0], new[k, 1], new[k, 2] = a, b, c
+        for k in range(n - 1, -1, -1):
+            a, b, c = new[k, 0], new[k, 1], new[k, 2]
+            for s in range(cells + 1, cells + 1 + min(cells, n - 1 - k)):
+                weight, r = band[k, s], k - cells + s
+                a, b, c = a - weight * new[r, 0], b - weight * new[r, 1], c - weight * new[r, 2]
+            weight = band[k, cells]
+            new[k, 0], new[k, 1], new[k, 2] = a * weight, b * weight, c * weight
+        for j in range(journal.shape[0]):
             k = j * cells + cells - 1
-            for q in range(count):
-                taken[q] += operator.journal[i, j, 0] * (old[k, q] - journal[q])
-                taken[q] += operator.journal[i, j, 1] * (new[k, q] - journal[q])
+            for q in range(3):
+                taken[q] += journal[j, 0] * old[k, q] + journal[j, 1] * new[k, q]
+            taken[2] -= journal[j, 0] + journal[j, 1]
     return taken
 
 
-@compiled
+@inner
 def march_one(operator: CrossOperator, field: FloatArray, sources: FloatArray) -> float:
     """`march_cross` for one field of fresh oil at zero beside a journal at zero, with sources in the lowest cells only.
 
@@ -101,31 +117,11 @@ def march_one(operator: CrossOperator, field: FloatArray, sources: FloatArray) -
             value = new[k]
             for r in range(cells + 1, cells + 1 + min(cells, n - 1 - k)):
                 value -= band[k, r] * new[k - cells + r]
-            new[k] = value / band[k, cells]
+            new[k] = value * band[k, cells]
         for j in range(operator.journal.shape[1]):
             k = j * cells + cells - 1
             taken += operator.journal[i, j, 0] * old[k] + operator.journal[i, j, 1] * new[k]
     return taken
-
-
-@inner
-def _substitute(band: FloatArray, width: int, x: FloatArray) -> None:
-    n, count = x.shape
-    for k in range(n):
-        for r in range(1, min(width, k) + 1):
-            scale = band[k, width - r]
-            if scale != 0.0:
-                for q in range(count):
-                    x[k, q] -= scale * x[k - r, q]
-    for k in range(n - 1, -1, -1):
-        for r in range(1, min(width, n - 1 - k) + 1):
-            scale = band[k, width + r]
-            if scale != 0.0:
-                for q in range(count):
-                    x[k, q] -= scale * x[k + r, q]
-        inverse = 1.0 / band[k, width]
-        for q in range(count):
-            x[k, q] *= inverse
 
 
 @compiled
@@ -155,3 +151,87 @@ def face_temperature(
             first, second = field[i, j * cells], field[i, j * cells + 1]
             bend = (second - first - slope * (two - one)) / (two * two - one * one)
             face[i, j] = first - slope * one - bend * one * one
+
+
+@inner
+def station_heat(grid: FilmGrid, flux: FloatArray) -> FloatArray:
+    """What a heat flux density into the pad takes between two stations.
+
+    Parameters
+    ----------
+    grid : FilmGrid
+    flux : (nt + 1, nz + 1) ndarray
+        [W/m^2]
+
+    Returns
+    -------
+    (nt, nz + 1) ndarray
+        [W]
+    """
+    return 0.5 * grid.dx * (flux[1:] + flux[:-1]) * grid.height
+
+
+@compiled
+def conduct(
+    film: tuple[FilmGrid, FilmWork, FloatArray, float],
+    operator: CrossOperator,
+    pad: tuple[FloatArray, FloatArray, FloatArray],
+    missing: FloatArray,
+    tolerance: float,
+    answer: tuple[FloatArray, FloatArray],
+) -> float:
+    """Change temperatures so that the pad takes what it conducts at its face's new temperature, not at its old one.
+
+    By how much the pad's coarser nodes change is found by GMRES: Y. Saad, SIAM J. Sci. Comput. 14 (1993) 461.
+
+    Parameters
+    ----------
+    film : tuple
+        Mesh, pressure solution, edges of the cells, and the oil's conductivity [W/m/K].
+    operator : CrossOperator
+    pad : tuple
+        `flux` and `to_coarse` of `model.pad.bending.PadDeformation`, and about what the coarser nodes change by where
+        the film would bring them by something, (c, c).
+    missing : (nt + 1, nz + 1) ndarray
+        The face's temperature with what the pad took at its old one, less that [K].
+    tolerance : float
+        Share of it that may be left.
+    answer : tuple
+        (nt + 1, n) temperatures of the cells and (nt + 1, nz + 1) of the face, changed [degC].
+
+    Returns
+    -------
+    float
+        What the journal takes up besides [W]; NaN, and nothing is changed, if the answer has no bounds.
+    """
+    grid, work, edges, conductivity = film
+    flux, to_coarse, guess = pad
+    right = np.dot(to_coarse, missing.copy().ravel())
+    limit, size, shape = tolerance * tolerance * np.dot(right, right), right.size, missing.shape
+    steps, images, faces = np.empty((STEPS, size)), np.empty((STEPS, size)), np.empty((STEPS, *shape))
+    fields, taken = np.empty((STEPS, *answer[0].shape)), np.empty(STEPS)
+    gram, seen, weights, left = np.empty((STEPS, STEPS)), np.empty(STEPS), np.empty(0), right
+    for k in range(STEPS):
+        steps[k] = np.dot(guess, left)
+        steps[k] /= np.sqrt(np.dot(steps[k], steps[k]))
+        heat = np.dot(flux, steps[k]).reshape(shape)
+        fields[k, 0] = 0.0
+        taken[k] = march_one(operator, fields[k], -station_heat(grid, heat))
+        face_temperature(work, edges, conductivity, fields[k], heat, faces[k])
+        images[k] = steps[k] - np.dot(to_coarse, faces[k].ravel())
+        gram[k, : k + 1] = np.dot(images[: k + 1], images[k])
+        gram[: k + 1, k] = gram[k, : k + 1]
+        if not gram[k, k] < BOUNDLESS:
+            return np.nan
+        gram[k, k] *= 1.0 + 1e-13  # images that hardly differ are of no use to each other
+        seen[k] = np.dot(images[k], right)
+        weights = np.linalg.solve(gram[: k + 1, : k + 1].copy(), seen[: k + 1])
+        left = right - np.dot(weights, images[: k + 1])
+        if np.dot(left, left) < limit:
+            break
+    more = 0.0
+    for k in range(weights.size):
+        more += weights[k] * taken[k]
+        answer[0][:] += weights[k] * fields[k]
+        answer[1][:] += weights[k] * faces[k]
+    return more

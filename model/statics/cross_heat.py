@@ -15,19 +15,26 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from model.arrays import FloatArray
-from model.film.cross_energy import CrossOperator, cross_operator
-from model.film.cross_march import face_temperature, march_cross, march_one
+from model.film.cross_energy import cross_operator
+from model.film.cross_film import CrossOperator
+from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
+from model.pad.bending import PadDeformation
 from model.setup import Setup
 from model.statics.compiled.constants import BOUNDLESS
-from model.statics.heat_paths import FilmAnswer, balance_heat, minimal_residual
+from model.statics.heat_paths import FilmAnswer, balance_heat
 from model.statics.pad_film import PadFilm
 
 #: What a pad conducts is solved to this share in every step; what is left contracts with the rest.
 CONDUCTION_TOLERANCE = 0.03
+#: And to this one where the last step has changed a temperature by more than so much [K]: all else is far off, too.
+ROUGH_TOLERANCE, ROUGH = 0.15, 3.0
+#: Share of a film's thickness through which heat gets from the pad's face into the oil that carries it away.
+FACE_SHARE = 0.1
 
 
 @dataclass
@@ -50,7 +57,12 @@ class CrossAnswer:
 
 
 def settle_cross_temperatures(
-    setup: Setup, films: list[PadFilm], surface_speed: float, journal: float, limits: tuple[float, float]
+    setup: Setup,
+    films: list[PadFilm],
+    surface_speed: float,
+    journal: float,
+    limits: tuple[float, float],
+    operator: CrossOperator,
 ) -> tuple[float, float, float]:
     """Temperatures of all films, pads and the journal for the present flows; as `settle_temperatures` of `heat_paths`.
 
@@ -65,6 +77,8 @@ def settle_cross_temperatures(
         The journal's temperature so far [degC]; NaN for none.
     limits : tuple of float
         Relaxation, and the largest change of a temperature in one step [K].
+    operator : CrossOperator
+        Room for the balances of one film after the other.
 
     Returns
     -------
@@ -80,7 +94,7 @@ def settle_cross_temperatures(
     answers: list[CrossAnswer | None] = []
     back, around = 0.0, housing_oil(films)
     for film in order:
-        answer, share = _answer(setup, film, surface_speed, (start, around))
+        answer, share = _answer(setup, film, surface_speed, (start, around), operator)
         answers.append(answer)
         back = max(back, share)
     inlets, journal = balance_heat(setup, order, [a.outer if a is not None else None for a in answers])
@@ -147,8 +161,17 @@ def _into_pad(film: PadFilm, rise: FloatArray) -> FloatArray:
     return np.asarray(pad.flux @ (pad.to_coarse @ rise.ravel())).reshape(rise.shape)
 
 
+@lru_cache(maxsize=64)
+def _settled(pad: PadDeformation, power: int) -> FloatArray:
+    """About what the pad's coarser nodes change by, per kelvin that the film would bring them by, (c, c).
+
+    For a film whose oil lies behind a resistance of 2^power [m^2 K/W].
+    """
+    return np.asarray(np.linalg.inv(np.eye(pad.flux.shape[1]) + 2.0**power * (pad.to_coarse @ pad.flux)))
+
+
 def _answer(
-    setup: Setup, film: PadFilm, surface_speed: float, temperatures: tuple[float, float]
+    setup: Setup, film: PadFilm, surface_speed: float, temperatures: tuple[float, float], operator: CrossOperator
 ) -> tuple[CrossAnswer | None, float]:
     """A film's answers, and which share of its oil runs back where it enters; None if the film carries nothing.
 
@@ -160,61 +183,27 @@ def _answer(
         return None, 0.0
     oil = setup.bearing.oil
     heat = (oil.specific_heat, oil.conductivity, film.kept, 1.0, oil.viscosity_exponent)
-    operator, back = cross_operator(film.grid, film.work, cross, surface_speed, heat)
+    back = cross_operator(film.grid, film.work, cross, surface_speed, heat, operator)
     taken = pad_heat(film, around)
-    rows, columns = film.work.temperature.shape
-    fields = np.zeros((rows, columns * (len(cross.edges) - 1), 3))
+    fields = np.zeros((taken.shape[0], operator.made.shape[1], 3))
     fields[0, :, 1] = 1.0
-    sources = np.zeros((rows - 1, fields.shape[1], 3))
-    sources[:, :, 0] = operator.made
-    sources[:, :: len(cross.edges) - 1, 0] -= _station_heat(film, taken)
-    kept = march_cross(operator, fields, sources, np.array([0.0, 0.0, 1.0]))
-    faces = np.empty((3, rows, columns))
-    nothing = np.zeros_like(taken)
+    sources = operator.made
+    sources[:, :: len(cross.edges) - 1] -= station_heat(film.grid, taken)
+    kept = march_cross(operator, fields, sources)
+    faces = np.empty((3, *taken.shape))
     for m in range(3):
-        given = taken if m == 0 else nothing
+        given = taken if m == 0 else np.zeros_like(taken)
         face_temperature(film.work, cross.edges, oil.conductivity, fields[:, :, m], given, faces[m])
-    if np.abs(fields).max() < BOUNDLESS:
-        missing = faces[0] + film.inlet * faces[1] + journal * faces[2] - cross.face
-        _correct_for_pad(setup, film, operator, missing, (fields, faces, kept))
+    missing = faces[0] + film.inlet * faces[1] + journal * faces[2] - cross.face
+    pad = film.deformation
+    if pad is not None and 0.0 < np.abs(missing).max() < BOUNDLESS:
+        solved = (film.grid, film.work, cross.edges, oil.conductivity)
+        resistance = FACE_SHARE * float(film.work.thickness.mean()) / oil.conductivity
+        body = (pad.flux, pad.to_coarse, _settled(pad, round(math.log2(resistance))))
+        far = film.temperature_change > ROUGH
+        tolerance = ROUGH_TOLERANCE if far else CONDUCTION_TOLERANCE
+        more = conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
+        kept[0] += more if math.isfinite(more) else 0.0
     weight = operator.carried / operator.carried.sum()
     outlet = weight.ravel() @ fields[-1]
     return CrossAnswer(fields, faces, FilmAnswer(outlet, kept)), back
-
-
-def _station_heat(film: PadFilm, flux: FloatArray) -> FloatArray:
-    """What a heat flux density into the pad takes between two stations, (nt, nz + 1) [W]."""
-    return np.asarray(0.5 * (flux[1:] + flux[:-1]) * film.grid.dx * film.grid.height[None, :])
-
-
-def _correct_for_pad(
-    setup: Setup,
-    film: PadFilm,
-    operator: CrossOperator,
-    missing: FloatArray,
-    parts: tuple[FloatArray, FloatArray, FloatArray],
-) -> None:
-    """Change the answers so that the pad takes what it conducts at its new temperature, not at its old one."""
-    if not missing.any():
-        return
-    fields, faces, kept = parts
-    cross = film.cross
-    assert cross is not None
-    conductivity, shape = setup.bearing.oil.conductivity, missing.shape
-    field = np.zeros(fields.shape[:2])
-
-    def cooled(face: FloatArray) -> tuple[FloatArray, float]:
-        """What a change of the face's temperature, through the pad, does to it and to the journal."""
-        flux = _into_pad(film, face.reshape(shape))
-        taken = march_one(operator, field, -_station_heat(film, flux))
-        answer = np.empty(shape)
-        face_temperature(film.work, cross.edges, conductivity, field, flux, answer)
-        return answer, taken
-
-    change = minimal_residual(lambda t: t - cooled(t)[0].ravel(), missing.ravel(), CONDUCTION_TOLERANCE)
-    if not np.isfinite(change).all():
-        return
-    answer, taken = cooled(change)
-    faces[0] += answer
-    fields[:, :, 0] += field
-    kept[0] += taken

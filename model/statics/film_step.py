@@ -79,10 +79,11 @@ def _heat_films(search: Search) -> float:
         return max((f.temperature_change for f in carrying), default=0.0)
     for film in search.films:
         film.rest(search.position, search.surface_speed, oil)
-    settle = settle_cross_temperatures if search.setup.thermal == "thd" else settle_temperatures
-    change, search.limited, search.journal = settle(
-        search.setup, search.films, search.surface_speed, search.journal, limits
-    )
+    state = (search.setup, search.films, search.surface_speed, search.journal, limits)
+    if search.setup.thermal == "thd":
+        change, search.limited, search.journal = settle_cross_temperatures(*state, search.heat_balances)
+    else:
+        change, search.limited, search.journal = settle_temperatures(*state)
     for film in carrying:
         film.correct(search.surface_speed, oil)
     return change

@@ -18,6 +18,7 @@ from model.statics import conditions
 from model.statics.acceleration import Anderson
 from model.statics.carrying import leave_unstable, longest_step, unloaded_pads, update_carrying
 from model.statics.compiled.constants import (
+    ACROSS,
     BOUNDLESS,
     HEAT_PER_FORCE,
     MAX_ITERATIONS,
@@ -54,7 +55,9 @@ def iterate(search: Search) -> Equilibrium:
     memory, setup = Anderson(), search.setup
     isothermal = setup.thermal == "isothermal" and not setup.flexible_pads
     # a film with temperatures across knows that it makes less heat when it is hotter: it does not swing
-    relaxed, slow = (1.0, SLOW_ACROSS) if setup.thermal == "thd" else (RELAXATION, SLOW)
+    across = setup.thermal == "thd"
+    relaxed, slow = (1.0, SLOW_ACROSS) if across else (RELAXATION, SLOW)
+    accuracy = setup.accuracy * (ACROSS if across else 1.0)
     search.relaxation = 1.0 if search.warm else relaxed
     for iteration in range(1, MAX_ITERATIONS + 1):
         if update_carrying(setup, search.films, search.position, search.surface_speed):
@@ -70,7 +73,7 @@ def iterate(search: Search) -> Equilibrium:
         best_left, left = min(best_left, left), max(residual, heat / HEAT_PER_FORCE)
         near = residual < NEAR and heat < NEAR_HEAT
         search.relaxation = 1.0 if near else relaxed
-        if residual < setup.accuracy and heat < HEAT_PER_FORCE * setup.accuracy:
+        if residual < accuracy and heat < HEAT_PER_FORCE * accuracy:
             if not leave_unstable(setup, search.films, search.position):
                 return _settled(search, iteration, residual, heat)
             memory.reset()
@@ -106,7 +109,8 @@ def _move(search: Search, step: tuple[FloatArray, FloatArray], damping: float) -
     search.position = search.position + scale * shift
     search.grow(scale)
     for film, move, change in zip(search.films, moves, bent, strict=True):
-        film.tilt += float(scale * move[0])
+        # a pad that friction stops where it does not tilt stops there, whatever the step's length
+        film.tilt = 0.0 if move[0] == -film.tilt else film.tilt + float(scale * move[0])
         film.deflection += float(scale * move[1])
         if change is not None:
             film.bent += scale * change

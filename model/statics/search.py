@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from model.arrays import FloatArray
+from model.film.cross_film import CrossOperator
 from model.film.energy import heat_by_drag
 from model.film.mesh import FilmWork
 from model.growth import grown
@@ -79,6 +81,13 @@ class Search:
     def surface_speed(self) -> float:
         """Of the journal [m/s]."""
         return self.speed * self.setup.bearing.journal_radius
+
+    @cached_property
+    def heat_balances(self) -> CrossOperator:
+        """Room for the balances of one film with temperatures across after the other."""
+        cross = self.films[0].cross
+        assert cross is not None
+        return CrossOperator.place(*cross.temperature.shape)
 
     @property
     def carrying(self) -> list[PadFilm]:

@@ -3,12 +3,13 @@
 - A flexure, or a stuck rocker: k_theta of Eq. (12), the same at every load.
 - A rocker's contact moves by R_H R_b / (R_H - R_b) per radian (pure rolling of radius R_b in a seat of radius R_H),
   and the pad's load acts there: k_theta = factor W R_H R_b / (R_H - R_b). A sphere on a flat has R_H infinite: W R_b.
-- A sphere that slides is held up to a moment mu W R. Short of that its contact gives way elastically, by Mindlin's
-  tangential stiffness 4 G a / (2 - nu) of two like bodies on the contact radius a of Hertz.
+- A sphere that slides is held up to a moment M_f = mu W R. Short of that its contact gives way elastically, first by
+  Mindlin's tangential stiffness 4 G a / (2 - nu) of two like bodies on the contact radius a of Hertz, k in all, then
+  less and less, as it slips from its rim inwards: M = M_f [1 - (1 - t / t_s)^(3/2)], t_s = 3 M_f / (2 k).
 
 All count from the untilted, concentric attitude.
 
-R. D. Mindlin, ASME J. Appl. Mech. 16 (1949) 259; K. L. Johnson, Contact Mechanics (1985), Eq. (4.22) and (7.42).
+R. D. Mindlin, ASME J. Appl. Mech. 16 (1949) 259; K. L. Johnson, Contact Mechanics (1985), Eq. (4.22), (7.40), (7.42).
 """
 
 from __future__ import annotations
@@ -62,16 +63,15 @@ def tilt_hold(setup: Setup, tilt: float, load: float) -> TiltHold:
         stiffness += roll * max(load, 0.0)
         arm = roll * tilt if load > 0.0 else 0.0
     moment, slides = stiffness * tilt, False
-    if setup.friction:
+    if setup.friction and load > 0.0:
         stick, slip = friction_limits(setup, load)
-        slides = abs(stick * tilt) > slip
-        if slides:
-            moment += math.copysign(slip, tilt)
-            arm += math.copysign(slip / load, tilt) if load > 0.0 else 0.0
-        else:
-            moment += stick * tilt
-            stiffness += stick
-            arm += stick * tilt / (3.0 * load) if load > 0.0 else 0.0
+        share = min(abs(tilt) * stick / (1.5 * slip), 1.0)
+        held = 1.0 - (1.0 - share) ** 1.5
+        slides = share == 1.0
+        moment += math.copysign(slip * held, tilt)
+        stiffness += stick * math.sqrt(1.0 - share)
+        # with the load the limit grows, and by a third of it the contact's stiffness
+        arm += math.copysign(slip / load * (held - share * math.sqrt(1.0 - share)), tilt)
     return TiltHold(moment, stiffness, arm, slides)
 
 

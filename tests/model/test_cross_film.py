@@ -14,8 +14,8 @@ from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.errors import OptionError
 from model.film.cross_energy import cross_operator
-from model.film.cross_film import CrossFilm, cross_film, cross_pressure_change, set_cross_viscosity
-from model.film.cross_march import face_temperature, march_cross, march_one
+from model.film.cross_film import CrossFilm, CrossOperator, cross_film, cross_pressure_change, set_cross_viscosity
+from model.film.cross_march import conduct, face_temperature, march_cross, march_one, station_heat
 from model.film.energy import solve_energy
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.film.reynolds import solve_film
@@ -120,12 +120,11 @@ def couette(nahme: float, cells: int) -> tuple[float, float]:
         set_cross_viscosity(cross, work, oil_constants(oil))
         dragged = 0.5 * speed * h * work.density * work.drag * grid.height
         work.flow_x[:] = 0.5 * (dragged[1:] + dragged[:-1])
-        operator, back = cross_operator(grid, work, cross, speed, (2000.0, 0.13, 1.0, 1.0, 0.0))
-        assert back == 0.0
-        fields = np.full((41, operator.made.shape[1], 1), 40.0)
-        march_cross(operator, fields, operator.made[:, :, None].copy(), np.array([40.0]))
-        cross.temperature[:] += 0.5 * (fields[:, :, 0].reshape(cross.temperature.shape) - cross.temperature)
-    face_temperature(work, cross.edges, 0.13, fields[:, :, 0], np.zeros_like(face), face)
+        operator = CrossOperator.place(*cross.temperature.shape)
+        assert cross_operator(grid, work, cross, speed, (2000.0, 0.13, 1.0, 1.0, 0.0), operator) == 0.0
+        field = marched(operator)[0] @ np.array([1.0, 40.0, 40.0])
+        cross.temperature[:] += 0.5 * (field.reshape(cross.temperature.shape) - cross.temperature)
+    face_temperature(work, cross.edges, 0.13, field, np.zeros_like(face), face)
     return float(face[-1, 0]) - 40.0, float(cross.shear[-1, 0])
 
 
@@ -148,10 +147,9 @@ def test_shear_heating_is_nahme_s_exact_solution(nahme):
 def test_a_well_mixed_film_between_insulated_walls_is_the_adiabatic_one():
     grid, work, cross = solved(6)
     heat, mixing = 2000.0, 1e4
-    operator, _ = cross_operator(grid, work, cross, SURFACE, (heat, mixing, 1.0, 0.0, 0.0))
-    fields = np.full((81, operator.made.shape[1], 1), 40.0)
-    march_cross(operator, fields, operator.made[:, :, None].copy(), np.zeros(1))
-    across = fields[:, :, 0].reshape(cross.temperature.shape)
+    operator = CrossOperator.place(*cross.temperature.shape)
+    cross_operator(grid, work, cross, SURFACE, (heat, mixing, 1.0, 0.0, 0.0), operator)
+    across = (marched(operator)[0] @ np.array([1.0, 40.0, 0.0])).reshape(cross.temperature.shape)
     assert np.ptp(across, axis=2).max() < 0.01
     adiabatic = np.empty_like(work.temperature)
     solve_energy(grid, work, 40.0, SURFACE, (heat, mixing), 0.0, adiabatic)
@@ -171,17 +169,50 @@ def test_oil_that_takes_up_any_heat_is_isothermal(rocker):
     np.testing.assert_allclose(p.h, same.h, rtol=1e-5, atol=1e-5 * np.abs(same.h).max())
 
 
-def test_one_field_marches_as_many_do():
-    grid, work, cross = solved(6)
-    operator, _ = cross_operator(grid, work, cross, SURFACE, (2000.0, 0.13, 1.0, 1.0, 0.0))
+def test_one_field_marches_as_three_do():
+    operator = balanced()
     rng = np.random.default_rng(5)
     sources = rng.standard_normal((80, 7))
-    many, spread = np.zeros((81, 42, 1)), np.zeros((80, 42, 1))
-    spread[:, ::6, 0] = sources
-    taken = march_cross(operator, many, spread, np.zeros(1))
+    operator.made[:] = 0.0
+    operator.made[:, ::6] = sources
+    many, taken = marched(operator)
     one = np.zeros((81, 42))
     assert march_one(operator, one, sources) == pytest.approx(taken[0], rel=1e-12)
     np.testing.assert_allclose(one, many[:, :, 0], rtol=1e-9, atol=1e-15)
+
+
+def test_what_a_pad_conducts_is_that_of_its_face_s_new_temperature():
+    # a pad of our own: its coarser nodes are the face's mean at every fourth station, heat flows to its ends
+    grid, work, cross = solved(6)
+    operator, rng = balanced(), np.random.default_rng(7)
+    to_coarse = np.kron(np.eye(21)[:, np.arange(81) // 4], np.full((1, 7), 1.0 / 28.0))
+    flux = np.kron(np.eye(21)[np.arange(81) // 4], np.ones((7, 1))) @ (3e3 * np.eye(21) - 1e3 * np.eye(21, k=1))
+    alone, field = rng.standard_normal((81, 7)), np.zeros((81, 42))
+    face = alone.copy()
+    pad = (flux, to_coarse, np.eye(21))
+    more = conduct((grid, work, cross.edges, 0.13), operator, pad, alone, 1e-9, (field, face))
+    heat = (flux @ (to_coarse @ face.ravel())).reshape(face.shape)
+    one, answer = np.zeros((81, 42)), np.empty((81, 7))
+    assert more == pytest.approx(march_one(operator, one, -station_heat(grid, heat)), rel=1e-6)
+    face_temperature(work, cross.edges, 0.13, one, heat, answer)
+    assert abs(answer).max() > 0.1
+    np.testing.assert_allclose(face, alone + answer, atol=1e-6)
+    np.testing.assert_allclose(field, one, atol=1e-6)
+
+
+def balanced() -> CrossOperator:
+    """Heat balances of a film of one temperature."""
+    grid, work, cross = solved(6)
+    operator = CrossOperator.place(*cross.temperature.shape)
+    cross_operator(grid, work, cross, SURFACE, (2000.0, 0.13, 1.0, 1.0, 0.0), operator)
+    return operator
+
+
+def marched(operator: CrossOperator) -> tuple[np.ndarray, np.ndarray]:
+    """Its three fields, and what the journal takes."""
+    fields = np.zeros((operator.made.shape[0] + 1, operator.made.shape[1], 3))
+    fields[0, :, 1] = 1.0
+    return fields, march_cross(operator, fields, operator.made)
 
 
 @pytest.mark.slow
