@@ -40,8 +40,6 @@ class CrossFilm(NamedTuple):
         [degC]
     face : (nt + 1, nz + 1) ndarray
         Of the pad's face [degC].
-    taken : (nt + 1, nz + 1) ndarray
-        Heat flux density into the pad [W/m^2].
     fluidity : (nt + 1, nz + 1, n) ndarray
         1 / mu, as the pressure was solved with [1/(Pa s)].
     shear : (nt + 1, nz + 1) ndarray
@@ -53,7 +51,6 @@ class CrossFilm(NamedTuple):
     edges: FloatArray
     temperature: FloatArray
     face: FloatArray
-    taken: FloatArray
     fluidity: FloatArray
     shear: FloatArray
     centre: FloatArray
@@ -131,7 +128,6 @@ def cross_film(work: FilmWork, temperature: float, cells: int = CELLS) -> CrossF
         edges,
         np.full((*shape, cells), temperature),
         np.full(shape, temperature),
-        np.zeros(shape),
         np.ones((*shape, cells)),
         np.ones(shape),
         np.full(shape, 0.5),

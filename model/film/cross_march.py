@@ -210,7 +210,8 @@ def conduct(
     limit, size, shape = tolerance * tolerance * np.dot(right, right), right.size, missing.shape
     steps, images, faces = np.empty((STEPS, size)), np.empty((STEPS, size)), np.empty((STEPS, *shape))
     fields, taken = np.empty((STEPS, *answer[0].shape)), np.empty(STEPS)
-    gram, seen, weights, left = np.empty((STEPS, STEPS)), np.empty(STEPS), np.empty(0), right
+    gram, seen, left = np.empty((STEPS, STEPS)), np.empty(STEPS), right
+    weights: FloatArray = np.empty(0)
     for k in range(STEPS):
         steps[k] = np.dot(guess, left)
         steps[k] /= np.sqrt(np.dot(steps[k], steps[k]))

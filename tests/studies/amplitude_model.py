@@ -10,6 +10,7 @@ displacement at the excitation frequency against the perturbation of the same eq
 from __future__ import annotations
 
 import argparse
+import copy
 import math
 from pathlib import Path
 
@@ -73,17 +74,19 @@ def followed(
     return rate, radial
 
 
-def impedance(p: Prediction, amplitude: float, axis: int, omega: float) -> np.ndarray:
-    """Column of h by a motion along X (0) or Y (1) of this amplitude [m]."""
+def harmonics(p: Prediction, motion: np.ndarray, omega: float, most: int = 1) -> np.ndarray:
+    """Phasors of the films' force [N] for a motion Re(motion exp(i omega t)) [m]: at omega, 2 omega, ... (most, 2)."""
     films = [f for f in p.equilibrium.films if f.forces is not None]
     rest, speed = p.equilibrium.position, p.equilibrium.surface_speed
-    direction = np.eye(2)[axis]
+    # the solution's arrays are kept: films are followed on copies
+    films = copy.deepcopy(films)
     wedges = [f.approach(rest)[1] for f in films]
     rates, dt = [0.0] * len(films), 2 * math.pi / omega / STEPS
-    total = np.zeros(2, complex)
+    total = np.zeros((most, 2), complex)
 
     def journal(t: float) -> tuple[np.ndarray, np.ndarray]:
-        return rest + amplitude * math.sin(omega * t) * direction, amplitude * omega * math.cos(omega * t) * direction
+        turned = motion * np.exp(1j * omega * t)
+        return rest + turned.real, (1j * omega * turned).real
 
     for n in range(STEPS * PERIODS):
         force = np.zeros(2)
@@ -94,8 +97,14 @@ def impedance(p: Prediction, amplitude: float, axis: int, omega: float) -> np.nd
             rates[k], _ = followed(film, half, journal((n + 0.5) * dt), speed, rate)
             wedges[k] += dt * rates[k]
         if n >= STEPS * (PERIODS - 1):
-            total += force * np.exp(-1j * omega * n * dt) * 2.0 / STEPS
-    return total / (-1j * amplitude)
+            turns = np.exp(-1j * omega * n * dt * np.arange(1, most + 1))
+            total += turns[:, None] * force * 2.0 / STEPS
+    return total
+
+
+def impedance(p: Prediction, amplitude: float, axis: int, omega: float) -> np.ndarray:
+    """Column of h by a motion along X (0) or Y (1) of this amplitude [m]."""
+    return harmonics(p, amplitude * np.eye(2)[axis], omega)[0] / amplitude
 
 
 def main() -> None:
@@ -115,7 +124,6 @@ def main() -> None:
                 h = impedance(p, share * clearance, axis, omega)[axis]
             except (ArithmeticError, ZeroDivisionError):
                 h = complex(math.nan, math.nan)
-            p = predict(bearing, chosen.load, speed=omega, thermal="isothermal", pivots="rigid", mesh=(40, 4))
             cells.append((h.real / p.h[axis, axis].real - 1.0, h.imag / p.h[axis, axis].imag - 1.0))
         (kx, cx), (ky, cy) = cells
         print(f"| {share:.0%} | {kx:+.1%} | {ky:+.1%} | {cx:+.1%} | {cy:+.1%} |", flush=True)

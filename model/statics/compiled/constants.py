@@ -49,8 +49,8 @@ HEATING_STEP = 15.0
 #: would change them by this times `Setup.accuracy`, 3e-5 K as a rule. That is 1e-6 of the viscosity, and of that the
 #: step leaves a tenth.
 HEAT_PER_FORCE = 300.0
-#: With temperatures across the films it ends at so many times `Setup.accuracy`: 1e-3 K asked for in the last step,
-#: which leaves a fifth of that, where a mesh twice as fine moves them by 0.1 K.
+#: With temperatures across the films it ends at so many times `Setup.accuracy`: less than 1e-3 K asked for in the last
+#: step. That leaves 2e-5 K and 6e-7 of K and C (rocker; two steps fewer), where a mesh twice as fine moves 0.1 K.
 ACROSS = 30.0
 #: Kelvins beyond which a film is no film: squares would overflow.
 BOUNDLESS = 1e30
