@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from model.arrays import FloatArray
@@ -211,7 +213,7 @@ def conduct(
     steps, images, faces = np.empty((STEPS, size)), np.empty((STEPS, size)), np.empty((STEPS, *shape))
     fields, taken = np.empty((STEPS, *answer[0].shape)), np.empty(STEPS)
     gram, seen, left = np.empty((STEPS, STEPS)), np.empty(STEPS), right
-    weights: FloatArray = np.empty(0)
+    weights: Any = np.empty(0)
     for k in range(STEPS):
         steps[k] = np.dot(guess, left)
         steps[k] /= np.sqrt(np.dot(steps[k], steps[k]))
