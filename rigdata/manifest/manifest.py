@@ -17,6 +17,8 @@ from rigdata.manifest.toml_lines import key_lines
 from rigdata.problem import Problem, RigDataError
 
 SCHEMA = "tpjb-rig/1"
+#: Frequencies of the mains in any country [Hz].
+MAINS_FREQUENCIES = (50.0, 60.0)
 #: Larger manifests are refused before they are parsed [bytes].
 MAX_MANIFEST = 4 * 2**20
 #: Longer lines, and lines with more dots outside quotes, are refused.
@@ -142,7 +144,7 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
 
 def _mains(table: Table) -> float | None:
     value = table.quantity("mains", "frequency", low=0.0)
-    if value is not None and value not in (50.0, 60.0):
+    if value is not None and value not in MAINS_FREQUENCIES:
         table.error("mains", f"mains is {value:g} Hz", 'Give "50 Hz" or "60 Hz"')
         return None
     return value

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rigdata.manifest.manifest import MAINS_FREQUENCIES
 from rigdata.survey.channel_guess import ChannelGuess, guess_channel, quantity_of_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.run_guess import RunGuess, guess_run, strongest_lines
@@ -158,7 +159,7 @@ def _tachometers(
 
 
 def _is_mains(frequency: float) -> bool:
-    return any(abs(frequency - mains) < _MAINS_NEAR * mains for mains in (50.0, 60.0))
+    return any(abs(frequency - mains) < _MAINS_NEAR * mains for mains in MAINS_FREQUENCIES)
 
 
 def _common_line(exports: Sequence[Export], quantities: dict[str, str], runs: Sequence[RunGuess]) -> float:

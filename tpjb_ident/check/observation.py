@@ -11,6 +11,7 @@ import numpy as np
 
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.channel_statistics import ChannelStatistics
+from rigdata.manifest.manifest import MAINS_FREQUENCIES
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.arrays import ComplexArray, FloatArray
@@ -26,8 +27,6 @@ _FITTED = 2**16
 _DECIMATED = 4000
 #: Samples that tell the quantiles of a channel, and whether it has noise.
 _SPREAD = 8192
-#: Mains of any country [Hz].
-MAINS = (50.0, 60.0)
 
 
 @dataclass(frozen=True)
@@ -143,7 +142,7 @@ def _over_band(
         return np.empty((0, len(live)), complex), lines
     turning = [run.point.shaft_speed_hz] if run.point.shaft_speed > 0 else []
     force = [i for i, c in enumerate(live) if c.quantity == "force"]
-    rows, floor = band_lines(run, used, force, [*turning, *MAINS])
+    rows, floor = band_lines(run, used, force, [*turning, *MAINS_FREQUENCIES])
     first = rows[0] if len(rows) else np.full(len(live), np.nan + 0j)
     return rows, replace(lines, phasor=first, floor=floor)
 

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigdata.campaign import Campaign
+from rigdata.manifest.manifest import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError
 from rigdata.run import Run
 from tpjb_ident.arrays import FloatArray
 
-CHOICES = (50.0, 60.0)
 #: Excitations this near to one of them make the question matter [Hz].
 NEAR = 0.3
 #: Runs and samples that are looked at.
@@ -39,11 +39,11 @@ def mains_frequency(campaign: Campaign, usual: float) -> float:
     if stated is not None:
         return float(stated)
     dynamic = campaign.of_kind("dynamic")
-    struck = [c for c in CHOICES if any(abs(run.point.excitation_hz - c) < NEAR for run in dynamic)]
-    if not struck or usual not in CHOICES:
+    struck = [c for c in MAINS_FREQUENCIES if any(abs(run.point.excitation_hz - c) < NEAR for run in dynamic)]
+    if not struck or usual not in MAINS_FREQUENCIES:
         return usual
-    votes = {c: _votes(campaign.runs, c) for c in CHOICES}
-    best = max(CHOICES, key=lambda c: (votes[c], c == usual))
+    votes = {c: _votes(campaign.runs, c) for c in MAINS_FREQUENCIES}
+    best = max(MAINS_FREQUENCIES, key=lambda c: (votes[c], c == usual))
     if votes[best] == 0 and len(struck) == 1:
         return struck[0]  # it cannot be ruled out, and must be named
     return best

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft, ndimage
 
+from rigdata.manifest.manifest import MAINS_FREQUENCIES
 from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
 
-MAINS = (50.0, 60.0)  # [Hz]
 AROUND = 0.35  # [Hz] in which the mains is looked for
 SMOOTH = 0.1  # [s]: whole periods of either, so that taking off the running mean leaves the pick-up whole
 NOISE_FROM, NOISE_TO = 1.0, 4.0  # [Hz] off the mains, where noise is measured
@@ -82,7 +82,7 @@ def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: floa
         None for short or slow records.
     """
     n = len(good)
-    if n < SHORTEST * rate or rate < 2.2 * max(MAINS) or good.sum() < 0.5 * n:
+    if n < SHORTEST * rate or rate < 2.2 * max(MAINS_FREQUENCIES) or good.sum() < 0.5 * n:
         return None
     index = np.arange(n)
     window = np.hanning(n) * good
@@ -96,7 +96,7 @@ def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: floa
     frequency = np.arange(spectra.shape[1]) * rate / length
     best: PickupSignature | None = None
     strength = 0.0
-    for mains in MAINS:
+    for mains in MAINS_FREQUENCIES:
         off = np.abs(frequency - mains)
         noise = np.sqrt(np.mean(np.abs(spectra[:, (off > NOISE_FROM) & (off < NOISE_TO)]) ** 2, axis=1))
         power = np.sum(np.abs(spectra / np.maximum(noise, 1e-300)[:, None]) ** 2, axis=0)
