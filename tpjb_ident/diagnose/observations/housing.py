@@ -13,11 +13,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.setup import Setup
+from rigdata.manifest.manifest import MAINS_FREQUENCIES
+from tpjb_ident.dynamic.broadband.spectra.run_spectra import SpectraSettings, run_spectra
+from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.records.run_phasors import run_phasors
 from tpjb_ident.dynamic.spectral_lines.windows import RecordTooShortError
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
+    from rigdata.run import Run
 
 #: Runs that are looked at: those of the highest frequencies, where the housing shakes most.
 RUNS = 8
@@ -66,14 +70,17 @@ def cell_stiffness(campaign: Campaign) -> tuple[float, float] | None:
     rows = []
     for run in runs:
         try:
-            found = run_phasors(run, mass)
+            band = None if run.excitation_kind == "sine" else run.band
+            found = run_phasors(run, mass) if band is None else _over_band(run, band, mass, campaign.mains)
         except RecordTooShortError:
             continue
         if found.acceleration is None:
             continue
-        force, acceleration = found.cell_force.phasors[:, 0], found.acceleration.phasors[:, 0]
-        power = np.sum(np.abs(force) ** 2, axis=0)
-        slope = np.sum((np.conj(force) * -acceleration / run.point.excitation**2).real, axis=0)
+        lines = len(found.lines.excitation)
+        omega = 2 * np.pi * np.array([line.frequency for line in found.lines.excitation])
+        force, acceleration = found.cell_force.phasors[:, :lines], found.acceleration.phasors[:, :lines]
+        power = np.sum(np.abs(force) ** 2, axis=(0, 1))
+        slope = np.sum((np.conj(force) * -acceleration / omega[:, None] ** 2).real, axis=(0, 1))
         # an axis that the run does not excite says nothing
         rows.append(np.where(power > 0.05 * power.max(), slope / np.maximum(power, 1e-300), np.nan))
     if not rows:
@@ -83,3 +90,8 @@ def cell_stiffness(campaign: Campaign) -> tuple[float, float] | None:
         return None
     x, y = (float(v) for v in np.nanmedian(table, axis=0))
     return tuple(1.0 / max(c, 1.0 / STIFF) for c in (x, y))  # type: ignore[return-value]
+
+
+def _over_band(run: Run, band: tuple[float, float], housing_mass: float, mains: float | None) -> RunPhasors:
+    """Phasors of a run that is excited over a band; `cell_stiffness` needs them at no common bins."""
+    return run_spectra(run, housing_mass, SpectraSettings(band, None, mains or MAINS_FREQUENCIES[0], {})).phasors
