@@ -35,7 +35,12 @@ from model.setup import Setup
 from rigdata.virtual_rig import Instruments, Noise, RigPlan, RigTruth, VirtualRig, write_campaign
 from tests.studies.diagnosis.mixtures import BEARINGS, KINDS, OUTSIDE, Bench, Drawn, bench, draw, hidden
 from tests.studies.diagnosis.tables import tables
-from tpjb_ident.compare.rig_from_model import INSTRUMENT_ERRORS, erring_instruments, truth_of
+from tpjb_ident.compare.rig_from_model import (
+    INSTRUMENT_ERRORS,
+    ModelConvergenceError,
+    erring_instruments,
+    truth_of,
+)
 from tpjb_ident.diagnose.forward.nuisance import Nuisance, Shift
 
 #: Slow to simulate.
@@ -124,7 +129,10 @@ def run(one: Bench, name: str, kind: str, seed: int) -> dict[str, Any] | None:
         return None
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "campaign.h5"
-        write_campaign(path, rig_of(name, drawn, seed))
+        try:
+            write_campaign(path, rig_of(name, drawn, seed))
+        except ModelConvergenceError as error:
+            return {"kind": kind, "seed": seed, "failed": f"no campaign: {error}", "code": None}
         out = Path(folder) / "out"
         began = os.times()
         command = [sys.executable, "-m", "tpjb_ident", "diagnose", str(path), "--out", str(out), "--quiet"]
