@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from model.statics.conditions import largest_reynolds
 from model.statics.equilibrium import Equilibrium
 from model.statics.pad_flow import PadFlow, pad_flow
 from model.statics.power import power_loss
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True, repr=False)
@@ -97,6 +100,42 @@ class Prediction:
         rows = [[f"{line:.4g}", *(f"{v:.4g}" for v in row)] for line, row in zip(lines, cells, strict=True)]
         table = "".join("<tr>" + "".join(f"<td>{c}</td>" for c in row) + "</tr>" for row in rows)
         return f"<p>{self}</p><table><tr>{''.join(f'<th>{n}</th>' for n in heads)}</tr>{table}</table>"
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per excitation frequency: point, K, C, position, conditions; SI, names as in prediction.csv."""
+        import pandas as pd
+
+        lines = np.atleast_1d(np.asarray(self.excitation, float)) / (2 * math.pi)
+        table: dict[str, Any] = {
+            "static_load_N": self.load,
+            "static_load_direction_deg": math.degrees(self.load_direction),
+            "shaft_speed_Hz": self.speed / (2 * math.pi),
+            "excitation_Hz": lines,
+        }
+        for values, kind, unit in ((self.k, "k", "N_per_m"), (self.c, "c", "Ns_per_m")):
+            columns = values.reshape(-1, 4).T
+            table.update({f"{kind}{at}_{unit}": one for at, one in zip(("xx", "xy", "yx", "yy"), columns, strict=True)})
+        x, y = self.position
+        return pd.DataFrame(table | {"x_m": x, "y_m": y, "status": "; ".join(self.status)})
+
+    def plot(self) -> Any:
+        """Stiffness above damping over the excitation frequency, drawn by pandas.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        names = ("xx", "xy", "yx", "yy")
+        table = self.to_dataframe().rename(columns={"excitation_Hz": "excitation, Hz"})
+        shown = table[["excitation, Hz"]].copy()
+        for kind, unit, scale in (("k", "N_per_m", 1e6), ("c", "Ns_per_m", 1e3)):
+            shown[[kind + n for n in names]] = table[[f"{kind}{n}_{unit}" for n in names]] / scale
+        groups = [tuple("k" + n for n in names), tuple("c" + n for n in names)]
+        axes = shown.plot(x="excitation, Hz", subplots=groups, style="o-", grid=True, figsize=(7, 6))
+        for axis, label in zip(axes, ("stiffness, MN/m", "damping, kN s/m"), strict=True):
+            axis.set_ylabel(label)
+            axis.legend(ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
+        return axes[0].figure
 
     @property
     def converged(self) -> bool:

@@ -158,7 +158,7 @@ def _kind_of(given: Path) -> str:
             return "folder"
         inside_it = [p.name for p in itertools.islice(given.iterdir(), 1000) if p.suffix.lower() in HDF5_SUFFIXES][:3]
         hint = f", or one of its HDF5 files ({', '.join(inside_it)})" if inside_it else ""
-        cure = f"Give the folder that holds {MANIFEST_NAME}{hint}"
+        cure = f"Give the folder that holds {MANIFEST_NAME}{hint}; `tpjb init FOLDER` drafts one for records"
         raise _cannot(str(given), f"the folder has no {MANIFEST_NAME}", cure)
     if not given.exists():
         raise _cannot(str(given)[:200], "there is no such file or folder", "Check the path")

@@ -231,7 +231,7 @@ CONTACT = (3e-6, math.log(500.0))
             {"directions": (PadDirection(0.0, 0.0), PadDirection(math.radians(15.1), 0.0))},
             r"moves-aside: the shaft goes \+15.10",
         ),
-        ({"fits": (law(contact=CONTACT),)}, "contact-incomplete: below 1701 N"),
+        ({"fits": (law(contact=CONTACT),)}, "contact-incomplete: the shaft is not fully in contact below 1701 N"),
         ({"fits": (law(contact=(3e-4, math.log(3000.0))),)}, "contact-never-complete"),
         (
             {"fits": (law(), law("hertz-point")), "weights": (0.49, 0.51)},

@@ -27,6 +27,7 @@ def page_and_svg(tmp_path_factory):
         title=HOSTILE,
         subtitle=HOSTILE,
         answer=HOSTILE,
+        then=HOSTILE,
         more=[HOSTILE],
         key_table=Table(HOSTILE, [HOSTILE, "n"], [[HOSTILE, "1"]]),
         sections=[Section(HOSTILE, notes=[HOSTILE], panels=panels, tables=[Table("t", ["a"], [[HOSTILE]])])],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 import tpjb_ident as ti
@@ -55,6 +56,10 @@ def test_prediction(rocker_file):
     assert str(p).startswith("5000 N at -90 deg, 22 Hz: shaft at (")
     assert f"thinnest film {1e6 * p.min_film:.3g} um" in str(p)
     assert str(p).endswith("all well")
+    table = p.to_dataframe()
+    assert len(table) == np.size(p.excitation)
+    assert table["kyy_N_per_m"][0] == np.ravel(p.kyy)[0]
+    assert table["shaft_speed_Hz"][0] == pytest.approx(22.0)
 
 
 def test_operating_point():

@@ -114,7 +114,7 @@ class Locus(Presented):
 
     def __str__(self) -> str:
         radii = [1e6 * float(np.hypot(*p.position)) for p in self.points]
-        text = f"locus: {len(self.points)} positions, {min(radii):.1f} to {max(radii):.1f} um from the centre"
+        text = f"locus: {len(self.points)} positions, {min(radii):.1f} to {max(radii):.1f} µm from the centre"
         return text + (f"; {', '.join(sentences(self.status))}" if self.status else "")
 
 

@@ -133,7 +133,7 @@ class ClearancePolygon(Presented):
         pads = ", ".join(
             f"{1e6 * c:.2f} ({1e6 * s:.2f})" for c, s in zip(self.clearance, self.clearance_se, strict=True)
         )
-        text = f"clearance polygon {self.run}: per pad {pads} um (se), pushed by {self.push_load:.0f} N"
+        text = f"clearance polygon {self.run}: per pad {pads} µm (se), pushed by {self.push_load:.0f} N"
         return text + (f"; {', '.join(sentences(self.status))}" if self.status else "")
 
 
@@ -287,9 +287,9 @@ def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[Con
     outside = [c for c in curves or () if bool(c.is_extrapolated(push))]
     if not outside:
         return ()
-    pads = ", ".join(str(c.pad) for c in outside)
     lowest = min(c.valid_from for c in outside)
-    detail = f"pushed with {push:.0f} N, dry tests of pads {pads} hold from {lowest:.0f} N on"
+    pads = "all pads" if len(outside) == len(curves or ()) else "pads " + ", ".join(f"#{c.pad}" for c in outside)
+    detail = f"pushed with {push:.0f} N, the dry tests of {pads} hold from {lowest:.0f} N on; the sweep corrects it"
     return (Condition("give-extrapolated", detail),)
 
 
@@ -338,7 +338,8 @@ def _status(fit: SideFit, clearance: FloatArray, se: FloatArray, reached: int) -
     # below half a micrometre a difference between pads is of no consequence, however well it is measured
     odd = np.flatnonzero(spread > np.maximum(IRREGULAR * se, 0.5e-6))
     if len(odd):
-        found.append(Condition("irregular", "pads " + ", ".join(str(k + 1) for k in odd)))
+        apart = ", ".join(f"pad #{k + 1} {1e6 * (clearance[k] - np.nanmedian(clearance)):+.1f} µm" for k in odd)
+        found.append(Condition("irregular", f"{apart} from the median of all: worn, damaged or wrongly assembled"))
     turn = np.nanmean(fit.tilt)
     if abs(turn) > IRREGULAR * np.sqrt(np.nanmean(fit.tilt_se**2) / reached) and abs(turn) > 5e-3:
         found.append(Condition("frame-turned", f"all sides by {np.degrees(turn):+.2f} deg"))

@@ -192,7 +192,7 @@ def _status(
     elif abs(aside.angle) > 0.5 * settings.displacement_angle_limit:
         found.append(Condition("moves-aside", f"the shaft goes {aside}"))
     if onset > 0.0:
-        found.append(Condition("contact-incomplete", f"below {onset:.0f} N"))
+        found.append(Condition("contact-incomplete", f"the shaft is not fully in contact below {onset:.0f} N"))
     if onset >= float(np.max(steps.load)):
         found.append(Condition("contact-never-complete"))
     shares: dict[str, float] = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +41,7 @@ def write_comparison_report(
     comparison: Comparison,
     settings: Mapping[str, Any] | None = None,
     inputs: Mapping[str, str] | None = None,
+    then: str = "",
 ) -> Path:
     """Write report.html and its figures.
 
@@ -52,13 +54,15 @@ def write_comparison_report(
         How it was made, for the reader; default: the comparison's own settings.
     inputs : mapping of str to str, optional
         SHA-256 of the inputs; default: of the campaign's files.
+    then : str
+        The command that comes next.
 
     Returns
     -------
     Path
         report.html; the figures lie beside it in ``figures`` as SVG and PNG.
     """
-    page = comparison_page(comparison, settings, inputs)
+    page = replace(comparison_page(comparison, settings, inputs), then=then)
     panels = [panel for section in page.sections for panel in section.panels]
     texts = save_panels(panels, folder / "figures")
     path = folder / "report.html"

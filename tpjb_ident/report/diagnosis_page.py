@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ def write_diagnosis_report(
     result: CampaignDiagnosis,
     settings: Mapping[str, Any],
     inputs: Mapping[str, str],
+    then: str = "",
 ) -> Path:
     """Write report.html and its figures into an existing folder.
 
@@ -45,13 +47,15 @@ def write_diagnosis_report(
         Settings of the command, for the last section.
     inputs : mapping of str to str
         Input files and their hashes.
+    then : str
+        The command that comes next.
 
     Returns
     -------
     Path
         The page.
     """
-    page = diagnosis_page(campaign, result, settings, inputs)
+    page = replace(diagnosis_page(campaign, result, settings, inputs), then=then)
     texts = save_panels([panel for section in page.sections for panel in section.panels], folder / "figures")
     path = folder / "report.html"
     write_text(path, render_page(page, texts))

@@ -48,10 +48,9 @@ def set_up_section(comparison: Comparison) -> Section:
     """
     campaign = comparison.campaign
     if isinstance(campaign, TableSource):
-        return Section("Set-up", notes=[f"{comparison.bearing}."], tables=[bearing_table(comparison)])
+        return Section("Set-up", tables=[bearing_table(comparison)])
     return Section(
         "Set-up",
-        notes=[f"{comparison.bearing}."],
         tables=[sensor_table(tuple(campaign.channels.values())), bearing_table(comparison), run_matrix(campaign.runs)],
     )
 

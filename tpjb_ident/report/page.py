@@ -68,6 +68,8 @@ class Page:
         Further findings.
     key_table : Table or None
         The answer in numbers.
+    then : str
+        The command that comes next.
     sections : sequence of Section
     settings, inputs : mapping of str to str
         How it was made; SHA-256 of what it was made from.
@@ -82,6 +84,7 @@ class Page:
     answer: str
     more: Sequence[str] = ()
     key_table: Table | None = None
+    then: str = ""
     sections: Sequence[Section] = ()
     settings: Mapping[str, str] = field(default_factory=dict)
     inputs: Mapping[str, str] = field(default_factory=dict)

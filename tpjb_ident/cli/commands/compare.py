@@ -91,9 +91,10 @@ def _from_campaign(
     with output_folder(target, "compare", (campaign,)) as folder:
         with model_beside(source, drawn, settings.asked()) as ahead, progress("comparing") as show:
             result = compare_campaign(source, drawn, settings, show, ahead)
-            write_comparison(folder, result, options, inputs, show)
+            then = next_command(result, str(campaign), bearing)
+            write_comparison(folder, result, options, inputs, show, then)
         write_record(folder, target, "compare", options, inputs)
-    show_comparison(result, next_command(result, str(campaign), bearing))
+    show_comparison(result, then)
     print_line(f"Report: {target / 'report.html'}")
     refuse_comparison(result)
 
@@ -112,9 +113,10 @@ def _from_table(
         with progress("comparing") as show:
             result = compare_table(path, drawn, settings, error, show)
         write_table(folder, "comparison", comparison_frame(result))
-        write_comparison_report(folder, result, options, inputs)
+        then = next_command(result, f"--coefficients {path}", bearing)
+        write_comparison_report(folder, result, options, inputs, then)
         write_record(folder, target, "compare", options, inputs)
-    show_comparison(result, next_command(result, f"--coefficients {path}", bearing))
+    show_comparison(result, then)
     print_line(f"Report: {target / 'report.html'}")
     refuse_comparison(result)
 
@@ -131,7 +133,7 @@ def _variants(text: str) -> tuple[str, ...]:
 
 
 def write_comparison(
-    folder: Path, result: Comparison, options: dict[str, Any], inputs: dict[str, str], show: Progress
+    folder: Path, result: Comparison, options: dict[str, Any], inputs: dict[str, str], show: Progress, then: str = ""
 ) -> None:
     """Write every table, pivots.toml, the figures and report.html.
 
@@ -146,6 +148,8 @@ def write_comparison(
         SHA-256 by file name.
     show : Progress
         Called with what is being done, how much is done, of how much.
+    then : str
+        The command that comes next.
     """
     from tpjb_ident.compare.pivot_formula import printed_formula
     from tpjb_ident.compare.positions import locus_frame
@@ -167,7 +171,7 @@ def write_comparison(
         write_table(folder, "locus_comparison", locus_frame(result))
     show("drawing figures", 1, 2)
     named = {name: getattr(value, "name", value) for name, value in options.items()}
-    write_comparison_report(folder, result, named, inputs)
+    write_comparison_report(folder, result, named, inputs, then)
 
 
 def show_comparison(result: Comparison, then: str = "") -> None:

@@ -132,9 +132,10 @@ def _from_campaign(asked: _Asked, campaign: Path, bearing: Path | None) -> None:
         with progress("diagnosing") as show:
             result = diagnose_campaign(source, drawn, asked.baseline, asked.settings, show)
             write_identification(folder, found := _identified(result))
-            _write(folder, asked, source, result, inputs)
+            then = _next(asked, result, str(campaign), bearing)
+            _write(folder, asked, source, result, inputs, then)
         write_record(folder, asked.target, "diagnose", options, inputs)
-    _show(source.id, asked, result, str(campaign), bearing)
+    _show(source.id, asked, result, then)
     refuse_untrusted(found)
 
 
@@ -153,13 +154,14 @@ def _from_table(asked: _Asked, path: Path, bearing: Path | None, reading_error: 
     with output_folder(asked.target, "diagnose", (path,)) as folder:
         with progress("diagnosing") as show:
             result = diagnose_table(path, drawn, asked.baseline, asked.settings, error, show)
-            _write(folder, asked, source, result, inputs)
+            then = _next(asked, result, f"--coefficients {path}", bearing)
+            _write(folder, asked, source, result, inputs, then)
         write_record(folder, asked.target, "diagnose", asked.options, inputs)
-    _show(source.id, asked, result, f"--coefficients {path}", bearing)
+    _show(source.id, asked, result, then)
 
 
 def _write(  # type: ignore[no-untyped-def]
-    folder: Path, asked: _Asked, source, result: CampaignDiagnosis, inputs: dict[str, str]
+    folder: Path, asked: _Asked, source, result: CampaignDiagnosis, inputs: dict[str, str], then: str
 ) -> None:
     from tpjb_ident.report.diagnosis_page import write_diagnosis_report
 
@@ -170,13 +172,16 @@ def _write(  # type: ignore[no-untyped-def]
     if verdict.behaves_like:
         write_text(folder / "with-terms.effects.toml", verdict.terms_toml(before, measured))
     named = {name: getattr(value, "name", value) for name, value in asked.options.items()}
-    write_diagnosis_report(folder, source, result, named, inputs)
+    write_diagnosis_report(folder, source, result, named, inputs, then)
 
 
-def _show(name: str, asked: _Asked, result: CampaignDiagnosis, source: str, bearing: Path | None) -> None:
+def _next(asked: _Asked, result: CampaignDiagnosis, source: str, bearing: Path | None) -> str:
     from tpjb_ident.report.diagnosis_words import next_command
 
-    then = next_command(source, str(bearing or ""), result.diagnosis.verdict, str(asked.target))
+    return next_command(source, str(bearing or ""), result.diagnosis.verdict, str(asked.target))
+
+
+def _show(name: str, asked: _Asked, result: CampaignDiagnosis, then: str) -> None:
     show_verdict(name, result, then)
     print_line(f"Report: {asked.target / 'report.html'}")
 

@@ -62,9 +62,8 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
         show_clearance(polygon, drawn, source.id)
     if found is not None:
         print_line(str(found))
-    for part in (polygon, found):
-        for condition in part.status if part is not None else ():
-            note_line("note", condition.sentence())
+    for condition in polygon.status if polygon is not None else ():  # those of the locus stand in its line
+        note_line("note", condition.sentence())
     for sentence in dict.fromkeys([*(c.sentence() for c in static.left_out), *refused]):
         if found is None or sentence not in sentences(found.status):
             note_line("note", sentence)

@@ -54,7 +54,7 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
     for curve in curves:
         for condition in curve.status:
             if condition not in ABOUT_ALL:
-                note_line("note", f"pad {curve.pad}: {condition.sentence()}")
+                note_line("note", f"pad #{curve.pad}: {condition.sentence()}")
     bad = [f"pad {c.pad}: {condition.sentence()}" for c in curves for condition in untrusted(c.status)]
     without = sorted({run.pad or 0 for run in source.of_kind("dry_pivot")} - {curve.pad for curve in curves})
     bad += [f"pad {pad}: has no curve, its records were refused" for pad in without]
