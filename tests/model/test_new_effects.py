@@ -208,6 +208,26 @@ def test_friction_holds_a_pad_up_to_its_limit(spherical, coefficient):
     assert "pivot friction holds" in named or "loose" in named
 
 
+def test_friction_gives_way_by_mindlins_partial_slip(spherical):
+    """Initial slope, limit, a slope without a kink between them, and both derivatives by differences."""
+    setup = apply_effects(Setup(spherical, pivot_laws("kirk", spherical)), [Effect("pivot_friction", coefficient=0.1)])
+    load = 3000.0
+    stick, slip = friction_limits(setup, load)
+    end = 1.5 * slip / stick
+    assert tilt_hold(setup, 1e-6 * end, load).stiffness == pytest.approx(stick, rel=1e-5)
+    assert tilt_hold(setup, 0.5 * end, load).moment == pytest.approx(slip * (1 - 0.5**1.5))
+    beyond = tilt_hold(setup, -1.01 * end, load)
+    assert (beyond.moment, beyond.stiffness, beyond.slides) == (pytest.approx(-slip), 0.0, True)
+    assert tilt_hold(setup, 0.9999 * end, load).stiffness < 0.02 * stick
+    for tilt in (0.2 * end, -0.7 * end):
+        told = tilt_hold(setup, tilt, load)
+        step, push = 1e-5 * end, 1e-4 * load
+        by_tilt = tilt_hold(setup, tilt + step, load).moment - tilt_hold(setup, tilt - step, load).moment
+        by_load = tilt_hold(setup, tilt, load + push).moment - tilt_hold(setup, tilt, load - push).moment
+        assert told.stiffness == pytest.approx(by_tilt / (2 * step), rel=1e-6)
+        assert told.arm == pytest.approx(by_load / (2 * push), rel=1e-6)
+
+
 def test_friction_that_is_broken_loose_leaves_a_free_pad(spherical):
     free = run(spherical)
     setup = apply_effects(Setup(spherical, pivot_laws("kirk", spherical)), [Effect("pivot_friction", coefficient=1e-4)])
