@@ -203,3 +203,15 @@ def test_an_effect_outside_the_library_is_not_named(setup, observations):
     assert verdict.verdict == "unexplained"
     assert not verdict.effects
     assert np.isfinite(residuals(hurt, hurt.value)).all()
+
+
+@pytest.mark.slow
+def test_a_direction_between_those_of_the_grid_is_named_where_a_generic_term_leads(setup, observations):
+    hidden = [Effect("structure_compliance", stiffness=5e8, direction=math.radians(20.0))]
+    given = campaign(observations, setup, hidden, 3)
+    tried = {"structure_compliance", "series_compliance", "pivot_flexibility", "housing_flexibility"}
+    settings = DiagnoseSettings(workers=1, skip=frozenset(known_effects()) - tried)
+    (found,) = diagnose(given, setup, settings).verdict.effects
+    assert found.name == "structure_compliance"
+    assert found.parameters["direction"].value == pytest.approx(math.radians(20.0), abs=0.02)
+    assert found.parameters["stiffness"].lo < 5e8 < found.parameters["stiffness"].hi

@@ -38,13 +38,15 @@ FIRST = 3
 #: Of these, the ones that may yet be the best: derivatives from elsewhere mistake a fit by up to 25 nats where it rises
 #: by as many, and by a third of its rise where that is large (`docs/diagnosis.md`).
 NEAR, HALF = 30.0, 0.5
+#: Effects with a direction that are turned off their grid where a generic term leads.
+TURNED = 2
 #: Evidence [nats] that no tolerance makes up once an effect is taken away: 45 at the most in all samples.
 HOPELESS = 100.0
 #: Candidates that are fitted since they explain most by themselves, whatever else may be off.
 ALONE = 3
 #: Pairs of candidates that are fitted from the baseline: forward selection can begin with a compromise.
 PAIRS = 2
-#: Candidates that are fitted in the place of every effect of the model.
+#: Candidates that are fitted in the place of every effect.
 RIVALS = 3
 
 
@@ -81,7 +83,7 @@ class Selection:
         return self._nothing[0]
 
     def _likeliest(self, model: Fit) -> Fit:
-        """The likeliest fit of a model's candidates that was met so far; the model itself if none is much better."""
+        """The likeliest fit of a model's candidates met so far; the model itself if none is much better."""
         known = self._places.get(model.label, model) if model.candidates else self.baseline
         return known if known.evidence > model.evidence + CLEARLY else model
 
@@ -103,11 +105,11 @@ class Selection:
                 tried = self._best([*tried, *self._extended(self.drawn, table)])
             if count == 1:
                 tried = sorted([*tried, *self._pairs(singles)], key=lambda f: -f.evidence)
-            # what may be off acts otherwise beside a large effect, and a direction between those of the grid does not
-            # show its worth: the likeliest are told with derivatives and directions of their own
-            lead = self._leading(model, tried[:FIRST])
+            # what may be off acts otherwise beside a large effect, a direction between those of the grid shows not its
+            # worth: the likeliest have derivatives and directions of their own
+            lead = self._leading(model, tried)
             near = self.run.together([functools.partial(self.refined, f) for f in lead])
-            tried = [*near, *tried[len(near) :]]
+            tried = [*near, *(f for f in tried if not any(f is one for one in lead))]
             singles = singles or tuple(self._best(tried))
             chosen = self._chosen(model, tried)
             if chosen is None:
@@ -127,11 +129,17 @@ class Selection:
             count += 1
         return model, singles
 
-    def _leading(self, model: Fit, first: Sequence[Fit]) -> list[Fit]:
-        """Those of the first fits that may yet be the best."""
+    def _leading(self, model: Fit, tried: Sequence[Fit]) -> list[Fit]:
+        """Those of the first fits that may yet be the best; behind a generic term, effects with a direction too."""
+        first = tried[:FIRST]
         best = first[0].evidence if first else 0.0
         least = best - max(NEAR, HALF * (best - model.evidence))
-        return [f for f in first if f.evidence > least]
+        lead = [f for f in first if f.evidence > least]
+        if lead and lead[0].names & set(TERMS):
+            # free numbers of a term find any direction, an effect on its grid none between
+            turned = [f for f in tried if not f.names & set(TERMS) and any(c.refined() != c for c in f.candidates)]
+            lead += [f for f in turned[:TURNED] if not any(f is one for one in lead)]
+        return lead
 
     def _chosen(self, model: Fit, tried: Sequence[Fit]) -> Fit | None:
         """The best that unseen points want; an effect of the library before a generic term that does no better."""
@@ -190,7 +198,6 @@ class Selection:
         ----------
         model : Fit
         index : int
-            Of the candidate.
         """
         known = self._known.get((id(model), index))
         if known is None:
@@ -217,7 +224,6 @@ class Selection:
         ----------
         model : Fit
         index : int
-            Of the candidate.
         """
         known = self._less.get((id(model), index))
         if known is None:
@@ -293,15 +299,14 @@ class Selection:
         free = {c: v for c, v in table.items() if c.label not in {o.label for o in model.candidates}}
         every = scores(self.problem, model, free, courses=self.courses)
         ranked = self._promising(every)
+        known = {s.candidates for s in ranked}
         if model is self.drawn:
             # a fit of a large effect may end on either side of a hill: it begins at both sizes that were proposed
-            known = {s.candidates for s in ranked}
             first = alone(self.problem, model, free, self.courses)[:ALONE]
             names = {s.candidates for s in first} - known
             ranked = [*ranked, *first, *(s for s in every if s.candidates in names)]
             return self._best(self._fits([with_model(model, s, free, self.courses) for s in ranked]))
         starts = [with_model(model, s, free, self.courses) for s in ranked]
-        known = {s.candidates for s in ranked}
         starts += [s for s in instead(self.problem, model, free, STAND_IN) if s.candidates[-1:] not in known]
         return self._fits(starts)
 
