@@ -113,6 +113,10 @@ def _tell(what: str) -> None:
     warnings.warn(what, RuntimeWarning, stacklevel=4)
 
 
+#: What `_cache_type` relies on in numba.
+_LOADING = ("_load_overload", "_guard_against_spurious_io_errors")
+
+
 @functools.cache
 def _cache_type() -> Any:
     from numba.core.caching import FunctionCache
@@ -151,7 +155,10 @@ def _dispatcher(numba: Any, function: Callable[..., Any]) -> Any:
     if not hasattr(store, "_source_stamp"):  # a cache that is built otherwise: compile in every process, trust nothing
         return _not_kept(numba, function)
     store._source_stamp = stamp()
-    dispatcher._cache.__class__ = _cache_type()
+    if all(hasattr(dispatcher._cache, name) for name in _LOADING):  # a numba that loads otherwise: its own way
+        dispatcher._cache.__class__ = _cache_type()
+    else:
+        _tell_of_inner_loops()
     return dispatcher
 
 
