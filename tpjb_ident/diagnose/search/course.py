@@ -41,7 +41,8 @@ class Course:
         ----------
         amplitudes : (k,) ndarray
         """
-        return self._pieces(amplitudes, _VALUE)
+        inside = self._inside(amplitudes)
+        return self._pieces(inside, _VALUE) + (amplitudes - inside)[:, None] * self.slope_weights(inside)
 
     def slope_weights(self, amplitudes: FloatArray) -> FloatArray:
         """Weights of the columns in the derivative at some amplitudes, (k, 2 m).
@@ -50,7 +51,7 @@ class Course:
         ----------
         amplitudes : (k,) ndarray
         """
-        return self._pieces(amplitudes, _SLOPE)
+        return self._pieces(self._inside(amplitudes), _SLOPE)
 
     def slope(self, amplitude: float) -> FloatArray:
         """Derivative at an amplitude, (n,).
@@ -72,9 +73,11 @@ class Course:
         powers = np.vander(self.at[known] / scale, 3, increasing=True)
         return np.asarray(np.linalg.solve(powers, self.columns[:, known].T)[1] / scale)
 
-    def _pieces(self, amplitudes: FloatArray, basis: FloatArray) -> FloatArray:
+    def _inside(self, amplitudes: FloatArray) -> FloatArray:
+        return np.clip(amplitudes, self.at[0], self.at[-1])
+
+    def _pieces(self, inside: FloatArray, basis: FloatArray) -> FloatArray:
         count = len(self.at)
-        inside = np.clip(amplitudes, self.at[0], self.at[-1])
         left = np.clip(np.searchsorted(self.at, inside, side="right") - 1, 0, count - 2)
         length = self.at[left + 1] - self.at[left]
         u = (inside - self.at[left]) / length
@@ -82,20 +85,13 @@ class Course:
         parts = (u[:, None] ** np.arange(4)) @ basis
         if basis is _VALUE:
             parts[:, 2:] *= length[:, None]
-            parts += (amplitudes - inside)[:, None] * self._end(inside, length)
         else:
             parts[:, :2] /= length[:, None]
-        out = np.zeros((len(amplitudes), 2 * count))
-        rows = np.arange(len(amplitudes))
+        out = np.zeros((len(inside), 2 * count))
+        rows = np.arange(len(inside))
         for column, at in enumerate((left, left + 1, count + left, count + left + 1)):
             out[rows, at] = parts[:, column]
         return out
-
-    def _end(self, inside: FloatArray, length: FloatArray) -> FloatArray:
-        u = (inside == self.at[-1]).astype(float)
-        parts = (u[:, None] ** np.arange(4)) @ _SLOPE
-        parts[:, :2] /= length[:, None]
-        return np.asarray(parts)
 
 
 #: Cubic Hermite pieces by powers of the place within the piece, rows 1, u, u^2, u^3.
