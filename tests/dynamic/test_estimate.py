@@ -257,3 +257,13 @@ def test_thousands_of_windows_start_from_a_share_of_them():
         tracemalloc.stop()
         assert np.linalg.norm(est.h - H_TRUE) < 3e-3 * np.linalg.norm(H_TRUE)
         assert peak < 35e6
+
+
+def test_where_statsmodels_own_numbers_are_promised_it_is_run(monkeypatch):
+    rng = np.random.default_rng(5)
+    design, response = rng.standard_normal((40, 4)), rng.standard_normal(40)
+    ours = solve_rlm(design, response)
+    monkeypatch.setattr("tpjb_ident.dynamic.estimators.rlm.robust_fit", None)
+    theirs = solve_rlm(design, response, RlmSettings(library=True))
+    np.testing.assert_array_equal(theirs.params, ours.params)
+    np.testing.assert_array_equal(theirs.covariance, ours.covariance)

@@ -1,11 +1,12 @@
 """statsmodels' robust linear model on the stacked real rows of Eq. (15): the paper's choice.
 
 Huber's and Tukey's norms with the MAD scale are `irls.robust_fit`, equal to statsmodels to the last bit; for all
-others statsmodels itself is run. Kept as a reference with its traps guarded: complex input is refused (statsmodels
-takes it and returns false standard errors), the system is scaled before (``conv="coefs"`` has an absolute tolerance
-and never ends in SI units), and reaching the iteration limit is reported (statsmodels says nothing). What cannot be
-guarded: Re and Im of a row get weights of their own, and the M-estimator has no breakdown against bad displacements.
-`mm` exists for that.
+others, and where its own numbers are promised (`plain`), statsmodels itself is run.
+
+Kept as a reference with its traps guarded: complex input is refused (statsmodels takes it and returns false standard
+errors), the system is scaled before (``conv="coefs"`` has an absolute tolerance and never ends in SI units), and
+reaching the iteration limit is reported (statsmodels says nothing). What cannot be guarded: Re and Im of a row get
+weights of their own, and the M-estimator has no breakdown against bad displacements. `mm` exists for that.
 """
 
 from __future__ import annotations
@@ -57,12 +58,15 @@ class RlmSettings:
     max_iterations : int
     tolerance : float
         On the largest change of a coefficient, the system being of order one.
+    library : bool
+        Whether statsmodels itself is run whatever the norm: where its own numbers are promised.
     """
 
     norm: str = "huber"
     scale: str = "mad"
     max_iterations: int = 200
     tolerance: float = 1e-10
+    library: bool = False
 
 
 @dataclass(frozen=True)
@@ -121,7 +125,7 @@ def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | 
 
 
 def _fit(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RobustFit:
-    if settings.norm in OWN_NORMS and settings.scale == "mad":
+    if settings.norm in OWN_NORMS and settings.scale == "mad" and not settings.library:
         return robust_fit(design, response, settings.norm, settings.max_iterations, settings.tolerance)
     from statsmodels.robust.robust_linear_model import RLM
 
