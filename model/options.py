@@ -38,6 +38,9 @@ class Options:
     perturbed_bending : bool
         In the dynamics pads that deform (`tehd`, `thd`) bend with the motion, instead of moving as rigid bodies; see
         `model.dynamics.flexing_pads`.
+    axial_tilt : bool
+        Pads on spheres follow a shaft that leans (effect `misalignment`), as far as their pivots let them; see
+        `model.statics.axial_tilt`.
     """
 
     conduction: bool = False
@@ -47,6 +50,7 @@ class Options:
     turbulence: str = "none"
     perturbed_heat: bool = False
     perturbed_bending: bool = False
+    axial_tilt: bool = False
 
     def __post_init__(self) -> None:
         check_known("cavitation", self.cavitation, FILM_MODELS)
@@ -58,5 +62,7 @@ class Options:
         plain = (self.cavitation, self.turbulence, self.perturbed_heat) == ("swift-stieber", "none", False)
         if self.perturbed_bending and not plain:
             raise OptionError("perturbed_bending is for laminar films that rupture by swift-stieber, their heat frozen")
+        if self.axial_tilt and not plain:
+            raise OptionError("axial_tilt is for laminar films that rupture by swift-stieber, without perturbed_heat")
         if not (self.growth is None or isinstance(self.growth, Growth)):
             raise OptionError(f"growth must be a Growth or None, got {self.growth!r}")

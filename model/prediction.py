@@ -166,6 +166,11 @@ class Prediction:
         raise AttributeError(f"Prediction has no attribute {name!r}")
 
     @property
+    def axial_tilt(self) -> FloatArray:
+        """Of the pads about the axis across them, their ends at positive z outward (`Options.axial_tilt`) [rad]."""
+        return np.array([f.axial_tilt for f in self.equilibrium.films])
+
+    @property
     def pressure(self) -> tuple[FloatArray, ...]:
         """Per pad, (nt + 1, nz + 1) on the half width (full if misaligned) [Pa]."""
         return tuple(f.work.pressure for f in self.equilibrium.films)

@@ -127,6 +127,10 @@ class Setup:
             raise OptionError('thermal "thd" is for laminar films that rupture by swift-stieber; take "adiabatic"')
         if self.thermal == "thd" and self.options.perturbed_heat:
             raise OptionError('perturbed_heat is for films of one temperature across; take "adiabatic" or "tehd"')
+        if self.options.axial_tilt and self.bearing.pivot.kind != "spherical":
+            raise OptionError(
+                f"axial_tilt is for pads on spheres, not on {self.bearing.pivot.kind} pivots; leave it out"
+            )
         if not self.bearing.pads:
             raise BearingError("a bearing needs at least one pad")
         if len(self.pivots) != len(self.bearing.pads):
@@ -171,6 +175,11 @@ class Setup:
     def flexible_pads(self) -> bool:
         """Whether pads deform."""
         return self.thermal in BENDING or self.bending != 0.0
+
+    @property
+    def pads_follow(self) -> bool:
+        """Whether pads follow a shaft that leans."""
+        return self.options.axial_tilt and self.misalignment[0] != 0.0
 
     @property
     def bending_factor(self) -> float:

@@ -19,6 +19,7 @@ from model.dynamics.flexing_pads import flexing_impedance
 from model.dynamics.pivot_friction import friction_impedance
 from model.film.following_heat import heat_impedance
 from model.setup import Setup
+from model.statics.axial_tilt import axial_tilt_of
 from model.statics.equilibrium import Equilibrium
 from model.statics.pad_film import PadFilm, oil_constants
 from model.statics.tilt_hold import friction_limits, tilt_hold
@@ -216,6 +217,29 @@ def broken_loose(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibratio
     return friction_impedance(np.repeat(own[:, None], 2, axis=1), np.abs(drive) * vibration, stick, slip)
 
 
+def axial_inertia(setup: Setup, film: PadFilm) -> float:
+    """Moment of inertia of a pad about the axis across it through its pivot [kg m^2], of a sector of a ring.
+
+    Parameters
+    ----------
+    setup : Setup
+    film : PadFilm
+
+    Returns
+    -------
+    float
+    """
+    pad = film.pad
+    inner = setup.bearing.journal_radius + pad.pad_clearance
+    outer = inner + pad.thickness
+    ends = pad.leading_edge, pad.leading_edge + pad.arc
+    mean, square = (math.sin(ends[1]) - math.sin(ends[0])) / pad.arc, 0.5
+    square += 0.25 * (math.sin(2.0 * ends[1]) - math.sin(2.0 * ends[0])) / pad.arc
+    radius, radius_square = 2.0 / 3.0 * (outer**3 - inner**3) / (outer**2 - inner**2), 0.5 * (outer**2 + inner**2)
+    reach = radius_square * square - 2.0 * film.pivot_radius * radius * mean + film.pivot_radius**2
+    return pad.mass * (reach + setup.bearing.length**2 / 12.0)
+
+
 def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> ComplexArray:
     """h(omega) of the bearing inside the measured displacement, effects of the structure included.
 
@@ -235,8 +259,8 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
     beside = None
     if setup.options.perturbed_heat and setup.thermal != "isothermal":
         beside = [_heat_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
-    elif setup.options.perturbed_bending and setup.flexible_pads:
-        beside = [_bending_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
+    elif setup.pads_follow or (setup.options.perturbed_bending and setup.flexible_pads):
+        beside = [_shape_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
     return with_structure(setup, reduce_pads(pads, omega, setup.vibration, beside), omega)
 
 
@@ -247,10 +271,15 @@ def _frames(setup: Setup, film: PadFilm) -> tuple[FloatArray, FloatArray]:
     return pad_frames(film, tilt_hold(smooth, film.tilt, float(film.forces.force[0])).arm)
 
 
-def _bending_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
-    """What bending with the motion adds to a pad's film, (n, 4, 4)."""
+def _shape_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
+    """What bending and axial tilting with the motion add to a pad's film, (n, 4, 4)."""
     frame, moments = _frames(setup, film)
-    flexing = flexing_impedance(film, equilibrium.position, omega, setup.bending_factor)
+    factor = setup.bending_factor if setup.options.perturbed_bending else 0.0
+    axial = None
+    if setup.pads_follow:
+        assert film.forces is not None
+        axial = axial_tilt_of(setup, film, film.work.pressure, film.forces), axial_inertia(setup, film)
+    flexing = flexing_impedance(film, equilibrium.position, omega, factor, axial)
     return np.asarray(moments.T @ flexing @ frame, dtype=np.complex128)
 
 

@@ -3,7 +3,8 @@
 A thin film is softer than its pad: followed one step behind, the deformation overshoots and swings for ever. The few
 shapes in which a pad gives way most therefore take part in the Newton step: with h = ... + sum_m c_m phi_m and the
 pad's answer c = B p, the film's derivatives by c, (a, b) close the loop pad by pad, and leave an effective force and
-stiffness for the journal. What remains, and what heat does, contracts by itself.
+stiffness for the journal. What remains, and what heat does, contracts by itself. A pad that tilts along the shaft
+(`AxialTilt`) has one shape more, which the film's moment finds.
 """
 
 from __future__ import annotations
@@ -80,6 +81,27 @@ class SolvedFilm(NamedTuple):
     forces: FilmForces
 
 
+class AxialTilt(NamedTuple):
+    """A pad that is free to tilt along the shaft, about the axis across it through its pivot.
+
+    Attributes
+    ----------
+    shape : (nt + 1, nz + 1) ndarray
+        What a unit of axial tilt adds to h [m/rad].
+    weights : (unknowns,) ndarray
+        Moment by the pressure at the film's unknown nodes, less what grows with the pad's load [m^3].
+    stiffness : float
+        Of what holds the pad back [N m/rad].
+    moment : float
+        Not balanced [N m].
+    """
+
+    shape: FloatArray
+    weights: FloatArray
+    stiffness: float
+    moment: float
+
+
 @dataclass(frozen=True)
 class BendingStep:
     """One pad's part of a Newton step.
@@ -95,7 +117,9 @@ class BendingStep:
     by_approach : (m, 2) ndarray
         ... and per (a, b).
     share : float
-        Largest mismatch over the least film thickness.
+        Largest mismatch, or axial tilt asked for at the pad's ends, over the least film thickness.
+    axial_tilt : (3,) ndarray
+        Its change at rest, and per (a, b) [rad, rad/m]; empty if it is not free.
     """
 
     forces: FilmForces
@@ -103,6 +127,7 @@ class BendingStep:
     amplitude: FloatArray
     by_approach: FloatArray
     share: float
+    axial_tilt: FloatArray
 
 
 def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid) -> PadDeformation:
@@ -188,46 +213,79 @@ def wanted_shapes(
     return wanted
 
 
-def bending_step(body: PadDeformation, film: SolvedFilm, change: FloatArray, factor: float) -> BendingStep:
-    """Close the loop of pressure and deformation for one pad.
+def bending_step(
+    body: PadDeformation | None, film: SolvedFilm, change: FloatArray, factor: float, axial: AxialTilt | None = None
+) -> BendingStep:
+    """Close the loop of pressure, deformation and axial tilt for one pad.
 
     Parameters
     ----------
-    body : PadDeformation
+    body : PadDeformation or None
+        None for a rigid pad that tilts along the shaft.
     film : SolvedFilm
         At the present deformation.
     change : (nt + 1, nz + 1) ndarray
         Deformation asked for less the present one [m].
     factor : float
         On the computed deformation.
+    axial : AxialTilt, optional
+        Of a pad that tilts along the shaft.
     """
     grid, work, wedge, forces = film
-    slopes = shape_slopes(grid, work, conductances(grid, work, *wedge), body.shapes)
-    response = factor * body.response
-    asked = body.amplitudes @ change.ravel()
-    right = np.empty((SHAPES, 3))
+    least = forces.min_film
+    if body is None:
+        assert axial is not None
+        shapes, response, asked = np.empty((*change.shape, 0)), np.empty((0, len(work.unknown))), np.empty(0)
+        held, weights, mismatch, share = np.empty((0, 0)), force_weights(grid), change, 0.0
+    else:
+        shapes, response, asked = body.shapes, factor * body.response, body.amplitudes @ change.ravel()
+        held, weights, mismatch = _UNIT, body.weights, change - body.shapes @ asked
+        share = float(np.abs(change).max()) / least
+    bending = len(asked)
+    if axial is not None:
+        shapes = np.concatenate([shapes, axial.shape[:, :, None]], axis=2)
+        response, asked = np.vstack([response, axial.weights]), np.append(asked, axial.moment)
+        held = np.diag(np.append(np.ones(bending), axial.stiffness))
+    slopes = shape_slopes(grid, work, conductances(grid, work, *wedge), shapes)
+    right = np.empty((len(asked), 3))
     right[:, 0] = asked
     right[:, 1:] = response @ work.slopes[:, :2]
-    answer = np.asarray(np.linalg.solve(_UNIT - response @ slopes, right), dtype=float)
-    felt = (body.weights @ slopes) @ answer
+    answer = np.asarray(np.linalg.solve(held - response @ slopes, right), dtype=float)
+    felt = (weights @ slopes) @ answer
+    axial_step = answer[bending:].ravel()
+    if axial is not None:
+        share = max(share, abs(float(axial_step[0])) * float(np.abs(axial.shape).max()) / least)
     return BendingStep(
         forces=forces._replace(force=forces.force + felt[:, 0], stiffness=forces.stiffness + felt[:, 1:]),
-        mismatch=change - body.shapes @ asked,
-        amplitude=answer[:, 0],
-        by_approach=answer[:, 1:],
-        share=float(np.abs(change).max()) / forces.min_film,
+        mismatch=mismatch,
+        amplitude=answer[:bending, 0],
+        by_approach=answer[:bending, 1:],
+        share=share,
+        axial_tilt=axial_step,
     )
 
 
 _UNIT = np.eye(SHAPES)
 
 
-def change_of_shape(body: PadDeformation, step: BendingStep, da: float, db: float) -> FloatArray:
+def force_weights(grid: FilmGrid) -> FloatArray:
+    """Radial and tangential force by the pressure at the unknown nodes, (2, unknowns) [m^2].
+
+    Parameters
+    ----------
+    grid : FilmGrid
+    """
+    inner = grid.area[1:-1, grid.first : -1]
+    return np.stack([(c[1:-1, None] * inner).ravel() for c in (grid.cos, grid.sin)])
+
+
+def change_of_shape(body: PadDeformation | None, step: BendingStep, da: float, db: float) -> FloatArray:
     """Change of the deformation that belongs to a move (da, db) of the film [m].
 
     Parameters
     ----------
-    body : PadDeformation
+    body : PadDeformation or None
+        None for a rigid pad.
     step : BendingStep
     da : float
         Change of a [m].
@@ -239,4 +297,6 @@ def change_of_shape(body: PadDeformation, step: BendingStep, da: float, db: floa
     (nt + 1, nz + 1) ndarray
         [m]
     """
+    if body is None:
+        return step.mismatch
     return step.mismatch + body.shapes @ (step.amplitude + step.by_approach @ np.array([da, db]))

@@ -56,6 +56,8 @@ def able(setup: Setup) -> bool:
 def _felt(setup: Setup) -> Options:
     """Options without those that do nothing in the statics, or where films keep their inlet's temperature."""
     options = dataclasses.replace(setup.options, perturbed_heat=False, perturbed_bending=False)
+    if not setup.pads_follow:
+        options = dataclasses.replace(options, axial_tilt=False)
     if setup.grown:
         options = dataclasses.replace(options, growth=None)
     if setup.thermal != "isothermal":

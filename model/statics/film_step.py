@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from model.pad.bending import SolvedFilm, bending_step, wanted_shapes
+from model.statics.axial_tilt import axial_tilt_of
 from model.statics.carrying import set_loaded
 from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP
 from model.statics.cross_heat import settle_cross_temperatures
@@ -39,9 +42,9 @@ def solve_films(search: Search) -> float:
         change = _heat_films(search)
     if change < BOUNDLESS:
         change = max(change, search.warm_up())
-    if search.setup.flexible_pads and change < BOUNDLESS:
+    if (search.setup.flexible_pads or search.setup.pads_follow) and change < BOUNDLESS:
         # a deformation counts like a temperature change of the same weight in the film's resistance
-        change = max(change, HEAT_PER_FORCE * _bend_pads(search))
+        change = max(change, HEAT_PER_FORCE * _shape_pads(search))
     return change
 
 
@@ -89,18 +92,23 @@ def _heat_films(search: Search) -> float:
     return change
 
 
-def _bend_pads(search: Search) -> float:
-    """Let every pad ask for the deformation its film gives it; returns the largest change over the least film."""
+def _shape_pads(search: Search) -> float:
+    """Let every pad ask for the deformation and axial tilt that its film gives it; largest change over the film."""
     setup, carrying = search.setup, search.carrying
-    bodies = [f.deformation for f in carrying if f.deformation is not None]
     pressures = [f.corrected_pressure() for f in carrying]
-    rises = [f.face_temperature - setup.inlet_temperature for f in carrying]
-    wanted = wanted_shapes(bodies, pressures, rises, setup.bending_factor)
+    asked = [np.zeros_like(f.bent) for f in carrying]
+    if setup.flexible_pads:
+        bodies = [f.deformation for f in carrying if f.deformation is not None]
+        rises = [f.face_temperature - setup.inlet_temperature for f in carrying]
+        wanted = wanted_shapes(bodies, pressures, rises, setup.bending_factor)
+        asked = [shape - f.bent for f, shape in zip(carrying, wanted, strict=True)]
     share = 0.0
-    for film, body, shape in zip(carrying, bodies, wanted, strict=True):
+    for film, pressure, change in zip(carrying, pressures, asked, strict=True):
         assert film.corrected is not None
         wedge = (film.pad.pad_clearance, *film.approach(search.position))
         solved = SolvedFilm(film.grid, film.work, wedge, film.corrected)
-        film.step = bending_step(body, solved, shape - film.bent, setup.bending_factor)
+        axial = axial_tilt_of(setup, film, pressure, film.corrected) if setup.pads_follow else None
+        body = film.deformation if setup.flexible_pads else None
+        film.step = bending_step(body, solved, change, setup.bending_factor, axial)
         share = max(share, film.step.share)
     return share

@@ -13,9 +13,9 @@ import numpy as np
 from model.arrays import FloatArray
 from model.conditions import Condition, has_answer
 from model.film.oil_state import least_share
-from model.pad.bending import change_of_shape
 from model.statics import conditions
 from model.statics.acceleration import Anderson
+from model.statics.axial_tilt import axial_shape, shape_change
 from model.statics.carrying import leave_unstable, longest_step, unloaded_pads, update_carrying
 from model.statics.compiled.constants import (
     ACROSS,
@@ -94,27 +94,28 @@ def _move(search: Search, step: tuple[FloatArray, FloatArray], damping: float) -
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
     shift, moves = step
     scale = min(damping, longest_step(search.films, shift))
-    bent: list[FloatArray | None] = []
+    bent: list[tuple[FloatArray, float]] = []
     for film, move in zip(search.films, moves, strict=True):
-        bent.append(None)
+        bent.append((_RIGID, 0.0))
         if film.forces is None:
             continue
         da = float(film.normal @ shift) - move[1] + film.closing
         db = float(film.tangent @ shift) + film.pivot_radius * move[0]
-        if film.deformation is not None and film.step is not None:
-            bent[-1] = change_of_shape(film.deformation, film.step, da, db)
-        worst = least_share(film.grid, film.work, da, db, _RIGID if bent[-1] is None else bent[-1])
+        if film.step is not None:
+            bent[-1] = shape_change(search.setup, film, da, db)
+        worst = least_share(film.grid, film.work, da, db, bent[-1][0])
         if worst * damping < SHRINK - 1.0:
             scale = min(scale, (SHRINK - 1.0) / worst)
     search.position = search.position + scale * shift
     search.grow(scale)
-    for film, move, change in zip(search.films, moves, bent, strict=True):
+    for film, move, (change, axial) in zip(search.films, moves, bent, strict=True):
         # a pad that friction stops where it does not tilt stops there, whatever the step's length
         film.tilt = 0.0 if move[0] == -film.tilt else film.tilt + float(scale * move[0])
         film.deflection += float(scale * move[1])
-        if change is not None:
-            film.bent += scale * change
+        if change.size:
             film.work.extra[:] += scale * change
+            film.bent += scale * (change - axial * axial_shape(film.grid) if search.setup.pads_follow else change)
+            film.axial_tilt += scale * axial
     return scale == 1.0
 
 

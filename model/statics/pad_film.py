@@ -75,6 +75,8 @@ class PadFilm:
         Temperatures across the film; None where there is one at each place.
     outlet : float
         Flow-weighted temperature at the trailing edge of a film with temperatures across [degC].
+    axial_tilt : float
+        How far the pad has turned about the axis across it, see `model.statics.axial_tilt` [rad].
     closing : float
         What the present step takes from the clearance, because the journal grows [m].
     """
@@ -105,6 +107,7 @@ class PadFilm:
     resting: RestingFilm | None = None
     cross: CrossFilm | None = None
     outlet: float = math.nan
+    axial_tilt: float = 0.0
     closing: float = 0.0
 
     @property

@@ -14,6 +14,7 @@ from model.film.energy import heat_by_drag
 from model.film.mesh import FilmWork
 from model.growth import grown
 from model.setup import Setup
+from model.statics.axial_tilt import aligned_tilt, axial_shape
 from model.statics.carrying import find_branch, set_loaded
 from model.statics.compiled.constants import FIRST_HEATING, HEATING_STEP, MICROMETRE
 from model.statics.compiled.first_position import first_position
@@ -103,6 +104,9 @@ class Search:
         self.films, self.works, self.shifts = pad_films(setup)
         for film in self.films:
             film.kept *= self.heat
+            if setup.pads_follow and not (setup.rotational_stiffness or setup.rolling or setup.friction):
+                film.axial_tilt = aligned_tilt(setup, film.pad.pivot_angle)  # nothing holds it: that is nearly there
+                film.work.extra[:] += film.axial_tilt * axial_shape(film.grid)
         self.warm = False
 
     def warm_up(self) -> float:
@@ -173,6 +177,9 @@ class Search:
             if self.setup.flexible_pads:
                 film.bent[:] = other.bent
                 film.work.extra[:] += other.bent
+            if self.setup.pads_follow:
+                film.work.extra[:] += (other.axial_tilt - film.axial_tilt) * axial_shape(film.grid)
+                film.axial_tilt = other.axial_tilt
         self.position, self.warm = start.position.copy(), True
         if coupled:
             self.journal = start.journal_temperature
@@ -213,6 +220,8 @@ class Search:
         parts = [self.position / MICROMETRE, np.array([self.warmth])]
         for film in self.films:
             parts.append(np.array([film.tilt * film.pivot_radius, film.deflection]) / MICROMETRE)
+            if self.setup.pads_follow:
+                parts.append(np.array([film.axial_tilt * film.pivot_radius / MICROMETRE]))
             parts += [state.ravel() * (0.0 if film.idle else 1.0) for state in film.heat_state]
             if self.setup.flexible_pads:
                 parts.append(film.bent.ravel() / MICROMETRE)
@@ -234,6 +243,11 @@ class Search:
             film.tilt = float(state[at]) * MICROMETRE / film.pivot_radius
             film.deflection = float(state[at + 1]) * MICROMETRE
             at += 2
+            if self.setup.pads_follow:
+                axial = float(state[at]) * MICROMETRE / film.pivot_radius
+                film.work.extra[:] += (axial - film.axial_tilt) * axial_shape(film.grid)
+                film.axial_tilt = axial
+                at += 1
             for part in film.heat_state:
                 if not film.idle:
                     part.ravel()[:] = state[at : at + part.size]

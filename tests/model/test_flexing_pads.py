@@ -9,9 +9,11 @@ import pytest
 
 from model.bearing import Bearing
 from model.bearing_file import load_bearing
+from model.dynamics.flexing_pads import flexing_impedance
 from model.effects import Effect
 from model.errors import OptionError
 from model.options import Options
+from model.pad.bending import force_weights
 from model.predict import predict
 from model.prediction import Prediction
 from model.setup import Mesh
@@ -71,3 +73,107 @@ def test_it_is_for_plain_films():
     for options in ({"turbulence": "ng-pan"}, {"cavitation": "jfo"}, {"perturbed_heat": True}):
         with pytest.raises(OptionError, match="perturbed_bending"):
             Options(perturbed_bending=True, **options)
+
+
+class _Marched:
+    """A film over a pad that flexes, marched in time: not linearised, and written apart from the product.
+
+    Control volumes about the product's nodes over half the width (the compliance belongs to these), one viscosity and
+    density, no rupture; every step of Newmark's trapezoidal rule solves pressure and deformation together.
+    """
+
+    def __init__(self, p: Prediction, pad: int) -> None:
+        film = p.equilibrium.films[pad]
+        grid, work, bearing = film.grid, film.work, p.setup.bearing
+        self.speed, self.clearance = p.equilibrium.surface_speed, film.pad.pad_clearance
+        self.viscosity, self.density = float(work.viscosity[1, 1]), float(work.density[1, 1])
+        self.start = np.array(film.approach(p.bearing_position))
+        self.angle, z = grid.angle, grid.z
+        self.step = bearing.journal_radius * (self.angle[1] - self.angle[0])
+        edges = np.concatenate([[z[0]], 0.5 * (z[1:] + z[:-1]), [z[-1]]])
+        self.height, self.gap = np.diff(edges), np.diff(z)
+        self.compliance = film.deformation.compliance
+        self.shape = work.pressure.shape
+        inner = np.zeros(self.shape, bool)
+        inner[1:-1, :-1] = True
+        self.inner = inner.ravel()
+        self.size = int(self.inner.sum())
+        self.weights = force_weights(grid)
+
+    def thickness(self, p: np.ndarray, wedge: np.ndarray, flexible: bool) -> np.ndarray:
+        whole = np.zeros(self.inner.size, p.dtype)
+        whole[self.inner] = p
+        bent = (self.compliance @ whole).reshape(self.shape) if flexible else self.still_bent
+        return self.clearance - wedge[0] * np.cos(self.angle)[:, None] - wedge[1] * np.sin(self.angle)[:, None] + bent
+
+    def outflow(self, p: np.ndarray, h: np.ndarray) -> np.ndarray:
+        """What leaves every control volume but by its change of thickness [kg/s]."""
+        whole = np.zeros(self.inner.size, p.dtype)
+        whole[self.inner] = p
+        whole = whole.reshape(self.shape)
+        along, across = 0.5 * (h[1:] + h[:-1]), 0.5 * (h[:, 1:] + h[:, :-1])
+        mobility = self.density / (12.0 * self.viscosity)
+        fx = self.height * (
+            0.5 * self.density * self.speed * along - mobility * along**3 * np.diff(whole, axis=0) / self.step
+        )
+        fz = -mobility * self.step * across**3 * np.diff(whole, axis=1) / self.gap
+        net = np.zeros(self.shape, p.dtype)
+        net[1:-1] = np.diff(fx, axis=0)
+        net[:, :-1] += fz
+        net[:, 1:] -= fz
+        return net.ravel()[self.inner]
+
+    def volume(self, h: np.ndarray) -> np.ndarray:
+        return (self.density * self.step * self.height * h).ravel()[self.inner]
+
+    def solve(self, residual, p: np.ndarray, slope: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+        """Newton's steps with one slope, by complex differences."""
+        if slope is None:
+            tiny = 1e-20
+            slope = np.stack([residual(p + 1j * tiny * e).imag / tiny for e in np.eye(self.size)], axis=1)
+        for _ in range(30):
+            step = np.linalg.solve(slope, residual(p))
+            p = p - step
+            if np.abs(step).max() < 1e-11 * np.abs(p).max():
+                break
+        return p, slope
+
+    def impedance(self, omega: float, flexible: bool, steps: int = 64) -> np.ndarray:
+        """Force's first harmonic over (a, b), (2, 2), by marching three periods of a small vibration."""
+        p = np.zeros(self.size)
+        for _ in range(12):
+            p, _ = self.solve(lambda q: self.outflow(q, self.thickness(q, self.start, flexible)), p, None)
+        out = np.empty((2, 2), complex)
+        dt, size = 2.0 * math.pi / omega / steps, 2e-4 * self.clearance
+        for axis in range(2):
+            force, now, slope = [], p, None
+            wedge, old = self.start.copy(), self.thickness(p, self.start, flexible)
+            for n in range(1, 3 * steps + 1):
+                wedge[axis] = self.start[axis] + size * math.sin(omega * n * dt)
+                left = self.outflow(now, old)
+
+                def residual(q: np.ndarray, wedge=wedge, old=old, left=left) -> np.ndarray:
+                    h = self.thickness(q, wedge, flexible)
+                    return (self.volume(h) - self.volume(old)) / dt + 0.5 * (self.outflow(q, h) + left)
+
+                now, slope = self.solve(residual, now, slope)
+                old = self.thickness(now, wedge, flexible)
+                force.append(self.weights @ (now - p))
+            phase = np.exp(-1j * omega * dt * np.arange(2 * steps + 1, 3 * steps + 1))
+            out[:, axis] = 2j / steps / size * (phase @ np.array(force)[2 * steps :])
+        return out
+
+
+def test_it_is_what_a_film_over_a_flexing_pad_does_when_marched_in_time(rocker):
+    omega = 2 * math.pi * 50
+    p = run(rocker, omega=omega, mesh=Mesh(20, 4))
+    film = p.equilibrium.films[0]
+    added = flexing_impedance(film, p.bearing_position, np.array([omega]), 1.0)[0]
+    marched = _Marched(p, 0)
+    marched.still_bent = film.bent
+    assert not film.work.ruptured[1:-1, :-1].any()
+    flexing, rigid = (marched.impedance(omega, flexible) for flexible in (True, False))
+    linear = film.forces.stiffness + 1j * omega * film.forces.damping
+    np.testing.assert_allclose(rigid, linear, atol=3e-3 * np.abs(linear).max())
+    np.testing.assert_allclose(flexing - rigid, added, atol=5e-3 * np.abs(added).max())
+    assert np.abs(added).max() > 0.3 * np.abs(rigid).max()

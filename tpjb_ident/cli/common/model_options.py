@@ -18,6 +18,7 @@ PHYSICS = {
     "jfo": "mass-conserving cavitation",
     "perturbed-heat": "in the dynamics the films' temperature and viscosity follow the motion",
     "perturbed-bending": "in the dynamics pads that deform (tehd, thd) bend with the motion",
+    "axial-tilt": "pads on spheres follow a shaft that leans (effect misalignment)",
     "turbulence": "films turn turbulent above a local Reynolds number of 500 to 1,000 (Ng and Pan)",
 }
 Physics = Annotated[
@@ -76,4 +77,5 @@ def parse_physics(names: str | None, housing: str | None) -> Any:
         turbulence="ng-pan" if "turbulence" in chosen else "none",
         perturbed_heat="perturbed-heat" in chosen,
         perturbed_bending="perturbed-bending" in chosen,
+        axial_tilt="axial-tilt" in chosen,
     )
