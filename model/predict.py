@@ -79,13 +79,10 @@ def predict(
 
     Raises
     ------
-    BearingError
-        The bearing has a number that no bearing has.
-    OperatingPointError
-        A load, direction, speed or excitation that is no number, or that no bearing can have.
+    BearingError, OperatingPointError
+        The bearing, or the load, direction, speed or excitation, has a number that none can have.
     OptionError, UnitError, EffectError
-        Another argument with a wrong name, dimension or sign (the message says which). All are `ModelError`, and
-        a ValueError too.
+        Another argument has a wrong name, dimension or sign. All are `ModelError`, and a ValueError too.
     """
     if not (options is None or isinstance(options, Options)):
         raise OptionError(f"options must be an Options object, got {options!r}")
@@ -94,14 +91,8 @@ def predict(
     setup = apply_effects(plain, effects)
     speed_si = _number(speed, "angular speed", "speed")
     omega = speed_si if excitation is None else to_si(excitation, "angular speed", "excitation")
-    return predict_setup(
-        setup,
-        _number(load, "force", "load"),
-        _number(load_direction, "angle", "load_direction"),
-        speed_si,
-        omega,
-        start.equilibrium if start is not None else None,
-    )
+    force, direction = _number(load, "force", "load"), _number(load_direction, "angle", "load_direction")
+    return predict_setup(setup, force, direction, speed_si, omega, start.equilibrium if start is not None else None)
 
 
 def _mesh(mesh: Any) -> Mesh:

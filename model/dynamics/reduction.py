@@ -21,7 +21,7 @@ from model.film.following_heat import heat_impedance
 from model.setup import Setup
 from model.statics.axial_tilt import axial_tilt_of
 from model.statics.equilibrium import Equilibrium
-from model.statics.pad_film import PadFilm, oil_constants
+from model.statics.pad_film import PadFilm
 from model.statics.tilt_hold import friction_limits, tilt_hold
 
 
@@ -286,10 +286,9 @@ def _shape_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: 
 def _heat_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
     """What a temperature that follows the motion adds to a pad's film, (n, 4, 4)."""
     frame, moments = _frames(setup, film)
-    oil, wedge = setup.bearing.oil, (film.pad.pad_clearance, *film.approach(equilibrium.position))
-    heat, given = (oil.specific_heat / film.kept, oil.conductivity / film.kept), oil_constants(oil)
-    speed = equilibrium.surface_speed
-    films = [heat_impedance(film.grid, film.work, wedge, speed, given, heat, float(w)) for w in omega]
+    wedge = (film.pad.pad_clearance, *film.approach(equilibrium.position))
+    running = film.running(equilibrium.surface_speed, setup.bearing.oil)
+    films = [heat_impedance(film.grid, film.work, wedge, running, float(w)) for w in omega]
     return np.asarray(moments.T @ np.array(films) @ frame, dtype=np.complex128)
 
 

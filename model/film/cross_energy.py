@@ -68,19 +68,15 @@ def cross_operator(
     factor, before, journal, made, carried, flows = operator
     factor[:] = 0.0
     before[:] = 0.0
+    film = (grid, work, cross)
     for i in range(nt):
         for j in range(lines):
-            _shared_flow(grid, work, cross, speed, i, j, flows[i, j])
-    net = np.sum(flows[0])
-    back = max(0.0, -np.sum(np.minimum(flows[0], 0.0)) - MOST_BACK * net) / max(net, 1e-300)
-    for j in range(lines):
-        dragged = 0.25 * speed * (work.thickness[0, j] * work.density[0, j] + work.thickness[1, j] * work.density[1, j])
-        back = max(back, 1.0 - work.flow_x[0, j] / (LEAST_NET_FLOW * dragged * grid.height[j]))
+            _shared_flow(film, speed, i, j, flows[i, j])
     space = _space(lines, cells)
     last = np.zeros(n)
     _dissipation(grid, work, cross, speed, 0, last)
     for i in range(nt):
-        _box(grid, work, cross, speed, heat, i, flows, space)
+        _box(film, speed, heat, i, flows, space)
         _set_rows(space, factor[i], before[i])
         for j in range(lines):
             exchange = space.high[j, cells - 1]
@@ -91,22 +87,39 @@ def cross_operator(
         _dissipation(grid, work, cross, speed, i + 1, last)
         for k in range(n):
             made[i, k] += 0.5 * heat[2] * last[k]
-            # a hotter film shears with less heat: taken as it will be, or the two would swing
-            less = heat[4] * made[i, k]
-            factor[i, k, cells] += less
-            made[i, k] += less * cross.temperature[i + 1, k // cells, k % cells]
+        _make_less(cross.temperature[i + 1], heat[4], made[i], factor[i])
         _factorise(factor[i], cells)
     for j in range(lines):
         for m in range(cells):
             carried[j, m] = heat[0] * max(flows[nt - 1, j, m], 0.0)
+    return _flow_back(grid, work, speed, flows[0])
+
+
+@inner
+def _make_less(temperature: FloatArray, thinning: float, made: FloatArray, factor: FloatArray) -> None:
+    """A hotter film shears with less heat: taken as it will be, or the two would swing."""
+    cells = temperature.shape[1]
+    for k in range(len(made)):
+        less = thinning * made[k]
+        factor[k, cells] += less
+        made[k] += less * temperature[k // cells, k % cells]
+
+
+@inner
+def _flow_back(grid: FilmGrid, work: FilmWork, speed: float, flows: FloatArray) -> float:
+    """See what `cross_operator` returns; `flows` of the cells over the leading edge."""
+    net = np.sum(flows)
+    back = max(0.0, -np.sum(np.minimum(flows, 0.0)) - MOST_BACK * net) / max(net, 1e-300)
+    for j in range(flows.shape[0]):
+        dragged = 0.25 * speed * (work.thickness[0, j] * work.density[0, j] + work.thickness[1, j] * work.density[1, j])
+        back = max(back, 1.0 - work.flow_x[0, j] / (LEAST_NET_FLOW * dragged * grid.height[j]))
     return back
 
 
 @inner
-def _shared_flow(
-    grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float, i: int, j: int, flow: FloatArray
-) -> None:
+def _shared_flow(film: tuple[FilmGrid, FilmWork, CrossFilm], speed: float, i: int, j: int, flow: FloatArray) -> None:
     """Mass flow of every cell through the face between stations i and i + 1 [kg/s]; their sum is the face's."""
+    grid, work, cross = film
     edges, cells = cross.edges, len(cross.edges) - 1
     f0, f1 = 0.0, 0.0
     for m in range(cells):
@@ -191,9 +204,7 @@ def _space(lines: int, cells: int) -> _Space:
 
 @inner
 def _box(
-    grid: FilmGrid,
-    work: FilmWork,
-    cross: CrossFilm,
+    film: tuple[FilmGrid, FilmWork, CrossFilm],
     speed: float,
     heat: tuple[float, float, float, float, float],
     i: int,
@@ -201,6 +212,7 @@ def _box(
     space: _Space,
 ) -> None:
     """Flows and couplings of the cells between stations i and i + 1."""
+    grid, work, cross = film
     lines, cells = space.theta.shape
     edges, conductivity, specific = cross.edges, heat[1], heat[0]
     up, beside, low, high, first, last, carried, theta, shares = space

@@ -206,7 +206,6 @@ def conduct(
     float
         What the journal takes up besides [W]; NaN, and nothing is changed, if the answer has no bounds.
     """
-    grid, work, edges, conductivity = film
     flux, to_coarse, guess = pad
     right = np.dot(to_coarse, missing.copy().ravel())
     limit, size, shape = tolerance * tolerance * np.dot(right, right), right.size, missing.shape
@@ -217,10 +216,7 @@ def conduct(
     for k in range(STEPS):
         steps[k] = np.dot(guess, left)
         steps[k] /= np.sqrt(np.dot(steps[k], steps[k]))
-        heat = np.dot(flux, steps[k]).reshape(shape)
-        fields[k, 0] = 0.0
-        taken[k] = march_one(operator, fields[k], -station_heat(grid, heat))
-        face_temperature(work, edges, conductivity, fields[k], heat, faces[k])
+        taken[k] = _conducted(film, operator, np.dot(flux, steps[k]), fields[k], faces[k])
         images[k] = steps[k] - np.dot(to_coarse, faces[k].ravel())
         gram[k, : k + 1] = np.dot(images[: k + 1], images[k])
         gram[: k + 1, k] = gram[k, : k + 1]
@@ -238,3 +234,20 @@ def conduct(
         answer[0][:] += weights[k] * fields[k]
         answer[1][:] += weights[k] * faces[k]
     return more
+
+
+@inner
+def _conducted(
+    film: tuple[FilmGrid, FilmWork, FloatArray, float],
+    operator: CrossOperator,
+    flux: FloatArray,
+    field: FloatArray,
+    face: FloatArray,
+) -> float:
+    """Temperatures of cells and face that a heat flux into the pad makes; what the journal takes up for it [W]."""
+    grid, work, edges, conductivity = film
+    heat = flux.reshape(face.shape)
+    field[0] = 0.0
+    taken = march_one(operator, field, -station_heat(grid, heat))
+    face_temperature(work, edges, conductivity, field, heat, face)
+    return taken

@@ -15,6 +15,7 @@ import numpy as np
 from model.arrays import FloatArray
 from model.compilation import compiled, inner
 from model.film.mesh import FilmGrid, FilmWork
+from model.film.oil_state import Running
 from model.film.slopes import pressure_change
 
 #: Least share of the Couette flow that is taken to run downstream. A pressure peak near a leading edge pushes oil
@@ -26,15 +27,7 @@ LEAST_THINNING = 1e-6
 
 
 @compiled
-def solve_energy(
-    grid: FilmGrid,
-    work: FilmWork,
-    inlet: float,
-    speed: float,
-    heat: tuple[float, float],
-    thinning: float,
-    temperature: FloatArray,
-) -> float:
+def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running, temperature: FloatArray) -> float:
     """March the film temperature from the leading edge.
 
     Parameters
@@ -43,13 +36,9 @@ def solve_energy(
         Mesh and the pressure solution (pressure, thickness, viscosity, density, flows).
     inlet : float
         Temperature at the leading edge [degC].
-    speed : float
-        Surface speed of the journal [m/s].
-    heat : tuple of float
-        Specific heat [J/kg/K] and conductivity [W/m/K] of the oil.
-    thinning : float
-        Share of the viscosity that a kelvin takes [1/K], for heat that is made at the new temperature, to first order
-        about `work.temperature`; 0 for heat that is made at that one.
+    running : Running
+        Heat is made at the new temperature, to first order about `work.temperature`; of an oil that does not thin
+        (kappa 0), at that one.
     temperature : (nt + 1, nz + 1) ndarray
         Overwritten with the new temperature [degC].
 
@@ -67,33 +56,27 @@ def solve_energy(
     rows, columns = temperature.shape
     fields = temperature.reshape((1, rows, columns))
     loss, sources = np.empty((rows, columns)), np.empty((1, rows, columns))
-    _made(grid, work, speed, sources[0], loss)
+    _made(grid, work, running.speed, sources[0], loss)
     for i in range(rows):
         for j in range(columns):
-            less = thinning * loss[i, j]
+            less = running.oil[1] * loss[i, j]
             sources[0, i, j] += work.gained[i, j] + less * work.temperature[i, j]
             loss[i, j] = work.exchange[i, j] + less
     for j in range(columns):
         temperature[0, j] = inlet
-    return march(grid, work, speed, heat, loss, fields, sources)
+    return march(grid, work, running, loss, fields, sources)
 
 
 @compiled
 def march(
-    grid: FilmGrid,
-    work: FilmWork,
-    speed: float,
-    heat: tuple[float, float],
-    loss: FloatArray,
-    fields: FloatArray,
-    sources: FloatArray,
+    grid: FilmGrid, work: FilmWork, running: Running, loss: FloatArray, fields: FloatArray, sources: FloatArray
 ) -> float:
     """March any number of temperature fields that differ in their inlet and sources: the equation is linear.
 
     Parameters
     ----------
-    grid, work, speed, heat
-        As for `solve_energy`.
+    grid, work, running
+        As for `solve_energy`; of the oil its heat only.
     loss : (nt + 1, nz + 1) ndarray
         What every kelvin loses per station of length dx and control-volume height [W/K].
     fields : (m, nt + 1, nz + 1) ndarray
@@ -106,17 +89,31 @@ def march(
     float
         Largest share of a line's flow that had to be limited.
     """
-    nz = work.flow_z.shape[1]
-    count = fields.shape[0]
-    limited = 0.0
-    lower, main, upper = np.zeros(nz + 1), np.zeros(nz + 1), np.zeros(nz + 1)
-    right, conduct = np.zeros((nz + 1, count)), np.empty(nz)
-    h, flow_x, flow_z, density = work.thickness, work.flow_x, work.flow_z, work.density
+    nz, count = work.flow_z.shape[1], fields.shape[0]
+    conduct = np.empty(nz)
     for j in range(nz):
-        conduct[j] = 0.25 * heat[1] * grid.dx / grid.dz[j]
-    for i in range(work.flow_x.shape[0]):
+        conduct[j] = 0.25 * running.heat[1] * grid.dx / grid.dz[j]
+    line = (np.zeros(nz + 1), np.zeros(nz + 1), np.zeros(nz + 1), np.zeros((nz + 1, count)))
+    return _march_lines(grid, work, running, (loss, fields, sources), line, conduct)
+
+
+@inner
+def _march_lines(
+    grid: FilmGrid,
+    work: FilmWork,
+    running: Running,
+    march: tuple[FloatArray, FloatArray, FloatArray],
+    line: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    conduct: FloatArray,
+) -> float:
+    """Set up and solve the equations of every line between two stations; see `march`."""
+    (loss, fields, sources), (lower, main, upper, right) = march, line
+    specific, nz, limited = running.heat[0], work.flow_z.shape[1], 0.0
+    h, flow_x, flow_z, density = work.thickness, work.flow_x, work.flow_z, work.density
+    for i in range(flow_x.shape[0]):
         for j in range(nz + 1):
-            couette = 0.25 * speed * (h[i, j] * density[i, j] + h[i + 1, j] * density[i + 1, j]) * grid.height[j]
+            dragged = h[i, j] * density[i, j] + h[i + 1, j] * density[i + 1, j]
+            couette = 0.25 * running.speed * dragged * grid.height[j]
             flow = flow_x[i, j]
             if flow < LEAST_FLOW * couette:
                 limited = max(limited, 1.0 - flow / couette)
@@ -126,18 +123,18 @@ def march(
             if j > 0:
                 south = 0.5 * (flow_z[i, j - 1] + flow_z[i + 1, j - 1])
                 film = h[i, j] + h[i, j - 1] + h[i + 1, j] + h[i + 1, j - 1]
-                low = -0.5 * (0.5 * heat[0] * south + conduct[j - 1] * film)
+                low = -0.5 * (0.5 * specific * south + conduct[j - 1] * film)
                 if j == nz:  # the edge is upwind: what leaves takes its temperature along
-                    low = -0.25 * heat[0] * max(south, 0.0)
+                    low = -0.25 * specific * max(south, 0.0)
             if j < nz:
                 north = 0.5 * (flow_z[i, j] + flow_z[i + 1, j])
                 film = h[i, j] + h[i, j + 1] + h[i + 1, j] + h[i + 1, j + 1]
-                high = -0.5 * (-0.5 * heat[0] * north + conduct[j] * film)
+                high = -0.5 * (-0.5 * specific * north + conduct[j] * film)
                 if j == 0 and grid.first == 1:
-                    high = -0.25 * heat[0] * max(-north, 0.0)
-            advect = heat[0] * flow
+                    high = -0.25 * specific * max(-north, 0.0)
+            advect = specific * flow
             lower[j], main[j], upper[j] = low, advect - low - high + 0.5 * loss[i + 1, j], high
-            for m in range(count):
+            for m in range(right.shape[1]):
                 t = fields[m]
                 value = (advect + low + high - 0.5 * loss[i, j]) * t[i, j]
                 value += 0.5 * (sources[m, i, j] + sources[m, i + 1, j])
@@ -147,7 +144,7 @@ def march(
                     value -= high * t[i, j + 1]
                 right[j, m] = value
         _tridiagonal(lower, main, upper, right)
-        for m in range(count):
+        for m in range(right.shape[1]):
             for j in range(nz + 1):
                 fields[m, i + 1, j] = right[j, m]
     return limited
@@ -155,22 +152,14 @@ def march(
 
 @compiled
 def heat_step(
-    grid: FilmGrid,
-    work: FilmWork,
-    speed: float,
-    oil: tuple[float, float, float, float],
-    heat: tuple[float, float],
-    thermal: tuple[float, float, float],
-    shift: FloatArray,
+    grid: FilmGrid, work: FilmWork, running: Running, thermal: tuple[float, float, float], shift: FloatArray
 ) -> tuple[float, float, float, float]:
     """Temperature for the pressure at hand, and what it will do to that pressure: one call for one film.
 
     Parameters
     ----------
-    grid, work, speed, heat
+    grid, work, running
         As for `solve_energy`; `work.temperature` is moved towards the new one.
-    oil : tuple of float
-        See `model.statics.pad_film.oil_constants`.
     thermal : tuple of float
         Inlet temperature [degC]; relaxation of the temperature; largest step [K].
     shift : (unknowns,) ndarray
@@ -184,7 +173,7 @@ def heat_step(
     """
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     new = np.empty((nt + 1, nz + 1))
-    limited = solve_energy(grid, work, thermal[0], speed, heat, oil[1], new)
+    limited = solve_energy(grid, work, thermal[0], running, new)
     change = 0.0
     for i in range(nt + 1):
         for j in range(nz + 1):
@@ -193,19 +182,13 @@ def heat_step(
     for i in range(nt + 1):
         for j in range(nz + 1):
             work.temperature[i, j] += share * (new[i, j] - work.temperature[i, j])
-    force = pressure_change(grid, work, speed, oil, shift)
+    force = pressure_change(grid, work, running.speed, running.oil, shift)
     return change, limited, force[0], force[1]
 
 
 @compiled
 def heat_by_drag(
-    grid: FilmGrid,
-    work: FilmWork,
-    wedge: tuple[float, float, float],
-    speed: float,
-    oil: tuple[float, float, float, float],
-    heat: float,
-    inlet: float,
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], running: Running, inlet: float
 ) -> None:
     """Temperature of a film whose oil is dragged along and not pressed: a start for the search.
 
@@ -219,15 +202,11 @@ def heat_by_drag(
         Its temperature is overwritten.
     wedge : tuple of float
         Cp, a, b [m].
-    speed : float
-        Surface speed of the journal [m/s].
-    oil : tuple of float
-        See `model.statics.pad_film.oil_constants`.
-    heat : float
-        Specific heat [J/kg/K].
+    running : Running
     inlet : float
         [degC]
     """
+    speed, oil, heat = running.speed, running.oil, running.heat[0]
     fluid = oil[0] * np.exp(oil[1] * (40.0 - inlet)) / (oil[2] * (1.0 + oil[3] * (40.0 - inlet)))
     along = 0.0
     for i in range(work.temperature.shape[0]):

@@ -12,7 +12,7 @@ heavy to follow. At omega = 0 this is the slope of the static locus; far above o
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from model.arrays import ComplexArray, FloatArray
 from model.compilation import compiled, inner
 from model.film.matrix import substitute
 from model.film.mesh import FilmGrid, FilmWork
+from model.film.oil_state import Running
 from model.film.reynolds import conductances
 from model.film.slopes import keep_ruptured, net_inflow
 
@@ -27,15 +28,17 @@ from model.film.slopes import keep_ruptured, net_inflow
 MOST_TURNS, SETTLED = 60, 1e-7
 
 
+class _Change(NamedTuple):
+    """Changes of thickness along the arc (nt + 1,) [m/m], of temperature [K/m] and pressure [Pa/m], by (a, b)."""
+
+    thicker: FloatArray
+    warmer: ComplexArray
+    pressure: ComplexArray
+
+
 @compiled
 def heat_impedance(
-    grid: FilmGrid,
-    work: FilmWork,
-    wedge: tuple[float, float, float],
-    speed: float,
-    oil: tuple[float, float, float, float],
-    heat: tuple[float, float],
-    omega: float,
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], running: Running, omega: float
 ) -> ComplexArray:
     """What the temperature that follows adds to a film's impedance.
 
@@ -45,12 +48,7 @@ def heat_impedance(
         As `model.film.reynolds.solve_film` left them, with a temperature that belongs to the pressure.
     wedge : tuple of float
         Cp, a, b [m].
-    speed : float
-        Surface speed of the journal [m/s].
-    oil : tuple of float
-        See `model.statics.pad_film.oil_constants`.
-    heat : tuple of float
-        Specific heat [J/kg/K] and conductivity [W/m/K] of the oil.
+    running : Running
     omega : float
         [rad/s]
 
@@ -59,31 +57,29 @@ def heat_impedance(
     (2, 2) complex ndarray
         By (a, b) [N/m]; NaN if pressure and heat do not settle.
     """
-    gx, gz = conductances(grid, work, wedge[0], wedge[1], wedge[2])
-    nt, nz = gx.shape[0], gz.shape[1]
+    conductance = conductances(grid, work, wedge[0], wedge[1], wedge[2])
+    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     out = np.zeros((2, 2), dtype=np.complex128)
-    loss = _local_loss(grid, work, speed, oil, heat, omega)
+    loss = _local_loss(grid, work, running, omega)
     for axis in range(2):
-        thicker = -grid.cos if axis == 0 else -grid.sin
-        warmer = np.zeros((nt + 1, nz + 1), dtype=np.complex128)
+        change = _Change(
+            -grid.cos if axis == 0 else -grid.sin,
+            np.zeros((nt + 1, nz + 1), dtype=np.complex128),
+            np.zeros((nt + 1, nz + 1), dtype=np.complex128),
+        )
         settled = False
         answer = np.zeros(work.unknown.shape[0], dtype=np.complex128)
         for _ in range(MOST_TURNS):
-            pressure = np.zeros((nt + 1, nz + 1), dtype=np.complex128)
             for i in range(1, nt):
                 for j in range(grid.first, nz):
                     k = (i - 1) * (nz - grid.first) + j - grid.first
                     frozen = work.slopes[k, axis] + 1j * omega * work.slopes[k, 2 + axis]
-                    pressure[i, j] = frozen + answer[k]
-            new = _temperature(grid, work, speed, oil, heat, (gx, gz), thicker, warmer, pressure, loss)
-            change, size = 0.0, 1e-300
-            for i in range(nt + 1):
-                for j in range(nz + 1):
-                    change = max(change, abs(new[i, j] - warmer[i, j]))
-                    size = max(size, abs(new[i, j]))
-            warmer = new
-            _pressure(grid, work, speed, oil, omega, warmer, answer)
-            if change < SETTLED * size:
+                    change.pressure[i, j] = frozen + answer[k]
+            new = _temperature(grid, work, running, conductance, change, loss)
+            asked, size = _step_and_size(new, change.warmer)
+            change.warmer[:] = new
+            _pressure(grid, work, running, omega, new, answer)
+            if asked < SETTLED * size:
                 settled = True
                 break
         for i in range(1, nt):
@@ -98,6 +94,17 @@ def heat_impedance(
 
 
 @inner
+def _step_and_size(new: ComplexArray, old: ComplexArray) -> tuple[float, float]:
+    """Largest difference, and largest value."""
+    change, size = 0.0, 1e-300
+    for i in range(new.shape[0]):
+        for j in range(new.shape[1]):
+            change = max(change, abs(new[i, j] - old[i, j]))
+            size = max(size, abs(new[i, j]))
+    return change, size
+
+
+@inner
 def _lighter(work: FilmWork, oil: tuple[float, float, float, float], i: int, j: int) -> tuple[float, float]:
     """Relative change of the density, and of density over viscosity, per kelvin."""
     density = -oil[2] * oil[3] / work.density[i, j]
@@ -106,13 +113,7 @@ def _lighter(work: FilmWork, oil: tuple[float, float, float, float], i: int, j: 
 
 @inner
 def _pressure(
-    grid: FilmGrid,
-    work: FilmWork,
-    speed: float,
-    oil: tuple[float, float, float, float],
-    omega: float,
-    warmer: ComplexArray,
-    answer: ComplexArray,
+    grid: FilmGrid, work: FilmWork, running: Running, omega: float, warmer: ComplexArray, answer: ComplexArray
 ) -> None:
     """Change of pressure by a change of temperature, into `answer` (unknowns,)."""
     h = work.thickness
@@ -121,18 +122,18 @@ def _pressure(
     across = np.empty((nt + 1, nz, 1), dtype=np.complex128)
     for i in range(nt):
         for j in range(nz + 1):
-            couette, denser, ratio = _face(grid, work, speed, oil, warmer, i, j)
+            couette, denser, ratio = _face(grid, work, running, warmer, i, j)
             along[i, j, 0] = couette * denser - (couette - work.flow_x[i, j]) * ratio
     for i in range(nt + 1):
         for j in range(nz):
-            across[i, j, 0] = work.flow_z[i, j] * _side(work, oil, warmer, i, j)
+            across[i, j, 0] = work.flow_z[i, j] * _side(work, running.oil, warmer, i, j)
     given: Any = answer  # the loops of the real ones are compiled for complex numbers too
     rhs = given.reshape((answer.shape[0], 1))
     net_inflow(along, across, grid.first, rhs)
     for i in range(1, nt):
         for j in range(grid.first, nz):
             k = (i - 1) * (nz - grid.first) + j - grid.first
-            stored = work.density[i, j] * _lighter(work, oil, i, j)[0] * warmer[i, j] * h[i, j]
+            stored = work.density[i, j] * _lighter(work, running.oil, i, j)[0] * warmer[i, j] * h[i, j]
             rhs[k, 0] -= 1j * omega * stored * grid.dx * grid.height[j]
     keep_ruptured(work, grid.first, rhs)
     substitute(work.band, given)
@@ -140,19 +141,13 @@ def _pressure(
 
 @inner
 def _face(
-    grid: FilmGrid,
-    work: FilmWork,
-    speed: float,
-    oil: tuple[float, float, float, float],
-    warmer: ComplexArray,
-    i: int,
-    j: int,
+    grid: FilmGrid, work: FilmWork, running: Running, warmer: ComplexArray, i: int, j: int
 ) -> tuple[float, complex, complex]:
     """Couette flow of a face along [kg/s], relative change of its density and of its density over viscosity."""
     one, two = work.density[i, j], work.density[i + 1, j]
     light, other = one / work.viscosity[i, j], two / work.viscosity[i + 1, j]
-    couette = 0.125 * speed * (work.thickness[i, j] + work.thickness[i + 1, j]) * (one + two) * grid.height[j]
-    here, there = _lighter(work, oil, i, j), _lighter(work, oil, i + 1, j)
+    couette = 0.125 * running.speed * (work.thickness[i, j] + work.thickness[i + 1, j]) * (one + two) * grid.height[j]
+    here, there = _lighter(work, running.oil, i, j), _lighter(work, running.oil, i + 1, j)
     denser = (one * here[0] * warmer[i, j] + two * there[0] * warmer[i + 1, j]) / (one + two)
     ratio = (light * here[1] * warmer[i, j] + other * there[1] * warmer[i + 1, j]) / (light + other)
     return couette, denser, ratio
@@ -168,16 +163,10 @@ def _side(work: FilmWork, oil: tuple[float, float, float, float], warmer: Comple
 
 
 @inner
-def _local_loss(
-    grid: FilmGrid,
-    work: FilmWork,
-    speed: float,
-    oil: tuple[float, float, float, float],
-    heat: tuple[float, float],
-    omega: float,
-) -> ComplexArray:
+def _local_loss(grid: FilmGrid, work: FilmWork, running: Running, omega: float) -> ComplexArray:
     """What a kelvin at a node stores and makes less, per station [W/K]."""
     p, h, mu = work.pressure, work.thickness, work.viscosity
+    speed, oil, heat = running
     out = np.empty(p.shape, dtype=np.complex128)
     for i in range(p.shape[0]):
         for j in range(p.shape[1]):
@@ -211,49 +200,76 @@ def _steepness(grid, p, q, i, j):  # type: ignore[no-untyped-def]
     return total
 
 
+class _March(NamedTuple):
+    """What the change of temperature is marched with.
+
+    The film's conductances; what a kelvin loses; the change found so far [K/m]; of the line between two stations the
+    changes of heat made and of flows across at either, and its tridiagonal equations.
+    """
+
+    conductance: tuple[FloatArray, FloatArray]
+    loss: ComplexArray
+    found: ComplexArray
+    made: ComplexArray
+    sides: ComplexArray
+    lower: ComplexArray
+    main: ComplexArray
+    upper: ComplexArray
+    right: ComplexArray
+
+
 @inner
 def _temperature(
     grid: FilmGrid,
     work: FilmWork,
-    speed: float,
-    oil: tuple[float, float, float, float],
-    heat: tuple[float, float],
+    running: Running,
     conductance: tuple[FloatArray, FloatArray],
-    thicker: FloatArray,
-    warmer: ComplexArray,
-    pressure: ComplexArray,
+    change: _Change,
     loss: ComplexArray,
 ) -> ComplexArray:
     """March the change of temperature for changes of thickness and pressure, (nt + 1, nz + 1) [K/m]."""
-    gx, gz = conductance
-    t, h = work.temperature, work.thickness
-    nt, nz = gx.shape[0], gz.shape[1]
-    out = np.zeros((nt + 1, nz + 1), dtype=np.complex128)
-    made = np.empty((2, nz + 1), dtype=np.complex128)
-    lower, main = np.zeros(nz + 1, dtype=np.complex128), np.zeros(nz + 1, dtype=np.complex128)
-    upper, right = np.zeros(nz + 1, dtype=np.complex128), np.zeros(nz + 1, dtype=np.complex128)
-    sides = np.zeros((2, nz), dtype=np.complex128)
-    _made(grid, work, speed, thicker, pressure, 0, made[1])
-    _sides(work, oil, gz, thicker, warmer, pressure, 0, sides[1])
-    for i in range(nt):
+    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
+    march = _March(
+        conductance,
+        loss,
+        np.zeros((nt + 1, nz + 1), dtype=np.complex128),
+        np.empty((2, nz + 1), dtype=np.complex128),
+        np.zeros((2, nz), dtype=np.complex128),
+        np.zeros(nz + 1, dtype=np.complex128),
+        np.zeros(nz + 1, dtype=np.complex128),
+        np.zeros(nz + 1, dtype=np.complex128),
+        np.zeros(nz + 1, dtype=np.complex128),
+    )
+    _march_lines(grid, work, running, change, march)
+    return march.found
+
+
+@inner
+def _march_lines(grid: FilmGrid, work: FilmWork, running: Running, change: _Change, march: _March) -> None:
+    """Set up and solve the equations of every line between two stations, one after the other."""
+    (gx, gz), loss, out, made, sides, lower, main, upper, right = march
+    thicker, warmer, pressure = change
+    t, h, flow_x, flow_z = work.temperature, work.thickness, work.flow_x, work.flow_z
+    heat, nz = running.heat, flow_z.shape[1]
+    _made(grid, work, running.speed, change, 0, made[1])
+    _sides(work, running.oil, gz, change, 0, sides[1])
+    for i in range(flow_x.shape[0]):
         made[0], sides[0] = made[1], sides[1]
-        _made(grid, work, speed, thicker, pressure, i + 1, made[1])
-        _sides(work, oil, gz, thicker, warmer, pressure, i + 1, sides[1])
+        _made(grid, work, running.speed, change, i + 1, made[1])
+        _sides(work, running.oil, gz, change, i + 1, sides[1])
         thick = 0.5 * (thicker[i] + thicker[i + 1])
         for j in range(nz + 1):
-            couette, denser, ratio = _face(grid, work, speed, oil, warmer, i, j)
+            couette, denser, ratio = _face(grid, work, running, warmer, i, j)
             share = thick / (0.5 * (h[i, j] + h[i + 1, j]))
-            driven = couette - work.flow_x[i, j]
+            driven = couette - flow_x[i, j]
             flow = couette * (share + denser) - driven * (3.0 * share + ratio)
             flow -= gx[i, j] * (pressure[i + 1, j] - pressure[i, j])
-            advect = heat[0] * work.flow_x[i, j]
+            advect = heat[0] * flow_x[i, j]
             value = 0.5 * (made[0, j] + made[1, j]) - heat[0] * flow * (t[i + 1, j] - t[i, j])
             low, high = 0.0, 0.0
             if j > 0:
-                south, more = (
-                    0.5 * (work.flow_z[i, j - 1] + work.flow_z[i + 1, j - 1]),
-                    0.5 * (sides[0, j - 1] + sides[1, j - 1]),
-                )
+                south = 0.5 * (flow_z[i, j - 1] + flow_z[i + 1, j - 1])
+                more = 0.5 * (sides[0, j - 1] + sides[1, j - 1])
                 film = 0.25 * (h[i, j] + h[i, j - 1] + h[i + 1, j] + h[i + 1, j - 1])
                 pass_on = heat[1] * grid.dx / grid.dz[j - 1]
                 low, changed = -0.5 * (0.5 * heat[0] * south + pass_on * film), -0.25 * heat[0] * more
@@ -265,7 +281,7 @@ def _temperature(
                 value -= changed * (t[i + 1, j - 1] - t[i + 1, j] + t[i, j - 1] - t[i, j])
                 value -= low * (out[i, j - 1] - out[i, j])
             if j < nz:
-                north, more = 0.5 * (work.flow_z[i, j] + work.flow_z[i + 1, j]), 0.5 * (sides[0, j] + sides[1, j])
+                north, more = 0.5 * (flow_z[i, j] + flow_z[i + 1, j]), 0.5 * (sides[0, j] + sides[1, j])
                 film = 0.25 * (h[i, j] + h[i, j + 1] + h[i + 1, j] + h[i + 1, j + 1])
                 pass_on = heat[1] * grid.dx / grid.dz[j]
                 high, changed = -0.5 * (-0.5 * heat[0] * north + pass_on * film), 0.25 * heat[0] * more
@@ -278,28 +294,27 @@ def _temperature(
                 value -= high * (out[i, j + 1] - out[i, j])
             right[j] = value + (advect - 0.5 * loss[i, j]) * out[i, j]
             lower[j], main[j], upper[j] = low, advect - low - high + 0.5 * loss[i + 1, j], high
-        for j in range(1, nz + 1):
-            scale = lower[j] / main[j - 1]
-            main[j] -= scale * upper[j - 1]
-            right[j] -= scale * right[j - 1]
-        right[nz] /= main[nz]
-        for j in range(nz - 1, -1, -1):
-            right[j] = (right[j] - upper[j] * right[j + 1]) / main[j]
+        _tridiagonal(lower, main, upper, right)
         out[i + 1] = right
-    return out
 
 
 @inner
-def _made(
-    grid: FilmGrid,
-    work: FilmWork,
-    speed: float,
-    thicker: FloatArray,
-    pressure: ComplexArray,
-    i: int,
-    made: ComplexArray,
-) -> None:
+def _tridiagonal(lower: ComplexArray, main: ComplexArray, upper: ComplexArray, right: ComplexArray) -> None:
+    """Thomas' algorithm in place; the solution is left in `right`, (n,)."""
+    last = right.shape[0] - 1
+    for j in range(1, last + 1):
+        scale = lower[j] / main[j - 1]
+        main[j] -= scale * upper[j - 1]
+        right[j] -= scale * right[j - 1]
+    right[last] /= main[last]
+    for j in range(last - 1, -1, -1):
+        right[j] = (right[j] - upper[j] * right[j + 1]) / main[j]
+
+
+@inner
+def _made(grid: FilmGrid, work: FilmWork, speed: float, change: _Change, i: int, made: ComplexArray) -> None:
     """Change of the heat made at a station, at the old temperature [W/m]."""
+    thicker, _, pressure = change
     for j in range(made.shape[0]):
         h, mu = work.thickness[i, j], work.viscosity[i, j]
         share, wide = thicker[i] / h, h**3 / (12.0 * mu)
@@ -316,13 +331,12 @@ def _sides(
     work: FilmWork,
     oil: tuple[float, float, float, float],
     gz: FloatArray,
-    thicker: FloatArray,
-    warmer: ComplexArray,
-    pressure: ComplexArray,
+    change: _Change,
     i: int,
     sides: ComplexArray,
 ) -> None:
     """Change of the flows across at a station [kg/s/m]."""
+    thicker, warmer, pressure = change
     for j in range(sides.shape[0]):
         share = 2.0 * thicker[i] / (work.thickness[i, j] + work.thickness[i, j + 1])
         changed = work.flow_z[i, j] * (3.0 * share + _side(work, oil, warmer, i, j))

@@ -2,11 +2,31 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from model.arrays import FloatArray
 from model.compilation import compiled
 from model.film.mesh import FilmGrid, FilmWork
+
+
+class Running(NamedTuple):
+    """What a film runs with.
+
+    Attributes
+    ----------
+    speed : float
+        Surface speed of the journal [m/s].
+    oil : tuple of float
+        See `model.statics.pad_film.oil_constants`.
+    heat : tuple of float
+        Specific heat [J/kg/K] and conductivity [W/m/K] of the oil, both over the share of the heat that stays in it.
+    """
+
+    speed: float
+    oil: tuple[float, float, float, float]
+    heat: tuple[float, float]
 
 
 @compiled

@@ -15,14 +15,13 @@ from model.pad.bending import SHAPES
 from model.setup import Setup
 from model.statics import conditions
 from model.statics.carrying import attitude_of
-from model.statics.compiled.bending import BodyStack, stacked_bodies
+from model.statics.compiled.bending import BodyStack, Shapes, stacked_bodies
 from model.statics.compiled.carrying import Case
 from model.statics.compiled.iteration import BOUNDLESS_HEAT, FILM_LOST, RESTARTING, SETTLED, SINGULAR, iterate
 from model.statics.compiled.laws import encoded
 from model.statics.compiled.stack import PadStack, PadState, stacked_grids
 from model.statics.equilibrium import Equilibrium
 from model.statics.newton_iteration import ended, settled_status
-from model.statics.pad_film import oil_constants
 from model.statics.search import Search
 from model.statics.tilt_hold import rolling_radius
 
@@ -82,17 +81,13 @@ def iterate_at_once(search: Search, cold: bool) -> Equilibrium:
     setup, films = search.setup, search.films
     pads = _pads(search)
     state = _state(search, pads.attitudes.shape[2])
-    oil = setup.bearing.oil
-    kept = 1.0 - setup.heat_loss
     roll = setup.rolling * rolling_radius(setup.bearing.pivot) if setup.rolling else 0.0
     size = setup.bearing.journal_radius**2 * setup.bearing.length
-    case = Case(
-        search.load, search.surface_speed, oil_constants(oil), (oil.specific_heat / kept, oil.conductivity / kept),
-        (float(setup.rotational_stiffness), roll), size, setup.accuracy, setup.thermal == "isothermal",
-    )  # fmt: skip
-    grids = stacked_grids(tuple(f.grid for f in films))
-    bodies = _bodies(search)
-    code, iterations, residual, heat, limited = iterate(grids, pads, search.works, state, case, bodies, cold)
+    running = films[0].running(search.surface_speed, setup.bearing.oil)
+    hold = (float(setup.rotational_stiffness), roll)
+    case = Case(search.load, running, hold, size, setup.accuracy, setup.thermal == "isothermal")
+    shapes = Shapes(stacked_grids(tuple(f.grid for f in films)), _bodies(search))
+    code, iterations, residual, heat, limited = iterate(shapes, pads, search.works, state, case, cold)
     _take_over(search, state)
     search.limited = limited
     figures = iterations, residual, heat

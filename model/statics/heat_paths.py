@@ -25,10 +25,11 @@ import numpy as np
 
 from model.arrays import FloatArray
 from model.film.energy import dissipation, march
+from model.film.oil_state import Running
 from model.pad.bending import PadDeformation
 from model.setup import Setup
 from model.statics.compiled.constants import BOUNDLESS
-from model.statics.pad_film import PadFilm
+from model.statics.pad_film import PadFilm, oil_constants
 from model.statics.pad_flow import flow_weighted, outlet_temperature, through_flow
 
 #: q h / k (T_mean - T_wall) of a parabolic profile, flat at the other wall.
@@ -174,8 +175,8 @@ class FilmHeat:
 
     def _march(self, film: PadFilm, fields: FloatArray, sources: FloatArray) -> None:
         oil = self.setup.bearing.oil
-        heat = (oil.specific_heat, oil.conductivity)
-        limited = march(film.grid, film.work, self.surface_speed, heat, film.work.exchange, fields, sources)
+        running = Running(self.surface_speed, oil_constants(oil), (oil.specific_heat, oil.conductivity))
+        limited = march(film.grid, film.work, running, film.work.exchange, fields, sources)
         self.limited = max(self.limited, limited)
 
 

@@ -14,7 +14,7 @@ from model.film.energy import heat_step
 from model.film.loaded_attitude import Branch
 from model.film.mesh import FilmGrid, FilmWork, film_grid
 from model.film.models import FilmSolver, film_solver
-from model.film.oil_state import set_viscosity
+from model.film.oil_state import Running, set_viscosity
 from model.film.resting import RestingFilm, resting_film
 from model.film.reynolds import FilmForces
 from model.film.slopes import pressure_change
@@ -211,6 +211,17 @@ class PadFilm:
         idle = self.idle or self.forces is None
         self.resting = resting_film(self.grid, wedge, surface_speed, oil, self.inlet, self.kept) if idle else None
 
+    def running(self, surface_speed: float, oil: Oil) -> Running:
+        """What the film runs with; what a share of the heat does, all of it does to oil that takes up more per kelvin.
+
+        Parameters
+        ----------
+        surface_speed : float
+            Of the journal [m/s].
+        oil : Oil
+        """
+        return Running(surface_speed, oil_constants(oil), (oil.specific_heat / self.kept, oil.conductivity / self.kept))
+
     def heat(self, surface_speed: float, oil: Oil, limits: tuple[float, float]) -> float:
         """Move the temperature towards what the pressure makes it, by `limits`: relaxation, and largest step [K].
 
@@ -228,11 +239,10 @@ class PadFilm:
             See `model.film.energy.solve_energy`.
         """
         assert self.forces is not None
-        # what a share of the heat does to the oil, all of it does to oil that takes up more per kelvin
+        running = self.running(surface_speed, oil)
         change, limited, radial, tangential = heat_step(
-            self.grid, self.work, surface_speed, oil_constants(oil),
-            (oil.specific_heat / self.kept, oil.conductivity / self.kept), (self.inlet, *limits), self.pressure_change,
-        )  # fmt: skip
+            self.grid, self.work, running, (self.inlet, *limits), self.pressure_change
+        )
         self.temperature_change = change
         self.corrected = self.forces._replace(force=self.forces.force + np.array([radial, tangential]))
         return limited

@@ -20,7 +20,7 @@ from model.statics.compiled.constants import FIRST_HEATING, HEATING_STEP, MICROM
 from model.statics.compiled.first_position import first_position
 from model.statics.equilibrium import Equilibrium, mean_temperature
 from model.statics.heat_paths import couples_heat
-from model.statics.pad_film import PadFilm, oil_constants, pad_films
+from model.statics.pad_film import PadFilm, pad_films
 
 #: A change of the clearance by more than this share asks for the table of a pad's loaded attitudes anew.
 NEW_TABLE = 1e-3
@@ -198,9 +198,8 @@ class Search:
             return
         for film in self.films:
             if not film.idle:
-                wedge, heat = (film.pad.pad_clearance, *film.approach(self.position)), oil.specific_heat / film.kept
-                speed = self.surface_speed
-                heat_by_drag(film.grid, film.work, wedge, speed, oil_constants(oil), heat, film.inlet)
+                wedge = (film.pad.pad_clearance, *film.approach(self.position))
+                heat_by_drag(film.grid, film.work, wedge, film.running(self.surface_speed, oil), film.inlet)
         self._balance_films(0.0)
 
     def _balance_films(self, hotter: float) -> None:

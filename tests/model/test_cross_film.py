@@ -18,6 +18,7 @@ from model.film.cross_film import CrossFilm, CrossOperator, cross_film, cross_pr
 from model.film.cross_march import conduct, face_temperature, march_cross, march_one, station_heat
 from model.film.energy import solve_energy
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film.oil_state import Running
 from model.film.reynolds import solve_film
 from model.growth import Growth, grown
 from model.options import Options
@@ -152,7 +153,7 @@ def test_a_well_mixed_film_between_insulated_walls_is_the_adiabatic_one():
     across = (marched(operator)[0] @ np.array([1.0, 40.0, 0.0])).reshape(cross.temperature.shape)
     assert np.ptp(across, axis=2).max() < 0.01
     adiabatic = np.empty_like(work.temperature)
-    solve_energy(grid, work, 40.0, SURFACE, (heat, mixing), 0.0, adiabatic)
+    solve_energy(grid, work, 40.0, Running(SURFACE, (OIL.viscosity_40, 0.0, 860.0, 0.0), (heat, mixing)), adiabatic)
     assert np.ptp(adiabatic) > 2.0
     np.testing.assert_allclose(across.mean(axis=2), adiabatic, atol=1e-3)
 

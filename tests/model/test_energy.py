@@ -13,6 +13,7 @@ from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.film.energy import dissipation, solve_energy
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film.oil_state import Running
 from model.film.reynolds import solve_film
 from model.predict import predict
 from model.statics.pad_flow import outlet_temperature, through_flow
@@ -41,7 +42,8 @@ def full_film(
     a, b = wedge
     assert solve_film(grid, work, (CLEARANCE, a * CLEARANCE, b * CLEARANCE), SURFACE, False).steps > 0
     temperature = np.empty_like(work.temperature)
-    assert solve_energy(grid, work, 40.0, SURFACE, (HEAT, conductivity), 0.0, temperature) == 0.0
+    running = Running(SURFACE, (MU, 0.0, RHO, 0.0), (HEAT, conductivity))
+    assert solve_energy(grid, work, 40.0, running, temperature) == 0.0
     return grid, work, temperature
 
 

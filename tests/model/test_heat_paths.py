@@ -12,6 +12,7 @@ from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.film.energy import dissipation, solve_energy
+from model.film.oil_state import Running
 from model.growth import Growth, grown
 from model.options import Options
 from model.predict import predict
@@ -74,8 +75,8 @@ def test_heat_that_pads_take_is_what_their_solid_says(rocker):
     work.exchange[:] = 0.0
     work.gained[:] = -into_pad.reshape(work.gained.shape) * film.grid.dx * film.grid.height
     again = np.empty_like(work.temperature)
-    heat = (oil.specific_heat, oil.conductivity)
-    solve_energy(film.grid, work, film.inlet, SPEED * rocker.journal_radius, heat, 0.0, again)
+    heat, as_it_is = (oil.specific_heat, oil.conductivity), (oil.viscosity_40, 0.0, oil.density_40, 0.0)
+    solve_energy(film.grid, work, film.inlet, Running(SPEED * rocker.journal_radius, as_it_is, heat), again)
     np.testing.assert_allclose(again, work.temperature, atol=2e-3)
 
 

@@ -23,6 +23,7 @@ from scipy.stats import qmc
 from model.bearing import Bearing, Oil, Pad, Pivot
 from model.film.energy import solve_energy
 from model.film.mesh import film_work
+from model.film.oil_state import Running
 from model.film.reynolds import solve_film
 from model.predict import predict
 from model.prediction import Prediction
@@ -148,10 +149,10 @@ def errors(p: Prediction) -> dict[str, float]:
         out["pivot"] = max(out["pivot"], abs(give - film.deflection) / film.pad.assembled_clearance)
         out["reynolds"] = max(out["reynolds"], reynolds_error(bearing, film, p.bearing_position, surface))
         fresh = np.empty_like(film.work.temperature)
-        heat = (bearing.oil.specific_heat, bearing.oil.conductivity)
+        heat, oil = (bearing.oil.specific_heat, bearing.oil.conductivity), (bearing.oil.viscosity_40, 0.0, 0.0, 0.0)
         film.work.viscosity[:] = bearing.oil.viscosity(film.work.temperature)
         film.work.density[:] = bearing.oil.density(film.work.temperature)
-        solve_energy(film.grid, film.work, film.inlet, surface, heat, 0.0, fresh)
+        solve_energy(film.grid, film.work, film.inlet, Running(surface, oil, heat), fresh)
         if p.setup.thermal == "isothermal":
             fresh[:] = film.inlet
         out["heat"] = max(out["heat"], float(np.abs(fresh - film.work.temperature).max()))

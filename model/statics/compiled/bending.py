@@ -47,6 +47,13 @@ class BodyStack(NamedTuple):
     supply: float
 
 
+class Shapes(NamedTuple):
+    """The films' meshes and the bodies of their pads."""
+
+    grids: GridStack
+    bodies: BodyStack
+
+
 def stacked_bodies(
     bodies: tuple[PadDeformation, ...], unknown: tuple[int, int], factor: float, supply: float
 ) -> BodyStack:
@@ -101,24 +108,24 @@ _RIGID = BodyStack(
 
 
 @inner
-def bend_pads(grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, bodies: BodyStack) -> float:
+def bend_pads(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState) -> float:
     """Close the loop of pressure and deformation for every pad that carries.
 
     Parameters
     ----------
-    grids : GridStack
+    shapes : Shapes
     pads : PadStack
     works : FilmWork
         With a leading axis for the pad.
     state : PadState
         What the journal feels, and what a move does to the shapes, are set.
-    bodies : BodyStack
 
     Returns
     -------
     float
         Largest change of shape asked for, over the least film.
     """
+    grids, bodies = shapes
     count = len(state.tilt)
     unknowns, coarse, across = works.unknown.shape[1], bodies.to_coarse.shape[1], state.bent.shape[2]
     rise, given = np.zeros((count, state.bent[0].size)), np.zeros((count, unknowns + coarse))
@@ -150,7 +157,8 @@ def bend_pads(grids: GridStack, pads: PadStack, works: FilmWork, state: PadState
                 if not largest >= abs(change[i, j]) and largest == largest:  # a NaN is not to be lost
                     largest = abs(change[i, j])
             share = max(share, largest / state.least[m])
-            _close_loop(grid_of(grids, m), work_of(works, m), pads, state, bodies, m, change)
+            film = (grid_of(grids, m), work_of(works, m))
+            _close_loop(film, pads, state, bodies, m, change)
     return share
 
 
@@ -178,9 +186,10 @@ def _times(matrix: np.ndarray, given: FloatArray, rows: IntArray, out: FloatArra
 
 @inner
 def _close_loop(
-    grid: FilmGrid, work: FilmWork, pads: PadStack, state: PadState, bodies: BodyStack, m: int, change: FloatArray
-) -> None:  # fmt: skip
+    film: tuple[FilmGrid, FilmWork], pads: PadStack, state: PadState, bodies: BodyStack, m: int, change: FloatArray
+) -> None:
     """One pad's part of a Newton step, see `model.pad.bending.bending_step`."""
+    grid, work = film
     k = bodies.which[m]
     shapes, amplitudes, response = bodies.shapes[k], bodies.amplitudes[k], bodies.response[k]
     a, b = state.wedge[m, 0], state.wedge[m, 1]

@@ -10,6 +10,7 @@ import numpy as np
 from model.arrays import FloatArray
 from model.compilation import inner
 from model.film.mesh import FilmWork
+from model.film.oil_state import Running
 from model.statics.compiled.constants import CROWN, EDGE, MAX_LOAD_CHANGES, NEAR_EDGE
 from model.statics.compiled.laws import compliance, deflection
 from model.statics.compiled.stack import PadStack, PadState
@@ -25,12 +26,7 @@ class Case(NamedTuple):
     ----------
     load : (2,) ndarray
         [N]
-    speed : float
-        Surface speed of the journal [m/s].
-    oil : tuple of float
-        See `model.statics.pad_film.oil_constants`.
-    heat : tuple of float
-        Specific heat [J/kg/K] and conductivity [W/m/K], both over the share of the heat that stays in the film.
+    running : Running
     hold : tuple of float
         Rotational stiffness of the pivots [N m/rad], and what every newton of pad load adds to it [m].
     size : float
@@ -41,9 +37,7 @@ class Case(NamedTuple):
     """
 
     load: FloatArray
-    speed: float
-    oil: tuple[float, float, float, float]
-    heat: tuple[float, float]
+    running: Running
     hold: tuple[float, float]
     size: float
     accuracy: float
@@ -157,7 +151,8 @@ def find_branch(case: Case, pads: PadStack, works: FilmWork, state: PadState, m:
         for j in range(warm.shape[1]):
             mean += warm[i, j]
     mean = mean / warm.size + hotter
-    scale = case.oil[0] * math.exp(case.oil[1] * (40.0 - mean)) * case.speed * case.size
+    speed, oil = case.running.speed, case.running.oil
+    scale = oil[0] * math.exp(oil[1] * (40.0 - mean)) * speed * case.size
     table, clearance = pads.attitudes[m], pads.clearance[m]
     load = np.empty(count)
     for k in range(count):

@@ -66,17 +66,18 @@ def balance(
     position = np.zeros(2)
     if size == 0.0:
         return position
+    curves = (pads, rigid, carried, lengths)
     x, y = load[0] / size * 0.4 * room, load[1] / size * 0.4 * room
-    fx, fy = _missing(x, y, load, pads, rigid, carried, lengths)
+    fx, fy = _missing(x, y, load, curves)
     error = math.hypot(fx, fy)
     step = 1e-4 * room
     for _ in range(60):
         if error < GOOD_ENOUGH * size:
             break
-        ax, ay = _missing(x + step, y, load, pads, rigid, carried, lengths)
-        bx, by = _missing(x - step, y, load, pads, rigid, carried, lengths)
-        cx, cy = _missing(x, y + step, load, pads, rigid, carried, lengths)
-        dx, dy = _missing(x, y - step, load, pads, rigid, carried, lengths)
+        ax, ay = _missing(x + step, y, load, curves)
+        bx, by = _missing(x - step, y, load, curves)
+        cx, cy = _missing(x, y + step, load, curves)
+        dx, dy = _missing(x, y - step, load, curves)
         jxx, jyx = (bx - ax) / (2 * step), (by - ay) / (2 * step)
         jxy, jyy = (dx - cx) / (2 * step), (dy - cy) / (2 * step)
         det = jxx * jyy - jxy * jyx
@@ -89,7 +90,7 @@ def balance(
             mx, my = share * mx, share * my
         for halving in range(8):  # a pad that takes up or sheds its load on the way bends the force sharply
             tx, ty = x + mx * 0.5**halving, y + my * 0.5**halving
-            gx, gy = _missing(tx, ty, load, pads, rigid, carried, lengths)
+            gx, gy = _missing(tx, ty, load, curves)
             left = math.hypot(gx, gy)
             if left < error or halving == 7:
                 x, y, fx, fy, error = tx, ty, gx, gy, left
@@ -100,9 +101,10 @@ def balance(
 
 @inner
 def _missing(
-    x: float, y: float, load: FloatArray, pads: FloatArray, rigid: FloatArray, carried: FloatArray, lengths: IntArray
+    x: float, y: float, load: FloatArray, curves: tuple[FloatArray, FloatArray, FloatArray, IntArray]
 ) -> tuple[float, float]:
     """Part of the load that the tabulated films do not carry at a position."""
+    pads, rigid, carried, lengths = curves
     fx, fy = load[0], load[1]
     for m in range(pads.shape[0]):
         at = pads[m, 2] + pads[m, 0] * x + pads[m, 1] * y

@@ -11,7 +11,7 @@ from model.compilation import compiled, inner
 from model.film.energy import heat_by_drag
 from model.film.mesh import FilmWork
 from model.statics.compiled.anderson import DEPTH, mixed
-from model.statics.compiled.bending import BodyStack
+from model.statics.compiled.bending import Shapes
 from model.statics.compiled.carrying import (
     Case,
     along,
@@ -69,7 +69,7 @@ def start_cold(grids: GridStack, case: Case, pads: PadStack, works: FilmWork, st
         if not state.idle[m]:
             a = rigid_approach(pads, state, m) - state.deflection[m]
             wedge = (pads.clearance[m], a, along(pads, state, m) + pads.pivot_radius[m] * state.tilt[m])
-            heat_by_drag(grid_of(grids, m), work_of(works, m), wedge, case.speed, case.oil, case.heat[0], pads.inlet[m])
+            heat_by_drag(grid_of(grids, m), work_of(works, m), wedge, case.running, pads.inlet[m])
     _balance_films(case, pads, works, state, 0.0)
 
 
@@ -92,19 +92,18 @@ def _balance_films(case: Case, pads: PadStack, works: FilmWork, state: PadState,
 
 @compiled
 def iterate(
-    grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case, bodies: BodyStack, cold: bool
+    shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, cold: bool
 ) -> tuple[int, int, float, float, float]:
     """Iterate from where the arrays stand, or from a cold start.
 
     Parameters
     ----------
-    grids : GridStack
+    shapes : Shapes
     pads : PadStack
     works : FilmWork
         With a leading axis for the pad.
     state : PadState
     case : Case
-    bodies : BodyStack
     cold : bool
         Start anew.
 
@@ -114,20 +113,19 @@ def iterate(
         How it ended, iterations, residual, change of temperature [K], limited share of a flow.
     """
     if cold:
-        start_cold(grids, case, pads, works, state)
+        start_cold(shapes.grids, case, pads, works, state)
     best, residual, heat, stalled = math.inf, math.inf, math.inf, 0
     left, best_left, limited, relaxation = math.inf, math.inf, 0.0, RELAXATION if cold else 1.0
-    mixes = not case.isothermal or len(bodies.which) > 0
+    mixes = not case.isothermal or len(shapes.bodies.which) > 0
     count, size = 0, _size(works, state) if mixes else 0
-    images, residuals = np.empty((DEPTH + 1, size)), np.empty((DEPTH + 1, size))
-    before = np.empty(size)
+    images, residuals, before = np.empty((DEPTH + 1, size)), np.empty((DEPTH + 1, size)), np.empty(size)
     for iteration in range(1, MAX_ITERATIONS + 1):
         if update_carrying(case, pads, works, state):
             count = 0
         kept = left > SLOW * best_left and mixes
         if kept:
             write_vector(pads, works, state, before)
-        heat, limited = solve_films(grids, pads, works, state, case, bodies, relaxation)
+        heat, limited = solve_films(shapes, pads, works, state, case, relaxation)
         if not heat < BOUNDLESS:
             return FILM_LOST if _lost(state) else BOUNDLESS_HEAT, iteration, math.inf, heat, limited
         residual, shift, moves = newton(case, pads, state)
@@ -138,12 +136,12 @@ def iterate(
         relaxation = 1.0 if near else RELAXATION
         if residual < case.accuracy and heat < HEAT_PER_FORCE * case.accuracy:
             if not leave_unstable(case, pads, works, state):
-                return _settled(grids, pads, works, state, case), iteration, residual, heat, limited
+                return _settled(shapes.grids, pads, works, state, case), iteration, residual, heat, limited
             count = 0
             continue
         stalled = 0 if residual < PROGRESS * best else stalled + 1
         best = min(best, residual)
-        whole = move(grids, pads, works, state, bodies, (shift, moves), 0.5 if stalled > PATIENCE else 1.0)
+        whole = move(shapes, pads, works, state, (shift, moves), 0.5 if stalled > PATIENCE else 1.0)
         if kept and whole and near and left > SLOW * best_left:
             count = _remember(images, residuals, count)
             write_vector(pads, works, state, images[count - 1])
@@ -190,7 +188,7 @@ def _settled(grids: GridStack, pads: PadStack, works: FilmWork, state: PadState,
             return RESTARTING
     for m in range(len(state.tilt)):
         if state.solved[m]:
-            solve_pressure(grids, pads, works, state, case, m, True)
+            solve_pressure((grid_of(grids, m), work_of(works, m)), pads, state, case, m, True)
     return SETTLED
 
 

@@ -9,29 +9,28 @@ import numpy as np
 from model.arrays import FloatArray
 from model.compilation import inner
 from model.film.energy import heat_step
-from model.film.mesh import FilmWork
+from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import least_share, set_viscosity
 from model.film.reynolds import solve_film
-from model.statics.compiled.bending import BodyStack, bend_pads, change_shape
+from model.statics.compiled.bending import Shapes, bend_pads, change_shape
 from model.statics.compiled.carrying import Case, along, hold_of, rigid_approach, set_loaded
 from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, LONGEST_STEP, SHRINK
 from model.statics.compiled.elimination import PadEquations, eliminate
 from model.statics.compiled.laws import compliance, deflection
-from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of, work_of
+from model.statics.compiled.stack import PadStack, PadState, grid_of, work_of
 
 
 @inner
 def solve_pressure(
-    grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case, m: int, sharp: bool
+    film: tuple[FilmGrid, FilmWork], pads: PadStack, state: PadState, case: Case, m: int, sharp: bool
 ) -> None:
     """Pressure of one film at its present temperature.
 
     Parameters
     ----------
-    grids : GridStack
+    film : tuple
+        Its mesh and arrays.
     pads : PadStack
-    works : FilmWork
-        With a leading axis for the pad.
     state : PadState
     case : Case
     m : int
@@ -39,12 +38,12 @@ def solve_pressure(
     sharp : bool
         See `model.film.reynolds.solve_film`.
     """
-    grid, work = grid_of(grids, m), work_of(works, m)
+    grid, work = film
     if not sharp:
-        set_viscosity(work, case.oil)
+        set_viscosity(work, case.running.oil)
     a = rigid_approach(pads, state, m) - state.deflection[m]
     b = along(pads, state, m) + pads.pivot_radius[m] * state.tilt[m]
-    found = solve_film(grid, work, (pads.clearance[m], a, b), case.speed, sharp)
+    found = solve_film(grid, work, (pads.clearance[m], a, b), case.running.speed, sharp)
     state.wedge[m, 0], state.wedge[m, 1] = a, b
     state.solved[m] = True
     state.stiffness[m], state.damping[m] = found.stiffness, found.damping
@@ -55,19 +54,18 @@ def solve_pressure(
 
 @inner
 def solve_films(
-    grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case, bodies: BodyStack, relaxation: float
+    shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, relaxation: float
 ) -> tuple[float, float]:
     """Solve every film that carries once: pressure, then temperature, then what the pads' deformation asks.
 
     Parameters
     ----------
-    grids : GridStack
+    shapes : Shapes
     pads : PadStack
     works : FilmWork
         With a leading axis for the pad.
     state : PadState
     case : Case
-    bodies : BodyStack
     relaxation : float
         Of a change of temperature.
 
@@ -80,11 +78,12 @@ def solve_films(
     lost = False
     for m in range(len(state.tilt)):
         if not state.idle[m]:
-            solve_pressure(grids, pads, works, state, case, m, False)
+            film = (grid_of(shapes.grids, m), work_of(works, m))
+            solve_pressure(film, pads, state, case, m, False)
             if state.steps[m] > 0 and not state.force[m, 0] > 0.0 and case.hold[0] == 0.0:
                 set_loaded(pads, works, state, m)
                 if not state.idle[m]:
-                    solve_pressure(grids, pads, works, state, case, m, False)
+                    solve_pressure(film, pads, state, case, m, False)
                     state.idle[m] = not state.force[m, 0] > 0.0
         if state.idle[m]:
             state.solved[m] = False
@@ -98,7 +97,7 @@ def solve_films(
         for m in range(len(state.tilt)):
             if state.solved[m] and state.steps[m] > 0:
                 asked, cut, radial, tangential = heat_step(
-                    grid_of(grids, m), work_of(works, m), case.speed, case.oil, case.heat,
+                    grid_of(shapes.grids, m), work_of(works, m), case.running,
                     (pads.inlet[m], relaxation, HEATING_STEP), state.shift[m],
                 )  # fmt: skip
                 state.heating[m] = asked
@@ -109,8 +108,8 @@ def solve_films(
                     change = asked
     for m in range(len(state.tilt)):
         state.felt[m], state.felt_stiffness[m] = state.corrected[m], state.stiffness[m]
-    if len(bodies.which) > 0 and change < BOUNDLESS:
-        change = max(change, HEAT_PER_FORCE * bend_pads(grids, pads, works, state, bodies))
+    if len(shapes.bodies.which) > 0 and change < BOUNDLESS:
+        change = max(change, HEAT_PER_FORCE * bend_pads(shapes, pads, works, state))
     return change, limited
 
 
@@ -164,25 +163,28 @@ def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArr
 
 @inner
 def move(
-    grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, bodies: BodyStack,
-    step: tuple[FloatArray, FloatArray], damping: float,
-) -> bool:  # fmt: skip
+    shapes: Shapes,
+    pads: PadStack,
+    works: FilmWork,
+    state: PadState,
+    step: tuple[FloatArray, FloatArray],
+    damping: float,
+) -> bool:
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way.
 
     Parameters
     ----------
-    grids : GridStack
+    shapes : Shapes
     pads : PadStack
     works : FilmWork
         With a leading axis for the pad.
     state : PadState
-    bodies : BodyStack
     step : tuple
         Shift of the journal and moves of the pads, see `newton`.
     damping : float
         Largest share of the step.
     """
-    shift, moves = step
+    (grids, bodies), (shift, moves) = shapes, step
     least = math.inf
     for m in range(len(state.tilt)):
         least = min(least, pads.clearance[m])
