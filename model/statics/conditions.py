@@ -141,6 +141,24 @@ def alternating(pads: Sequence[int]) -> Condition:
     )
 
 
+def stick_and_slip(pads: Sequence[int]) -> Condition:
+    """Pads that swing between sticking and sliding, numbers from 1.
+
+    Parameters
+    ----------
+    pads : sequence of int
+        Numbers from 1.
+
+    Returns
+    -------
+    Condition
+    """
+    return Condition(
+        f"pads {_listed(pads)} neither stick nor slide at rest", "error",
+        "friction holds them where their film loses its load, and without load there is no friction", tuple(pads),
+    )  # fmt: skip
+
+
 def never_at_rest(films: Sequence[PadFilm]) -> tuple[Condition, ...]:
     """Names the pads that went on taking up and shedding their load, if any did.
 

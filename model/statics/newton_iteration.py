@@ -36,6 +36,9 @@ from model.statics.film_step import refine_derivatives, solve_films
 from model.statics.newton_step import newton_step
 from model.statics.search import Search
 
+#: A pad that tilts by this share of the largest tilt in the last step swings, too.
+SWINGING = 0.3
+
 
 def iterate(search: Search) -> Equilibrium:
     """Iterate from where a search stands.
@@ -86,8 +89,17 @@ def iterate(search: Search) -> Equilibrium:
             search.set_vector(memory.next(before, search.vector()))
         else:
             memory.reset()
-    status = (*conditions.never_at_rest(search.films), conditions.NOT_CONVERGED)
+    status = (*(conditions.never_at_rest(search.films) or _swinging(search, moves[:, 0])), conditions.NOT_CONVERGED)
     return ended(search, (MAX_ITERATIONS, residual, heat), status)
+
+
+def _swinging(search: Search, tilts: FloatArray) -> tuple[Condition, ...]:
+    """Names the pads with friction that the last step moved most."""
+    if not search.setup.friction:
+        return ()
+    most = SWINGING * float(np.abs(tilts).max())
+    pads = [f.number for f, tilt in zip(search.films, tilts.tolist(), strict=True) if abs(tilt) >= most]
+    return (conditions.stick_and_slip(pads),)
 
 
 def _move(search: Search, step: tuple[FloatArray, FloatArray], damping: float) -> bool:
