@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from model.arrays import FloatArray
-from model.bearing import BearingError
 from model.predict import predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
@@ -78,33 +77,6 @@ class PolygonSides:
     pushed: FloatArray
     angle: FloatArray
 
-    def corners(self, pushed: bool = False) -> FloatArray:
-        """Where neighbouring sides meet, (n_pads, 2) [m], counter-clockwise: corner k is that of sides k and k + 1.
-
-        With `pushed` both sides are taken where the whole push load holds them; in a corner two pads share it, and
-        the shaft stops a little short (see `corner_positions`).
-
-        Parameters
-        ----------
-        pushed : bool
-            Where the push load holds the sides, not at zero load.
-
-        Returns
-        -------
-        (n_pads, 2) ndarray
-            [m]
-        """
-        order = np.argsort(self.angle % (2.0 * math.pi))
-        distance = (self.pushed if pushed else self.clearance)[order]
-        return _crossings(self.angle[order], distance)
-
-
-def _crossings(angle: FloatArray, distance: FloatArray) -> FloatArray:
-    """Points where every line n . x = distance meets the next one."""
-    normals = np.column_stack([np.cos(angle), np.sin(angle)])
-    pairs = [(k, (k + 1) % len(angle)) for k in range(len(angle))]
-    return np.array([np.linalg.solve(normals[[i, j]], distance[[i, j]]) for i, j in pairs])
-
 
 def polygon_sides(setup: Setup, push_load: float) -> PolygonSides:
     """Predict a cold clearance sweep with a push load [N].
@@ -135,42 +107,6 @@ def polygon_sides(setup: Setup, push_load: float) -> PolygonSides:
         )
     table = np.array(rows)
     return PolygonSides(table[:, 0], table[:, 1], table[:, 2])
-
-
-def corner_positions(setup: Setup, push_load: float) -> FloatArray:
-    """Where a push along the bisector of two neighbouring pads takes the shaft: both pivots give under their share.
-
-    Parameters
-    ----------
-    setup : Setup
-    push_load : float
-        [N]
-
-    Returns
-    -------
-    (n_pads, 2) ndarray
-        As read [m], counter-clockwise as `PolygonSides.corners`.
-
-    Raises
-    ------
-    BearingError
-        Two neighbouring pads stand half a turn apart or more.
-    """
-    angles = np.array([pad.pivot_angle for pad in setup.bearing.pads])
-    order = np.argsort(angles % (2.0 * math.pi))
-    out = []
-    for i, j in zip(order, np.roll(order, -1), strict=True):
-        half = 0.5 * ((angles[j] - angles[i]) % (2.0 * math.pi))
-        if half >= 0.5 * math.pi:
-            raise BearingError(
-                f"pads {i + 1} and {j + 1} stand {math.degrees(2 * half):.0f} deg apart: no corner there"
-            )
-        share = 0.5 * push_load / math.cos(half)
-        pair = np.array([[math.cos(angles[k]), math.sin(angles[k])] for k in (i, j)])
-        reach = [setup.bearing.pads[k].assembled_clearance + setup.pivots[k].deflection(share) for k in (i, j)]
-        bisector = np.array([math.cos(angles[i] + half), math.sin(angles[i] + half)])
-        out.append(np.linalg.solve(pair, reach) + push_load * (setup.structure @ bisector))
-    return np.asarray(np.array(out) @ setup.instruments.displacement_map(0.0).real.T)
 
 
 def sweep(

@@ -257,38 +257,3 @@ def _integrate(
                 for m in range(2):
                     stiffness[n, m] += direction * weight[i, j] * slopes[k, m]
                     damping[n, m] += direction * weight[i, j] * slopes[k, m + 2]
-
-
-def fluid_fraction(
-    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, filling: float = 1.0
-) -> FloatArray:
-    """Filling theta of a film that `solve_film_jfo` has solved.
-
-    Parameters
-    ----------
-    grid : FilmGrid
-    work : FilmWork
-    wedge : tuple of float
-        Cp, a, b [m].
-    speed : float
-        Surface speed of the journal [m/s].
-    filling : float
-        Share of the gap that is full where the film enters.
-
-    Returns
-    -------
-    (nt + 1, nz + 1) ndarray
-        1 where the film is full and at the edges; where it is ruptured, the share of the gap that oil fills.
-    """
-    faces = face_flows(grid, work, wedge, speed, filling)
-    p, ruptured = work.pressure, work.ruptured
-    theta = np.ones_like(p)
-    theta[0] = np.where(ruptured[0], filling, 1.0)
-    into = np.minimum(faces.supply, faces.couette[0] - faces.along[0] * p[1])
-    for i in range(1, p.shape[0] - 1):
-        into = into + faces.along[i] * p[i + 1]
-        into[:-1] += faces.across[i] * p[i, 1:]
-        into[1:] += faces.across[i] * p[i, :-1]
-        theta[i] = np.where(ruptured[i], into / faces.couette[i], 1.0)
-        into = faces.couette[i] * theta[i] + faces.along[i] * p[i]
-    return theta

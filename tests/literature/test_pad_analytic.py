@@ -15,7 +15,7 @@ from model.pad.block_cholesky import BlockCholesky, factor_rows
 from model.pad.elasticity import ElasticSector
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PivotFace, SectorMesh
-from model.pad.solid import PadSolid, pad_solid
+from tests.pad_responses import PadResponse, pad_solid
 
 BEARINGS = Path(__file__).parents[2] / "model" / "bearings"
 U_R, U_THETA, U_Z = range(3)
@@ -194,7 +194,7 @@ class TestBimetal:
         return strain + slope * edges[-1]
 
 
-def paper_pad(name: str, n_theta: int = 49, n_z: int = 9, **keywords: object) -> tuple[PadSolid, Bearing]:
+def paper_pad(name: str, n_theta: int = 49, n_z: int = 9, **keywords: object) -> tuple[PadResponse, Bearing]:
     bearing = load_bearing(BEARINGS / f"{name}.toml")
     pad = bearing.pads[0]
     theta = pad.leading_edge + pad.arc * np.linspace(0.0, 1.0, n_theta)
@@ -202,7 +202,7 @@ def paper_pad(name: str, n_theta: int = 49, n_z: int = 9, **keywords: object) ->
     return pad_solid(pad, bearing, theta, z, **keywords), bearing  # type: ignore[arg-type]
 
 
-def loaded(solid: PadSolid, force: float) -> np.ndarray:
+def loaded(solid: PadResponse, force: float) -> np.ndarray:
     """Pressure: half a sine along the arc, a parabola along z, of this resultant towards the pivot."""
     s = (solid.film_theta - solid.film_theta[0]) / np.ptp(solid.film_theta)
     z = solid.film_z / solid.film_z[-1]

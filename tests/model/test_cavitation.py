@@ -11,12 +11,12 @@ from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.dynamics.reduction import bearing_impedance
 from model.effects import Effect
-from model.film.cavitation import fluid_fraction
 from model.film.models import film_solver
 from model.film.reynolds import solve_film
 from model.options import CAVITATION, Options
 from model.predict import predict
 from model.prediction import Prediction
+from tests.fillings import fluid_fraction
 
 SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
 EXCITATION = 2 * math.pi * np.array([10.0, 25.0, 50.0])

@@ -11,9 +11,10 @@ from scipy import sparse
 from scipy.optimize import brentq
 from scipy.sparse.linalg import spsolve
 
-from model.film.cavitation import fluid_fraction, solve_film_jfo
+from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.film.reynolds import FilmForces, solve_film
+from tests.fillings import fluid_fraction
 
 MU, RHO, SPEED, RADIUS, CLEARANCE = 0.03, 850.0, 7.0, 0.05, 1e-4
 ARC = (-0.5, 0.5)

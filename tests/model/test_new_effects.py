@@ -19,7 +19,7 @@ from model.pivots import pivot_laws
 from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
-from model.static_tests import corner_positions, dry_curve, polygon_sides
+from model.static_tests import dry_curve, polygon_sides
 from model.statics.tilt_hold import friction_limits, rolling_radius, tilt_hold
 
 SPEED, OMEGA, LOAD, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, 5000.0, -math.pi / 2
@@ -70,9 +70,6 @@ def test_structure_compliance_gives_in_dry_tests_and_clearance_too(rocker):
     sides = polygon_sides(soft, 2000.0).pushed - polygon_sides(plain, 2000.0).pushed
     normals = np.array([[math.cos(p.pivot_angle), math.sin(p.pivot_angle)] for p in rocker.pads])
     np.testing.assert_allclose(sides, normals[:, 1] ** 2 * 2000.0 / 1e9, atol=1e-15)
-    corners = corner_positions(soft, 2000.0) - corner_positions(plain, 2000.0)
-    np.testing.assert_allclose(corners[:, 0], 0.0, atol=1e-15)
-    assert np.abs(corners[:, 1]).max() == pytest.approx(2e-6, rel=1e-6)
 
 
 def test_parts_of_the_structure_are_taken_off_a_measured_curve_one_by_one(rocker):

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from model.bearing_file import load_bearing
-from model.pad.solid import pad_solid
 from model.predict import predict
 from model.prediction import Prediction
+from tests.pad_responses import pad_solid
 
 FILE = Path(__file__).resolve().parents[2] / "model" / "bearings" / "rocker.toml"
 LOAD, SPEED = 5000.0, 2 * math.pi * 1000.0 / 60.0

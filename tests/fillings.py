@@ -1,0 +1,27 @@
+"""How full the gap of a film is where it is ruptured, from what `solve_film_jfo` leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from model.arrays import FloatArray
+from model.film.cavitation_matrix import face_flows
+from model.film.mesh import FilmGrid, FilmWork
+
+
+def fluid_fraction(
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, filling: float = 1.0
+) -> FloatArray:
+    """Filling theta of a film that `solve_film_jfo` has solved; (nt + 1, nz + 1), 1 where it is full."""
+    faces = face_flows(grid, work, wedge, speed, filling)
+    p, ruptured = work.pressure, work.ruptured
+    theta = np.ones_like(p)
+    theta[0] = np.where(ruptured[0], filling, 1.0)
+    into = np.minimum(faces.supply, faces.couette[0] - faces.along[0] * p[1])
+    for i in range(1, p.shape[0] - 1):
+        into = into + faces.along[i] * p[i + 1]
+        into[:-1] += faces.across[i] * p[i, 1:]
+        into[1:] += faces.across[i] * p[i, :-1]
+        theta[i] = np.where(ruptured[i], into / faces.couette[i], 1.0)
+        into = faces.couette[i] * theta[i] + faces.along[i] * p[i]
+    return theta

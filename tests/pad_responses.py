@@ -1,0 +1,113 @@
+"""A pad's response to single films, field by field: what tests and pictures ask of `model.pad.solid`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from model.arrays import FloatArray
+from model.bearing import Bearing, Pad
+from model.errors import ModelError
+from model.pad.line import Line
+from model.pad.mesh import MeshDensity, PadGeometry, PivotFace
+from model.pad.solid import PadSolid, solid_of
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PadResponse(PadSolid):
+    """Fields on the film grid have shape (n_theta, n_z); temperatures are rises above the oil supply [K]."""
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the film grid is one half of a symmetric film."""
+        return len(self._parts) == 1
+
+    def bend(self, pressure: ArrayLike) -> FloatArray:
+        """Deformation by film pressure, bilinear between film nodes."""
+        given = self._on_grid(pressure, "pressure")
+        out = np.zeros(given.shape)
+        for solid, to in self._parts:
+            force = self.geometry.inner_radius * (to.theta.gather @ given @ to.z.gather.T)
+            moved = (solid.compliance @ force.ravel()).reshape(force.shape)
+            out += to.theta.project @ moved @ to.z.project.T
+        return out
+
+    def expand(self, rise: ArrayLike) -> FloatArray:
+        """Thermal deformation for a film temperature rise, conduction through the pad included."""
+        return self._thermal(self._on_grid(rise, "rise"), "expansion")
+
+    def heat_flow(self, rise: ArrayLike) -> FloatArray:
+        """Heat flux density from film into pad [W/m^2], shape (n_theta, n_z), for a film temperature rise [K]."""
+        return self._thermal(self._on_grid(rise, "rise"), "flux")
+
+    @cached_property
+    def thermal(self) -> FloatArray:
+        """Deformation per film temperature rise, ``thermal @ rise.ravel()`` as `expand` [m/K], (n_film, n_film)."""
+        return self._thermal_matrix("expansion")
+
+    @cached_property
+    def heat_flux(self) -> FloatArray:
+        """Heat flux density into the pad per film temperature rise, as `heat_flow` [W/m^2/K], (n_film, n_film)."""
+        return self._thermal_matrix("flux")
+
+    @cached_property
+    def film_mass(self) -> FloatArray:
+        """Area weights of the film grid [m^2], (n_film, n_film): integrals of products of its bilinear functions.
+
+        ``film_mass @ compliance`` is symmetric and positive semidefinite.
+        """
+        theta, z = (Line(nodes, 1).matrix(0, 0) for nodes in (self.film_theta, self.film_z))
+        return np.asarray(self.geometry.inner_radius * np.kron(theta, z))
+
+    def pad_temperature(self, rise: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Temperature of the pad's mid-plane."""
+        even, to = self._parts[0]
+        coarse = to.coarse_theta @ self._on_grid(rise, "rise") @ to.coarse_z.T
+        field_ = (even.section @ coarse.ravel()).reshape(even.theta.n_nodes, even.radius.size)
+        return even.theta.nodes, even.radius, field_
+
+    def back_temperature(self, rise: ArrayLike) -> FloatArray:
+        """Temperature rise on the pad's back over the film nodes [K], shape (n_theta, n_z)."""
+        return self._thermal(self._on_grid(rise, "rise"), "back")
+
+    def _on_grid(self, values: ArrayLike, name: str) -> FloatArray:
+        array = np.asarray(values, dtype=float)
+        shape = (self.film_theta.size, self.film_z.size)
+        if array.shape not in (shape, (self._n_film,)):
+            raise ModelError(f"{name} must have the film grid's shape {shape}, got {array.shape}.")
+        return array.reshape(shape)
+
+    def _thermal(self, rise: FloatArray, name: str) -> FloatArray:
+        out = np.zeros(rise.shape)
+        for solid, to in self._parts:
+            coarse = to.coarse_theta @ rise @ to.coarse_z.T
+            answer = (getattr(solid, name) @ coarse.ravel()).reshape(solid.theta.n_nodes, solid.z.n_nodes)
+            out += to.theta.project @ answer @ to.z.project.T
+        return out
+
+    def _thermal_matrix(self, name: str) -> FloatArray:
+        out = np.zeros((self._n_film, self._n_film))
+        for solid, to in self._parts:
+            _, project, coarse = to.dense
+            out += project @ (getattr(solid, name) @ coarse)
+        return out
+
+
+def pad_solid(
+    pad: Pad,
+    bearing: Bearing,
+    film_theta: ArrayLike,
+    film_z: ArrayLike,
+    face: PivotFace | None = None,
+    density: MeshDensity | None = None,
+) -> PadResponse:
+    """Solid of a pad for a film grid."""
+    return _response(solid_of(PadGeometry.of(pad, bearing, face), film_theta, film_z, density))
+
+
+@lru_cache(maxsize=16)
+def _response(solid: PadSolid) -> PadResponse:
+    return PadResponse(**{f.name: getattr(solid, f.name) for f in fields(PadSolid)})
