@@ -224,6 +224,7 @@ CASES = {
     "coherence_spectrum": lambda: plots.coherence_spectrum(Shaken()),
     "frf": lambda: plots.frf(band()),
     "orbit": lambda: plots.orbit(Shaken()),
+    "spectra": lambda: plots.spectra(Shaken()),
     "window_weights": lambda: plots.window_weights(windows()),
     "isolability": lambda: plots.isolability(SEPARATION, EFFECTS),
     "gap": lambda: plots.gap(GAPS),

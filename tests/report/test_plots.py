@@ -16,6 +16,7 @@ from tests.report.plot_cases import (
     CASES,
     GAPS,
     PICTURES,
+    Shaken,
     comparison,
     curve,
     curves,
@@ -105,7 +106,7 @@ def test_axes_have_units(name):
     for axes in picture(name)[0].axes:
         for text in (axes.get_xlabel(), axes.get_ylabel()):
             assert text in UNITLESS or "sigma" in text or text.rsplit(", ", 1)[-1].split()[0] in {
-                "kN", "µm", "MN/m", "Hz", "deg", "°C", "standard",
+                "kN", "N", "µm", "MN/m", "Hz", "deg", "°C", "standard",
             }, text  # fmt: skip
 
 
@@ -119,6 +120,26 @@ def test_legends_do_not_cover_their_panels_nor_each_other(name):
         for axes in figure.axes:
             inside = axes.get_window_extent()
             assert box.y0 > inside.y1 - 2 or box.y1 < inside.y0 + 2 or box.x0 > inside.x1 or box.x1 < inside.x0
+
+
+def test_h_of_sines_is_k_and_omega_c_over_the_longest_series():
+    table = comparison()[:9]
+    real, imag = plots.frf(table, entries=("xx",)).axes
+    series = table[table["static_load_N"] == 5e3].sort_values("excitation_Hz")
+    drawn_real, drawn_imag = (axes.containers[0][0].get_ydata() for axes in (real, imag))
+    np.testing.assert_allclose(1e6 * drawn_real, series["kxx_N_per_m"])
+    np.testing.assert_allclose(1e6 * drawn_imag, 2 * np.pi * series["excitation_Hz"] * series["cxx_Ns_per_m"])
+    with pytest.raises(ValueError, match="no two excitation frequencies"):
+        plots.frf(table[table["excitation_Hz"] == 25.0])
+
+
+def test_a_spectrum_reads_the_amplitude_of_a_line():
+    move, force = plots.spectra(Shaken()).axes
+    for axes, true in ((move, 1.0), (force, 500.0)):
+        line = axes.get_lines()[0]
+        at = np.argmax(line.get_ydata())
+        assert line.get_xdata()[at] == pytest.approx(25.0)
+        assert line.get_ydata()[at] == pytest.approx(true, rel=0.05)
 
 
 @pytest.mark.parametrize("name", CASES)

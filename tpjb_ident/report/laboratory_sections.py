@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -14,7 +15,8 @@ from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
 from tpjb_ident.report.comparison_tables import point_label
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
-from tpjb_ident.report.plots import coherence, coherence_spectrum, orbit
+from tpjb_ident.report.plots import coherence, coherence_spectrum, frf, orbit, spectra
+from tpjb_ident.report.series import longest_series, where
 from tpjb_ident.rounding import fixed
 from tpjb_ident.schema import DAMPING, STIFFNESS
 
@@ -121,7 +123,7 @@ def run_matrix(runs: Sequence[Run]) -> Table:
 
 
 def evidence_section(campaign: Campaign, result: Identification) -> Section | None:
-    """Orbit and coherence of one run in the middle of the campaign, and the coherence of every point.
+    """Orbit, spectra, coherence of one run in the middle of the campaign; h over frequency; coherence of every point.
 
     Parameters
     ----------
@@ -134,24 +136,46 @@ def evidence_section(campaign: Campaign, result: Identification) -> Section | No
     Section or None
         None where there is nothing to draw.
     """
+    panels = [*_run_panels(campaign, result), *_stiffness_panels(result)]
+    if result.points:
+        title = "Force that the displacements do not explain"
+        panels.append(panel("coherence-points", title, functools.partial(coherence, result), EVIDENCE))
+    return Section(EVIDENCE, panels=panels) if panels else None
+
+
+def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
+    """Of the first run of the middle point that is whole."""
     if not result.points:
-        return None
+        return []
     point = result.points[len(result.points) // 2]
-    panels: list[Panel] = []
     for run in (r for r in campaign.of_kind("dynamic") if r.id in point.runs):
         try:
             label = f"run {run.id}, {point_label(point)}"
-            panels = [
+            return [
                 panel("orbit", f"Orbit of the shaft in the housing, {label}; thick: its part at the excitation",
                       orbit(run), EVIDENCE),
+                panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run), EVIDENCE),
                 panel("coherence-spectrum", f"Multiple coherence of force and displacement, {label}",
                       coherence_spectrum(run), EVIDENCE),
             ]  # fmt: skip
         except (RigDataError, ValueError):  # a damaged or short run: the next one shows the same
             continue
-        break
-    panels.append(panel("coherence-points", "Force that the displacements do not explain", coherence(result), EVIDENCE))
-    return Section(EVIDENCE, panels=panels)
+    return []
+
+
+def _stiffness_panels(result: Identification) -> list[Panel]:
+    """The dynamic stiffness h itself, over the excitation frequencies of sines and over every band."""
+    panels = []
+    series = longest_series(result.to_frame(), "frequency") if result.points else None
+    if series is not None:
+        title = f"Dynamic stiffness h over frequency, {where(series, 'frequency')}; a line: the model that fits"
+        panels.append(panel("h-over-frequency", title, functools.partial(frf, result), EVIDENCE))
+    for number, band in enumerate(result.bands, start=1):
+        key = band.key()
+        title = (f"Dynamic stiffness h over the band, {key['static_load_N'] / 1e3:g} kN, "
+                 f"{key['shaft_speed_Hz']:g} Hz shaft speed, {key['excitation']}")  # fmt: skip
+        panels.append(panel(f"h-over-band-{number}", title, functools.partial(frf, band), EVIDENCE))
+    return panels
 
 
 def budget_table(result: Identification) -> Table:

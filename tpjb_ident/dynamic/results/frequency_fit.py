@@ -75,15 +75,16 @@ class FrequencyFit:
         inflation = max(1.0, self.chi_square / self.dof) if self.dof > 0 else 1.0
         return np.sqrt(np.diag(self.covariance) * inflation)
 
-    def h(self, omega: float) -> np.ndarray:
-        """Dynamic stiffness of the model at `omega` [rad/s], (2, 2) complex.
+    def h(self, omega: float | FloatArray) -> np.ndarray:
+        """Dynamic stiffness of the model, (2, 2) or (n, 2, 2) complex [N/m].
 
         Parameters
         ----------
-        omega : float
+        omega : float or (n,) ndarray
             [rad/s]
         """
-        return np.asarray(self.K - omega**2 * self.M + 1j * omega * self.C)
+        w = np.asarray(omega, dtype=float)[..., None, None]
+        return np.asarray(self.K - w**2 * self.M + 1j * w * self.C)
 
 
 def chance_of(chi_square: float, dof: int, noise_dof: tuple[float, ...]) -> float:

@@ -30,6 +30,7 @@ from tpjb_ident.report.plots.pivot_stiffness import pivot_stiffness
 from tpjb_ident.report.plots.pivots_of_bearings import pivots_of_bearings
 from tpjb_ident.report.plots.residual_map import residual_map
 from tpjb_ident.report.plots.residual_series import residual_series
+from tpjb_ident.report.plots.spectra import spectra
 from tpjb_ident.report.plots.window_weights import window_weights
 
 __all__ = [
@@ -50,6 +51,7 @@ __all__ = [
     "pivots_of_bearings",
     "residual_map",
     "residual_series",
+    "spectra",
     "window_weights",
 ]
 

@@ -1,7 +1,9 @@
-"""Dynamic stiffness over the band of a broadband excitation, with intervals, and the coherence below it."""
+"""Dynamic stiffness over excitation frequency, real and imaginary, with intervals; over a band the coherence too."""
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,25 +12,43 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
+from tpjb_ident.report.series import longest_series
+from tpjb_ident.schema import STATIC_COLUMNS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import pandas as pd
 
-    from tpjb_ident.dynamic.broadband.band_result import BandModel, BandResult
+    from tpjb_ident.dynamic.broadband.band_result import BandResult
+    from tpjb_ident.dynamic.results.identification import Identification
 
 ENTRIES = {"xx": ("blue", "o"), "yy": ("red", "s"), "xy": ("green", "^"), "yx": ("ink", "v")}
 
 
+@dataclass(frozen=True)
+class Through:
+    """The model that the data support: its name, its band [Hz] and h (n, 2, 2) of angular frequencies (n,) [rad/s]."""
+
+    name: str
+    band: tuple[float, float]
+    h: Callable[[np.ndarray], np.ndarray]
+
+
 def frf(
-    band: BandResult | pd.DataFrame, *, entries: tuple[str, ...] = ("xx", "yy"), title: str | None = None
+    source: BandResult | Identification | pd.DataFrame,
+    *,
+    entries: tuple[str, ...] = ("xx", "yy"),
+    title: str | None = None,
 ) -> Figure:
-    """Draw the real and the imaginary part of h over frequency with 95 % intervals, and the coherence below.
+    """Draw the real and the imaginary part of h over frequency with 95 % intervals, over a band the coherence below.
 
     Parameters
     ----------
-    band : BandResult or DataFrame
-        One operating point of ``Identification.bands``, or the rows of one in ``frf.csv``. With a `BandResult` the
-        model that its lines support is drawn through them.
+    source : BandResult, Identification or DataFrame
+        One operating point of ``Identification.bands`` or its rows of ``frf.csv``; or points shaken by sines, or their
+        ``coefficients.csv``: then the longest series over frequency. With a result the model that its frequencies
+        support is drawn through them.
     entries : tuple of str
         Of ``"xx"``, ``"xy"``, ``"yx"``, ``"yy"``.
     title : str, optional
@@ -45,37 +65,78 @@ def frf(
     unknown = [entry for entry in entries if entry not in ENTRIES]
     if unknown or not entries:
         raise ValueError(f"entries must be some of {', '.join(ENTRIES)}; got {entries}")
-    table, model = _table(band)
-    if not len(table):
-        raise ValueError("there is no line to draw")
-    if table[["static_load_N", "static_load_direction_deg", "shaft_speed_Hz", "excitation"]].nunique().max() > 1:
+    table, model = _table(source)
+    if table is None or not len(table):
+        raise ValueError("there is no line to draw, or no two excitation frequencies at one load")
+    over_band = "coherence_x" in table
+    if over_band and table[[*STATIC_COLUMNS, "excitation"]].nunique().max() > 1:
         raise ValueError("the table holds several operating points; give the rows of one")
-    figure, ((real,), (imag,), (below,)) = new_pictures(3, 1, title=title, width=6.4, height=2.6)
+    figure, ((real,), (imag,), *below) = new_pictures(3 if over_band else 2, 1, title=title, height=2.3)
     for axes, part, name in ((real, "real", "Re h, MN/m"), (imag, "imag", "Im h, MN/m")):
         label(axes, "frequency, Hz", name)
         for entry in entries:
             _part(axes, table, f"h{entry}_{part}_N_per_m", entry)
-            _through(axes, table, model, entry, part)
-        axes.margins(x=0.02, y=0.1)
+            _through(axes, model, entry, part, label=entry == entries[0])
+        axes.margins(x=0.05, y=0.1)
     add_legend(real)
-    label(below, "frequency, Hz", "multiple coherence")
-    for axis, colour, dashes in (("x", "blue", "-"), ("y", "red", (0, (4, 2)))):
-        below.plot(table["excitation_Hz"], table[f"coherence_{axis}"], color=LIGHT[colour], linestyle=dashes,
-                   linewidth=1.2, label=f"force along {axis}")  # fmt: skip
-    below.set_ylim(min(0.9, 0.98 * float(table[["coherence_x", "coherence_y"]].min().min())), 1.01)
-    below.margins(x=0.02)
-    add_legend(below)
+    for (axes,) in below:
+        _coherence(axes, table)
     return figure
 
 
-def _table(band: BandResult | pd.DataFrame) -> tuple[pd.DataFrame, BandModel | None]:
+def _coherence(axes: Axes, table: pd.DataFrame) -> None:
+    label(axes, "frequency, Hz", "multiple coherence")
+    for axis, colour, dashes in (("x", "blue", "-"), ("y", "red", (0, (4, 2)))):
+        axes.plot(table["excitation_Hz"], table[f"coherence_{axis}"], color=LIGHT[colour], linestyle=dashes,
+                  linewidth=1.2, label=f"force along {axis}")  # fmt: skip
+    axes.set_ylim(min(0.9, 0.98 * float(table[["coherence_x", "coherence_y"]].min().min())), 1.01)
+    axes.margins(x=0.05)
+    add_legend(axes)
+
+
+def _table(source: BandResult | Identification | pd.DataFrame) -> tuple[pd.DataFrame | None, Through | None]:
+    """Rows as in ``frf.csv`` (without coherence where sines were run), and the model through them."""
     import pandas as pd
 
-    if isinstance(band, pd.DataFrame):
-        return band.sort_values("excitation_Hz", kind="stable"), None
+    from tpjb_ident.dynamic.results.identification import Identification
+
+    if isinstance(source, Identification):
+        series = longest_series(source.to_frame(), "frequency")
+        return _of_sines(series), _model_of_sines(source, series)
+    if isinstance(source, pd.DataFrame):
+        if "hxx_real_N_per_m" in source:
+            return source.sort_values("excitation_Hz", kind="stable"), None
+        return _of_sines(longest_series(source, "frequency")), None
     from tpjb_ident.dynamic.broadband.band_result import frf_frame
 
-    return frf_frame([band]), band.models.get(band.supported)
+    model = source.models.get(source.supported)
+    return frf_frame([source]), None if model is None else Through(model.model, model.band, model.h)
+
+
+def _of_sines(series: pd.DataFrame | None) -> pd.DataFrame | None:
+    """K and C as h = K + i omega C, with the names that ``frf.csv`` has."""
+    if series is None:
+        return None
+    rows = series.drop_duplicates("excitation_Hz").sort_values("excitation_Hz", kind="stable")
+    omega = 2 * np.pi * rows["excitation_Hz"]
+    made = {}
+    for entry, end in itertools.product(ENTRIES, ("", "_lo", "_hi")):
+        made[f"h{entry}_real_N_per_m{end}"] = rows[f"k{entry}_N_per_m{end}"]
+        made[f"h{entry}_imag_N_per_m{end}"] = rows[f"c{entry}_Ns_per_m{end}"] * omega
+    return rows[["excitation_Hz"]].assign(**made)
+
+
+def _model_of_sines(source: Identification, series: pd.DataFrame | None) -> Through | None:
+    """The model that the frequencies of the series support, None where they refuse all."""
+    if series is None:
+        return None
+    wanted = tuple(series.iloc[0][list(STATIC_COLUMNS)])
+    for group in source.frequency_fits():
+        p, fit = group.points[0].point, group.fits.get(group.supported)
+        if fit is not None and (p.static_load, p.static_load_direction_deg, p.shaft_speed_hz) == wanted:
+            low, high = (omega / (2 * np.pi) for omega in fit.omega_range)
+            return Through(fit.model, (low, high), fit.h)
+    return None
 
 
 def _part(axes: Axes, table: pd.DataFrame, column: str, entry: str) -> None:
@@ -87,7 +148,7 @@ def _part(axes: Axes, table: pd.DataFrame, column: str, entry: str) -> None:
     )  # fmt: skip
 
 
-def _through(axes: Axes, table: pd.DataFrame, model: BandModel | None, entry: str, part: str) -> None:
+def _through(axes: Axes, model: Through | None, entry: str, part: str, label: bool) -> None:
     """The model over the band as a line."""
     if model is None:
         return
@@ -95,4 +156,4 @@ def _through(axes: Axes, table: pd.DataFrame, model: BandModel | None, entry: st
     i, j = ("xy".index(letter) for letter in entry)
     h = model.h(2 * np.pi * f)[:, i, j]
     values = (h.real if part == "real" else h.imag) / 1e6
-    axes.plot(f, values, color=LIGHT[ENTRIES[entry][0]], linewidth=1.4, label=model.model if entry == "xx" else None)
+    axes.plot(f, values, color=LIGHT[ENTRIES[entry][0]], linewidth=1.4, label=model.name if label else None)
