@@ -21,14 +21,15 @@ def leftovers(campaign: Campaign) -> list[Problem]:
     """
     if campaign.path.is_dir():
         names = _files(campaign)
-        where, what = campaign.path.name, "files"
+        where, what = campaign.path.name, "file"
     else:
         names = _groups(campaign)
-        where, what = f"{campaign.path.name}:/runs", "groups"
+        where, what = f"{campaign.path.name}:/runs", "group"
     if not names:
         return []
-    listed = ", ".join(ascii(n)[1:-1][:60] for n in names[:_LISTED]) + (", ..." if len(names) > _LISTED else "")
-    text = f"{len(names)} {what} are named by no run ({listed})"
+    more = f", ... ({len(names)} in all)" if len(names) > _LISTED else ""
+    listed = ", ".join(ascii(n)[1:-1][:60] for n in names[:_LISTED])
+    text = f"no run names the {what}{'' if len(names) == 1 else 's'} {listed}{more}"
     return [Problem("note", where, "", text, "Add them to the manifest, or nothing if they are not wanted")]
 
 

@@ -7,6 +7,21 @@ import math
 MINUS = "\N{MINUS SIGN}"
 
 
+def counted(number: int, thing: str) -> str:
+    """A number of things, in the plural unless it is one.
+
+    Parameters
+    ----------
+    number : int
+    thing : str
+        In the singular.
+
+    >>> counted(1, "error"), counted(0, "error")
+    ('1 error', '0 errors')
+    """
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
 def plain(value: float, digits: int) -> str:
     """A number with `digits` decimals; never a negative zero.
 

@@ -209,7 +209,7 @@ def test_shared_records_and_leftovers(tmp_path):
         file["runs/c-1/extra"] = np.zeros(5)
     found = {p.what.split(" ")[-1]: p for p in check_campaign(tmp_path / "c.h5")}
     assert [p.severity for p in found.values()].count("error") == 0
-    assert "1 groups are named by no run (forgotten)" in [p.what for p in found.values()]
+    assert "no run names the group forgotten" in [p.what for p in found.values()]
     assert "1 datasets are not described: extra" in [p.what for p in found.values()]
 
 

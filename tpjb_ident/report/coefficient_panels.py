@@ -5,9 +5,9 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, Literal
 
+from tpjb_ident.report.drawing.series import CROSS, DIRECT, longest_series, where
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.plots.coefficient import coefficient
-from tpjb_ident.report.series import CROSS, DIRECT, longest_series, where
 from tpjb_ident.schema import KINDS
 
 if TYPE_CHECKING:

@@ -49,8 +49,9 @@ def left_sentences(verdict: Verdict) -> list[str]:
     """
     left = verdict.remainder
     out = [
-        f"On points that no fit has seen {left.sigma:.2f} sigma are left, {100 * left.share:.1f} % of the squared gap, "
-        f"most in {in_words(left.where)}; against noise and stated tolerances p = {left.p:.2g}."
+        "On points that no fit has seen, with all that has a tolerance free within it, "
+        f"{left.sigma:.2f} sigma are left: {100 * left.share:.1f} % of the squared gap above noise, most in "
+        f"{in_words(left.where)}; against noise and stated tolerances p = {left.p:.2g}."
     ]
     out += [f"The rest behaves like {b.words} (within {100 * b.spread:.0f} %)." for b in verdict.behaves_like]
     out += [f"{label_in_words(d.effect)}: its {label_in_words(d.parameter)} {d.words}, from {d.start:.3g} to "

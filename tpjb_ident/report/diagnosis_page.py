@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,16 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from tpjb_ident.diagnose.campaign import CampaignDiagnosis
     from tpjb_ident.diagnose.verdict.verdict import Verdict
+
+#: The gaps of a verdict in words; each is another question.
+GAPS = {
+    "before": "all points, model as stated",
+    "after": "all points, with what was added, all else as stated",
+    "heldout_before": "points that no fit has seen, model as stated",
+    "heldout_after": "points that no fit has seen, with what was added, all else as stated",
+    "within_tolerances": "points that no fit has seen, clearances, oil, sensors, .. free within their tolerances too",
+    "noise_floor": "what noise alone would leave",
+}
 
 
 def write_diagnosis_report(
@@ -104,8 +115,11 @@ def _effects_table(verdict: Verdict) -> Table:
 
 
 def _gap_table(verdict: Verdict) -> Table:
-    rows = [[name.replace("_", " "), f"{value:.3f}"] for name, value in verdict.gap.items()]
-    return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows)
+    told = {name: verdict.gap[name] for name in GAPS if math.isfinite(verdict.gap.get(name, math.nan))}
+    if not verdict.effects:  # nothing was added: before and after are the same
+        told = {name: value for name, value in told.items() if not name.endswith("after")}
+    rows = [[GAPS[name], f"{value:.2f}"] for name, value in told.items()]
+    return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows, frozenset({0}))
 
 
 def _effect_sections(verdict: Verdict) -> list[Section]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.effect_words import UNITS, WORDS, amount, finding, label_in_words
@@ -48,7 +48,8 @@ def verdict_sentences(
     if verdict.effects:
         sentences.append(
             "The sizes were fitted to these data; that they close the gap was tested on points left out of the fit: "
-            f"{verdict.gap['heldout_before']:.1f} standard deviations before, {verdict.gap['heldout_after']:.1f} after."
+            f"{verdict.gap['heldout_before']:.1f} standard deviations before, {verdict.gap['heldout_after']:.1f} after "
+            f"with all else as stated{_within(verdict)}."
         )
         checks = [f"{WORDS[e.name].check}" for e in verdict.effects if e.name in WORDS]
         if checks:
@@ -68,6 +69,12 @@ def verdict_sentences(
         hidden = ", ".join(label_in_words(n) for n in verdict.below_floor)
         sentences.append(f"This campaign could not have seen {hidden}: silence about that is no absence.")
     return sentences
+
+
+def _within(verdict: Verdict) -> str:
+    """The same gap once clearances, oil and sensors may be anywhere within their tolerances."""
+    left = verdict.gap.get("within_tolerances")
+    return "" if left is None else f", {left:.1f} with it free within its tolerances"
 
 
 def _answer(name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, float]] | None) -> str:
@@ -162,16 +169,6 @@ def _worse(gap: Mapping[str, float]) -> bool:
     return after > max(before + 0.3, 1.0)
 
 
-def effect_rows(verdict: Verdict) -> list[list[str]]:
-    """One row per effect: what was found with its size, and what to beware of.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    """
-    return [[label_in_words(e.label), finding(e.name, e.parameters), in_words(e.stands_in)] for e in verdict.effects]
-
-
 def next_command(campaign: str, bearing: str, verdict: Verdict, folder: str) -> str:
     """How to use what was found, as a command to type.
 
@@ -203,7 +200,3 @@ def parameter_rows(verdict: Verdict) -> list[list[str]]:
         for e in verdict.effects
         for key, p in e.parameters.items()
     ]
-
-
-__all__: Sequence[str] = ("effect_rows", "in_words", "next_command", "observable", "parameter_rows", "place",
-                          "verdict_sentences")  # fmt: skip

@@ -13,11 +13,11 @@ from rigdata.problem import RigDataError
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
 from tpjb_ident.report.comparison_tables import point_label
+from tpjb_ident.report.drawing.series import longest_series, where
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
 from tpjb_ident.report.plots import coherence, coherence_spectrum, frf, orbit, spectra
-from tpjb_ident.report.series import longest_series, where
-from tpjb_ident.rounding import fixed
+from tpjb_ident.rounding import fixed, with_interval
 from tpjb_ident.schema import DAMPING, STIFFNESS
 
 if TYPE_CHECKING:
@@ -190,12 +190,15 @@ def budget_table(result: Identification) -> Table:
     for p in result.points:
         half = p.stiffness.half_width()
         deviations = {name: np.sqrt(np.maximum(np.diag(part), 0.0)) for name, part in p.budget.items()}
-        for i in range(8):
-            kind, scale = (STIFFNESS, 1.0) if i < 4 else (DAMPING, 1 / p.stiffness.omega)
-            scale /= kind.display_scale
-            parts = [fixed(scale * float(deviations[n][i]), 3) if n in deviations else "–" for n in sources]
-            name = f"{kind.symbol}{ENTRIES[i % 4]}, {kind.display_unit}"
-            value, wide = fixed(scale * float(p.stiffness.vector[i]), 2), fixed(scale * float(half[i]), 3)
-            rows.append([point_label(p), name, value, wide, *parts])
-    columns = ["point", "coefficient", "value", "half of the 95 % interval", *sources]
-    return Table("Uncertainty budget: standard uncertainty by source", columns, rows, frozenset({0, 1}))
+        for entry, name in enumerate(ENTRIES):
+            row = [point_label(p), name]
+            for kind, i, per in ((STIFFNESS, entry, 1.0), (DAMPING, 4 + entry, 1 / p.stiffness.omega)):
+                scale = per / kind.display_scale
+                value = float(p.stiffness.vector[i])
+                row.append(with_interval(value, value - half[i], value + half[i], 1 / scale))
+                row += [fixed(scale * float(deviations[n][i]), 3) if n in deviations else "–" for n in sources]
+            rows.append(row)
+    columns = ["point", "", *(text for kind in (STIFFNESS, DAMPING)
+                              for text in (f"{kind.symbol}, {kind.display_unit}", *sources))]  # fmt: skip
+    caption = "Uncertainty budget: value ± half of its 95 % interval, then the standard uncertainty by source"
+    return Table(caption, columns, rows, frozenset({0, 1}))

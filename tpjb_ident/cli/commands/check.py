@@ -15,12 +15,14 @@ from tpjb_ident.cli.common.options import CampaignPath, Out, out_folder
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress, table
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from rigdata.problem import Problem
+    from rigdata.run import Run
 
 #: Kinds of run in the order of the summary.
 KINDS = ("dynamic", "locus", "clearance", "dry_pivot")
@@ -57,11 +59,11 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
     if opened is not None:
         show_coverage(opened)
     counts = summary["counts"]
-    print_line(f"{summary['campaign']}: {counts['error']} errors, {counts['warning']} warnings, {counts['note']} notes")
+    print_line(f"{summary['campaign']}: {', '.join(counted(counts[s], s) for s in SEVERITIES)}")
     print_line(f"Results: {target}")
     if errors:
         raise BadInputError(
-            f"{campaign}: {len(errors)} errors, listed above and in {target / 'check.json'}. Mend them."
+            f"{campaign}: {counted(len(errors), 'error')}, listed above and in {target / 'check.json'}: to be mended."
         )
 
 
@@ -103,12 +105,22 @@ def show_coverage(campaign: Campaign) -> None:
             at = [r.point for r in runs]
             rows.append([
                 kind, str(len(runs)), str(len({r.pad for r in runs}) if kind == "dry_pivot" else len(points)),
-                _range([r.sample_rate for r in runs]), _range([p.static_load / 1e3 for p in at]),
+                _range([_rate(r) for r in runs]), _range([p.static_load / 1e3 for p in at]),
                 _range([p.static_load_direction_deg for p in at]), _range([p.shaft_speed_hz for p in at]),
                 _range([p.excitation_hz for p in at if p.excitation]),
             ])  # fmt: skip
     columns = ["kind", "runs", "points, pads", "rate Hz", "load kN", "direction deg", "speed Hz", "excitation Hz"]
     table(f"{campaign.id}: what it covers", columns, rows, words=(0,))
+
+
+def _rate(run: Run) -> float:
+    """Sample rate [Hz]; NaN where the record cannot be read, which is among the problems already."""
+    from rigdata import RigDataError
+
+    try:
+        return run.sample_rate
+    except RigDataError:
+        return math.nan
 
 
 def _range(values: Sequence[float]) -> str:

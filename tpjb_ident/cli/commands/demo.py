@@ -12,6 +12,7 @@ from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.options import Out, out_folder
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress
+from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.tables import write_table, write_text
 
@@ -53,7 +54,8 @@ def demo(out: Out = None) -> None:
         write_record(folder, target, "demo", options, inputs)
     counts = summary["counts"]
     print_line(
-        f"Read {len(campaign.runs)} records of {path.name}: {counts['error']} errors, {counts['warning']} warnings."
+        f"Read {len(campaign.runs)} records of {path.name}: {counted(counts['error'], 'error')}, "
+        f"{counted(counts['warning'], 'warning')}."
     )
     show_comparison(result)
     print_line(truth_sentence(result, json.loads(sample("demo.truth.json").read_text(encoding="utf-8"))))

@@ -14,6 +14,7 @@ from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import note_line, print_line, progress
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.export.formats import FORMATS, export_format
+from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
 
@@ -83,7 +84,7 @@ def refuse_doubtful(chosen: Chosen, forced: bool) -> None:
     if chosen.doubtful:
         what = "written because of --force, marked" if forced else "left out (--force writes them, marked)"
         more = [f"... and {len(chosen.doubtful) - 5} more"] if len(chosen.doubtful) > 5 else []
-        parts.append("\n".join([f"{len(chosen.doubtful)} points, {what}:", *chosen.doubtful[:5], *more]))
+        parts.append("\n".join([f"{counted(len(chosen.doubtful), 'point')}, {what}:", *chosen.doubtful[:5], *more]))
     if parts:
         raise NotTrustedError("\n".join(parts))
 

@@ -15,6 +15,7 @@ from tpjb_ident.cli.common.options import BearingOption, Out, out_folder
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import note_line, print_line, table
 from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.tables import write_table, write_text
 
@@ -272,7 +273,7 @@ def finish(snapshot: Snapshot | None, target: Path) -> None:
     if urgent:
         runs = list(dict.fromkeys(run for step in urgent for run in step.runs))
         raise NotTrustedError(
-            f"{len(runs)} runs to be repeated: {', '.join(runs[:8])}{', ..' if len(runs) > 8 else ''}"
+            f"{counted(len(runs), 'run')} to be repeated: {', '.join(runs[:8])}{', ..' if len(runs) > 8 else ''}"
         )
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT, VARIANT_LABEL, VARIANT_STYLE
 from tpjb_ident.report.drawing.picture import add_legend, new_picture
-from tpjb_ident.report.series import AXES, DIRECT, longest_series
+from tpjb_ident.report.drawing.series import AXES, DIRECT, longest_series
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, coefficient_column
 
 if TYPE_CHECKING:

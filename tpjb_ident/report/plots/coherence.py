@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, label, new_pictures, shrink
-from tpjb_ident.report.series import as_table
+from tpjb_ident.report.drawing.series import as_table
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.drawing.picture import add_legend, new_picture
-from tpjb_ident.report.series import AXES, as_table, longest_series
+from tpjb_ident.report.drawing.series import AXES, as_table, longest_series
 from tpjb_ident.schema import KINDS
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
-from tpjb_ident.report.series import longest_series
+from tpjb_ident.report.drawing.series import longest_series
 from tpjb_ident.schema import STATIC_COLUMNS
 
 if TYPE_CHECKING:
