@@ -9,6 +9,7 @@ from typing import Any
 def main() -> None:
     """Run the command line; the entry point of `tpjb` and of ``python -m tpjb_ident``."""
     _one_thread_for_small_matrices()
+    sys.unraisablehook = _interrupt_again
     for stream in (sys.stdout, sys.stderr):
         _never_refuse(stream)
     try:
@@ -21,6 +22,17 @@ def main() -> None:
     except OSError as error:  # of the streams: commands turn their own into messages
         print(f"tpjb: error: cannot print: {error.strerror or error}.", file=sys.stderr)
         sys.exit(2)
+
+
+def _interrupt_again(lost: Any) -> None:
+    """Deliver a Ctrl-C once more that fell into a callback, as of an import lock: Python drops what is raised there."""
+    import threading
+    from _thread import interrupt_main
+
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        threading.Timer(0.05, interrupt_main).start()  # by then the callback has ended; if it meets another: again
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _one_thread_for_small_matrices() -> None:
