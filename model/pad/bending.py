@@ -130,7 +130,7 @@ class BendingStep:
     axial_tilt: FloatArray
 
 
-def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid) -> PadDeformation:
+def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid, cooled: bool = False) -> PadDeformation:
     """Matrices of a pad for its film's mesh; the same object for pads of the same shape.
 
     Parameters
@@ -138,25 +138,31 @@ def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid) -> PadDeformatio
     pad : Pad
     bearing : Bearing
     grid : FilmGrid
+    cooled : bool
+        Whether the film loses heat through the pad to its free faces, so that their convection matters and may be
+        fitted.
 
     Returns
     -------
     PadDeformation
     """
     geometry = PadGeometry.of(pad, bearing)
-    return _pad_deformation(geometry, grid.angle.tobytes(), grid.z.tobytes(), grid.area.tobytes())
+    return _pad_deformation(geometry, grid.angle.tobytes(), grid.z.tobytes(), grid.area.tobytes(), cooled)
 
 
 @lru_cache(maxsize=8)
-def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes) -> PadDeformation:
-    from model.pad.solid import solid_of  # rigid pads need no solid, and need not wait for its algebra
+def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes, cooled: bool) -> PadDeformation:
+    # rigid pads need no solid, and need not wait for its algebra
+    from model.pad.convection import pad_operators_between
+    from model.pad.operators import pad_operators
+    from model.pad.solid import solid_of
 
     angle, z, area = (np.frombuffer(raw, dtype=float) for raw in (angles, zs, areas))
     ahead = 0
     if angle[0] - geometry.leading > 1e-9:  # a starved film: the dry arc ahead of it carries nothing
         ahead = DRY_STATIONS
         angle = np.concatenate([np.linspace(geometry.leading, angle[0], ahead + 1)[:-1], angle])
-    solid = solid_of(geometry, angle, z)
+    solid = solid_of(geometry, angle, z, operators=pad_operators_between if cooled else pad_operators)
     wet = slice(ahead * len(z), None)
     compliance = np.ascontiguousarray(solid.compliance[wet, wet])
     to_coarse, expansion, flux = solid.thermal_factors

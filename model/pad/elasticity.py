@@ -14,7 +14,7 @@ band of dense blocks.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -133,31 +133,34 @@ class ElasticSector:
         lame = [2.0 * g * m.poissons_ratio / (1.0 - 2.0 * m.poissons_ratio) for g, m in zip(shear, layers)]
         return self.mesh.per_gauss_point(lame), self.mesh.per_gauss_point(shear)
 
-    def thermal_load(self, temperature: FloatArray) -> FloatArray:
-        """Forces of hindered thermal expansion, the right-hand side of Eq. (7) in weak form.
+    def thermal_loads(self, temperature: FloatArray) -> Iterator[FloatArray]:
+        """Forces of hindered thermal expansion, the right-hand side of Eq. (7) in weak form, slab by slab.
 
         Parameters
         ----------
         temperature : (n_theta, n_r, n_z, n_columns) ndarray
             Temperature rise at the nodes [K].
 
-        Returns
-        -------
-        ndarray, shape (n_theta, 3 * n_r * n_z, n_columns)
+        Yields
+        ------
+        (3 * n_r * n_z, n_columns) ndarray
         """
         mesh = self.mesh
         n_theta, n_r, n_z, n_columns = temperature.shape
         lame, shear = self._lame()
         stress = (3.0 * lame + 2.0 * shear) * mesh.per_gauss_point([m.thermal_expansion for m in mesh.layers])
-        out = np.zeros((n_theta, 3, n_r, n_z, n_columns))
-        for (term,) in ((t,) for strain in _NORMAL for t in strain):
-            across = mesh.r.matrix(term.r, 0, stress * mesh.r.gauss[0] ** (1 - term.inverse_r))
-            load = np.tensordot(across, temperature, (1, 1))  # (r, theta, z, columns)
-            load = np.tensordot(mesh.theta.matrix(term.theta, 0), load, (1, 1))  # (theta, r, z, columns)
-            load = np.tensordot(mesh.z.matrix(term.z, 0), load, (1, 2))  # (z, theta, r, columns)
-            out[:, term.component] += load.transpose(1, 2, 0, 3)
-        out[self.fixed] = 0.0
-        return out.reshape(n_theta, 3 * n_r * n_z, n_columns)
+        terms = [t for strain in _NORMAL for t in strain]
+        along = [mesh.theta.matrix(t.theta, 0) for t in terms]
+        across = [mesh.r.matrix(t.r, 0, stress * mesh.r.gauss[0] ** (1 - t.inverse_r)) for t in terms]
+        for i in range(n_theta):
+            near = slice(max(0, i - mesh.theta.degree), i + mesh.theta.degree + 1)
+            out = np.zeros((3, n_r, n_z, n_columns))
+            for term, by_theta, by_r in zip(terms, along, across, strict=True):
+                load = np.tensordot(by_theta[i, near], temperature[near], 1)  # (r, z, columns)
+                load = np.tensordot(by_r, load, 1)
+                out[term.component] += np.tensordot(load, mesh.z.matrix(term.z, 0), (1, 1)).transpose(0, 2, 1)
+            out[self.fixed[i]] = 0.0
+            yield out.reshape(3 * n_r * n_z, n_columns)
 
     def surface_response(self, temperature: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Radial displacement of the film face under nodal forces and temperatures.
@@ -185,7 +188,7 @@ class ElasticSector:
         n_fields, n_surface = temperature.shape[3], self.mesh.n_surface
         compliance = np.zeros((n_surface, n_surface))
         expansion = np.zeros((n_surface, n_fields))
-        rhs = self._surface_loads(self.thermal_load(temperature))
+        rhs = self._surface_loads(self.thermal_loads(temperature), n_fields)
         for block in forward_rows(factor_rows(self.stiffness_rows()), rhs):
             unit = block[:, n_fields:]
             width = unit.shape[1]
@@ -193,14 +196,13 @@ class ElasticSector:
             expansion[:width] += unit.T @ block[:, :n_fields]
         return compliance, expansion
 
-    def _surface_loads(self, thermal: FloatArray) -> Iterator[FloatArray]:
+    def _surface_loads(self, thermal: Iterable[FloatArray], n_fields: int) -> Iterator[FloatArray]:
         """Thermal loads, then unit forces on the film nodes of this slab and of those before it."""
         n_r, n_z = self.mesh.r.n_nodes, self.mesh.z.n_nodes
-        n_fields = thermal.shape[2]
         for i, load in enumerate(thermal):
             rhs = np.zeros((3, n_r, n_z, n_fields + (i + 1) * n_z))
             rhs[_U, 0, :, -n_z:] = np.eye(n_z)
             rhs[self.fixed[i]] = 0.0
-            rhs = rhs.reshape(3 * n_r * n_z, n_fields + (i + 1) * n_z)
-            rhs[:, :n_fields] = load
-            yield rhs
+            flat = rhs.reshape(3 * n_r * n_z, -1)
+            flat[:, :n_fields] = load
+            yield flat

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -11,7 +11,7 @@ from model.arrays import FloatArray
 from model.pad.elasticity import ElasticSector
 from model.pad.heat import conduct
 from model.pad.line import Line
-from model.pad.mesh import MeshDensity, PadGeometry, sector_mesh
+from model.pad.mesh import MeshDensity, PadGeometry, SectorMesh, sector_mesh
 from model.pad.store import load_arrays, save_arrays, storage_key
 
 
@@ -55,9 +55,6 @@ class PadOperators:
         return Line(self.theta.breaks, 1), Line(self.z.breaks, 1)
 
 
-_RESULTS = ("compliance", "expansion", "flux", "section", "back")
-
-
 @lru_cache(maxsize=12)  # 4 MB each
 def pad_operators(geometry: PadGeometry, density: MeshDensity, even: bool) -> PadOperators:
     """Operators of one pad geometry: from memory, from the cache folder, or by solving (a few seconds).
@@ -69,42 +66,82 @@ def pad_operators(geometry: PadGeometry, density: MeshDensity, even: bool) -> Pa
     even : bool
         Symmetry in z of loads and temperatures.
     """
+    return operators_at(geometry, density, even, (geometry.back_convection,))[0]
+
+
+def operators_at(
+    geometry: PadGeometry, density: MeshDensity, even: bool, convections: tuple[float, ...]
+) -> tuple[PadOperators, ...]:
+    """Operators of one pad geometry at several convections of its free faces, with one solution of its elasticity.
+
+    Parameters
+    ----------
+    geometry : PadGeometry
+        Its own `back_convection` counts for nothing.
+    density : MeshDensity
+    even : bool
+        Symmetry in z of loads and temperatures.
+    convections : tuple of float
+        [W/m^2/K]
+
+    Returns
+    -------
+    tuple of PadOperators
+        In that order; they share their `compliance`.
+    """
     mesh = sector_mesh(geometry, density)
-    shapes = _shapes(mesh.theta, mesh.z, mesh.r.n_nodes)
-    key = storage_key((geometry, density, even))
+    shapes = _shapes(mesh.theta, mesh.z, mesh.r.n_nodes, len(convections))
+    key = storage_key((replace(geometry, back_convection=0.0), density, even, convections))
     arrays = load_arrays(key, shapes)
     if arrays is None:
-        arrays = _solve(geometry, density, even)
+        arrays = _solve(geometry, density, even, convections)
         save_arrays(key, arrays)
     for array in arrays.values():
         array.setflags(write=False)
-    return PadOperators(theta=mesh.theta, z=mesh.z, radius=mesh.r.nodes, **arrays)
+    compliance = arrays.pop("compliance")
+    return tuple(
+        PadOperators(mesh.theta, mesh.z, mesh.r.nodes, compliance, **{name: array[k] for name, array in arrays.items()})
+        for k in range(len(convections))
+    )
 
 
-def _shapes(theta: Line, z: Line, n_r: int) -> dict[str, tuple[int, int]]:
+def _shapes(theta: Line, z: Line, n_r: int, count: int) -> dict[str, tuple[int, ...]]:
     n_surface = theta.n_nodes * z.n_nodes
     n_temperatures = theta.breaks.size * z.breaks.size
-    rows = (n_surface, n_surface, n_surface, theta.n_nodes * n_r, n_surface)
-    return {name: (count, n_surface if name == "compliance" else n_temperatures) for name, count in zip(_RESULTS, rows)}
+    rows = {"expansion": n_surface, "flux": n_surface, "section": theta.n_nodes * n_r, "back": n_surface}
+    return {
+        "compliance": (n_surface, n_surface), **{name: (count, row, n_temperatures) for name, row in rows.items()}
+    }  # fmt: skip
 
 
-def _solve(geometry: PadGeometry, density: MeshDensity, even: bool) -> dict[str, FloatArray]:
+def _solve(
+    geometry: PadGeometry, density: MeshDensity, even: bool, convections: tuple[float, ...]
+) -> dict[str, FloatArray]:
     """Solve conduction, then thermoelasticity; see `PadOperators` for the results."""
     mesh = sector_mesh(geometry, density)
     theta, z = mesh.theta, mesh.z
     spread = np.asarray(np.kron(Line(theta.breaks, 1).tabulate(theta.nodes), Line(z.breaks, 1).tabulate(z.nodes)))
-    solution = conduct(mesh, geometry.back_convection, spread, even)
-    field = solution.temperature
-    heat = solution.heat.reshape(theta.n_nodes, z.n_nodes, -1)
-    flux = np.linalg.solve(theta.matrix(0, 0), heat.reshape(theta.n_nodes, -1)).reshape(heat.shape)
-    flux = np.linalg.solve(z.matrix(0, 0), flux) / geometry.inner_radius
+    n_temperatures = spread.shape[1]
+    shape = (theta.n_nodes, mesh.r.n_nodes, z.n_nodes, len(convections), n_temperatures)
+    field, flux = np.empty(shape), np.empty((len(convections), mesh.n_surface, n_temperatures))
+    for k, convection in enumerate(convections):
+        solution = conduct(mesh, convection, spread, even)
+        field[:, :, :, k] = solution.temperature
+        flux[k] = _flux(mesh, solution.heat) / geometry.inner_radius
     body = ElasticSector.held_at(mesh, mesh.held(geometry.face), even)
-    compliance, expansion = body.surface_response(field)
-    n_temperatures = field.shape[3]
+    compliance, expansion = body.surface_response(field.reshape(*shape[:3], -1))
     return {
         "compliance": compliance,
-        "expansion": expansion,
-        "flux": flux.reshape(-1, n_temperatures),
-        "section": field[:, :, 0].reshape(-1, n_temperatures),
-        "back": field[:, -1].reshape(-1, n_temperatures),
+        "expansion": np.stack(np.split(expansion, len(convections), axis=1)),
+        "flux": flux,
+        "section": np.moveaxis(field[:, :, 0], 2, 0).reshape(len(convections), -1, n_temperatures),
+        "back": np.moveaxis(field[:, -1], 2, 0).reshape(len(convections), -1, n_temperatures),
     }
+
+
+def _flux(mesh: SectorMesh, heat: FloatArray) -> FloatArray:
+    """Heat flux density at the nodes of the film face, per radian of the arc, of heat that enters there."""
+    theta, z = mesh.theta, mesh.z
+    by_arc = heat.reshape(theta.n_nodes, z.n_nodes, -1)
+    flux = np.linalg.solve(theta.matrix(0, 0), by_arc.reshape(theta.n_nodes, -1)).reshape(by_arc.shape)
+    return np.asarray(np.linalg.solve(z.matrix(0, 0), flux).reshape(mesh.n_surface, -1))

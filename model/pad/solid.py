@@ -7,6 +7,7 @@ face; tilt and pivot deflection are the equilibrium's business. Positive is outw
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
@@ -19,6 +20,8 @@ from model.pad.film_map import FilmMap
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PadGeometry
 from model.pad.operators import PadOperators, pad_operators
+
+Operators = Callable[[PadGeometry, MeshDensity, bool], PadOperators]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,7 +74,11 @@ class PadSolid:
 
 
 def solid_of(
-    geometry: PadGeometry, film_theta: ArrayLike, film_z: ArrayLike, density: MeshDensity | None = None
+    geometry: PadGeometry,
+    film_theta: ArrayLike,
+    film_z: ArrayLike,
+    density: MeshDensity | None = None,
+    operators: Operators = pad_operators,
 ) -> PadSolid:
     """Solid of a pad for a film grid.
 
@@ -83,6 +90,8 @@ def solid_of(
     film_z : (n_z,) array_like
         Film nodes along the axis [m from the mid-plane]: 0 to L/2 (symmetric film), or -L/2 to L/2.
     density : MeshDensity, optional
+    operators : callable, optional
+        How the finite elements are solved: `pad_operators`, or `pad_operators_between` where the convection varies.
 
     Returns
     -------
@@ -100,11 +109,13 @@ def solid_of(
         _check_span(z, (0.0, 0.5 * geometry.length), "film_z", "m")
     else:
         _check_span(z, (-0.5 * geometry.length, 0.5 * geometry.length), "film_z", "m")
-    return _solid(geometry, density or MeshDensity(), theta.tobytes(), z.tobytes())
+    return _solid(geometry, density or MeshDensity(), theta.tobytes(), z.tobytes(), operators)
 
 
 @lru_cache(maxsize=8)  # a dense matrix of a usual film grid has 3 MB, and there are four
-def _solid(geometry: PadGeometry, density: MeshDensity, theta_bytes: bytes, z_bytes: bytes) -> PadSolid:
+def _solid(
+    geometry: PadGeometry, density: MeshDensity, theta_bytes: bytes, z_bytes: bytes, operators: Operators
+) -> PadSolid:
     theta, z = (np.frombuffer(raw, dtype=float) for raw in (theta_bytes, z_bytes))
     half = 0.5 * geometry.length
     full = bool(z[0] < -1e-6 * geometry.length)
@@ -112,7 +123,7 @@ def _solid(geometry: PadGeometry, density: MeshDensity, theta_bytes: bytes, z_by
     across = Line(_snap(z, -half if full else 0.0, half), 1)
     parts = []
     for even in (True, False) if full else (True,):
-        solid = pad_operators(geometry, density, even)
+        solid = operators(geometry, density, even)
         parts.append((solid, FilmMap.between((solid.theta, solid.z), (along, across), even if full else None)))
     return PadSolid(geometry, density, along.breaks, across.breaks, tuple(parts))
 

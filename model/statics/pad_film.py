@@ -317,7 +317,7 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FloatArray]:
                 inlet=setup.inlet_temperature,
                 bent=bent[k],
                 pressure_change=shifts[k],
-                deformation=pad_deformation(pad, bearing, grid) if solid else None,
+                deformation=pad_deformation(pad, bearing, grid, setup.options.conduction) if solid else None,
                 kept=1.0 - setup.heat_loss,
                 rupture=rupture,
                 cross=cross_film(work, setup.inlet_temperature) if across else None,

@@ -52,7 +52,7 @@ def pressure_response(body: ElasticSector, pressure: float) -> np.ndarray:
 def thermal_field(body: ElasticSector, rise: float) -> np.ndarray:
     """Displacement of all nodes, (n_theta, 3, n_r, n_z), under a uniform temperature rise."""
     shape = body.fixed.shape
-    load = body.thermal_load(np.full((shape[0], shape[2], shape[3], 1), rise))
+    load = np.stack(list(body.thermal_loads(np.full((shape[0], shape[2], shape[3], 1), rise))))
     return BlockCholesky(tuple(factor_rows(body.stiffness_rows()))).solve(load).reshape(shape)
 
 

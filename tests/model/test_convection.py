@@ -1,0 +1,50 @@
+"""Operators interpolated over the convection of a pad's free faces are those of a solution for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model.bearing_file import load_bearing
+from model.pad.convection import LARGEST, pad_operators_between
+from model.pad.mesh import MeshDensity, PadGeometry
+from model.pad.operators import operators_at, pad_operators
+
+COARSE = MeshDensity(2, 1, 3, 1)
+
+
+@pytest.fixture(scope="module")
+def rocker():
+    return load_bearing("model/bearings/rocker.toml")
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_between_the_nodes(rocker, even):
+    geometry = PadGeometry.of(rocker.pads[0], rocker)
+    asked = (0.0, 20.0, 50.0, 137.0, 500.0, 1500.0, 8000.0)
+    for convection, exact in zip(asked, operators_at(geometry, COARSE, even, asked), strict=True):
+        near = pad_operators_between(replace(geometry, back_convection=convection), COARSE, even)
+        np.testing.assert_array_equal(near.compliance, exact.compliance)
+        np.testing.assert_allclose(near.back, exact.back, atol=5e-6)
+        np.testing.assert_allclose(near.section, exact.section, atol=5e-6)
+        np.testing.assert_allclose(near.expansion, exact.expansion, atol=5e-6 * np.abs(exact.expansion).max())
+        np.testing.assert_allclose(near.flux, exact.flux, atol=5e-5 * np.abs(exact.flux).max())
+        if even:  # a film that is warmer all over: what it loses, small beside what goes from node to node
+            lost, right = near.flux.sum(axis=1).mean(), exact.flux.sum(axis=1).mean()
+            assert lost == pytest.approx(right, rel=5e-4, abs=1e-3)
+
+
+def test_beyond_the_nodes_a_pad_is_solved_for_its_own(rocker):
+    geometry = replace(PadGeometry.of(rocker.pads[0], rocker), back_convection=3.0 * LARGEST)
+    exact = pad_operators(geometry, COARSE, True)
+    np.testing.assert_array_equal(pad_operators_between(geometry, COARSE, True).flux, exact.flux)
+
+
+def test_several_at_once_are_the_same_as_one_by_one(rocker):
+    geometry = PadGeometry.of(rocker.pads[0], rocker)
+    for convection, together in zip((50.0, 400.0), operators_at(geometry, COARSE, True, (50.0, 400.0)), strict=True):
+        alone = pad_operators(replace(geometry, back_convection=convection), COARSE, True)
+        np.testing.assert_allclose(together.expansion, alone.expansion, rtol=1e-9, atol=1e-18)
+        np.testing.assert_allclose(together.flux, alone.flux, rtol=1e-9, atol=1e-9)
