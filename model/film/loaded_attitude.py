@@ -138,6 +138,7 @@ def loaded_attitude(start: float, end: float, radius: float, length: float) -> L
     work.density[:] = 1.0
     unit = radius**2 * length
 
+    @functools.cache  # roots are sought between places that are asked for already
     def force(curvature: float, wedge: float) -> tuple[float, float]:
         # (Cp - a) = 1: Cp = 1 + A
         work.ruptured[:] = False
