@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtr
 
 from model.effects import Effect
 from model.setup import Setup
@@ -161,9 +162,7 @@ def chance(separation: float, margin: float = MARGIN) -> float:
     margin : float
         By how much chi-square must differ.
     """
-    from scipy.stats import norm
-
-    return float(norm.cdf((separation**2 - margin) / (2.0 * separation))) if separation > 0.0 else 0.0
+    return float(ndtr((separation**2 - margin) / (2.0 * separation))) if separation > 0.0 else 0.0
 
 
 def suggested(tests: Sequence[Separation]) -> tuple[Separation, ...]:

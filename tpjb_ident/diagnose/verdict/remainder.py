@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtrc, ndtr
 
 from tpjb_ident.arrays import FloatArray, IntArray
 from tpjb_ident.diagnose.search.assessment import assess
@@ -41,20 +42,18 @@ def excess(problem: Problem, fitted: Fit) -> Excess:
     problem : Problem
     fitted : Fit
     """
-    from scipy.stats import chi2, norm
-
     # every kind of observable as wrong as stated, nothing beyond, no more scatter than stated
     stated = problem.basis.stated
     told = assess(problem.basis, fitted.assessment.linear, stated, fixed=True)
     total = problem.basis.covariance(stated) + fitted.assessment.linear.spread
     residual = told.linear.residual
     rows = _groups(problem)
-    tests = [(float(chi2.sf(_square(total, residual, at), len(at))), name) for name, at in rows]
+    tests = [(float(chdtrc(len(at), _square(total, residual, at))), name) for name, at in rows]
     first = len(fitted.errors)
     left = 1.0 - np.diag(told.covariance)[first:]
     for one, m, spread in zip(problem.nuisances, told.free[first:], left, strict=True):
         if spread > TOLD:
-            tests.append((2.0 * float(norm.sf(abs(m) / np.sqrt(spread))), f"{one.name} {one.place}".strip()))
+            tests.append((2.0 * float(ndtr(-abs(m) / np.sqrt(spread))), f"{one.name} {one.place}".strip()))
     p, where = min(tests)
     return Excess(min(1.0, p * len(tests)), where)
 
