@@ -212,7 +212,7 @@ def diagnose_measured(
         Answers of the model at this bearing's baseline, known from before.
     """
     baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
-    settings = settings.with_tolerances(measured.tolerances)
+    settings = replace(settings, tolerances=measured.tolerances)
     tell = progress or (lambda text, done, total: None)
     found, curves = measured.identification, measured.curves
     given = baseline.pivots == "measured"
@@ -257,7 +257,7 @@ def diagnose_table(
     tell = progress or (lambda text, done, total: None)
     if baseline.pivots == "measured":
         raise BadInputError("--pivots measured: a table holds no dry tests. Give kirk, rigid or a pivots.toml.")
-    settings = settings.with_tolerances(settings.tolerances.layered(bearing))
+    settings = replace(settings, tolerances=settings.tolerances.layered(bearing))
     observations = observe_table(path, reading_error, settings.tolerance)
     setup = apply_effects(Setup(bearing, pivot_laws(baseline.pivots, bearing), baseline.thermal), baseline.effects)
     result = diagnose(observations, setup, settings, lambda text, share: tell(text, int(100 * share), 100))

@@ -15,7 +15,6 @@ from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arguments import as_campaign
 from tpjb_ident.diagnose.campaign import Baseline, CampaignDiagnosis, diagnose_campaign
 from tpjb_ident.diagnose.observations.layout import DynamicTest, Layout
-from tpjb_ident.diagnose.observations.tolerance import Tolerance
 from tpjb_ident.diagnose.plan.plan import CampaignPlan
 from tpjb_ident.diagnose.plan.plan import plan as work_out
 from tpjb_ident.diagnose.plan.planned import around, dry, dynamic
@@ -62,7 +61,8 @@ def diagnose(
     effects : sequence of Effect
         Already in the model.
     settings : DiagnoseSettings, optional
-        Default: model tolerance of 1.5 % of the direct coefficients, all cores.
+        Default: tolerances as in `docs/diagnosis.md`, all cores; another one is stated by
+        ``DiagnoseSettings(tolerances=Tolerances().states({"model": 0.03}, "script"))``.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def diagnose(
         No campaign, or no bearing anywhere.
     """
     opened = as_campaign(campaign, "campaign")
-    chosen = settings or DiagnoseSettings(tolerance=Tolerance())
+    chosen = settings or DiagnoseSettings()
     return diagnose_campaign(opened, bearing_of(opened, bearing), Baseline(pivots, thermal, tuple(effects)), chosen)
 
 

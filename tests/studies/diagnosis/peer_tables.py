@@ -1,7 +1,7 @@
 """Mixtures that another program computed: K and C by the ROSS fluid-film engine, diagnosed as tables.
 
     python -m tests.studies.diagnosis.peer_tables --python /path/to/an/environment/with/ross/bin/python
-        [--count 20] [--seed 0] [--rows FILE] [--again]
+        [--count 20] [--seed 0] [--rows FILE] [--again] [--model-tolerance 0.03]
 
 The paper's rocker bearing with pivots of 1e9 N/m and an adiabatic film on ROSS's own mesh: ten points (six loads at
 25 Hz, four more frequencies at 5 kN). Every campaign's oil, inlet, clearances and pivots are drawn from the default
@@ -30,6 +30,7 @@ from model.effects import Effect
 from tests.studies.bench_ross import SPEED, bearing, peer_case
 from tpjb_ident.arrays import ComplexArray
 from tpjb_ident.diagnose.campaign import Baseline, diagnose_table
+from tpjb_ident.diagnose.forward.tolerances import Tolerances
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 
 HZ = 2 * math.pi
@@ -123,7 +124,9 @@ def write_table(path: Path, found: list[list[float]], hidden: list[Effect], outs
     pd.DataFrame(rows).to_csv(path, index=False)
 
 
-def run(python: str, kind: tuple[str, ...], seed: int, kept: list[list[float]] | None = None) -> dict[str, Any]:
+def run(
+    python: str, kind: tuple[str, ...], seed: int, tolerance: float, kept: list[list[float]] | None = None
+) -> dict[str, Any]:
     """Compute (or take what is kept) and diagnose one campaign; a row with what came out."""
     rng = np.random.default_rng([seed, 20190761])
     hidden = draw(kind, rng)
@@ -133,7 +136,8 @@ def run(python: str, kind: tuple[str, ...], seed: int, kept: list[list[float]] |
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "peer.csv"
         write_table(path, found, hidden, outside, seed)
-        result = diagnose_table(path, bearing(), Baseline(PIVOTS), DiagnoseSettings(workers=1)).diagnosis.verdict
+        settings = DiagnoseSettings(workers=1, tolerances=Tolerances().states({"model": tolerance}, "study"))
+        result = diagnose_table(path, bearing(), Baseline(PIVOTS), settings).diagnosis.verdict
     named = [{"name": e.name, **{k: (p.value, p.lo, p.hi) for k, p in e.parameters.items()}} for e in result.effects]
     return {
         "seed": seed, "kind": kind, "outside": outside, "truth": [{"name": e.name, **e.parameters} for e in hidden],
@@ -180,6 +184,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=2 * len(KINDS))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rows", type=Path, default=Path("peer_tables.jsonl"))
+    parser.add_argument("--model-tolerance", type=float, default=Tolerances()["model"], help="share of K and omega C")
     parser.add_argument("--again", action="store_true", help="diagnose what is kept anew")
     asked = parser.parse_args()
     kept = [json.loads(t) for t in asked.rows.read_text("utf-8").splitlines()] if asked.rows.exists() else []
@@ -187,9 +192,9 @@ def main() -> None:
     for number in range(asked.count):
         seed, kind = asked.seed + number, KINDS[number % len(KINDS)]
         if asked.again and seed in known:
-            known[seed] = run(asked.python, kind, seed, known[seed]["peer"])
+            known[seed] = run(asked.python, kind, seed, asked.model_tolerance, known[seed]["peer"])
         elif seed not in known:
-            known[seed] = run(asked.python, kind, seed)
+            known[seed] = run(asked.python, kind, seed, asked.model_tolerance)
         asked.rows.write_text("".join(json.dumps(row, default=float) + "\n" for row in known.values()), "utf-8")
     print(f"{len(known)} campaigns\n\n{table(list(known.values()))}")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from tpjb_ident.diagnose.forward.tolerances import Tolerances
 from tpjb_ident.diagnose.observations.tolerance import Tolerance
@@ -14,10 +14,8 @@ class DiagnoseSettings:
 
     Attributes
     ----------
-    tolerance : Tolerance
-        What the model is trusted to, per kind of observable.
     tolerances : Tolerances
-        What may be off in drawing, data sheet and instruments.
+        What may be off in drawing, data sheet, instruments and in the model itself.
     wanted : float
         Held-out log score (nats, summed over the folds) that an effect must be worth to unseen points.
     exceeds : float
@@ -42,7 +40,6 @@ class DiagnoseSettings:
     workers : int or None
     """
 
-    tolerance: Tolerance = field(default_factory=Tolerance)
     tolerances: Tolerances = field(default_factory=Tolerances)
     wanted: float = 5.0
     exceeds: float = 1.6
@@ -56,12 +53,7 @@ class DiagnoseSettings:
     skip: frozenset[str] = frozenset()
     workers: int | None = None
 
-    def with_tolerances(self, stated: Tolerances) -> DiagnoseSettings:
-        """Return a copy with other stated tolerances; the model's own among them.
-
-        Parameters
-        ----------
-        stated : Tolerances
-            Stated tolerances.
-        """
-        return replace(self, tolerances=stated, tolerance=replace(self.tolerance, stiffness=stated["model"]))
+    @property
+    def tolerance(self) -> Tolerance:
+        """What the model is trusted to: the stated ``model`` of `tolerances` for K and omega C, the defaults beside."""
+        return Tolerance(stiffness=self.tolerances["model"])
