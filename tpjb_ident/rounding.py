@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 MINUS = "\N{MINUS SIGN}"
+#: An interval that reaches this many times further to one side than to the other is told by its ends.
+ASKEW = 1.5
 
 
 def counted(number: int, thing: str) -> str:
@@ -40,7 +42,7 @@ def plain(value: float, digits: int) -> str:
 
 
 def with_interval(value: float, low: float, high: float, scale: float = 1.0) -> str:
-    """Value and half the width of its interval, both to the digit that the interval allows.
+    """Value and half the width of its interval, or its ends where it is askew, to the digit that it allows.
 
     Parameters
     ----------
@@ -55,6 +57,8 @@ def with_interval(value: float, low: float, high: float, scale: float = 1.0) -> 
 
     >>> with_interval(163.2841e6, 162.0e6, 164.6e6, 1e6)
     '163.3 ± 1.3'
+    >>> with_interval(66.4, 0.0, 294.7)
+    '66 (0 to 295)'
     """
     if not math.isfinite(value):
         return "no answer"
@@ -62,6 +66,9 @@ def with_interval(value: float, low: float, high: float, scale: float = 1.0) -> 
     if not math.isfinite(half) or half <= 0:
         return f"{value / scale:.4g}".replace("-", MINUS)
     digits = max(0, 1 - math.floor(math.log10(half)))
+    below, above = value - low, high - value
+    if max(below, above) > ASKEW * min(below, above):  # as where a bound cuts it off
+        return f"{plain(value / scale, digits)} ({plain(low / scale, digits)} to {plain(high / scale, digits)})"
     return f"{plain(value / scale, digits)} ± {plain(half, digits)}"
 
 

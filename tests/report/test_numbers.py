@@ -16,6 +16,7 @@ from tpjb_ident.rounding import fixed, percent, signed, with_interval
         ((-0.4849e6, -1.04e6, 0.07e6, 1e6), "−0.48 ± 0.56"),
         ((652.1e6, 640e6, 664e6, 1e6), "652 ± 12"),
         ((0.00001e6, -0.5e6, 0.5e6, 1e6), "0.00 ± 0.50"),
+        ((66.4, 0.0, 294.7), "66 (0 to 295)"),
         ((5.0, math.nan, math.nan), "5"),
         ((math.nan, 1.0, 2.0), "no answer"),
     ],

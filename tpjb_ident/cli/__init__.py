@@ -26,11 +26,18 @@ def main() -> None:
 
 def _interrupt_again(lost: Any) -> None:
     """Deliver a Ctrl-C once more that fell into a callback, as of an import lock: Python drops what is raised there."""
+    import signal
     import threading
     from _thread import interrupt_main
 
+    def interrupt() -> None:
+        if hasattr(signal, "pthread_kill"):  # wakes a thread that waits, which the other one does not
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+        else:
+            interrupt_main()
+
     if issubclass(lost.exc_type, KeyboardInterrupt):
-        threading.Timer(0.05, interrupt_main).start()  # by then the callback has ended; if it meets another: again
+        threading.Timer(0.05, interrupt).start()  # by then the callback has ended; if it meets another: again
     else:
         sys.__unraisablehook__(lost)
 
