@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from model.arrays import FloatArray
 from model.bearing import Bearing, Pad
 from model.errors import ModelError
+from model.pad.heat import conduct
 from model.pad.line import Line
-from model.pad.mesh import MeshDensity, PadGeometry, PivotFace
+from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, SectorMesh, sector_mesh
 from model.pad.solid import PadSolid, solid_of
 
 
@@ -64,14 +65,22 @@ class PadResponse(PadSolid):
 
     def pad_temperature(self, rise: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Temperature of the pad's mid-plane."""
-        even, to = self._parts[0]
-        coarse = to.coarse_theta @ self._on_grid(rise, "rise") @ to.coarse_z.T
-        field_ = (even.section @ coarse.ravel()).reshape(even.theta.n_nodes, even.radius.size)
-        return even.theta.nodes, even.radius, field_
+        mesh, field_ = self._conducted(rise)
+        return mesh.theta.nodes, mesh.r.nodes, field_[:, :, 0]
 
     def back_temperature(self, rise: ArrayLike) -> FloatArray:
         """Temperature rise on the pad's back over the film nodes [K], shape (n_theta, n_z)."""
-        return self._thermal(self._on_grid(rise, "rise"), "back")
+        (_, to), *_ = self._parts
+        return np.asarray(to.theta.project @ self._conducted(rise)[1][:, -1] @ to.z.project.T)
+
+    def _conducted(self, rise: ArrayLike) -> tuple[SectorMesh, FloatArray]:
+        """Mesh of the pad, and the temperature rise at its nodes under one that is even in z."""
+        (_, to), *_ = self._parts
+        coarse = to.coarse_theta @ self._on_grid(rise, "rise") @ to.coarse_z.T
+        mesh = sector_mesh(self.geometry, self.density)
+        along, across = (Line(line.breaks, 1).tabulate(line.nodes) for line in (mesh.theta, mesh.z))
+        face = np.asarray(along @ coarse @ across.T).reshape(-1, 1)
+        return mesh, conduct(mesh, self.geometry.back_convection, face).temperature[..., 0]
 
     def _on_grid(self, values: ArrayLike, name: str) -> FloatArray:
         array = np.asarray(values, dtype=float)

@@ -15,7 +15,7 @@ import numpy as np
 from model.pad.mesh import MeshDensity, PadGeometry
 from model.pad.operators import PadOperators, operators_at, pad_operators
 
-#: Eight nodes: temperatures in the pad to 1e-6 of the film's, heat into it to 3e-4 (`tests/model/test_convection.py`).
+#: Eight nodes: expansion to 2e-6, heat into the pad to 3e-4 (`tests/model/test_convection.py`).
 NODES = 8
 #: Largest convection between the nodes [W/m^2/K]; above it a pad is solved for its own.
 LARGEST = 1e4
@@ -48,9 +48,9 @@ def pad_operators_between(geometry: PadGeometry, density: MeshDensity, even: boo
     ]  # fmt: skip
     mixed = {
         name: sum(w * getattr(one, name) for w, one in zip(weights, known, strict=True))
-        for name in ("expansion", "flux", "section", "back")
+        for name in ("expansion", "flux")
     }
     return replace(known[0], **mixed)
 
 
-_known = lru_cache(maxsize=3)(operators_at)  # 23 MB each
+_known = lru_cache(maxsize=3)(operators_at)  # 13 MB each

@@ -26,28 +26,19 @@ class PadOperators:
     ----------
     theta, z : Line
         Elements of the face along the arc [rad] and along the half length [m].
-    radius : (n_r,) ndarray
-        Radii of the nodes across the thickness [m].
     compliance : (n_surface, n_surface) ndarray
         Outward displacement per outward nodal force [m/N].
     expansion : (n_surface, n_temperatures) ndarray
         Outward displacement per temperature rise of the face's bilinear nodes [m/K].
     flux : (n_surface, n_temperatures) ndarray
         Heat flux density from film into pad per temperature rise [W/m^2/K].
-    section : (n_theta * n_r, n_temperatures) ndarray
-        Temperature rise at the nodes of the mid-plane z = 0 per temperature rise [K/K].
-    back : (n_theta * n_z, n_temperatures) ndarray
-        The same on the back.
     """
 
     theta: Line
     z: Line
-    radius: FloatArray
     compliance: FloatArray
     expansion: FloatArray
     flux: FloatArray
-    section: FloatArray
-    back: FloatArray
 
     @property
     def coarse(self) -> tuple[Line, Line]:
@@ -90,7 +81,7 @@ def operators_at(
         In that order; they share their `compliance`.
     """
     mesh = sector_mesh(geometry, density)
-    shapes = _shapes(mesh.theta, mesh.z, mesh.r.n_nodes, len(convections))
+    shapes = _shapes(mesh.theta, mesh.z, len(convections))
     key = storage_key((replace(geometry, back_convection=0.0), density, even, convections))
     arrays = load_arrays(key, shapes)
     if arrays is None:
@@ -100,18 +91,16 @@ def operators_at(
         array.setflags(write=False)
     compliance = arrays.pop("compliance")
     return tuple(
-        PadOperators(mesh.theta, mesh.z, mesh.r.nodes, compliance, **{name: array[k] for name, array in arrays.items()})
+        PadOperators(mesh.theta, mesh.z, compliance, **{name: array[k] for name, array in arrays.items()})
         for k in range(len(convections))
     )
 
 
-def _shapes(theta: Line, z: Line, n_r: int, count: int) -> dict[str, tuple[int, ...]]:
+def _shapes(theta: Line, z: Line, count: int) -> dict[str, tuple[int, ...]]:
     n_surface = theta.n_nodes * z.n_nodes
     n_temperatures = theta.breaks.size * z.breaks.size
-    rows = {"expansion": n_surface, "flux": n_surface, "section": theta.n_nodes * n_r, "back": n_surface}
-    return {
-        "compliance": (n_surface, n_surface), **{name: (count, row, n_temperatures) for name, row in rows.items()}
-    }  # fmt: skip
+    each = (count, n_surface, n_temperatures)
+    return {"compliance": (n_surface, n_surface), "expansion": each, "flux": each}
 
 
 def _solve(
@@ -134,8 +123,6 @@ def _solve(
         "compliance": compliance,
         "expansion": np.stack(np.split(expansion, len(convections), axis=1)),
         "flux": flux,
-        "section": np.moveaxis(field[:, :, 0], 2, 0).reshape(len(convections), -1, n_temperatures),
-        "back": np.moveaxis(field[:, -1], 2, 0).reshape(len(convections), -1, n_temperatures),
     }
 
 

@@ -27,8 +27,6 @@ def test_between_the_nodes(rocker, even):
     for convection, exact in zip(asked, operators_at(geometry, COARSE, even, asked), strict=True):
         near = pad_operators_between(replace(geometry, back_convection=convection), COARSE, even)
         np.testing.assert_array_equal(near.compliance, exact.compliance)
-        np.testing.assert_allclose(near.back, exact.back, atol=5e-6)
-        np.testing.assert_allclose(near.section, exact.section, atol=5e-6)
         np.testing.assert_allclose(near.expansion, exact.expansion, atol=5e-6 * np.abs(exact.expansion).max())
         np.testing.assert_allclose(near.flux, exact.flux, atol=5e-5 * np.abs(exact.flux).max())
         if even:  # a film that is warmer all over: what it loses, small beside what goes from node to node
