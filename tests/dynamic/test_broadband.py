@@ -296,6 +296,7 @@ def test_a_dead_cell_costs_its_run_and_an_inverted_one_the_band(tmp_path):
     assert "records-contradicted" in untrusted(result.quality)
 
 
+@pytest.mark.slow
 def test_what_runs_show_of_their_gains_is_told_from_what_h_takes():
     """Gains put on the runs of 300 campaigns of 40 quiet lines: their size comes back, and h's interval holds."""
     rng = np.random.default_rng(12)

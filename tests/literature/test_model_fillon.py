@@ -80,6 +80,7 @@ def test_peak_pad_temperatures_with_the_paths_of_heat_one_by_one(rpm):
     assert peak(p) == pytest.approx(PEAK[rpm][0], abs=7.0 if rpm > 3000 else 4.0)
 
 
+@pytest.mark.slow
 def test_without_those_paths_the_speed_does_not_show():
     # the paper's model: too hot at 1000 rpm, where pads and journal cool the film, too cold at 4000: hot oil stays
     rise = {rpm: run(rpm, "tehd").max_temperature - theirs for rpm, (_, theirs) in PEAK.items()}

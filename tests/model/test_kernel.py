@@ -76,6 +76,7 @@ def test_without_numbas_cache_the_code_is_compiled_anew(monkeypatch):
     assert compilation.compiled(_twice).dispatcher == ("_twice", False)
 
 
+@pytest.mark.slow
 def test_where_nothing_can_be_written_the_code_is_compiled_and_the_cure_is_told(monkeypatch):
     monkeypatch.setattr(numba.core.caching.CacheImpl, "_locator_classes", [])
     compilation._tell.cache_clear()

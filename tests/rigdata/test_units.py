@@ -132,6 +132,7 @@ def test_signals_and_engineering_units():
     assert not any(is_signal(u) for u in ("um", "N", "m/s^2", "degC", "Hz", "%"))
 
 
+@pytest.mark.slow
 @given(st.text(max_size=60), st.sampled_from(sorted(SI_UNITS)))
 @settings(max_examples=80, deadline=None)
 def test_any_text_gives_a_finite_number_or_a_unit_error(text, dimension):
