@@ -79,9 +79,11 @@ def undescribed(names: Sequence[str], what: str, file: str, run: str) -> tuple[P
     """
     if not names:
         return ()
-    listed = ", ".join(ascii(n)[1:-1][:40] for n in names[:6]) + (", ..." if len(names) > 6 else "")
+    listed = ", ".join(ascii(n)[1:-1][:40] for n in names[:6]) + (
+        f", ... ({len(names)} in all)" if len(names) > 6 else ""
+    )
     cure = "Nothing, or describe them in the manifest"
-    return (Problem("note", file, what, f"{len(names)} {what} are not described: {listed}", cure, run),)
+    return (Problem("note", file, what, f"{what} without a description: {listed}", cure, run),)
 
 
 def missing_channel(name: str, known: Iterable[str], held: str) -> tuple[str, str, str]:

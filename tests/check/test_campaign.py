@@ -210,7 +210,7 @@ def test_shared_records_and_leftovers(tmp_path):
     found = {p.what.split(" ")[-1]: p for p in check_campaign(tmp_path / "c.h5")}
     assert [p.severity for p in found.values()].count("error") == 0
     assert "no run names the group forgotten" in [p.what for p in found.values()]
-    assert "1 datasets are not described: extra" in [p.what for p in found.values()]
+    assert "datasets without a description: extra" in [p.what for p in found.values()]
 
 
 def test_a_problem_prints_itself_with_place_and_cure():

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import csv
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rigdata.near_names import nearest_name
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.schema import ENTRIES
 
@@ -16,6 +19,9 @@ if TYPE_CHECKING:
 
 HZ = 2.0 * math.pi
 _UNITS = {"k": "N_per_m", "c": "Ns_per_m"}
+_KNOWN = tuple(f"{part}{entry}_{unit}" for part, unit in _UNITS.items() for entry in ENTRIES)
+#: A column that looks like a coefficient: misspelt, it would be silently left out.
+_COEFFICIENT = re.compile(r"([A-Za-z]{1,5}_Ns?_per_m)(_se|_lo|_hi|)")
 
 
 @dataclass(frozen=True)
@@ -90,13 +96,21 @@ def _read(path: Path) -> pd.DataFrame:
 
     try:
         frame = pd.read_csv(path, sep=None, engine="python", comment="#", encoding="utf-8-sig")
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, csv.Error) as error:  # csv.Error: no delimiter is to be found, as in an empty file
         raise BadInputError(
             f"{path}: cannot be read as a table ({error}). Save it as CSV with a line of names."
         ) from error
+    columns = [str(name) for name in frame.columns]
     for name in ("static_load_N", "shaft_speed_Hz"):
-        if name not in frame.columns:
-            raise BadInputError(f"{path.name}: column {name} is missing. Add it.")
+        if name not in columns:
+            near = nearest_name(name, columns)
+            hint = f"; {near!r} is not it" if near else ""
+            raise BadInputError(f"{path.name}: column {name} is missing{hint}. Add it.")
+    for name in columns:
+        stem = _COEFFICIENT.fullmatch(name)
+        if stem is not None and stem[1] not in _KNOWN:
+            near = nearest_name(stem[1], _KNOWN)
+            raise BadInputError(f"{path.name}: column {name!r} is no coefficient. Did you mean {near}{stem[2]}?")
     return frame
 
 

@@ -58,8 +58,8 @@ class Panel:
         return figure
 
 
-def is_wide(svg: str) -> bool:
-    """Whether a picture holds several panels side by side and wants the whole width of a page.
+def shape(svg: str) -> str:
+    """How a picture stands on a page: ``"wide"``, several panels side by side; ``"tall"``, on top of each other; or "".
 
     Parameters
     ----------
@@ -69,7 +69,9 @@ def is_wide(svg: str) -> bool:
     found = _SIZE.search(svg)
     assert found is not None
     width, height = float(found[1]), float(found[2])
-    return width > 1.35 * height and width > 6.5 * 72.0
+    if width > 1.35 * height and width > 6.5 * 72.0:
+        return "wide"
+    return "tall" if height > 0.8 * width else ""
 
 
 #: Panels from which on a second process draws too, and how many processes do at most.

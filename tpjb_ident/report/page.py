@@ -12,9 +12,9 @@ from pathlib import Path
 import jinja2
 import markupsafe
 
-from tpjb_ident.report.figure import Panel, inline_svg, is_wide
+from tpjb_ident.report.figure import Panel, inline_svg, shape
 from tpjb_ident.runtime.provenance import versions
-from tpjb_ident.runtime.tables import printable
+from tpjb_ident.runtime.tables import printable, readable
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
         lstrip_blocks=True,
     )
     script = environment.get_template("sort.js").render()
-    wide = {p.name for section in page.sections for p in section.panels if is_wide(svg[p.name])}
+    shapes = {p.name: shape(svg[p.name]) for section in page.sections for p in section.panels}
     drawn = {p.name: _element(svg[p.name], p) for section in page.sections for p in section.panels}
     return environment.get_template("report.html").render(
         page=page,
@@ -123,7 +123,7 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
         style=markupsafe.Markup(environment.get_template("style.css").render()),  # our own text, no data in it
         script=markupsafe.Markup(script),  # likewise
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        wide=wide,
+        shapes=shapes,
         versions=versions(),
         finished=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
     )
@@ -135,4 +135,4 @@ def _element(svg: str, panel: Panel) -> markupsafe.Markup:
 
 
 def _printable_cell(value: object) -> object:
-    return printable(value) if isinstance(value, str) and not isinstance(value, markupsafe.Markup) else value
+    return readable(value) if isinstance(value, str) and not isinstance(value, markupsafe.Markup) else value

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 #: A text cell that starts like this is a formula to a spreadsheet.
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+_SIGNS = {"um": "µm", "degC": "°C", "m/s^2": "m/s²"}
+_UNIT = re.compile(r"(?:(?<=\d )|(?<=nan )|\A)(um|degC|m/s\^2)(?![\w/^'\"])")
 
 
 def write_atomic(path: Path, write: Callable[[Path], None]) -> None:
@@ -106,6 +108,20 @@ def _disarm(cell: Any) -> Any:
     safe = "'" + cell if cell.startswith(_FORMULA_STARTS) else cell
     # A carriage return within a cell is not quoted by the csv module: what follows it would begin a line of its own.
     return safe.replace("\r", " ")
+
+
+def readable(text: object) -> str:
+    """`printable`, its units with the signs that people write: µm, °C, m/s².
+
+    Parameters
+    ----------
+    text : object
+        For a terminal or a page; what a program reads, or a user typed in quotes, keeps its letters.
+
+    >>> readable("30 um at 45 degC, '30 um'")
+    "30 µm at 45 °C, '30 um'"
+    """
+    return _UNIT.sub(lambda match: _SIGNS[match[1]], printable(text))
 
 
 def printable(text: object) -> str:

@@ -17,6 +17,8 @@ from rigdata.readers.text.stamps import stamp_seconds
 
 _MAGIC, _END = "LabVIEW Measurement", "***End_of_Header***"
 _X, _COMMENT = "X_Value", "Comment"
+#: Lines that are held as text at a time: as text a table takes several times the memory of its numbers.
+_BLOCK = 20_000
 
 
 @dataclass
@@ -26,6 +28,7 @@ class _Segment:
     header: dict[str, list[str]] = field(default_factory=dict)
     names: list[str] = field(default_factory=list)
     rows: list[str] = field(default_factory=list)
+    blocks: list[FloatArray] = field(default_factory=list)
 
 
 def read_series(path: Path) -> list[Series]:
@@ -54,8 +57,8 @@ def read_series(path: Path) -> list[Series]:
         raise _refuse(path, "line 1", f"does not begin with {_MAGIC!r}", "Is it a LabVIEW measurement file?")
     separator, decimal = _spelling(lines)
     found: dict[str, list[Series]] = {}
-    for segment in _segments(lines, separator):
-        for one in _channels(path, segment, separator, decimal):
+    for segment in _segments(path, lines, separator, decimal):
+        for one in _channels(segment, decimal):
             found.setdefault(one.name, []).append(one)
     if not found:
         raise _refuse(path, "", "holds no channel over time", "Export the run again, with its samples")
@@ -93,28 +96,38 @@ def _heading(lines: Iterator[str], separator: str) -> dict[str, list[str]]:
     return found
 
 
-def _segments(lines: Iterator[str], separator: str) -> Iterator[_Segment]:
-    """Segments in order; without headings of their own all samples are one."""
+def _segments(path: Path, lines: Iterator[str], separator: str, decimal: str) -> Iterator[_Segment]:
+    """Segments in order, their rows as numbers; without headings of their own all samples are one."""
     segment: _Segment | None = None
+    blank = f"{separator} \t\r\n"
     for line in lines:
-        cells = [c.strip() for c in line.split(separator)]
-        if cells[0] == "Channels":
+        first = line.partition(separator)[0].strip()
+        if first == "Channels":
             if segment is not None:
-                yield segment
+                yield _turned(path, segment, separator, decimal)
             segment = _Segment(header=_heading(lines, separator))
             names = next(lines, "")
             segment.names = [c.strip() for c in names.split(separator)]
-        elif cells[0] == _X:
+        elif first == _X:
             segment = segment or _Segment()
-            segment.names = cells
-        elif segment is not None and any(cells):
+            segment.names = [c.strip() for c in line.split(separator)]
+        elif segment is not None and line.strip(blank):
             segment.rows.append(line)
+            if len(segment.rows) == _BLOCK:
+                _turned(path, segment, separator, decimal)
     if segment is not None:
-        yield segment
+        yield _turned(path, segment, separator, decimal)
 
 
-def _channels(path: Path, segment: _Segment, separator: str, decimal: str) -> list[Series]:
-    values = _numbers(path, segment, separator, decimal)
+def _turned(path: Path, segment: _Segment, separator: str, decimal: str) -> _Segment:
+    """The segment with the rows that it holds as text turned into numbers."""
+    segment.blocks.append(_numbers(path, segment, separator, decimal))
+    segment.rows.clear()
+    return segment
+
+
+def _channels(segment: _Segment, decimal: str) -> list[Series]:
+    values = np.concatenate(segment.blocks)
     found = []
     x: FloatArray | None = None
     number = 0

@@ -24,6 +24,7 @@ from tpjb_ident.cli.common.options import (
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress, table
 from tpjb_ident.effect_words import UNITS, label_in_words
+from tpjb_ident.rounding import signed
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_table, write_text
@@ -31,6 +32,7 @@ from tpjb_ident.runtime.tables import write_table, write_text
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from model.effects.kind import Parameter
     from model.setup import Setup
     from tpjb_ident.diagnose.observations.layout import Layout
     from tpjb_ident.diagnose.plan.plan import CampaignPlan
@@ -104,14 +106,28 @@ def _parts(folder: Path, setup: Setup, tests: Layout) -> dict[str, CampaignPlan]
     return {f"isolability_{one.name}": one.free for one in found}
 
 
+def _seen_from(at: float, parameter: Parameter) -> str:
+    """The size from which an effect is seen; a factor as its distance from one."""
+    if math.isnan(at):
+        return "never"
+    unit, scale = UNITS.get(parameter.unit, (parameter.unit, 1.0))
+    if unit == "%" and parameter.neutral == 1.0:
+        return f"{signed(100 * (at - 1.0))} %"
+    return f"{float(f'{at / scale:.3g}'):g} {unit}".replace(" °", "°")
+
+
 def _show(found: CampaignPlan) -> None:
     rows = []
-    for row in found.to_frame().to_dict("records"):
-        at = float(row["seen_from"])
-        unit, scale = UNITS.get(row["unit"], (row["unit"], 1.0))
-        seen = "never" if math.isnan(at) else f"{at / scale:.4g} {unit}".replace(" °", "°")
+    for row, candidate in zip(found.to_frame().to_dict("records"), found.candidates, strict=True):
         like = label_in_words(row["mistaken_for"]) or "-"
-        rows.append([label_in_words(row["effect"]), f"{row['typical_size_sigma']:.1f}", seen, like])
+        rows.append(
+            [
+                label_in_words(row["effect"]),
+                f"{row['typical_size_sigma']:.1f}",
+                _seen_from(float(row["seen_from"]), candidate.parameter),
+                like,
+            ]
+        )
     table("What this campaign could tell", ["effect", "sigma", "seen from", "like"], rows, (0, 3))
     print_line("sigma: standard deviations that the effect is seen with at a typical size; like: what looks the same.")
     blind = [label_in_words(name) for name in found.below_floor]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.common.output import command_output
 from tpjb_ident.cli.common.table_layout import table_lines, wrapped
-from tpjb_ident.runtime.tables import printable
+from tpjb_ident.runtime.tables import printable, readable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -60,7 +60,7 @@ def print_line(text: str) -> None:
 
 def _fitted(text: str, stderr: bool = False) -> str:
     """Lines with whole words on a terminal; as they are in a log, which has no edge, and for who searches messages."""
-    lines = [printable(line) for line in text.split("\n")]
+    lines = [readable(line) for line in text.split("\n")]
     if _console(stderr).is_terminal or ("COLUMNS" in os.environ and not stderr):
         lines = [part for line in lines for part in wrapped(line, width())]
     return "\n".join(lines)
@@ -132,7 +132,7 @@ def table(
     if command_output().silent:
         return
     shown = rows[:MOST_ROWS] if whole else rows
-    lines = table_lines([printable(c) for c in columns], [[printable(c) for c in r] for r in shown], words, width())
+    lines = table_lines([readable(c) for c in columns], [[readable(c) for c in r] for r in shown], words, width())
     for line in ("", printable(title), *lines, ""):
         _console().print(line, markup=False)
     if len(shown) < len(rows):
