@@ -27,6 +27,9 @@ class OperatingPoint:
     shaft_speed: float = 0.0
     excitation: float = 0.0
 
+    def __repr__(self) -> str:
+        return f"<OperatingPoint: {self}>"
+
     def __str__(self) -> str:
         parts = [f"{self.static_load:g} N at {self.static_load_direction_deg:g} deg"]
         parts += [f"shaft {self.shaft_speed_hz:g} Hz"] if self.shaft_speed else ["shaft at rest"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from rigdata.arrays import FloatArray
@@ -37,6 +38,10 @@ class Record:
 
     def __len__(self) -> int:
         return len(self.values)
+
+    def __repr__(self) -> str:
+        towards = "" if self.axis is None else f" at {math.degrees(self.axis):g} deg"
+        return f"<Record {self.name}: {self.quantity}{towards}, {len(self)} samples at {self.rate:g} Hz>"
 
 
 @dataclass(frozen=True)

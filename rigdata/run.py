@@ -74,6 +74,10 @@ class Run:
     excitation_kind: str = "sine"
     band: tuple[float, float] | None = None
 
+    def __repr__(self) -> str:
+        towards = "" if self.pad is None else f", pad #{self.pad}"
+        return f"<Run {self.id}: {self.kind}{towards}, {self.point}>"
+
     @property
     def file(self) -> str:
         """Name of the file, as the user knows it."""

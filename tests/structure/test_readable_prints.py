@@ -51,6 +51,14 @@ def test_positions_and_curves_are_one_line_and_a_table_in_a_notebook():
         assert len(result.to_dataframe())
 
 
+def test_runs_points_and_records_in_the_units_of_a_rig(small_campaign):
+    run = ti.load_campaign(small_campaign).of_kind("dynamic")[0]
+    assert repr(run).startswith(f"<Run {run.id}: dynamic, ")
+    assert repr(run.point) == f"<OperatingPoint: {run.point}>"
+    assert repr(run.record("X1A")).startswith("<Record X1A: displacement at 45 deg, ")
+    assert "1.57" not in repr(run)
+
+
 def test_prediction(rocker_file):
     p = predict(load_bearing(rocker_file), 5000.0, speed=2 * math.pi * 22, thermal="isothermal")
     assert str(p).startswith("5000 N at -90 deg, 22 Hz: shaft at (")

@@ -114,7 +114,8 @@ class Locus(Presented):
 
     def __str__(self) -> str:
         radii = [1e6 * float(np.hypot(*p.position)) for p in self.points]
-        text = f"locus: {len(self.points)} positions, {min(radii):.1f} to {max(radii):.1f} µm from the centre"
+        origin = "probes' zero" if "no-centre" in self.status else "centre"
+        text = f"{len(self.points)} positions, {min(radii):.1f} to {max(radii):.1f} µm from the {origin}"
         return text + (f"; {', '.join(sentences(self.status))}" if self.status else "")
 
 

@@ -61,14 +61,14 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
     if polygon is not None:
         show_clearance(polygon, drawn, source.id)
     if found is not None:
-        print_line(str(found))
+        print_line(f"locus: {found}")
     for condition in polygon.status if polygon is not None else ():  # those of the locus stand in its line
         note_line("note", condition.sentence())
     for sentence in dict.fromkeys([*(c.sentence() for c in static.left_out), *refused]):
         if found is None or sentence not in sentences(found.status):
             note_line("note", sentence)
     for other in others:
-        print_line(str(other))
+        print_line(f"locus: {other}")
     print_line(f"Results: {target}")
     if polygon is None and source.of_kind("clearance"):
         raise NotTrustedError(
