@@ -139,8 +139,11 @@ def update_carrying(setup: Setup, films: list[PadFilm], position: FloatArray, su
 
 
 def _keeps_its_load(setup: Setup, film: PadFilm, inside: float) -> bool:
-    """Whether a pad can go on carrying: near its edge, whether the film would push a small change back."""
-    if inside > 0.0 or inside < -_edge(film) or film.forces is None:
+    """Whether a pad can go on carrying: near its edge, whether the film would push a small change back.
+
+    Friction holds pads where the table of free ones knows no load: there the film decides alone.
+    """
+    if inside > 0.0 or film.forces is None or (inside < -_edge(film) and not setup.friction):
         return inside > 0.0
     return is_stable(setup, film)
 

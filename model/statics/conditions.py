@@ -36,6 +36,7 @@ SINGULAR = Condition("singular", "error", "a Newton step has no solution")
 UNSUPPORTED = Condition(
     "no pads against the load", "error", "no set of pivots can balance the load, wherever the journal goes"
 )
+STICK_AND_SLIP = "friction holds them where their film loses its load, and without load there is no friction"
 FLOW_BACK = Condition(
     "flow back at a leading edge", "warning", "a pressure peak pushes oil back; the heat balance there is limited"
 )
@@ -101,8 +102,8 @@ def left_unloaded(pads: Sequence[int]) -> Condition:
     Condition
     """
     return Condition(
-        f"pads {_listed(pads)} cannot keep their load", "warning", "carrying, they would push the journal off",
-        tuple(pads),
+        f"pads {_listed(pads)} cannot keep their load", "warning",
+        "carrying, they would push the journal off, or friction holds them off", tuple(pads),
     )  # fmt: skip
 
 
@@ -155,8 +156,18 @@ def stick_and_slip(pads: Sequence[int]) -> Condition:
     """
     return Condition(
         f"pads {_listed(pads)} neither stick nor slide at rest", "error",
-        "friction holds them where their film loses its load, and without load there is no friction", tuple(pads),
+        STICK_AND_SLIP, tuple(pads),
     )  # fmt: skip
+
+
+def held_off(status: Sequence[Condition]) -> tuple[int, ...]:
+    """Pads of `stick_and_slip` in a status.
+
+    Parameters
+    ----------
+    status : sequence of Condition
+    """
+    return tuple(pad for c in status if c.detail == STICK_AND_SLIP for pad in c.pads)
 
 
 def never_at_rest(films: Sequence[PadFilm]) -> tuple[Condition, ...]:

@@ -9,7 +9,10 @@ import numpy as np
 
 from model.arrays import FloatArray
 from model.setup import Setup
+from model.statics import conditions
 from model.statics.at_once import able, iterate_at_once
+from model.statics.carrying import let_idle
+from model.statics.compiled.constants import MAX_LOAD_CHANGES
 from model.statics.conditions import HOTTEST_FILM, runaway
 from model.statics.equilibrium import Equilibrium
 from model.statics.heat_paths import couples_heat
@@ -47,6 +50,8 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
     result = _iterated(search, cold=True)
     if not result.converged and couples_heat(setup):
         result = _raise_heat(search, result)
+    if not result.converged and setup.friction:
+        result = _let_held_idle(search, result)
     return result if result.converged else _raise_load(search, result)
 
 
@@ -57,6 +62,22 @@ def _iterated(search: Search, cold: bool) -> Equilibrium:
     if cold:
         search.start_cold()
     return iterate(search)
+
+
+def _let_held_idle(search: Search, failed: Equilibrium) -> Equilibrium:
+    """Let pads idle that friction holds where their film loses its load: they have no other rest."""
+    result = failed
+    for _ in search.films:
+        held = [f for f in search.films if f.number in conditions.held_off(result.status) and not f.idle]
+        if not held:
+            return failed
+        for film in held:
+            let_idle(film)
+            film.load_changes = MAX_LOAD_CHANGES
+        result = iterate(search)
+        if result.converged:
+            return result
+    return failed
 
 
 def _raise_load(search: Search, failed: Equilibrium) -> Equilibrium:

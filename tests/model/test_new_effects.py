@@ -21,6 +21,8 @@ from model.prediction import Prediction
 from model.setup import Setup
 from model.static_tests import dry_curve, polygon_sides
 from model.statics.tilt_hold import friction_limits, rolling_radius, tilt_hold
+from tests.studies.regimes_model import fault, rolling
+from tests.studies.robustness_model import draw
 
 SPEED, OMEGA, LOAD, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, 5000.0, -math.pi / 2
 
@@ -268,3 +270,30 @@ def test_friction_impedance_balances_the_drive():
     assert n[0, 1] == stick
     amplitude = drive[0, 0] / abs(own[0, 0] + n[0, 0])
     assert describing(np.array([amplitude]), stick, slip)[0] == pytest.approx(n[0, 0], rel=1e-6)
+
+
+@pytest.mark.slow
+def test_pads_that_friction_holds_off_their_loaded_attitude_idle():
+    case = draw(2000, 1)[538]
+    p = rolling(case, np.random.default_rng(538))
+    assert "pads 4 cannot keep their load" in p.status
+    assert p.idle_pads == (4,)
+    assert fault(p) == ""
+    # nor is there any tilt at which pad #4 carries: the film's moment is above what friction holds, or below
+    film, missing = p.equilibrium.films[3], []
+    for film.tilt in np.linspace(-1e-3, 2.5e-3, 200):
+        film.solve(p.bearing_position, p.equilibrium.surface_speed, p.setup.bearing.oil)
+        load, moment = film.forces.force * (1.0, -film.pivot_radius)
+        if film.forces.steps > 0 and load > 1.0:
+            missing.append(moment - tilt_hold(p.setup, film.tilt, load).moment)
+    assert len(missing) > 50
+    assert max(missing) < 0.0
+
+
+@pytest.mark.slow
+def test_pads_that_friction_holds_carry_beyond_what_free_ones_do():
+    for number, pads in ((717, (1,)), (879, (1, 4))):
+        p = rolling(draw(2000, 1)[number], np.random.default_rng(number))
+        assert p.converged, p.status
+        assert p.idle_pads == pads
+        assert fault(p) == ""
