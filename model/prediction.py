@@ -167,7 +167,7 @@ class Prediction:
 
     @property
     def axial_tilt(self) -> FloatArray:
-        """Of the pads about the axis across them, their ends at positive z outward (`Options.axial_tilt`); idle ones 0 [rad]."""
+        """Of pads about the axis across them, ends at positive z outward (`Options.axial_tilt`); idle ones 0 [rad]."""
         return np.array([0.0 if f.idle else f.axial_tilt for f in self.equilibrium.films])
 
     @property
