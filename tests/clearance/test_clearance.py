@@ -21,7 +21,7 @@ from rigdata.virtual_rig import (
     VirtualRig,
     write_campaign,
 )
-from tpjb_ident.clearance.measure import coldest_run, measure_clearance, measure_clearances, measure_run
+from tpjb_ident.clearance.measure import coldest_run, measure_clearance, measure_run
 from tpjb_ident.clearance.polygon_pairs import clearance_change, pairs_frame, radial_stiffness
 from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot import fit_pivots
@@ -66,7 +66,7 @@ def whole(tmp_path_factory):
 def measured(whole):
     """Both sweeps, the lighter push first."""
     source, _, curves = whole
-    return measure_clearances(source, ANGLES, curves)
+    return tuple(measure_run(run, ANGLES, curves) for run in source.of_kind("clearance"))
 
 
 def bearing_centre(truth):

@@ -47,7 +47,7 @@ def test_one_campaign(tmp_path, kind):
         assert np.all(error < 4 * curve.relative_stiffness_se(LOADS))
         facts = truth.runs[f"p-{curve.pad}-up"]
         stated = np.radians(facts["load_direction_error_deg"])
-        assert abs(curve.load_direction_offset - stated) < 5 * curve.load_direction.se + 1e-3
+        assert abs(curve.load_direction.angle - stated) < 5 * curve.load_direction.se + 1e-3
         upper = curve.pad in (3, 4)
         assert (curve.onset_load > 0.0) is upper
         assert ("contact-incomplete" in curve.status) is upper

@@ -174,25 +174,6 @@ def measure_clearance(
     return measure_run(coldest_run(runs), pivot_angles, curves, rule)
 
 
-def measure_clearances(
-    campaign: Campaign,
-    pivot_angles: Sequence[float],
-    curves: Sequence[PivotCurve] | None = None,
-    rule: CentreRule = "least-absolute",
-) -> tuple[ClearancePolygon, ...]:
-    """All clearance runs of a campaign (hot and cold, several push loads), each as `measure_clearance`.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    pivot_angles : sequence of float
-        Pad directions [rad], pad #1 first.
-    curves : sequence of PivotCurve, optional
-    rule : CentreRule, optional
-    """
-    return tuple(measure_run(run, pivot_angles, curves, rule) for run in campaign.of_kind("clearance"))
-
-
 def measure_run(
     run: Run,
     pivot_angles: Sequence[float],

@@ -117,11 +117,6 @@ class PivotCurve(Presented):
         """The most likely law with its parameters and covariance."""
         return self.fits[0]
 
-    @property
-    def load_direction_offset(self) -> float:
-        """Angle from the pad to the load [rad]."""
-        return self.load_direction.angle
-
     def deflection(self, load: ArrayLike) -> FloatArray:
         """Deflection [m] at pad loads [N]; same shape as `load`, which must not be negative.
 

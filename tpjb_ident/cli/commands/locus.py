@@ -68,7 +68,7 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
         if found is None or sentence not in sentences(found.status):
             note_line("note", sentence)
     for other in others:
-        print_line(f"locus: {other}")
+        print_line(str(other))
     print_line(f"Results: {target}")
     if polygon is None and source.of_kind("clearance"):
         raise NotTrustedError(
