@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tpjb_ident.view.session import Curve, Session
-from tpjb_ident.view.style import BLUE, GREY, INK, ORANGE, new_plot
+from tpjb_ident.view.style import BLUE, GREY, INK, ORANGE, new_plot, side_by_side
 
 if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.point_result import PointResult
@@ -28,7 +28,7 @@ def model_tab(session: Session) -> Any:
     session : Session
         What the page shows.
     """
-    from bokeh.layouts import column, row
+    from bokeh.layouts import column
     from bokeh.models import Div
 
     load, line, pivots = _controls(session)
@@ -41,7 +41,7 @@ def model_tab(session: Session) -> Any:
     pivots.on_change("active", lambda attr, old, new: follower.later(follower.update, follower.residuals))
     follower.update()
     follower.residuals()
-    return column(row(load, line, pivots), said, row(plots["k"], plots["c"], sizing_mode="stretch_width"), rest,
+    return column(side_by_side(load, line, pivots), said, side_by_side(plots["k"], plots["c"]), rest,
                   sizing_mode="stretch_width")  # fmt: skip
 
 
@@ -141,8 +141,9 @@ def _draw(plot: Any, sources: dict[str, Any]) -> None:
         plot.scatter("x", entry, source=sources["measured"], color=INK, fill_color=colour, size=9,
                      legend_label=f"{entry} measured")  # fmt: skip
     plot.y_range.start = 0
-    plot.legend.location = "bottom_right"
+    plot.add_layout(plot.legend[0], "below")  # covers nothing
     plot.legend.orientation = "horizontal"
+    plot.legend.ncols = 2
     plot.legend.label_text_font_size = "8pt"
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from rigdata.problem import RigDataError
 from rigdata.survey.spectrum import amplitude_spectrum, strongest
-from tpjb_ident.view.style import BLUE, COLOURS, INK, RED, new_plot
+from tpjb_ident.view.style import BLUE, COLOURS, INK, RED, new_plot, side_by_side
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +39,7 @@ def records_tab(campaign: Campaign) -> Any:
     ----------
     campaign : Campaign
     """
-    from bokeh.layouts import column, row
+    from bokeh.layouts import column
     from bokeh.models import ColumnDataSource, Div, MultiSelect, Select
 
     runs = {run.id: run for run in campaign.runs}
@@ -87,9 +87,10 @@ def records_tab(campaign: Campaign) -> Any:
     channel.on_change("value", lambda attr, old, new: update())
     others.on_change("value", lambda attr, old, new: update())
     update()
-    left, right = column(time, spectrum, sizing_mode="stretch_width"), column(orbit, fall, sizing_mode="stretch_width")
-    return column(row(pick, channel, others), facts, row(left, right, sizing_mode="stretch_width"),
-                  sizing_mode="stretch_width")  # fmt: skip
+    left, right = (
+        column(*pair, sizing_mode="stretch_width", min_width=340) for pair in ((time, spectrum), (orbit, fall))
+    )
+    return column(side_by_side(pick, channel, others), facts, side_by_side(left, right), sizing_mode="stretch_width")
 
 
 def show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict[str, Any]) -> str:

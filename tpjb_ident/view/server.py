@@ -12,6 +12,8 @@ from tpjb_ident.view.session import Session
 
 #: The only address that is ever listened on.
 LOOPBACK = "127.0.0.1"
+#: Without it a phone shows the page as wide as a desk's and small.
+VIEWPORT = '{% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">{% endblock %}'
 
 
 class ViewError(TpjbError):
@@ -71,6 +73,7 @@ def build(document: Any, session: Session) -> None:
     from bokeh.layouts import column
     from bokeh.models import Div, TabPanel, Tabs
 
+    document.template = VIEWPORT
     document.title = f"tpjb: {printable(session.name)}"
     panels = []
     if session.campaign is not None and session.campaign.runs:

@@ -77,7 +77,10 @@ def _faults_told(file: str, run: str | None) -> Iterator[None]:
 
 
 #: What HDF5 says of files that people have, in words.
-_PLAIN = {"file signature not found": "it is empty, or of another kind", "truncated file": "it is cut off before its end"}
+_PLAIN = {
+    "file signature not found": "it is empty, or of another kind",
+    "truncated file": "it is cut off before its end",
+}
 
 
 def _first_line(error: BaseException) -> str:
