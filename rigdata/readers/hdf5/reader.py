@@ -76,16 +76,10 @@ def _faults_told(file: str, run: str | None) -> Iterator[None]:
         raise _refuse(file, "", what, "Copy it again from the rig, or check it with h5dump", run) from error
 
 
-#: What HDF5 says of files that people have, in words.
-_PLAIN = {
-    "file signature not found": "it is empty, or of another kind",
-    "truncated file": "it is cut off before its end",
-}
-
-
 def _first_line(error: BaseException) -> str:
     text = str(error).splitlines()[0] if str(error) else type(error).__name__
-    return next((said for mark, said in _PLAIN.items() if mark in text), text[:160])
+    plain = {"signature not found": "it is empty, or of another kind", "truncated file": "it is cut off before its end"}
+    return next((said for mark, said in plain.items() if mark in text), text[:160])
 
 
 def read_texts(path: Path, file: str) -> tuple[str, str]:
