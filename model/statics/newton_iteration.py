@@ -22,7 +22,6 @@ from model.statics.compiled.constants import (
     BOUNDLESS,
     HEAT_PER_FORCE,
     MAX_ITERATIONS,
-    MAX_LOAD_CHANGES,
     NEAR,
     NEAR_HEAT,
     PATIENCE,
@@ -152,9 +151,9 @@ def settled_status(search: Search) -> tuple[Condition, ...]:
     search : Search
     """
     staying, restarting = unloaded_pads(search.films, search.position)
-    if search.setup.friction:  # without friction they would carry
-        held = [f.number for f in search.films if f.number in restarting and f.load_changes >= MAX_LOAD_CHANGES]
-        staying, restarting = sorted(staying + held), [k for k in restarting if k not in held]
+    if search.held:  # without friction they would carry
+        staying = sorted(staying + [k for k in restarting if k in search.held])
+        restarting = [k for k in restarting if k not in search.held]
     if restarting:
         return (conditions.undecided(restarting), conditions.NOT_CONVERGED)
     return (conditions.left_unloaded(staying),) if staying else ()

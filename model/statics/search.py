@@ -54,6 +54,8 @@ class Search:
         Temperature of the journal that the clearances belong to [degC].
     warming : float
         What the present step changes it by [K].
+    held : set of int
+        Numbers of pads that friction holds off their loaded attitude.
     works : FilmWork
         The arrays of all films side by side, with a leading axis for the pad.
     shifts : (n, unknowns) ndarray
@@ -72,6 +74,7 @@ class Search:
     heat: float = 1.0
     warmth: float = field(init=False)
     warming: float = 0.0
+    held: set[int] = field(default_factory=set)
     works: FilmWork = field(init=False)
     shifts: FloatArray = field(init=False)
 

@@ -50,9 +50,12 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
     result = _iterated(search, cold=True)
     if not result.converged and couples_heat(setup):
         result = _raise_heat(search, result)
+    if not result.converged:
+        result = _raise_load(search, result)
     if not result.converged and setup.friction:
-        result = _let_held_idle(search, result)
-    return result if result.converged else _raise_load(search, result)
+        search.lay_out()
+        result = _let_held_idle(search, _iterated(search, cold=True))
+    return result
 
 
 def _iterated(search: Search, cold: bool) -> Equilibrium:
@@ -74,6 +77,7 @@ def _let_held_idle(search: Search, failed: Equilibrium) -> Equilibrium:
         for film in held:
             let_idle(film)
             film.load_changes = MAX_LOAD_CHANGES
+        search.held |= {f.number for f in held}
         result = iterate(search)
         if result.converged:
             return result

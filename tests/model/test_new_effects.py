@@ -297,3 +297,10 @@ def test_pads_that_friction_holds_carry_beyond_what_free_ones_do():
         assert p.converged, p.status
         assert p.idle_pads == pads
         assert fault(p) == ""
+
+
+def test_a_pad_that_carries_under_friction_is_not_let_idle(spherical):
+    friction = Effect("pivot_friction", coefficient=0.1)
+    p = predict(spherical, 8000.0, -1.2, 138.0, effects=[friction])
+    assert p.converged
+    assert p.idle_pads == ()
