@@ -43,9 +43,7 @@ def pad_operators_between(geometry: PadGeometry, density: MeshDensity, even: boo
     convections = tuple(float(h) for h in through * nodes / (1.0 - nodes))
     known = _known(replace(geometry, back_convection=0.0), density, even, convections)
     x = geometry.back_convection / (geometry.back_convection + through)
-    weights = [
-        float(np.prod([(x - other) / (node - other) for other in nodes if other != node])) for node in nodes
-    ]  # fmt: skip
+    weights = [float(np.prod([(x - other) / (node - other) for other in nodes if other != node])) for node in nodes]
     mixed = {
         name: sum(w * getattr(one, name) for w, one in zip(weights, known, strict=True))
         for name in ("expansion", "flux")
