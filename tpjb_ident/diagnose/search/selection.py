@@ -4,35 +4,24 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
-from tpjb_ident.diagnose.forward.candidates import TERMS, Candidate
+from tpjb_ident.diagnose.forward.candidates import TERMS
 from tpjb_ident.diagnose.forward.workers import Map
 from tpjb_ident.diagnose.search.descend import fit
-from tpjb_ident.diagnose.search.fit import Fit, Start, fitted
+from tpjb_ident.diagnose.search.fit import Fit, Start
 from tpjb_ident.diagnose.search.problem import Problem
-from tpjb_ident.diagnose.search.screen import (
-    Columns,
-    Courses,
-    Score,
-    alone,
-    columns,
-    instead,
-    scores,
-    with_model,
-)
+from tpjb_ident.diagnose.search.proposals import ROUNDS_ON_THE_WAY, Proposals, best_of
+from tpjb_ident.diagnose.search.screen import scores, with_model
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.diagnose.search.settle import settle
-from tpjb_ident.diagnose.search.worth import STAND_IN, Worth, worth
+from tpjb_ident.diagnose.search.worth import Worth, worth
 
 Progress = Callable[[str, float], None]
 #: Log evidence [nats] below which two fits of the same candidates are one.
 CLEARLY = 1.0
-#: How often a model takes derivatives of its own while the search goes on.
-ROUNDS_ON_THE_WAY = 2
 #: Candidates of every round that are compared with derivatives of their own.
 FIRST = 3
 #: Of these, the ones that may yet be the best: derivatives from elsewhere mistake a fit by up to 25 nats where it rises
@@ -42,10 +31,6 @@ NEAR, HALF = 30.0, 0.5
 TURNED = 2
 #: Evidence [nats] that no tolerance makes up once an effect is taken away: 45 at the most in all samples.
 HOPELESS = 100.0
-#: Candidates that are fitted since they explain most by themselves, whatever else may be off.
-ALONE = 3
-#: Pairs of candidates that are fitted from the baseline: forward selection can begin with a compromise.
-PAIRS = 2
 #: Candidates that are fitted in the place of every effect.
 RIVALS = 3
 
@@ -59,20 +44,15 @@ class Selection:
     run : Map
     problem : Problem
     settings : DiagnoseSettings
-    drawn : Fit
-        The model as drawn, everything that may be off to first order.
-    first : dict of Candidate to (n, k) ndarray
-        Derivatives of every candidate there.
-    courses : dict of Candidate to Course
+    proposed : Proposals
+        Fits to choose among.
     """
 
     run: Map
     problem: Problem
     settings: DiagnoseSettings
-    drawn: Fit
+    proposed: Proposals
     _nothing: list[Fit]
-    first: Columns
-    courses: Courses
     _known: dict[tuple[int, int], tuple[Fit, Worth]] = field(default_factory=dict, repr=False)
     _less: dict[tuple[int, int], tuple[Fit, Fit | None]] = field(default_factory=dict, repr=False)
     _places: dict[str, Fit] = field(default_factory=dict, repr=False)
@@ -87,30 +67,36 @@ class Selection:
         known = self._places.get(model.label, model) if model.candidates else self.baseline
         return known if known.evidence > model.evidence + CLEARLY else model
 
-    def forward(self, say: Progress) -> tuple[Fit, tuple[Fit, ...]]:
+    def forward(self, say: Progress, afar: bool = False) -> tuple[Fit, tuple[Fit, ...]]:
         """Add what unseen points want, one at a time or two at once; drop what they do not want any more.
 
         Parameters
         ----------
         say : callable
             Called with a text and a share done.
+        afar : bool
+            Whether fits from the drawing that close most of the gap are settled too: a large effect changes what
+            everything else does, and its fit stops on the way until derivatives are its own.
         """
-        model, table = self.baseline, self.first
+        model, table = self.baseline, self.proposed.first
         singles: tuple[Fit, ...] = ()
         count, again = 0, {""}
         while count < self.settings.most_effects:
             say(f"fits, effect {count + 1}", 0.2 + 0.2 * count)
-            tried = self._extended(model, table)
+            tried = self.proposed.extended(model, table)
+            afresh = self.proposed.afresh(self.proposed.drawn, table) if not count else []
             if not count:
-                tried = self._best([*tried, *self._extended(self.drawn, table)])
+                tried = best_of([*tried, *afresh])
             if count == 1:
-                tried = sorted([*tried, *self._pairs(singles)], key=lambda f: -f.evidence)
+                tried = sorted([*tried, *self.proposed.pairs(singles)], key=lambda f: -f.evidence)
             # what may be off acts otherwise beside a large effect, a direction between those of the grid shows not its
             # worth: the likeliest have derivatives and directions of their own
             lead = self._leading(model, tried)
-            near = self.run.together([functools.partial(self.refined, f) for f in lead])
+            near = self.run.together([functools.partial(self.proposed.refined, f) for f in lead])
+            if afar:
+                near += self.proposed.far(near, afresh or self.proposed.afresh(self.proposed.as_drawn(model), table))
             tried = [*near, *(f for f in tried if not any(f is one for one in lead))]
-            singles = singles or tuple(self._best(tried))
+            singles = singles or tuple(best_of(tried))
             chosen = self._chosen(model, tried)
             if chosen is None:
                 likelier = self._likeliest(model)
@@ -119,14 +105,14 @@ class Selection:
                 # one effect more only showed where the others have their place
                 again.add(model.label)
                 model = settle(self.run, self.problem, likelier)
-                table = self._renewed(model)
+                table = self.proposed.renewed(model)
                 continue
-            chosen = chosen if any(chosen is f for f in near) else self.refined(chosen)
+            chosen = chosen if any(chosen is f for f in near) else self.proposed.refined(chosen)
             model = self.backward(settle(self.run, self.problem, chosen))
             if len(model.candidates) <= count:
                 break
-            table = self._renewed(model)
-            count += 1
+            table = self.proposed.renewed(model)
+            count = len(model.candidates)
         return model, singles
 
     def _leading(self, model: Fit, tried: Sequence[Fit]) -> list[Fit]:
@@ -245,7 +231,7 @@ class Selection:
         if model.evidence - max(less.evidence, self.baseline.evidence) > HOPELESS:
             return self.baseline
         # the way from an effect back to nothing may end at a better place than the way from the drawing
-        self._nothing[:] = self._best([self.baseline, settle(self.run, self.problem, less)])[:1]
+        self._nothing[:] = best_of([self.baseline, settle(self.run, self.problem, less)])[:1]
         return self.baseline
 
     def kept(self, model: Fit) -> Fit:
@@ -294,84 +280,6 @@ class Selection:
             model = settle(self.run, self.problem, less)
         return model
 
-    def _extended(self, model: Fit, table: Columns) -> list[Fit]:
-        """Fits of a model with one candidate more, best first."""
-        free = {c: v for c, v in table.items() if c.label not in {o.label for o in model.candidates}}
-        every = scores(self.problem, model, free, courses=self.courses)
-        ranked = self._promising(every)
-        known = {s.candidates for s in ranked}
-        if model is self.drawn:
-            # a fit of a large effect may end on either side of a hill: it begins at both sizes that were proposed
-            first = alone(self.problem, model, free, self.courses)[:ALONE]
-            names = {s.candidates for s in first} - known
-            ranked = [*ranked, *first, *(s for s in every if s.candidates in names)]
-            return self._best(self._fits([with_model(model, s, free, self.courses) for s in ranked]))
-        starts = [with_model(model, s, free, self.courses) for s in ranked]
-        starts += [s for s in instead(self.problem, model, free, STAND_IN) if s.candidates[-1:] not in known]
-        return self._fits(starts)
-
-    def _best(self, fits: Sequence[Fit]) -> list[Fit]:
-        """The better fit of every set of candidates, best first."""
-        kept: dict[str, Fit] = {}
-        for f in sorted(fits, key=lambda f: -f.evidence):
-            kept.setdefault(f.label, f)
-        return list(kept.values())
-
-    def _promising(self, ranked: Sequence[Score]) -> list[Score]:
-        """The best, and the best of every other effect that promises a fair share: a first step can mislead."""
-        chosen = list(ranked[: self.settings.tried])
-        names = {s.candidates[0].name for s in chosen}
-        for s in ranked[self.settings.tried :]:
-            if s.gain > 0.3 * ranked[0].gain and s.candidates[0].name not in names:
-                chosen.append(s)
-                names.add(s.candidates[0].name)
-        # what it is worth is told by the fit
-        return [s for s in chosen if s.gain > 0.0]
-
-    def _pairs(self, singles: Sequence[Fit]) -> list[Fit]:
-        """Fits of two candidates at once from the baseline: what a compromise between two would hide."""
-        table = dict(self.first)
-        for f in singles:  # the secant of a fit tells more than the derivative at the baseline
-            (c,), (a,) = f.candidates, f.amplitudes
-            if len(a) == 1 and abs(a[0] - c.neutral) > 1e-3 * c.step:
-                alone = f.prediction - f.columns @ f.nuisance - self.problem.base
-                table[c] = alone[:, None] / (a[0] - c.neutral)
-        ranked = scores(self.problem, self.drawn, table, pairs=True)[:PAIRS]
-        return self._fits([with_model(self.drawn, s, table) for s in ranked])
-
-    def _fits(self, starts: Sequence[Start]) -> list[Fit]:
-        """Fits from their starts, best first."""
-        found = self.run(fit, [(start,) for start in starts])
-        return sorted((f for f in found if f is not None), key=lambda f: -f.evidence)
-
-    def refined(self, model: Fit) -> Fit:
-        """The same model with directions off their grid and derivatives of its own.
-
-        Parameters
-        ----------
-        model : Fit
-        """
-        swapped = tuple(c.refined() for c in model.candidates)
-        if swapped != model.candidates:
-            parts, amplitudes = [], []
-            for old, new, a, at in zip(model.candidates, swapped, model.amplitudes, model.slices, strict=True):
-                more = len(new.free) - len(old.free) if not new.form else 0
-                parts.append(np.column_stack([model.jacobian[:, at], np.zeros((len(model.prediction), more))]))
-                amplitudes.append(np.append(a, [new.about.get("direction", 0.0)] * more))
-            model = replace(model, candidates=swapped, amplitudes=tuple(amplitudes), jacobian=np.column_stack(parts))
-            start = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
-            model = fitted(self.problem, start, model.prediction, model.assessment.scales)
-        return settle(self.run, self.problem, model, ROUNDS_ON_THE_WAY)
-
-    def _renewed(self, model: Fit) -> dict[Candidate, FloatArray]:
-        """Derivatives at a model: new ones for the candidates that rank best by those of the baseline."""
-        labels = {c.label for c in model.candidates}
-        table = {c: v for c, v in self.first.items() if c.label not in labels}
-        best = [
-            s.candidates[0] for s in scores(self.problem, model, table, courses=self.courses)[: 2 * self.settings.tried]
-        ]
-        return table | columns(self.run, model, best)
-
     def rivals(self, model: Fit, singles: Sequence[Fit]) -> tuple[tuple[Fit, ...], ...]:
         """For every candidate of a model, fits in which another one takes its place.
 
@@ -390,10 +298,12 @@ class Selection:
                 out.append(())
                 continue
             used = {gone.label, *(o.label for o in rest.candidates)}
-            table = {c: v for c, v in self.first.items() if c.label not in used}
-            best = [s for s in scores(self.problem, rest, table, courses=self.courses) if s.gain > 0.0][:RIVALS]
-            found = self._fits([with_model(rest, s, table, self.courses) for s in best])
+            table = {c: v for c, v in self.proposed.first.items() if c.label not in used}
+            best = [s for s in scores(self.problem, rest, table, courses=self.proposed.courses) if s.gain > 0.0][
+                :RIVALS
+            ]
+            found = self.proposed.fits([with_model(rest, s, table, self.proposed.courses) for s in best])
             if gone.name in TERMS:  # an effect that lies off its grid does not do what free numbers do
-                found = self.run.together([functools.partial(self.refined, f) for f in found])
+                found = self.run.together([functools.partial(self.proposed.refined, f) for f in found])
             out.append(tuple(found))
         return tuple(out)
