@@ -18,8 +18,8 @@ from tpjb_ident.diagnose.search.worth import Worth
 
 #: How often another explanation may take the place of one effect of the model.
 SWAPS = 2
-#: Variance of the error beyond what is stated, in stated ones, above which a model is wrong: in a thousand mixtures right
-#: ones need 0.011 of it at the most, those that miss a large effect 0.1 to 70.
+#: Variance of the error beyond what is stated, in stated ones, above which a model is wrong: of the mixtures right ones
+#: need 0.011 at the most, those that miss a large effect 0.1 to 70.
 WRONG = 0.05
 
 
