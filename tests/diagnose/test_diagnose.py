@@ -21,6 +21,7 @@ from tpjb_ident.diagnose.observations.gap import gap, residuals
 from tpjb_ident.diagnose.observations.layout import Layout
 from tpjb_ident.diagnose.plan.plan import plan
 from tpjb_ident.diagnose.plan.planned import around, dry, dynamic, planned_observations
+from tpjb_ident.diagnose.search.selection import Selection
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.diagnose.verdict.localise import localise
 
@@ -215,3 +216,24 @@ def test_a_direction_between_those_of_the_grid_is_named_where_a_generic_term_lea
     assert found.name == "structure_compliance"
     assert found.parameters["direction"].value == pytest.approx(math.radians(20.0), abs=0.02)
     assert found.parameters["stiffness"].lo < 5e8 < found.parameters["stiffness"].hi
+
+
+@pytest.mark.slow
+def test_what_a_search_leaves_wrong_is_sought_from_the_drawing(setup, observations, monkeypatch):
+    forward = Selection.forward
+    asked = []
+
+    def stuck_at_first(self, say, afar=False):
+        asked.append(afar)
+        return forward(self, say, afar) if afar else (self.baseline, ())
+
+    monkeypatch.setattr(Selection, "forward", stuck_at_first)
+    given = campaign(observations, setup, [Effect("thermal_growth", clearance_change=-12e-6)], 7)
+    (found,) = diagnose(given, setup, few()).verdict.effects
+    assert found.name == "thermal_growth"
+    assert found.parameters["clearance_change"].value == pytest.approx(-12e-6, abs=0.3e-6)
+    assert asked == [False, True]
+    # nothing is sought where nothing is wrong
+    asked.clear()
+    assert not diagnose(campaign(observations, setup, (), 8), setup, few()).verdict.effects
+    assert asked == [False]
