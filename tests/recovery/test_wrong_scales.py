@@ -88,7 +88,7 @@ def test_a_clearance_of_a_tenth_of_the_drawing_s_is_an_error_of_the_check(tmp_pa
     source = campaign(tmp_path, gain("X1*", 0.1), plan=SWEEP)
     out = tpjb("check", source.path, "--out", tmp_path / "o")
     assert out.exit_code == 2
-    assert "the bearing file says 80 um" in out.output.replace("\n", " ")
+    assert "the bearing file says 80 µm" in " ".join(out.output.split())
 
 
 @pytest.mark.parametrize("axes", [(np.pi / 4, 3 * np.pi / 4), (0.3, 1.2)])
