@@ -6,6 +6,7 @@ the numerical packages (checked), one thread each, and see the data under the sa
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -58,7 +59,9 @@ def dask_workers(address: str, patience: float = PATIENCE) -> Iterator[Workers]:
         ) from error
     with client:
         count = _checked(client, address, patience)
-        pool = PoolWorkers(client.get_executor, count, alive=lambda: bool(client.scheduler_info()["workers"]))
+        # pure: a job is known by a hash of all that it is given, which took longer here than the job did there
+        opened = functools.partial(client.get_executor, pure=False)
+        pool = PoolWorkers(opened, count, alive=lambda: bool(client.scheduler_info()["workers"]))
         try:
             yield pool
         finally:
