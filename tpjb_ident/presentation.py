@@ -59,17 +59,11 @@ class Presented:
 
     def _repr_html_(self) -> str:
         sentences = "".join(f"<p>{html.escape(line)}</p>" for line in self.summary().splitlines())
-        return f"{sentences}{in_display_units(self.to_dataframe()).to_html(index=False, max_rows=MOST_ROWS)}"
+        return f"{sentences}{_in_display_units(self.to_dataframe()).to_html(index=False, max_rows=MOST_ROWS)}"
 
 
-def in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
-    """A table in MN/m, kN s/m, kN and µm to four digits; of coefficients without the columns that only scripts want.
-
-    Parameters
-    ----------
-    frame : DataFrame
-        SI, as the tables on disk.
-    """
+def _in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
+    """A table in MN/m, kN s/m, kN and µm to four digits; of coefficients without the columns that only scripts want."""
     import pandas as pd
 
     wanted = [name for name in frame.columns if _FOR_PEOPLE.fullmatch(name)]

@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 
 from tests.command_line import tpjb
 from tpjb_ident.cli.app import app
-from tpjb_ident.cli.common.examples import EXAMPLES
-from tpjb_ident.cli.common.sparkline import BARS, sparkline
+from tpjb_ident.cli.commands.show import BARS, sparkline
+from tpjb_ident.cli.common.registration import EXAMPLES
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from tpjb_ident.report.coefficient_panels import coefficient_panels
 from tpjb_ident.report.drawing.series import longest_series
-from tpjb_ident.report.position_panels import position_panels
+from tpjb_ident.report.panels import coefficient_panels, position_panels
 
 NAMES = [f"{s}{e}_{u}" for s, u in (("k", "N_per_m"), ("c", "Ns_per_m")) for e in ("xx", "xy", "yx", "yy")]
 

@@ -113,15 +113,8 @@ def worth_a_diagnosis(found: tuple[Deviation, ...]) -> bool:
     return any(abs(d.median) > OFF and d.inside <= 0.5 * d.n for d in own)
 
 
-def verdict_sentence(comparison: Comparison, found: tuple[Deviation, ...]) -> str:
-    """Say in one sentence what to conclude.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    found : tuple of Deviation
-        Of it.
-    """
+def _verdict_sentence(comparison: Comparison, found: tuple[Deviation, ...]) -> str:
+    """Say in one sentence what to conclude."""
     name, best = comparison.campaign.id, closest(found)
     if best is None:
         return f"{name}: no coefficient could be compared; see the quality flags."
@@ -137,13 +130,8 @@ def verdict_sentence(comparison: Comparison, found: tuple[Deviation, ...]) -> st
     return f"{name}: prediction and measurement {agrees} with {PIVOTS_IN_WORDS[best]}."
 
 
-def effects_sentences(comparison: Comparison) -> tuple[str, ...]:
-    """Say that effects took part, and what that means for the agreement.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    """
+def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
+    """Say that effects took part, and what that means for the agreement."""
     effects = comparison.settings.effects
     if not effects:
         return ()
@@ -187,7 +175,7 @@ def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None)
         for v in comparison.variants
         if v.name != best
     ]
-    sentences[:0] = [verdict_sentence(comparison, found), *effects_sentences(comparison)]
+    sentences[:0] = [_verdict_sentence(comparison, found), *_effects_sentences(comparison)]
     sentences += _pivot_sentence(comparison) + _clearance_sentence(comparison) + _locus_sentence(comparison)
     return (*sentences, *comparison.remarks)
 

@@ -152,7 +152,7 @@ def diagnose_campaign(
     """
     settings = settings or DiagnoseSettings()
     measured = measure_campaign(campaign, bearing, settings.tolerances, progress, estimator)
-    return diagnose_measured(measured, bearing, baseline, settings, progress)
+    return _diagnose_measured(measured, bearing, baseline, settings, progress)
 
 
 def measure_campaign(
@@ -187,13 +187,13 @@ def measure_campaign(
     curves, polygon, locus = static.curves, static.clearance, static.locus
     found = replace(found, conditions=found.conditions + static.left_out)
     housing = with_housing(Setup(bearing, pivot_laws("rigid", bearing)), campaign).instruments
-    certain = stated_tolerances(campaign, bearing, known or Tolerances())
+    certain = _stated_tolerances(campaign, bearing, known or Tolerances())
     if polygon is None and locus is not None:
         certain = replace(certain, centre=unknown_centre(locus))
-    return Measured(found, tuple(curves), polygon, locus, housing, certain, sensor_positions(campaign, bearing))
+    return Measured(found, tuple(curves), polygon, locus, housing, certain, _sensor_positions(campaign, bearing))
 
 
-def diagnose_measured(
+def _diagnose_measured(
     measured: Measured,
     bearing: Bearing,
     baseline: Baseline | None = None,
@@ -201,16 +201,7 @@ def diagnose_measured(
     progress: Callable[[str, int, int], None] | None = None,
     memory: Memory | None = None,
 ) -> CampaignDiagnosis:
-    """Find what the model of an identified campaign lacks.
-
-    Parameters
-    ----------
-    measured : Measured
-    bearing, baseline, settings, progress
-        As of `diagnose_campaign`; the tolerances are those of `measured`.
-    memory : Memory, optional
-        Answers of the model at this bearing's baseline, known from before.
-    """
+    """Find what the model of an identified campaign lacks."""
     baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
     settings = replace(settings, tolerances=measured.tolerances)
     tell = progress or (lambda text, done, total: None)
@@ -277,18 +268,8 @@ def unknown_centre(locus: Locus) -> float:
     return max(1e-3, 3.0 * max(math.hypot(*p.position) for p in locus.points))
 
 
-def stated_tolerances(campaign: Campaign, bearing: Bearing, known: Tolerances) -> Tolerances:
-    """Tolerances by the weight of their source: command line, bearing file, manifest, defaults.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        Its manifest may state uncertainties of probes and cells.
-    bearing : Bearing
-        Its file may have ``[tolerances]``.
-    known : Tolerances
-        Defaults, and what the command line states.
-    """
+def _stated_tolerances(campaign: Campaign, bearing: Bearing, known: Tolerances) -> Tolerances:
+    """Tolerances by the weight of their source: command line, bearing file, manifest, defaults."""
     found = known.layered(bearing)
     probes = [c for c in campaign.channels.values() if c.quantity == "displacement" and c.axis is not None]
     cells = [c for c in campaign.channels.values() if c.quantity == "force" and c.uncertainty]
@@ -303,16 +284,8 @@ def stated_tolerances(campaign: Campaign, bearing: Bearing, known: Tolerances) -
     return found
 
 
-def sensor_positions(campaign: Campaign, bearing: Bearing) -> tuple[float, ...]:
-    """Fraction of the arc at which every pad carries its thermometer, as the manifest states it; else 0.75.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        The campaign that is diagnosed.
-    bearing : Bearing
-        As drawn.
-    """
+def _sensor_positions(campaign: Campaign, bearing: Bearing) -> tuple[float, ...]:
+    """Fraction of the arc at which every pad carries its thermometer, as the manifest states it; else 0.75."""
     given = {int(c.pad): float(c.position) for c in campaign.channels.values()
              if c.quantity == "temperature" and c.pad is not None and c.position is not None}  # fmt: skip
     return tuple(given.get(k, SENSOR) for k in range(1, len(bearing.pads) + 1))

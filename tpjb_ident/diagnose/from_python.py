@@ -78,7 +78,7 @@ def diagnose(
     """
     opened = as_campaign(campaign, "campaign")
     chosen = settings or DiagnoseSettings()
-    return diagnose_campaign(opened, bearing_of(opened, bearing), Baseline(pivots, thermal, tuple(effects)), chosen)
+    return diagnose_campaign(opened, _bearing_of(opened, bearing), Baseline(pivots, thermal, tuple(effects)), chosen)
 
 
 def plan(
@@ -191,19 +191,8 @@ def planned_layout(bearing: Bearing, points: Sequence[OperatingPoint], static: t
     )
 
 
-def bearing_of(campaign: Campaign, given: Bearing | str | Path | None) -> Bearing:
-    """The bearing given, or the one that a campaign carries.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    given : Bearing, str, Path or None
-
-    Raises
-    ------
-    ArgumentError
-        Neither is there.
-    """
+def _bearing_of(campaign: Campaign, given: Bearing | str | Path | None) -> Bearing:
+    """The bearing given, or the one that a campaign carries."""
     if given is not None:
         return as_bearing(given)
     if not campaign.bearing_text:

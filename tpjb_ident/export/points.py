@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tpjb_ident.arrays import BoolArray, FloatArray
+from tpjb_ident.condition_kinds import ERRORS
 from tpjb_ident.export.errors import ExportError
-from tpjb_ident.export.trust import doubts
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, STATIC_COLUMNS
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_COLUMNS, coefficient_column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -151,3 +152,33 @@ def _with_doubts(quality: object, doubts: str) -> str:
 
 def _numbers(table: pd.DataFrame, column: str) -> FloatArray:
     return table[column].to_numpy(dtype=float) if column in table else np.full(len(table), np.nan)
+
+
+def doubts(row: Mapping[str, Any]) -> str:
+    """Say why a row of coefficients is not to be trusted.
+
+    A film's direct stiffness and damping are positive by the sign convention of CONTRIBUTING; a wrong polarity of a
+    probe or cell turns the sign of one or of all of them.
+
+    Parameters
+    ----------
+    row : mapping of str to value
+        A row of coefficients.csv or prediction.csv.
+
+    Returns
+    -------
+    str
+        Empty if nothing forbids trust.
+    """
+    quality = row.get("quality")
+    found = [name for name in quality.split("; ") if name in ERRORS] if isinstance(quality, str) else []
+    if row.get("converged") is False or str(row.get("converged")) == "False":
+        found.append("the model did not converge")
+    for name in ("kxx", "kyy", "cxx", "cyy"):
+        column = coefficient_column(name)
+        value, high = float(row[column]), float(row.get(f"{column}_hi", math.nan))
+        kind = KINDS[name[0]]
+        if (high if math.isfinite(high) else value) < 0:
+            size = f"{value / kind.display_scale:.4g} {kind.display_unit}"
+            found.append(f"{name} is negative ({size}): check polarity and axes of probes and cells")
+    return "; ".join(found)

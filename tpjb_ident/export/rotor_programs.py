@@ -97,16 +97,8 @@ def _rows(table: SpeedTable) -> Iterator[tuple[float, FloatArray, FloatArray]]:
     yield from zip(60.0 * table.speed, table.k, table.c, strict=True)
 
 
-def xltrc_text(table: SpeedTable, source: str) -> str:
-    """Tab-separated table in the order of XLTRC's user-defined bearing sheet: paste it below the sheet's head.
-
-    Parameters
-    ----------
-    table : SpeedTable
-        Of one load and frequency.
-    source : str
-        Where the coefficients come from.
-    """
+def _xltrc_text(table: SpeedTable, source: str) -> str:
+    """Tab-separated table in the order of XLTRC's user-defined bearing sheet: paste it below the sheet's head."""
     names = [f"{kind}{e}" for kind in "KC" for e in ENTRIES]
     head = "\t".join(["Speed (rpm)", *(f"{n} ({'N/m' if n[0] == 'K' else 'N-s/m'})" for n in names)])
     lines = [f"* {_one_line(source)}", f"* {table.words}; SI units", f"* 95 % intervals and flags: {INTERVALS}"]
@@ -116,31 +108,15 @@ def xltrc_text(table: SpeedTable, source: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def dyrobes_text(table: SpeedTable, source: str) -> str:
-    """External bearing file of Dyrobes: points, unit system 4 (N, m, s), 8 coefficients, then one line per speed.
-
-    Parameters
-    ----------
-    table : SpeedTable
-        Of one load and frequency.
-    source : str
-        Where the coefficients come from.
-    """
+def _dyrobes_text(table: SpeedTable, source: str) -> str:
+    """External bearing file of Dyrobes: points, unit system 4 (N, m, s), 8 coefficients, then one line per speed."""
     lines = [f"{len(table.speed)}, 4, 8, 0, 0, 0, 0   {_one_line(source)}; {table.words}{_appendix(table)}"]
     lines += [", ".join([f"{rpm:.6g}", *(f"{v:.8e}" for v in (*k, *c))]) for rpm, k, c in _rows(table)]
     return "\n".join(lines) + "\n"
 
 
-def ansys_text(table: SpeedTable, source: str) -> str:
-    """File that ANSYS reads for COMBI214: titles, count and unit keys (0: SI; 1: rpm to rad/s), K and C by speed.
-
-    Parameters
-    ----------
-    table : SpeedTable
-        Of one load and frequency.
-    source : str
-        Where the coefficients come from.
-    """
+def _ansys_text(table: SpeedTable, source: str) -> str:
+    """File that ANSYS reads for COMBI214: titles, count and unit keys (0: SI; 1: rpm to rad/s), K and C by speed."""
     third = table.warning or f"K11 .. K22, C11 .. C22 in N/m, N s/m; intervals: {INTERVALS}"
     lines = [_one_line(source)[:80], table.words[:80], third[:80]]
     lines.append(f"{len(table.speed):10d}{0:10d}{1:10d}")
@@ -169,7 +145,7 @@ def write_xltrc(folder: Path, points: tuple[StaticPoint, ...], source: str) -> N
         Where the coefficients come from.
     """
     for table in speed_tables(points):
-        write_text(folder / f"xltrc_{table.name}.txt", xltrc_text(table, source))
+        write_text(folder / f"xltrc_{table.name}.txt", _xltrc_text(table, source))
 
 
 def write_dyrobes(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
@@ -183,7 +159,7 @@ def write_dyrobes(folder: Path, points: tuple[StaticPoint, ...], source: str) ->
         Where the coefficients come from.
     """
     for table in speed_tables(points):
-        write_text(folder / f"dyrobes_{table.name}.txt", dyrobes_text(table, source))
+        write_text(folder / f"dyrobes_{table.name}.txt", _dyrobes_text(table, source))
 
 
 def write_ansys(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
@@ -197,4 +173,4 @@ def write_ansys(folder: Path, points: tuple[StaticPoint, ...], source: str) -> N
         Where the coefficients come from.
     """
     for table in speed_tables(points):
-        write_text(folder / f"ansys_{table.name}.txt", ansys_text(table, source))
+        write_text(folder / f"ansys_{table.name}.txt", _ansys_text(table, source))

@@ -15,7 +15,6 @@ from tpjb_ident.compare.pivot_formula import printed_formula
 from tpjb_ident.compare.positions import predicted_locus
 from tpjb_ident.compare.summary import Deviation, deviations, summary_sentences
 from tpjb_ident.compare.tables import comparison_frame
-from tpjb_ident.report.coefficient_panels import coefficient_panels
 from tpjb_ident.report.comparison_tables import (
     clearance_table,
     flag_table,
@@ -27,8 +26,7 @@ from tpjb_ident.report.drawing.colours import VARIANT_LABEL
 from tpjb_ident.report.figure import Panel, save_panels
 from tpjb_ident.report.laboratory_sections import budget_table, evidence_section, set_up_section
 from tpjb_ident.report.page import Page, Section, Table, render_page
-from tpjb_ident.report.pivot_panels import pivot_panels
-from tpjb_ident.report.position_panels import position_panels
+from tpjb_ident.report.panels import coefficient_panels, pivot_panels, position_panels
 from tpjb_ident.rounding import percent
 from tpjb_ident.runtime.tables import write_text
 

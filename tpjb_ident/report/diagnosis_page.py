@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from tpjb_ident.effect_words import WORDS, finding
-from tpjb_ident.report.coefficient_panels import coefficient_panels
+from tpjb_ident.effect_words import UNITS, WORDS, finding, label_in_words
 from tpjb_ident.report.diagnosis_coefficients import before_and_after, median_deviations
-from tpjb_ident.report.diagnosis_evidence import evidence_sections
-from tpjb_ident.report.diagnosis_panels import GROUP, diagnosis_panels
 from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_rows, place, verdict_sentences
-from tpjb_ident.report.figure import Panel, save_panels
+from tpjb_ident.report.figure import Panel, panel, save_panels
 from tpjb_ident.report.page import Page, Section, Table, render_page
+from tpjb_ident.report.panels import coefficient_panels
+from tpjb_ident.report.plots.gap import gap
+from tpjb_ident.report.plots.residual_map import residual_map
+from tpjb_ident.report.plots.residual_series import residual_series
+from tpjb_ident.report.plots.residual_table import residual_frame
+from tpjb_ident.rounding import signed
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
@@ -23,7 +26,8 @@ if TYPE_CHECKING:
 
     from rigdata.campaign import Campaign
     from tpjb_ident.diagnose.campaign import CampaignDiagnosis
-    from tpjb_ident.diagnose.verdict.verdict import Verdict
+    from tpjb_ident.diagnose.diagnose import Diagnosis
+    from tpjb_ident.diagnose.verdict.verdict import Assumption, Verdict
 
 #: The gaps of a verdict in words; each is another question.
 GAPS = {
@@ -34,6 +38,11 @@ GAPS = {
     "within_tolerances": "points that no fit has seen, clearances, oil, sensors, .. free within their tolerances too",
     "noise_floor": "what noise alone would leave",
 }
+GROUP = "Where model and measurement part"
+OVER: tuple[tuple[Literal["load", "frequency"], str, str], ...] = (
+    ("load", "residuals-load", "Residuals over static load, the coefficients that disagree most"),
+    ("frequency", "residuals-excitation", "Residuals over excitation frequency, the same coefficients"),
+)
 
 
 def write_diagnosis_report(
@@ -172,7 +181,7 @@ def _sections(result: CampaignDiagnosis, table: pd.DataFrame) -> list[Section]:
         Section(
             GROUP,
             notes=[note],
-            panels=diagnosis_panels(result.diagnosis),
+            panels=_diagnosis_panels(result.diagnosis),
             tables=[
                 Table(
                     "Largest shares of the squared gap",
@@ -183,7 +192,7 @@ def _sections(result: CampaignDiagnosis, table: pd.DataFrame) -> list[Section]:
             ],
         )
     )
-    sections += evidence_sections(verdict)
+    sections += _evidence_sections(verdict)
     if tried:
         text = "Log evidence above the baseline's, in nats, everything that may be off left free within its tolerance."
         columns = ["explanation", "log evidence", "held-out gap"]
@@ -191,3 +200,55 @@ def _sections(result: CampaignDiagnosis, table: pd.DataFrame) -> list[Section]:
     if verdict.effects:
         sections.append(Section("The gap", tables=[_gap_table(verdict)]))
     return sections
+
+
+def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
+    """Draw the residuals over load, over frequency and as a map, and the gap by observable, before and after."""
+    panels = []
+    frame = residual_frame(diagnosis)
+    for over, name, title in OVER:
+        try:
+            panels.append(panel(name, title, residual_series(frame, over), GROUP))
+        except ValueError:  # nothing varies over it
+            continue
+    if len(frame):
+        panels.append(panel("residual-map", "Residuals of every coefficient and point", residual_map(frame), GROUP))
+    title = "Gap by observable, held-out points where there are any (* fitted points)"
+    return [*panels, panel("gap-by-observable", title, gap(diagnosis.verdict, logarithmic=False), GROUP)]
+
+
+def _evidence_sections(verdict: Verdict) -> list[Section]:
+    """Sections of the report; those for which a diagnosis holds nothing are left out."""
+    out = [Section("What is left", _left_sentences(verdict))]
+    if verdict.assumptions:
+        note = (
+            "One standard deviation each. They are free within these in every fit and part of every interval; the last "
+            "column is what the fit made of them. That of the model is what the campaign turned out to need."
+        )
+        columns = ["tolerance", "stated", "source", "fitted"]
+        rows = [_row(a) for a in verdict.assumptions]
+        table = Table("Stated tolerances", columns, rows, frozenset({0, 2, 3}))
+        out.append(Section("What may be off", [note], tables=[table]))
+    return out
+
+
+def _left_sentences(verdict: Verdict) -> list[str]:
+    """Say what is left on unseen points, what it behaves like, and what drifts."""
+    left = verdict.remainder
+    out = [
+        "On points that no fit has seen, with all that has a tolerance free within it, "
+        f"{left.sigma:.2f} sigma are left: {100 * left.share:.1f} % of the squared gap above noise, most in "
+        f"{in_words(left.where)}; against noise and stated tolerances p = {left.p:.2g}."
+    ]
+    out += [f"The rest behaves like {b.words} (within {100 * b.spread:.0f} %)." for b in verdict.behaves_like]
+    out += [f"{label_in_words(d.effect)}: its {label_in_words(d.parameter)} {d.words}, from {d.start:.3g} to "
+            f"{d.end:.3g}." for d in verdict.drift]  # fmt: skip
+    return out
+
+
+def _row(one: Assumption) -> list[str]:
+    """A tolerance in the units that people read; a ratio in per cent."""
+    values: Sequence[float] = one.fitted if isinstance(one.fitted, list) else [one.fitted]
+    unit, scale = UNITS.get(one.unit, (one.unit, 1.0))
+    fitted = ", ".join(signed(v / scale) for v in values)
+    return [label_in_words(one.name), f"{one.stated / scale:.3g} {unit}", one.source, f"{fitted} {unit}"]

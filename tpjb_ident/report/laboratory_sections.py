@@ -50,20 +50,19 @@ def set_up_section(comparison: Comparison) -> Section:
     """
     campaign = comparison.campaign
     if isinstance(campaign, TableSource):
-        return Section("Set-up", tables=[bearing_table(comparison)])
+        return Section("Set-up", tables=[_bearing_table(comparison)])
     return Section(
         "Set-up",
-        tables=[sensor_table(tuple(campaign.channels.values())), bearing_table(comparison), run_matrix(campaign.runs)],
+        tables=[
+            _sensor_table(tuple(campaign.channels.values())),
+            _bearing_table(comparison),
+            _run_matrix(campaign.runs),
+        ],
     )
 
 
-def sensor_table(channels: Sequence[Channel]) -> Table:
-    """Channels with their calibration.
-
-    Parameters
-    ----------
-    channels : sequence of Channel
-    """
+def _sensor_table(channels: Sequence[Channel]) -> Table:
+    """Channels with their calibration."""
     rows = []
     for one in channels:
         if one.quantity not in SENSITIVITY:
@@ -77,13 +76,8 @@ def sensor_table(channels: Sequence[Channel]) -> Table:
     return Table("Sensors", columns, rows, frozenset({0, 1, 2, 3}))
 
 
-def bearing_table(comparison: Comparison) -> Table:
-    """Geometry of the bearing, its pivots and its oil, as the bearing file states them.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    """
+def _bearing_table(comparison: Comparison) -> Table:
+    """Geometry of the bearing, its pivots and its oil, as the bearing file states them."""
     bearing = comparison.bearing
     pad, oil = bearing.pads[0], bearing.oil
     rows = [
@@ -101,13 +95,8 @@ def bearing_table(comparison: Comparison) -> Table:
     return Table("Bearing and oil", ["", "as stated"], rows, frozenset({0, 1}))
 
 
-def run_matrix(runs: Sequence[Run]) -> Table:
-    """Operating points with their number of runs.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-    """
+def _run_matrix(runs: Sequence[Run]) -> Table:
+    """Operating points with their number of runs."""
     counted: dict[tuple[str, ...], int] = {}
     for run in runs:
         p = run.point

@@ -107,7 +107,7 @@ def _sections(snapshot: Snapshot) -> list[Section]:
     measured = snapshot.measured
     if measured.points or measured.refusals:
         note = "From the good runs so far. They change while runs come in; tpjb identify has the last word."
-        tables = [points_table(measured.points)] if measured.points else []
+        tables = [_points_table(measured.points)] if measured.points else []
         panels = _panels(snapshot)
         sections.append(Section("Stiffness and damping so far", [note, *measured.refusals], panels, tables))
     if measured.curves:
@@ -119,7 +119,7 @@ def _sections(snapshot: Snapshot) -> list[Section]:
         rows = [[f"#{i + 1}", with_interval(c[i], c[i] - 1.96 * se[i], c[i] + 1.96 * se[i])] for i in range(len(c))]
         table = Table("Assembled clearance by pad, from the sweep", ["pad", "\N{MICRO SIGN}m"], rows)
         sections.append(Section("Clearance", tables=[table]))
-    sections.append(Section("Records", tables=[records_table(snapshot)]))
+    sections.append(Section("Records", tables=[_records_table(snapshot)]))
     waiting = [s for s in snapshot.states if s.state in ("to run", "being written")]
     if waiting:
         rows = [[s.run.id, s.run.kind, described(s.run), s.run.file] for s in waiting]
@@ -151,13 +151,8 @@ def _panels(snapshot: Snapshot) -> list[Panel]:
     return panels
 
 
-def points_table(points: tuple[PointResult, ...]) -> Table:
-    """K and C of every point so far, with intervals and flags.
-
-    Parameters
-    ----------
-    points : tuple of PointResult
-    """
+def _points_table(points: tuple[PointResult, ...]) -> Table:
+    """K and C of every point so far, with intervals and flags."""
     rows = []
     for p in points:
         half, omega = p.stiffness.half_width(), p.stiffness.omega
@@ -172,13 +167,8 @@ def points_table(points: tuple[PointResult, ...]) -> Table:
     return Table("Direct coefficients so far, 95 % intervals", columns, rows, frozenset({7}))
 
 
-def records_table(snapshot: Snapshot) -> Table:
-    """Records that have landed, the newest first.
-
-    Parameters
-    ----------
-    snapshot : Snapshot
-    """
+def _records_table(snapshot: Snapshot) -> Table:
+    """Records that have landed, the newest first."""
     why = {one.run.id: one.why for one in snapshot.placed if one.run is not None}
     landed = sorted((s for s in snapshot.states if s.landed), key=lambda s: s.landed, reverse=True)
     rows = []

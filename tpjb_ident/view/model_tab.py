@@ -112,12 +112,12 @@ class _Follower:
         near = [p for p in self.points if abs(p.point.static_load / (1e3 * load) - 1.0) < _NEAR]
         for part, (_, scale) in PARTS.items():
             _fill(self.sources[part], scale * getattr(got, part), got.frequency, line)
-            self.sources[part]["measured"].data = measured_columns(near, part, scale)
+            self.sources[part]["measured"].data = _measured_columns(near, part, scale)
         self.said.text = describe(got, line, load, name, len(near))
 
     def residuals(self) -> None:
         """Show all points against the chosen pivots."""
-        self.residual.data = residual_columns(self.session, self.session.pivots[self.pivots.active])
+        self.residual.data = _residual_columns(self.session, self.session.pivots[self.pivots.active])
 
     def later(self, *tasks: Callable[[], None]) -> None:
         """Let a moving slider outrun the model: only its last place counts."""
@@ -154,18 +154,8 @@ def _fill(sources: dict[str, Any], table: np.ndarray, frequency: np.ndarray, lin
     sources["here"].data = {"x": [line], **at}
 
 
-def measured_columns(points: list[PointResult], part: str, scale: float) -> dict[str, list[float]]:
-    """Measured direct coefficients of the points at a load, over their excitation.
-
-    Parameters
-    ----------
-    points : list of PointResult
-        At the load that is shown.
-    part : str
-        "k" or "c".
-    scale : float
-        Size in SI of the unit that is shown.
-    """
+def _measured_columns(points: list[PointResult], part: str, scale: float) -> dict[str, list[float]]:
+    """Measured direct coefficients of the points at a load, over their excitation."""
     tables = [p.stiffness.k if part == "k" else p.stiffness.c for p in points]
     return {
         "x": [p.point.excitation_hz for p in points],
@@ -201,16 +191,8 @@ def describe(curve: Curve, line: float, load: float, pivots: str, measured: int)
     return f"{load:g} kN, {line:g} Hz, {pivots} pivots: {numbers}; {points} at this load."
 
 
-def residual_columns(session: Session, pivots: str) -> dict[str, list[float]]:
-    """Predicted / measured - 1 in per cent, of the direct coefficients at every point.
-
-    Parameters
-    ----------
-    session : Session
-        What the page shows.
-    pivots : str
-        Of the model.
-    """
+def _residual_columns(session: Session, pivots: str) -> dict[str, list[float]]:
+    """Predicted / measured - 1 in per cent, of the direct coefficients at every point."""
     found = session.identification
     assert found is not None
     assert session.predict is not None

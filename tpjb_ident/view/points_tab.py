@@ -40,24 +40,19 @@ def points_tab(found: Identification) -> Any:
 
     def update() -> None:
         point = named[pick.value]
-        numbers.data = coefficient_rows(point)
-        windows.data = window_rows(point)
+        numbers.data = _coefficient_rows(point)
+        windows.data = _window_rows(point)
         plot.title.text = f"robust weight of {point.n_windows} windows; flags: " + (
             ", ".join(str(q) for q in point.quality) or "none"
         )
 
     pick.on_change("value", lambda attr, old, new: update())
     update()
-    return column(pick, table, plot, stiffness_plot(found), sizing_mode="stretch_width")
+    return column(pick, table, plot, _stiffness_plot(found), sizing_mode="stretch_width")
 
 
-def stiffness_plot(found: Identification) -> Any:
-    """Direct stiffness of all points over load, with 95 % intervals as bars.
-
-    Parameters
-    ----------
-    found : Identification
-    """
+def _stiffness_plot(found: Identification) -> Any:
+    """Direct stiffness of all points over load, with 95 % intervals as bars."""
     from bokeh.models import ColumnDataSource, Whisker
 
     plot = new_plot("direct stiffness, 95 % intervals", "static load, kN", "stiffness, MN/m", name="stiffness-plot")
@@ -91,13 +86,8 @@ def label(p: PointResult) -> str:
     )
 
 
-def coefficient_rows(p: PointResult) -> dict[str, list[str]]:
-    """Columns of the table: eight coefficients with half their intervals.
-
-    Parameters
-    ----------
-    p : PointResult
-    """
+def _coefficient_rows(p: PointResult) -> dict[str, list[str]]:
+    """Columns of the table: eight coefficients with half their intervals."""
     half, omega = p.stiffness.half_width(), p.stiffness.omega
     rows: dict[str, list[str]] = {"coefficient": [], "value": [], "interval": [], "unit": []}
     for i, name in enumerate(("kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy")):
@@ -109,13 +99,8 @@ def coefficient_rows(p: PointResult) -> dict[str, list[str]]:
     return rows
 
 
-def window_rows(p: PointResult) -> dict[str, list[Any]]:
-    """Columns of the plot: weight of each window; the rejected ones carry their reason.
-
-    Parameters
-    ----------
-    p : PointResult
-    """
+def _window_rows(p: PointResult) -> dict[str, list[Any]]:
+    """Columns of the plot: weight of each window; the rejected ones carry their reason."""
     weights = np.asarray(p.stiffness.weights, dtype=float).min(axis=1)
     reasons = [""] * len(weights)
     low = np.argsort(weights, kind="stable")

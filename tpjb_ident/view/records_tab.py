@@ -59,7 +59,7 @@ def records_tab(campaign: Campaign) -> Any:
         plot.multi_line("x", "y", source=data[name], color="colour", legend_field="name")
         plot.add_layout(plot.legend[0], "below")  # covers nothing
         plot.legend.orientation = "horizontal"
-    fall = waterfall_plot(data["waterfall"])
+    fall = _waterfall_plot(data["waterfall"])
     orbit = new_plot("shaft in the housing", "x, µm", "y, µm", match_aspect=True, height=420, name="orbit-plot")
     orbit.line("x", "y", source=data["orbit"], color=BLUE, line_width=0.7, legend_label="as measured")
     orbit.line("x", "y", source=data["without"], color=RED, line_width=0.7, legend_label="without running speed")
@@ -127,14 +127,8 @@ def show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict[
     return said + (f"; of another quantity, not drawn: {apart}" if apart else "")
 
 
-def waterfall_plot(source: Any) -> Any:
-    """An empty waterfall: amplitude over frequency and time.
-
-    Parameters
-    ----------
-    source : ColumnDataSource
-        With what `waterfall` gives.
-    """
+def _waterfall_plot(source: Any) -> Any:
+    """An empty waterfall: amplitude over frequency and time."""
     from bokeh.models import ColorBar, LinearColorMapper
 
     plot = new_plot("waterfall", "frequency, Hz", "time, s", name="waterfall-plot")

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.runtime.tables import printable
 from tpjb_ident.view.session import Session
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pandas as pd
+
 #: The only address that is ever listened on.
 LOOPBACK = "127.0.0.1"
 #: Without it a phone shows the page as wide as a desk's and small.
 VIEWPORT = '{% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">{% endblock %}'
+MOST_ROWS = 5000
 
 
 class ViewError(TpjbError):
@@ -89,9 +95,30 @@ def build(document: Any, session: Session) -> None:
 
             panels.append(TabPanel(child=model_tab(session), title="prediction and measurement"))
     if session.tables:
-        from tpjb_ident.view.tables_tab import tables_tab
-
-        panels.append(TabPanel(child=tables_tab(session.tables), title="tables"))
+        panels.append(TabPanel(child=_tables_tab(session.tables), title="tables"))
     head = Div(text=f"<h1 style='font-size:1.3rem;margin:.3rem 0'>{html.escape(printable(session.name))}</h1>")
     document.add_root(column(head, Tabs(tabs=panels, name="tabs", sizing_mode="stretch_width"),
                              sizing_mode="stretch_width"))  # fmt: skip
+
+
+def _tables_tab(tables: Mapping[str, pd.DataFrame]) -> Any:
+    """Build the tab."""
+    from bokeh.layouts import column
+    from bokeh.models import ColumnDataSource, DataTable, Select, TableColumn
+
+    pick = Select(title="table", options=list(tables), value=next(iter(tables)), name="table", width=320)
+    source = ColumnDataSource({})
+    grid = DataTable(source=source, columns=[], height=560, sizing_mode="stretch_width", reorderable=False, name="grid")
+
+    def update() -> None:
+        frame = tables[pick.value].head(MOST_ROWS)
+        source.data = {str(c): [_cell(v) for v in frame[c]] for c in frame.columns}
+        grid.columns = [TableColumn(field=str(c), title=printable(c)) for c in frame.columns]
+
+    pick.on_change("value", lambda attr, old, new: update())
+    update()
+    return column(pick, grid, sizing_mode="stretch_width")
+
+
+def _cell(value: Any) -> Any:
+    return f"{value:.6g}" if isinstance(value, float) else printable(value)

@@ -79,13 +79,8 @@ def here(states: Sequence[RunStatus]) -> Run | None:
     return max(reversed(landed), key=lambda s: s.landed).run if landed else None
 
 
-def set_up(run: Run) -> tuple[float, float, float]:
-    """Load [N], its direction [rad] and speed [rad/s]: what takes time to change at the rig.
-
-    Parameters
-    ----------
-    run : Run
-    """
+def _set_up(run: Run) -> tuple[float, float, float]:
+    """Load [N], its direction [rad] and speed [rad/s]: what takes time to change at the rig."""
     return run.point.static_load, run.point.static_load_direction, run.point.shaft_speed
 
 
@@ -166,7 +161,7 @@ def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
         run, why = status.run, f"{said(problem)}. {problem.cure}."
         if run.kind not in ("dynamic", "locus"):
             now.append(Step("repeat", f"Repeat {run.id} ({described(run)}): {why}", (run.id,)))
-        elif at is None or set_up(run) == set_up(at):
+        elif at is None or _set_up(run) == _set_up(at):
             now.append(Step("repeat", f"Repeat {run.id} before you change the load: {why}", (run.id,)))
         else:
             load = f"{run.point.static_load / 1e3:g} kN at {run.point.static_load_direction_deg:g} deg"
@@ -227,7 +222,9 @@ def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
     if not waiting:
         left = [s for s in states if s.state in ("repeat", "being written")]
         return [] if left else [Step("next", "Every run of the plan has landed.")]
-    same = [run for run in waiting if at is not None and run.kind in ("dynamic", "locus") and set_up(run) == set_up(at)]
+    same = [
+        run for run in waiting if at is not None and run.kind in ("dynamic", "locus") and _set_up(run) == _set_up(at)
+    ]
     run = (same or waiting)[0]
     more = f"{len(same) - 1} more at this load" if len(same) > 1 else f"{len(waiting) - 1} more in the plan"
     change = "" if same or at is None else " (new set-up)"

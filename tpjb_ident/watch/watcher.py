@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import datetime
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from statistics import median
 
 from rigdata.campaign import MANIFEST_NAME, Campaign, load_campaign
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from rigdata.survey.exports import records_below
 from tpjb_ident.check.campaign import judged
+from tpjb_ident.check.findings import Finding
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.watch.landing import FileState, Landings, file_state
-from tpjb_ident.watch.lengths import name_cut_records, seconds
 from tpjb_ident.watch.measured import Measured, Measuring
 from tpjb_ident.watch.next_steps import Step, next_steps, plan_lacks
 from tpjb_ident.watch.run_status import RunStatus, judge_states
 from tpjb_ident.watch.unplanned import Unplanned, place_record, unplanned_problem
+
+#: Share of the usual length below which a record was cut off.
+WHOLE = 0.8
 
 
 @dataclass(frozen=True)
@@ -199,7 +204,7 @@ class Watcher:
     ) -> Snapshot:
         landed = [run for run in runs if run.id in self._seen]
         seen = judged(replace(campaign, runs=tuple(landed)), [self._seen[run.id].observation for run in landed])
-        name_cut_records(seen, [self._seen[run.id].seconds for run in landed])
+        _name_cut_records(seen, [self._seen[run.id].seconds for run in landed])
         when = {run.id: self._seen[run.id].landed for run in landed}
         planned = frozenset(run.id for run in campaign.runs)
         written = frozenset(run.id for run in runs if (self.folder / run.file).resolve() in moving)
@@ -227,3 +232,31 @@ def _digest(path: Path) -> str:
         return sha256(path)
     except OSError:  # gone or locked again: its state tells
         return "missing"
+
+
+def seconds(run: Run) -> float:
+    """Length of a record [s]; 0 where it cannot be told.
+
+    Parameters
+    ----------
+    run : Run
+    """
+    try:
+        return run.length / run.sample_rate
+    except RigDataError:
+        return 0.0
+
+
+def _name_cut_records(seen: Sequence[Observation], lengths: Sequence[float]) -> None:
+    """Note records below `WHOLE` of the median length of their kind, before everything else that follows from it."""
+    of_kind: dict[str, list[float]] = {}
+    for one, length in zip(seen, lengths, strict=True):
+        if length > 0:
+            of_kind.setdefault(one.run.kind, []).append(length)
+    for one, length in zip(seen, lengths, strict=True):
+        usual = median(of_kind[one.run.kind]) if one.run.kind in of_kind else 0.0
+        if 0 < length < WHOLE * usual and len(of_kind[one.run.kind]) > 2:
+            what = f"{length:.3g} s long, the others of its kind {usual:.3g} s: cut off, or not written to its end"
+            one.report.say("short record", "error", "record", what, "Copy it again from the logger, or repeat the run")
+            found: list[Finding] = one.report.found
+            found.insert(0, found.pop())

@@ -57,7 +57,7 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
     for sentence in gathered(problems):
         print_line(sentence)
     if opened is not None:
-        show_coverage(opened)
+        _show_coverage(opened)
     counts = summary["counts"]
     print_line(f"{summary['campaign']}: {', '.join(counted(counts[s], s) for s in SEVERITIES)}")
     print_line(f"Results: {target}")
@@ -89,13 +89,8 @@ def gathered(problems: Sequence[Problem]) -> list[str]:
     return sentences
 
 
-def show_coverage(campaign: Campaign) -> None:
-    """Print what the campaign holds: runs, points, rates and the range that they cover.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    """
+def _show_coverage(campaign: Campaign) -> None:
+    """Print what the campaign holds: runs, points, rates and the range that they cover."""
     rows = []
     for kind in KINDS:
         runs = campaign.of_kind(kind)

@@ -58,7 +58,7 @@ def demo(out: Out = None) -> None:
         f"{counted(counts['warning'], 'warning')}."
     )
     show_comparison(result)
-    print_line(truth_sentence(result, json.loads(sample("demo.truth.json").read_text(encoding="utf-8"))))
+    print_line(_truth_sentence(result, json.loads(sample("demo.truth.json").read_text(encoding="utf-8"))))
     print_line(f"Report: {(target / 'report.html').resolve()}")
     print_line("On your own campaign: tpjb compare CAMPAIGN   (every command: tpjb --help)")
     refuse_comparison(result)
@@ -77,15 +77,8 @@ def sample(name: str) -> Path:
     return Path(rigdata.__path__[0]) / "samples" / name
 
 
-def truth_sentence(result: Comparison, truth: dict[str, Any]) -> str:
-    """Say how far the identified direct coefficients are from what was put into the computed records.
-
-    Parameters
-    ----------
-    result : Comparison
-    truth : mapping of str to object
-        Content of the truth file.
-    """
+def _truth_sentence(result: Comparison, truth: dict[str, Any]) -> str:
+    """Say how far the identified direct coefficients are from what was put into the computed records."""
     import numpy as np
 
     known = {(p["static_load_N"], p["excitation_Hz"]): p for p in truth["points"]}

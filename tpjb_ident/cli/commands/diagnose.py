@@ -182,21 +182,12 @@ def _next(asked: _Asked, result: CampaignDiagnosis, source: str, bearing: Path |
 
 
 def _show(name: str, asked: _Asked, result: CampaignDiagnosis, then: str) -> None:
-    show_verdict(name, result, then)
+    _show_verdict(name, result, then)
     print_line(f"Report: {asked.target / 'report.html'}")
 
 
-def show_verdict(name: str, result: CampaignDiagnosis, then: str) -> None:
-    """Print the verdict, the effects with their intervals, and the gap, in the units that people read.
-
-    Parameters
-    ----------
-    name : str
-        Of the campaign.
-    result : CampaignDiagnosis
-    then : str
-        The command that comes next.
-    """
+def _show_verdict(name: str, result: CampaignDiagnosis, then: str) -> None:
+    """Print the verdict, the effects with their intervals, and the gap, in the units that people read."""
     from tpjb_ident.report.diagnosis_coefficients import before_and_after, median_deviations
     from tpjb_ident.report.diagnosis_words import parameter_rows, verdict_sentences
 

@@ -62,22 +62,11 @@ def export(
     print_line(f"Results: {target}")
     if form.note:
         note_line("note", form.note)
-    refuse_doubtful(written.chosen, force)
+    _refuse_doubtful(written.chosen, force)
 
 
-def refuse_doubtful(chosen: Chosen, forced: bool) -> None:
-    """End with exit code 3 if a point stayed behind, or left because that was forced.
-
-    Parameters
-    ----------
-    chosen : Chosen
-    forced : bool
-        Whether the doubtful points were written all the same.
-
-    Raises
-    ------
-    NotTrustedError
-    """
+def _refuse_doubtful(chosen: Chosen, forced: bool) -> None:
+    """End with exit code 3 if a point stayed behind, or left because that was forced."""
     parts = []
     if chosen.left_out:
         parts.append(f"left out, because their coefficients are not finite: {'; '.join(chosen.left_out[:5])}")

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tpjb_ident.cli.common.band_display import refused_bands, show_bands
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.identification_display import (
+    refused_bands,
+    show_bands,
     show_coefficients,
     show_frequency_fits,
     show_remarks,
@@ -87,12 +88,12 @@ def identify(
     """
     options = as_given(locals())
     source = open_campaign(campaign)
-    phasors = phasor_settings(lines, delay or ())
+    phasors = _phasor_settings(lines, delay or ())
     settings = replace(identify_settings(source, method, norm), phasors=phasors, keep_weights=False)
     from tpjb_ident.dynamic.identify import identify as run_identification
     from tpjb_ident.runtime.workers import open_workers
 
-    count, start = worker_count(source, workers, scheduler)
+    count, start = _worker_count(source, workers, scheduler)
     target = out_folder(out, "identify")
     with output_folder(target, "identify", (campaign,)) as folder:
         with (
@@ -103,7 +104,7 @@ def identify(
             result = run_identification(source, settings, show, team, store)
         write_identification(folder, result)
         if plain or keep_r:
-            write_plain(folder, source, plain_settings(window, norm), keep_r)
+            _write_plain(folder, source, _plain_settings(window, norm), keep_r)
         write_record(folder, target, "identify", options, source.fingerprint(), result.remarks())
     if result.points or not result.bands:
         show_summary(result)
@@ -140,22 +141,8 @@ def finished_runs(target: Path) -> Iterator[RunStore]:
     store.clear()
 
 
-def worker_count(campaign: Campaign, asked: int | None, scheduler: str | None) -> tuple[int | None, str | None]:
-    """Processes to use, and how they begin: as asked, else one per core where the records pay for starting them.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    asked : int, optional
-        Option --workers; None: as it pays.
-    scheduler : str, optional
-        Address of a Dask scheduler.
-
-    Raises
-    ------
-    BadInputError
-        Both a number and a scheduler.
-    """
+def _worker_count(campaign: Campaign, asked: int | None, scheduler: str | None) -> tuple[int | None, str | None]:
+    """Processes to use, and how they begin: as asked, else one per core where the records pay for starting them."""
     if scheduler is not None:
         if asked is not None:
             raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")
@@ -169,21 +156,8 @@ def worker_count(campaign: Campaign, asked: int | None, scheduler: str | None) -
     return copies, "fork"
 
 
-def phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:
-    """Build `PhasorSettings` from ``--lines`` and ``--delay``.
-
-    Parameters
-    ----------
-    lines : str, optional
-        Option --lines.
-    delays : sequence of str
-        Options --delay, ``QUANTITY=TIME``.
-
-    Raises
-    ------
-    BadInputError
-        Not a frequency, not a time, or a quantity that has no direction.
-    """
+def _phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:
+    """Build `PhasorSettings` from ``--lines`` and ``--delay``."""
     from rigdata.units import UnitError, parse_quantity
     from tpjb_ident.dynamic.records.extraction import QUANTITIES
     from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
@@ -268,14 +242,8 @@ def write_identification(folder: Path, result: Identification) -> None:
     write_table(folder, "budget", result.budget_frame())
 
 
-def plain_settings(window: str, norm: str | None) -> PlainSettings:
-    """Build `PlainSettings` from ``--window`` and ``--norm``.
-
-    Raises
-    ------
-    BadInputError
-        Not a time above zero.
-    """
+def _plain_settings(window: str, norm: str | None) -> PlainSettings:
+    """Build `PlainSettings` from ``--window`` and ``--norm``."""
     from rigdata.units import UnitError, parse_quantity
     from tpjb_ident.dynamic.plain import PlainSettings
 
@@ -288,7 +256,7 @@ def plain_settings(window: str, norm: str | None) -> PlainSettings:
     return PlainSettings(length, norm or "huber")
 
 
-def write_plain(folder: Path, campaign: Campaign, settings: PlainSettings, keep_r: bool) -> None:
+def _write_plain(folder: Path, campaign: Campaign, settings: PlainSettings, keep_r: bool) -> None:
     """Write ``plain`` (Eq. (15) by statsmodels' RLM, nothing else) and, if asked for, the R matrices behind it."""
     from tpjb_ident.dynamic.plain import plain_frame, plain_points, write_r_matrices
 

@@ -67,12 +67,12 @@ def init(folder: Folder, bearing: Bearing = None, update: Update = False, out: O
     target.mkdir(parents=True, exist_ok=True)
     write_text(target / MANIFEST, text)
     command_output().add_files(target, (MANIFEST,))
-    show_survey(found, folder.name)
+    _show_survey(found, folder.name)
     for problem in problems:
         note_line("warning", f"left out: {problem}")
     print_line(f"{target / MANIFEST}: {_marks(text)} lines are marked ??; only you can fill them in.")
     if given is None and not (target / BEARING).exists():
-        draft = bearing_draft(found)
+        draft = _bearing_draft(found)
         write_text(target / BEARING, draft)
         command_output().add_files(target, (BEARING,))
         print_line(f"{target / BEARING}: {_marks(draft)} more, from drawing and data sheet; `identify` needs none.")
@@ -135,14 +135,8 @@ def looked_at(folder: Path, names: Sequence[str]) -> tuple[list[Export], list[Pr
     return exports, problems
 
 
-def bearing_draft(found: Survey) -> str:
-    """Text of a bearing file with every entry explained; the pads' angles where dry load steps tell them.
-
-    Parameters
-    ----------
-    found : Survey
-        Of the folder's records.
-    """
+def _bearing_draft(found: Survey) -> str:
+    """Text of a bearing file with every entry explained; the pads' angles where dry load steps tell them."""
     text = (Path(model.__file__).parent / DRAFT).read_text("utf-8")
     steps = {run.pad: run.direction for run in found.runs if run.kind == "dry_pivot" and run.pad}
     count = len(steps)
@@ -166,16 +160,8 @@ def bearing_file(folder: Path) -> str | None:
     return found[0] if len(found) == 1 else None
 
 
-def show_survey(found: Survey, name: str) -> None:
-    """Print what the channels and the files may be.
-
-    Parameters
-    ----------
-    found : Survey
-        Of the folder's records.
-    name : str
-        Of the folder.
-    """
+def _show_survey(found: Survey, name: str) -> None:
+    """Print what the channels and the files may be."""
     rows = [[n, g.quantity or "?", g.unit or "?", g.axis or "", g.why] for n, g in found.channels.items()]
     table(f"{name}: channels, guessed", ["channel", "quantity", "unit", "axis", "why"], rows, words=range(5))
     runs = [

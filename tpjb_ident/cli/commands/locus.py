@@ -38,14 +38,14 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
 
     from tpjb_ident.compare.static_tests import measure_static
     from tpjb_ident.report.figure import save_panels
-    from tpjb_ident.report.position_panels import position_panels
+    from tpjb_ident.report.panels import position_panels
 
     target = out_folder(out, "locus")
     with output_folder(target, "locus", (campaign,)) as folder:
         with progress("measuring positions"):
             static = measure_static(source, drawn)
             polygon, found = static.clearance, static.locus
-            others, refused = other_polygons(source, drawn, static)
+            others, refused = _other_polygons(source, drawn, static)
         if polygon is None and found is None:
             raise BadInputError("; ".join(c.detail for c in static.left_out))
         if found is not None:
@@ -53,13 +53,13 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
         if polygon is not None:
             write_table(folder, "clearance", polygon.to_frame())
         if polygon is not None and others:
-            write_pairs(folder, polygon, others)
+            _write_pairs(folder, polygon, others)
         pads = (np.array([p.pivot_angle for p in drawn.pads]), np.array([p.assembled_clearance for p in drawn.pads]))
         save_panels(position_panels(polygon, pads, found, {}, others), folder / "figures")
         write_record(folder, target, "locus", {"campaign": campaign, "bearing": bearing or source.bearing_name},
                      source.fingerprint() | given)  # fmt: skip
     if polygon is not None:
-        show_clearance(polygon, drawn, source.id)
+        _show_clearance(polygon, drawn, source.id)
     if found is not None:
         print_line(f"locus: {found}")
     for condition in polygon.status if polygon is not None else ():  # those of the locus stand in its line
@@ -79,19 +79,10 @@ def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
         raise NotTrustedError("; ".join(bad))
 
 
-def other_polygons(
+def _other_polygons(
     source: Campaign, drawn: Bearing, static: StaticTests
 ) -> tuple[tuple[ClearancePolygon, ...], tuple[str, ...]]:
-    """Polygons of the sweeps beside the one that counts, and what is wrong with those that cannot be used.
-
-    Parameters
-    ----------
-    source : Campaign
-    drawn : Bearing
-        The bearing, for the angles of its pads.
-    static : StaticTests
-        Static tests as measured.
-    """
+    """Polygons of the sweeps beside the one that counts, and what is wrong with those that cannot be used."""
     from rigdata.problem import RigDataError
     from tpjb_ident.clearance.measure import measure_run
 
@@ -108,17 +99,8 @@ def other_polygons(
     return tuple(found), tuple(refused)
 
 
-def write_pairs(folder: Path, polygon: ClearancePolygon, others: Sequence[ClearancePolygon]) -> None:
-    """Write all polygons, and each beside the one that counts.
-
-    Parameters
-    ----------
-    folder : Path
-        Existing.
-    polygon : ClearancePolygon
-    others : sequence of ClearancePolygon
-        Polygons of the other sweeps.
-    """
+def _write_pairs(folder: Path, polygon: ClearancePolygon, others: Sequence[ClearancePolygon]) -> None:
+    """Write all polygons, and each beside the one that counts."""
     import pandas as pd
 
     from tpjb_ident.clearance.polygon_pairs import pairs_frame
@@ -128,16 +110,8 @@ def write_pairs(folder: Path, polygon: ClearancePolygon, others: Sequence[Cleara
     write_table(folder, "clearance_pairs", pairs_frame(polygon, others))
 
 
-def show_clearance(polygon: ClearancePolygon, bearing: Bearing, name: str) -> None:
-    """Print the clearance per pad beside the drawing's.
-
-    Parameters
-    ----------
-    polygon : ClearancePolygon
-    bearing : Bearing
-    name : str
-        Of the campaign.
-    """
+def _show_clearance(polygon: ClearancePolygon, bearing: Bearing, name: str) -> None:
+    """Print the clearance per pad beside the drawing's."""
     rows = [
         [f"#{k + 1}", f"{1e6 * pad.assembled_clearance:.1f}", f"{1e6 * polygon.clearance[k]:.2f}",
          f"{1.96e6 * polygon.clearance_se[k]:.2f}", f"{1e6 * polygon.clearance_pushed[k]:.2f}"]

@@ -27,7 +27,7 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
     from tpjb_ident.compare.pivot_formula import printed_formula
     from tpjb_ident.pivot import PivotSettings, fit_pivots, pads_table, pivot_table, write_pivots
     from tpjb_ident.report.figure import save_panels
-    from tpjb_ident.report.pivot_panels import pivot_panels
+    from tpjb_ident.report.panels import pivot_panels
 
     source = open_campaign(campaign)
     drawn, given = open_bearing(source, bearing)
@@ -43,7 +43,7 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
             save_panels(pivot_panels(curves, formula), folder / "figures")
         write_record(folder, target, "pivot", {"campaign": campaign, "bearing": bearing or source.bearing_name},
                      source.fingerprint() | given)  # fmt: skip
-    show_curves(curves, source.id, formula)
+    _show_curves(curves, source.id, formula)
     print_line(f"Results: {target}")
     from tpjb_ident.compare.bearing_checks import bearing_problems
 
@@ -62,17 +62,8 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
         raise NotTrustedError("; ".join(bad))
 
 
-def show_curves(curves: Any, name: str, formula: Any = None) -> None:
-    """Print the tangent stiffness of every pad at half and at full measured load, and the share of Kirk's formula.
-
-    Parameters
-    ----------
-    curves : object
-    name : str
-        Of the campaign.
-    formula : object, optional
-        ``formula(pad, load)`` gives the printed (secant, tangent) stiffness [N/m].
-    """
+def _show_curves(curves: Any, name: str, formula: Any = None) -> None:
+    """Print the tangent stiffness of every pad at half and at full measured load, and the share of Kirk's formula."""
     rows = []
     for curve in curves:
         cells = [f"#{curve.pad}"]

@@ -69,7 +69,7 @@ def plan(
     from model.setup import Setup
     from tpjb_ident.diagnose.from_python import planned_layout
     from tpjb_ident.diagnose.plan.plan import plan as work_out
-    from tpjb_ident.report.plan_page import save_isolability
+    from tpjb_ident.report.panels import save_isolability
 
     drawn = load_bearing(bearing)
     points = operating_points(load, load_direction, speed, excitation)

@@ -86,7 +86,7 @@ def predict(
         frame = _predicted(loaded, points, settings)
         write_table(folder, "prediction", frame)
         write_record(folder, target, "predict", options, inputs)
-    show_predictions(frame, loaded.name)
+    _show_predictions(frame, loaded.name)
     print_line(f"Results: {target}")
     bad = int((~frame["converged"]).sum())
     if bad:
@@ -206,16 +206,8 @@ def model_settings(pivots: Any, thermal: str, effects: Path | None) -> Any:
     return ModelSettings(pivots, thermal, chosen)
 
 
-def show_predictions(frame: Any, name: str) -> None:
-    """Print the direct coefficients, at most 20 rows.
-
-    Parameters
-    ----------
-    frame : object
-        As prediction.csv.
-    name : str
-        Of the bearing.
-    """
+def _show_predictions(frame: Any, name: str) -> None:
+    """Print the direct coefficients, at most 20 rows."""
     columns = ["load kN", "dir deg", "speed Hz", "exc. Hz", "kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m",
                "h_min µm"]  # fmt: skip
     rows = [

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,7 +15,6 @@ from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.inputs import campaign_place, open_campaign
 from tpjb_ident.cli.common.options import Out, out_folder
 from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.sparkline import sparkline
 from tpjb_ident.cli.common.terminal import print_line, progress, table
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import output_folder
@@ -33,6 +34,10 @@ Source = Annotated[
 ]
 Wanted = Annotated[str | None, typer.Option("--run", metavar="ID", help="One run of a campaign, channel by channel.")]
 Picture = Annotated[bool, typer.Option("--picture", help="Draw channels and spectra to a PNG and an SVG in --out.")]
+BARS = " ▁▂▃▄▅▆▇█"
+PLAIN = " .:-=+*#@"
+#: What lies this far below the highest bar is blank.
+DECADES = 3.0
 
 
 @guarded
@@ -48,28 +53,23 @@ def show(source: Source, run: Wanted = None, picture: Picture = False, out: Out 
         raise BadInputError(f"{source}: there is no such file or folder. Check the path.")
     campaign = open_campaign(source) if place.is_dir() or place.suffix.lower() in CAMPAIGNS else None
     if campaign is not None and run is None:
-        show_campaign(campaign)
+        _show_campaign(campaign)
         if picture:
             raise BadInputError("--picture: of a campaign needs --run ID; the runs are listed above.")
         return
     if campaign is None and run is not None:
         raise BadInputError(f"--run: {source.name} is a single record, not a campaign. Leave the option out.")
     with progress(f"looking at {source.name}"):
-        title, series = run_series(campaign.run(run)) if campaign and run else file_series(source)
-        shown = [for_people(s) for s in series] if campaign else series
+        title, series = _run_series(campaign.run(run)) if campaign and run else _file_series(source)
+        shown = [_for_people(s) for s in series] if campaign else series
         looks = {s.name: _look(s) for s in shown}
     show_channels(title, shown, looks)
     if picture or out is not None:
         _write(out_folder(out, "show"), source, title, series, (shown, looks) if picture else None)
 
 
-def show_campaign(campaign: Campaign) -> None:
-    """Print the runs of a campaign.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    """
+def _show_campaign(campaign: Campaign) -> None:
+    """Print the runs of a campaign."""
     print_line(str(campaign))
     if campaign.description:
         print_line(campaign.description)
@@ -87,14 +87,8 @@ def show_campaign(campaign: Campaign) -> None:
         print_line(f"... and {len(campaign.runs) - len(rows)} more runs")
 
 
-def run_series(run: Run) -> tuple[str, list[Series]]:
-    """Channels of a run, calibrated.
-
-    Parameters
-    ----------
-    run : Run
-        Its records are read.
-    """
+def _run_series(run: Run) -> tuple[str, list[Series]]:
+    """Channels of a run, calibrated."""
     from rigdata.problem import Problem, RigDataError
     from rigdata.readers.series import Series
 
@@ -116,27 +110,15 @@ def run_series(run: Run) -> tuple[str, list[Series]]:
     return f"{run.id} ({run.kind})", found
 
 
-def file_series(path: Path) -> tuple[str, list[Series]]:
-    """Channels of a record file, as they are.
-
-    Parameters
-    ----------
-    path : Path
-        A record file.
-    """
+def _file_series(path: Path) -> tuple[str, list[Series]]:
+    """Channels of a record file, as they are."""
     from rigdata.survey.exports import read_export
 
     return path.name, list(read_export(path).series)
 
 
-def for_people(one: Series) -> Series:
-    """A calibrated channel in the unit that people read.
-
-    Parameters
-    ----------
-    one : Series
-        SI.
-    """
+def _for_people(one: Series) -> Series:
+    """A calibrated channel in the unit that people read."""
     unit, scale, zero = READ.get(one.unit, (one.unit, 1.0, 0.0))
     return replace(one, unit=unit, values=one.values / scale - zero)
 
@@ -197,3 +179,32 @@ def _write(
             write_quick_look(folder, title, *picture)
         write_record(folder, target, "show", {"source": source, "shown": title}, inputs)
     print_line(f"Results: {target}")
+
+
+def sparkline(values: Sequence[float], width: int = 48, plain: bool = False) -> str:
+    """Draw positive values on a logarithmic scale, the largest of neighbours where they share a cell.
+
+    Parameters
+    ----------
+    values : sequence of float
+    width : int
+        Cells.
+    plain : bool
+        Letters of ASCII instead of block elements.
+
+    >>> sparkline([1.0, 10.0, 100.0, 1000.0], width=4)
+    ' ▃▅█'
+    """
+    finite = [v if math.isfinite(v) and v > 0 else 0.0 for v in values]
+    top = max(finite, default=0.0)
+    if top <= 0:
+        return " " * min(width, len(finite))
+    width = min(width, len(finite))
+    edges = [round(i * len(finite) / width) for i in range(width + 1)]
+    letters = PLAIN if plain else BARS
+    out = []
+    for first, last in itertools.pairwise(edges):
+        peak = max(finite[first:last])
+        share = 1.0 + math.log10(peak / top) / DECADES if peak > 0 else 0.0
+        out.append(letters[max(0, min(len(letters) - 1, round(share * (len(letters) - 1))))])
+    return "".join(out)

@@ -62,10 +62,10 @@ def verify(results: Folder, given: Inputs = None, out: Out = None) -> None:
         refuse_special(path)
         if not path.exists():
             raise BadInputError(f"--input {path}: no such file or folder. Check the path.")
-    checked = [one for command, entry in entries.items() for one in check_entry(results, command, entry, given or ())]
-    show_checked(results, entries, checked)
+    checked = [one for command, entry in entries.items() for one in _check_entry(results, command, entry, given or ())]
+    _show_checked(results, entries, checked)
     if out is not None:
-        write_checked(out_folder(out, "verify"), results, checked)
+        _write_checked(out_folder(out, "verify"), results, checked)
     judge(results, checked)
 
 
@@ -94,23 +94,8 @@ def recorded(results: Path) -> dict[str, dict[str, Any]]:
     return entries
 
 
-def check_entry(results: Path, command: str, entry: dict[str, Any], given: Sequence[Path]) -> Iterator[Checked]:
-    """Hold the files of one command against its entry.
-
-    Parameters
-    ----------
-    results : Path
-        Output folder.
-    command : str
-    entry : dict
-        Of run.json.
-    given : sequence of Path
-        Where the inputs are; empty for where the record says.
-
-    Yields
-    ------
-    Checked
-    """
+def _check_entry(results: Path, command: str, entry: dict[str, Any], given: Sequence[Path]) -> Iterator[Checked]:
+    """Hold the files of one command against its entry."""
     marks = _texts(entry.get("outputs_sha256"))
     for name in outputs_of(entry):
         yield Checked(command, "result", name, _state([results], name, marks.get(name), "missing"))
@@ -156,18 +141,8 @@ def _state(folders: Sequence[Path], name: str, mark: str | None, absent: State) 
     return state
 
 
-def show_checked(results: Path, entries: dict[str, dict[str, Any]], checked: Sequence[Checked]) -> None:
-    """Print counts per command, what differs by name, and which versions are others now.
-
-    Parameters
-    ----------
-    results : Path
-        Output folder of former commands.
-    entries : mapping of str to dict[str, object]
-        Of run.json, by command.
-    checked : sequence of Checked
-        State of every file.
-    """
+def _show_checked(results: Path, entries: dict[str, dict[str, Any]], checked: Sequence[Checked]) -> None:
+    """Print counts per command, what differs by name, and which versions are others now."""
     rows = []
     for command, entry in entries.items():
         mine = [one for one in checked if one.command == command]
@@ -197,18 +172,8 @@ _WORDS: dict[State, str] = {
 }
 
 
-def write_checked(target: Path, results: Path, checked: Sequence[Checked]) -> None:
-    """Write verify.json.
-
-    Parameters
-    ----------
-    target : Path
-        Output folder.
-    results : Path
-        Output folder of former commands.
-    checked : sequence of Checked
-        State of every file.
-    """
+def _write_checked(target: Path, results: Path, checked: Sequence[Checked]) -> None:
+    """Write verify.json."""
     with output_folder(target, "verify") as folder:
         answer = {"schema": "tpjb-verify/1", "folder": results.name, "files": [asdict(one) for one in checked]}
         write_text(folder / "verify.json", json.dumps(answer, indent=1, ensure_ascii=False) + "\n")

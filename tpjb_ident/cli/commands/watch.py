@@ -63,7 +63,7 @@ def watch(
     target = out_folder(out, "watch")
     pause, patience = _amount(every, "time", "--every", "2 s"), _amount(settle, "time", "--settle", "5 s")
     wanted = None if within is None else _amount(within, "ratio", "--within", "3 %")
-    watcher = open_watch(folder, bearing, target / KEPT, patience, wanted)
+    watcher = _open_watch(folder, bearing, target / KEPT, patience, wanted)
     settings = {"folder": folder, "every": every, "settle": settle, "within": within or "-"}
     refresh = 0 if once else max(2, round(pause))
     print_line(f"Watching {folder}; the page: {target / 'watch.html'}")
@@ -74,9 +74,9 @@ def watch(
         while True:
             snapshot = watcher.look()
             if snapshot is not None:
-                told = show_news(snapshot, told)
+                told = _show_news(snapshot, told)
                 try:
-                    write_results(target, folder, snapshot, refresh, settings)
+                    _write_results(target, folder, snapshot, refresh, settings)
                 except (BadInputError, OSError) as error:
                     if last is None or once:
                         raise
@@ -92,27 +92,8 @@ def watch(
     finish(last, target)
 
 
-def open_watch(folder: Path, bearing: Path | None, kept: Path, settle: float, within: float | None) -> Watcher:
-    """Make the watcher of a campaign folder.
-
-    Parameters
-    ----------
-    folder : Path
-        With ``campaign.toml``.
-    bearing : Path, optional
-        Option --bearing.
-    kept : Path
-        Where phasors of finished runs stay.
-    settle : float
-        [s]
-    within : float, optional
-        Share.
-
-    Raises
-    ------
-    BadInputError
-        No folder, or one without a manifest.
-    """
+def _open_watch(folder: Path, bearing: Path | None, kept: Path, settle: float, within: float | None) -> Watcher:
+    """Make the watcher of a campaign folder."""
     if not folder.is_dir():
         raise BadInputError(f"{folder}: is no folder. Give the folder that the logger writes to, with campaign.toml.")
     if not (folder / "campaign.toml").is_file():
@@ -144,39 +125,21 @@ def open_watch(folder: Path, bearing: Path | None, kept: Path, settle: float, wi
     return Watcher(folder, Landings(settle), Measuring(settings, angles, RunStore(kept)), within)
 
 
-def write_results(target: Path, folder: Path, snapshot: Snapshot, refresh: int, settings: dict[str, Any]) -> None:
-    """Write page, state and coefficients into the output folder, all of them or none.
-
-    Parameters
-    ----------
-    target : Path
-        Output folder.
-    folder : Path
-        Of the campaign.
-    snapshot : Snapshot
-    refresh : int
-        Seconds after which the page loads itself again; 0: never.
-    settings : dict
-        Options as they were given.
-    """
+def _write_results(target: Path, folder: Path, snapshot: Snapshot, refresh: int, settings: dict[str, Any]) -> None:
+    """Write page, state and coefficients into the output folder, all of them or none."""
     from tpjb_ident.report.watch_page import write_watch_page
 
     with output_folder(target, "watch", (folder,)) as staging:
         write_watch_page(staging, snapshot, refresh, {name: str(value) for name, value in settings.items()})
         if snapshot.measured.identification is not None:
             write_table(staging, "coefficients", snapshot.measured.identification.to_frame())
-        document = state_document(snapshot)
+        document = _state_document(snapshot)
         write_text(staging / "watch.json", json.dumps(document, indent=1, ensure_ascii=False) + "\n")
         write_record(staging, target, "watch", settings, snapshot.hashes)
 
 
-def state_document(snapshot: Snapshot) -> dict[str, Any]:
-    """Content of watch.json.
-
-    Parameters
-    ----------
-    snapshot : Snapshot
-    """
+def _state_document(snapshot: Snapshot) -> dict[str, Any]:
+    """Content of watch.json."""
     return {
         "schema": SCHEMA,
         "campaign": snapshot.campaign.id,
@@ -203,20 +166,8 @@ def state_document(snapshot: Snapshot) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def show_news(snapshot: Snapshot, told: frozenset[str]) -> frozenset[str]:
-    """Print what landed, and every step that was not printed before.
-
-    Parameters
-    ----------
-    snapshot : Snapshot
-    told : frozenset of str
-        Sentences that the former look has printed.
-
-    Returns
-    -------
-    frozenset of str
-        Those of this look.
-    """
+def _show_news(snapshot: Snapshot, told: frozenset[str]) -> frozenset[str]:
+    """Print what landed, and every step that was not printed before."""
     by_id = {s.run.id: s for s in snapshot.states}
     if len(snapshot.new) > MOST_LINES:
         from tpjb_ident.report.watch_page import coverage_table

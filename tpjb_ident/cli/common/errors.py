@@ -51,7 +51,7 @@ def guarded(command: Command) -> Command:
                 sys.stdout = _Sink()
                 raise typer.Exit(0) from None
             except Exception as error:
-                message = bad_input_message(error)
+                message = _bad_input_message(error)
                 if message is None:
                     _report_bug(error)
                     raise typer.Exit(BUG) from None
@@ -69,19 +69,8 @@ class _Sink:
         """Nothing is kept."""
 
 
-def bad_input_message(error: Exception) -> str | None:
-    """Say what is wrong with the input; None if `error` is no fault of the input.
-
-    Parameters
-    ----------
-    error : Exception
-        What ended a command.
-
-    Returns
-    -------
-    str or None
-        One message with its cure.
-    """
+def _bad_input_message(error: Exception) -> str | None:
+    """Say what is wrong with the input; None if `error` is no fault of the input."""
     if _is_refusal(error):
         return str(error)
     if isinstance(error, OSError) and error.strerror:

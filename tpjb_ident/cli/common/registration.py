@@ -11,8 +11,48 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from tpjb_ident.cli.common.examples import EXAMPLES
 from tpjb_ident.cli.common.output import output_of
+
+DEMO = "rigdata/samples/demo.h5"
+ROCKER = "model/bearings/rocker.toml"
+
+EXAMPLES: dict[str, tuple[str, ...]] = {
+    "check": (f"tpjb check {DEMO}", f"tpjb check {DEMO} --json > findings.json"),
+    "compare": (f"tpjb compare {DEMO}", f'tpjb compare {DEMO} --pivots "kirk, measured" --thermal tehd'),
+    "demo": ("tpjb demo", "tpjb demo --out /tmp/look"),
+    "diagnose": (f"tpjb diagnose {DEMO}", f"tpjb diagnose {DEMO} --pivots measured --out found"),
+    "export": (
+        "tpjb export tpjb-identify-out --to ross",
+        "tpjb export tpjb-predict-out --to excel",
+        f"tpjb export {DEMO} --to mat",
+    ),
+    "identify": (f"tpjb identify {DEMO}", f"tpjb identify {DEMO} --method rlm --norm tukey --out rlm"),
+    "init": ("tpjb init exports", "tpjb init exports --bearing rocker.toml"),
+    "locus": (f"tpjb locus {DEMO}",),
+    "pivot": (f"tpjb pivot {DEMO}",),
+    "plan": (
+        f"tpjb plan {ROCKER}",
+        f'tpjb plan {ROCKER} --load "5, 10 kN" --excitation "20..60:10 Hz" --locus 0',
+    ),
+    "predict": (
+        f'tpjb predict {ROCKER} --load "2.5..8.75:1.25 kN" --excitation "25 Hz"',
+        f'tpjb predict {ROCKER} --pivots rigid --speed "1000, 2000, 3000 rpm"',
+        f"tpjb predict {ROCKER} --pivots tpjb-pivot-out/pivots.toml --thermal tehd",
+    ),
+    "show": (
+        f"tpjb show {DEMO}",
+        f"tpjb show {DEMO} --run d-05000-25-01 --picture",
+        "tpjb show exports/run1.csv",
+    ),
+    "simulate": (
+        f"tpjb simulate {ROCKER} --plan short --seed 1",
+        f'tpjb simulate {ROCKER} --load "5 kN" --excitation "10..50:10 Hz" --fault "dead run=d-* channel=X1A"',
+    ),
+    "verify": ("tpjb verify tpjb-identify-out", "tpjb verify tpjb-identify-out --input campaigns/rocker-A"),
+    "watch": ("tpjb watch records", 'tpjb watch records --once --within "3 %"'),
+    "view": (f"tpjb view {DEMO}", "tpjb view tpjb-compare-out"),
+}
+
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document with all results, for other programs.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings and errors only.")]
@@ -67,19 +107,11 @@ def add_command(app: typer.Typer, command: Callable[..., None], name: str | None
         Default: the function's own.
     """
     name = name or command.__name__
-    app.command(name, cls=Grouped, epilog=examples_text(name))(with_output_options(command, name))
+    app.command(name, cls=Grouped, epilog=_examples_text(name))(_with_output_options(command, name))
 
 
-def with_output_options(command: Callable[..., None], name: str) -> Callable[..., None]:
-    """Wrap a command so that it takes ``--json`` and ``--quiet`` after its own options.
-
-    Parameters
-    ----------
-    command : callable
-        Guarded already.
-    name : str
-        Of the command.
-    """
+def _with_output_options(command: Callable[..., None], name: str) -> Callable[..., None]:
+    """Wrap a command so that it takes ``--json`` and ``--quiet`` after its own options."""
 
     @functools.wraps(command)
     def wrapper(*args: Any, as_json: bool = False, quiet: bool = False, **kwargs: Any) -> None:
@@ -98,14 +130,8 @@ def with_output_options(command: Callable[..., None], name: str) -> Callable[...
     return wrapper
 
 
-def examples_text(name: str) -> str | None:
-    """Examples of a command, as they stand under its help; None if there are none.
-
-    Parameters
-    ----------
-    name : str
-        Of the command.
-    """
+def _examples_text(name: str) -> str | None:
+    """Examples of a command, as they stand under its help; None if there are none."""
     lines = EXAMPLES.get(name)
     if not lines:
         return None

@@ -114,16 +114,8 @@ def masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArr
     return {**masks, "E": np.ones(len(elements), dtype=bool)}
 
 
-def part_of(layout: Layout, name: str) -> Layout:
-    """Tests of a layout that belong to a data set, ``"A"`` to ``"D"``.
-
-    Parameters
-    ----------
-    layout : Layout
-        Tests, with their operating points.
-    name : str
-        One of the four letters.
-    """
+def _part_of(layout: Layout, name: str) -> Layout:
+    """Tests of a layout that belong to a data set, ``"A"`` to ``"D"``."""
     line = _usual(np.array([w for t in layout.dynamic for w in t.excitation]))
     plain = tuple(replace(t, pads=()) for t in layout.dynamic)
     if name == "A":

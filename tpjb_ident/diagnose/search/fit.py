@@ -98,7 +98,7 @@ class Fit:
             Amplitudes and nuisances, counted from their priors' means.
         """
         columns = np.column_stack([self.jacobian, self.columns])
-        return self.prediction + columns @ (free - free_numbers(self.candidates, self.amplitudes, self.nuisance))
+        return self.prediction + columns @ (free - _free_numbers(self.candidates, self.amplitudes, self.nuisance))
 
 
 def build(candidates: Sequence[Candidate], amplitudes: Sequence[FloatArray]) -> tuple[Effect, ...]:
@@ -113,18 +113,10 @@ def build(candidates: Sequence[Candidate], amplitudes: Sequence[FloatArray]) -> 
     return tuple(c.effect(a) for c, a in zip(candidates, amplitudes, strict=True))
 
 
-def free_numbers(
+def _free_numbers(
     candidates: Sequence[Candidate], amplitudes: Sequence[FloatArray], nuisance: FloatArray
 ) -> FloatArray:  # fmt: skip
-    """All free numbers, counted from their priors' means, (k + m,).
-
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-    amplitudes : sequence of (k_i,) ndarray
-    nuisance : (m,) ndarray
-        In standard deviations.
-    """
+    """All free numbers, counted from their priors' means, (k + m,)."""
     moved = [a - c.origin for c, a in zip(candidates, amplitudes, strict=True)]
     return np.concatenate([*moved, nuisance]) if moved else nuisance
 
@@ -153,7 +145,7 @@ class Start:
     @property
     def free(self) -> FloatArray:
         """Amplitudes and nuisances, counted from their priors' means, (k + m,)."""
-        return free_numbers(self.candidates, self.amplitudes, self.nuisance)
+        return _free_numbers(self.candidates, self.amplitudes, self.nuisance)
 
     @property
     def width(self) -> FloatArray:
