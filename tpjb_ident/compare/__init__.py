@@ -5,11 +5,15 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from tpjb_ident.model_guard import check_model
+
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import CompareSettings, Comparison, Variant, compare_campaign
     from tpjb_ident.compare.predictions import ModelSettings, PointPrediction, predict_points, prediction_frame
     from tpjb_ident.compare.summary import deviations, summary_sentences
     from tpjb_ident.compare.tables import comparison_frame
+
+check_model()  # before any file of this package imports the model
 
 _HOMES = {
     "CompareSettings": "comparison",

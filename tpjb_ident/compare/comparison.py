@@ -6,21 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from model.bearing import Bearing
+from model.effects import Effect
 from rigdata.campaign import Campaign
 from tpjb_ident.compare.coefficient_table import TableSource
+from tpjb_ident.compare.measured_pivots import beside_measured, counted_twice
 from tpjb_ident.compare.model_side import Asked, ModelSide, model_side
-from tpjb_ident.compare.pivot_effects import beside_measured, counted_twice
 from tpjb_ident.compare.predictions import PointPrediction, Progress
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import TpjbError
-from tpjb_ident.model_guard import check_model
 from tpjb_ident.presentation import Presented, changed, shown_by
-
-check_model()
-
-from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
-from model.effects import Effect  # noqa: E402
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from model.bearing import Bearing
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.coefficient_table import TableRow, TableSource, read_coefficients
 from tpjb_ident.compare.comparison import CompareSettings, Comparison, Variant
@@ -15,12 +16,7 @@ from tpjb_ident.compare.predictions import ModelSettings, predict_points
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult
-from tpjb_ident.model_guard import check_model
 from tpjb_ident.schema import ENTRIES
-
-check_model()
-
-from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
 
 METHOD = "table"
 

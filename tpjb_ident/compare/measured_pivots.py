@@ -1,15 +1,15 @@
-"""Measured pivot curves as laws that the model takes: exactly what `predict --pivots pivots.toml` would read."""
+"""Measured pivots as the model takes them, and effects beside them that must not count twice what dry tests hold."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.model_guard import check_model
-
-check_model()
-
-from model.pivots import PivotLaw, measured_pivots  # noqa: E402  (only once it is known to be ours)
+from model.effects import Effect
+from model.pivots import PivotLaw, measured_pivots
+from model.toml_text import parse_toml
+from tpjb_ident.errors import BadInputError
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
@@ -36,3 +36,67 @@ def measured_laws(curves: Sequence[PivotCurve], n_pads: int, source: str = "") -
     if not curves:
         raise ValueError("curves must hold at least one PivotCurve")
     return measured_pivots([pad_table(curve) for curve in curves], source or "the dry tests", n_pads)
+
+
+#: Effects that say how far pivots give way under load: a dry test measures just that.
+PIVOT_EFFECTS = frozenset({"pivot_flexibility", "soft_pivot"})
+#: Key of an effects file whose pivot effects are sizes beside measured pivots, as a diagnosis that began there writes.
+COUNTED_FROM = "counted_from"
+MEASURED = "measured pivots"
+
+
+def counted_twice(effects: Sequence[Effect]) -> tuple[str, ...]:
+    """Names of the effects that measured pivots hold already.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+    """
+    return tuple(dict.fromkeys(e.name for e in effects if e.name in PIVOT_EFFECTS))
+
+
+def beside_measured(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Effects without those that measured pivots hold already.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+    """
+    return tuple(e for e in effects if e.name not in PIVOT_EFFECTS)
+
+
+def counts_from_measured(path: Path | None) -> bool:
+    """Whether an effects file says that its sizes are meant beside measured pivots.
+
+    Parameters
+    ----------
+    path : Path, optional
+        An effects file that can be read.
+    """
+    if path is None:
+        return False
+    return bool(parse_toml(path.read_text(encoding="utf-8-sig")).get(COUNTED_FROM) == MEASURED)
+
+
+def refuse_counted_twice(pivots: Any, effects: Sequence[Effect], path: Path | None) -> None:
+    """Refuse measured pivots together with effects that count from the printed formula.
+
+    Parameters
+    ----------
+    pivots : object
+        What --pivots says: the path of a file, ``"measured"``, or something else.
+    effects : sequence of Effect
+    path : Path, optional
+        The file they come from.
+
+    Raises
+    ------
+    BadInputError
+    """
+    twice = counted_twice(effects)
+    if not (isinstance(pivots, Path) or pivots == "measured") or not twice or counts_from_measured(path):
+        return
+    raise BadInputError(
+        f"--effects {path.name if path else ''}: {', '.join(twice)} would count twice: measured pivots give way as far "
+        "as they do already. Use --pivots kirk with these effects, or take them out of the file with measured pivots."
+    )

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tpjb_ident.model_guard import check_model
-
-check_model()
-
-from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
-from model.pivots import formula_pivot  # noqa: E402
+from model.bearing import Bearing
+from model.pivots import formula_pivot
 
 #: (pad, load [N]) -> (secant, tangent) stiffness [N/m].
 Formula = Callable[[int, float], tuple[float, float]]

@@ -9,17 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from model.bearing import Bearing
+from model.effects import Effect
+from model.options import Options
+from model.predict import predict
+from model.prediction import Prediction
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.model_guard import check_model
 from tpjb_ident.schema import KINDS
-
-check_model()
-
-from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
-from model.effects import Effect  # noqa: E402
-from model.options import Options  # noqa: E402
-from model.predict import predict  # noqa: E402
-from model.prediction import Prediction  # noqa: E402
 
 if TYPE_CHECKING:
     import pandas as pd

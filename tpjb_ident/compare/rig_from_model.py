@@ -10,22 +10,18 @@ from typing import Any
 
 import numpy as np
 
+from model.bearing import Bearing
+from model.dynamics.reduction import bearing_impedance
+from model.effects import Effect, apply_effects
+from model.pivots import pivot_laws
+from model.predict import predict_setup
+from model.prediction import Prediction
+from model.setup import Setup
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Instruments, RigTruth
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.compare.predictions import ModelSettings
 from tpjb_ident.errors import TpjbError
-from tpjb_ident.model_guard import check_model
-
-check_model()
-
-from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
-from model.dynamics.reduction import bearing_impedance  # noqa: E402
-from model.effects import Effect, apply_effects  # noqa: E402
-from model.pivots import pivot_laws  # noqa: E402
-from model.predict import predict_setup  # noqa: E402
-from model.prediction import Prediction  # noqa: E402
-from model.setup import Setup  # noqa: E402
 
 #: Effects that act on the records: which error of the virtual instruments each one is, and its parameter.
 INSTRUMENT_ERRORS = {

@@ -8,16 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from model.effects import kind_of
 from tpjb_ident.compare.pivot_formula import printed_formula
 from tpjb_ident.compare.positions import locus_distance
 from tpjb_ident.compare.tables import DIRECT, comparison_frame
 from tpjb_ident.effect_words import Fixed, finding
-from tpjb_ident.model_guard import check_model
 from tpjb_ident.rounding import percent, signed
-
-check_model()
-
-from model.effects import kind_of  # noqa: E402  (only once it is known to be ours)
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,6 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from model.bearing import Bearing
+from model.bearing_file import load_bearing
+from model.effects import Effect
+from model.pivots import pivot_laws
+from model.setup import Setup
+from model.units import to_si
 from rigdata.near_names import unknown_name
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arguments import as_campaign
@@ -20,16 +26,6 @@ from tpjb_ident.diagnose.plan.plan import plan as work_out
 from tpjb_ident.diagnose.plan.planned import around, dry, dynamic
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.errors import ArgumentError
-from tpjb_ident.model_guard import check_model
-
-check_model()
-
-from model.bearing import Bearing  # noqa: E402  (only once it is known to be ours)
-from model.bearing_file import load_bearing  # noqa: E402
-from model.effects import Effect  # noqa: E402
-from model.pivots import pivot_laws  # noqa: E402
-from model.setup import Setup  # noqa: E402
-from model.units import to_si  # noqa: E402
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign

@@ -63,7 +63,7 @@ def compare(
     options["pivots"] = list(variants := _variants(pivots))
     model = model_settings("kirk", thermal, effects)
     from tpjb_ident.compare.comparison import CompareSettings
-    from tpjb_ident.compare.pivot_effects import counts_from_measured
+    from tpjb_ident.compare.measured_pivots import counts_from_measured
 
     settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
     files = {effects.name: sha256(effects)} if effects else {}

@@ -83,7 +83,7 @@ def diagnose(
     start = pivots if pivots == "measured" else pivot_choice(pivots)
     model = model_settings("kirk", thermal, effects)
     files = {f.name: sha256(f) for f in (effects, library, start if isinstance(start, Path) else None) if f}
-    from tpjb_ident.compare.pivot_effects import refuse_counted_twice
+    from tpjb_ident.compare.measured_pivots import refuse_counted_twice
     from tpjb_ident.diagnose.campaign import Baseline
 
     refuse_counted_twice(start, model.effects, effects)

@@ -76,7 +76,7 @@ def predict(
     settings = replace(model_settings(choice, thermal, effects), options=parse_physics(physics, housing_temperature))
     refuse_special(bearing)
     from model.bearing_file import load_bearing
-    from tpjb_ident.compare.pivot_effects import refuse_counted_twice
+    from tpjb_ident.compare.measured_pivots import refuse_counted_twice
 
     refuse_counted_twice(choice, settings.effects, effects)
     loaded = load_bearing(bearing)
