@@ -6,7 +6,7 @@ import pytest
 
 from model.growth import Growth
 from model.options import Options
-from tpjb_ident.cli.common.model_options import parse_physics
+from tpjb_ident.cli.commands.predict import parse_physics
 from tpjb_ident.errors import BadInputError
 
 

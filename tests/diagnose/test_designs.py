@@ -11,8 +11,7 @@ from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
-from tpjb_ident.diagnose.next_test.designs import Design, designs
-from tpjb_ident.diagnose.next_test.mirrored import mirrored, reversible
+from tpjb_ident.diagnose.next_test.designs import Design, designs, mirrored, reversible
 from tpjb_ident.diagnose.observations.layout import Layout
 from tpjb_ident.diagnose.plan.planned import dynamic
 

@@ -23,7 +23,7 @@ from tpjb_ident.diagnose.plan.plan import plan
 from tpjb_ident.diagnose.plan.planned import around, dry, dynamic, planned_observations
 from tpjb_ident.diagnose.search.selection import Selection
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
-from tpjb_ident.diagnose.verdict.localise import localise
+from tpjb_ident.diagnose.verdict.remainder import localise
 
 BEARINGS = Path(__file__).parents[2] / "model" / "bearings"
 SPEED = 2 * math.pi * 22

@@ -10,9 +10,10 @@ from model.effects import Effect, kind_of
 from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
 from tpjb_ident.diagnose.forward.tolerances import Tolerances
-from tpjb_ident.diagnose.next_test.checks import CHECKS, Check
 from tpjb_ident.diagnose.next_test.designs import Design, designs
 from tpjb_ident.diagnose.next_test.rank import (
+    CHECKS,
+    Check,
     Separation,
     chance,
     options_for,

@@ -32,7 +32,7 @@ from rigdata.virtual_rig import Fault, Noise, operating_points
 from rigdata.virtual_rig.truth import load_vector
 from tests.good_campaigns import BEARINGS, DAMPING, PLAN, RUN, STIFFNESS, directions, stiff_rig, written
 from tpjb_ident.check.campaign import check_campaign
-from tpjb_ident.compare.bearing_checks import bearing_problems
+from tpjb_ident.compare.static_tests import bearing_problems
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -19,7 +19,6 @@ from tpjb_ident.diagnose.forward.workers import Map, workers
 from tpjb_ident.diagnose.next_test.rank import Separation, options_for, ranked, say, separated, suggested
 from tpjb_ident.diagnose.observations.layout import Layout
 from tpjb_ident.diagnose.observations.observe import Observations
-from tpjb_ident.diagnose.observations.thinned import thinned
 from tpjb_ident.diagnose.search.fit import Fit
 from tpjb_ident.diagnose.search.problem import Problem, loosened
 from tpjb_ident.diagnose.search.search import Search, search
@@ -34,6 +33,8 @@ ACCURACY = 1e-5
 MESH = Mesh(48, 4)
 #: Other explanations that a confirming test is chosen against.
 IMPOSTORS = 2
+#: Load directions per load and speed that are enough: the locus of five pads has five waves, two directions to each.
+DIRECTIONS = 10
 
 
 @dataclass(frozen=True)
@@ -200,3 +201,34 @@ def _rivals(found: Search) -> list[Fit]:
         if r.names != found.model.names:
             kept.setdefault(r.names, r)
     return list(kept.values())[:IMPOSTORS]
+
+
+def thinned(observations: Observations, most: int = DIRECTIONS) -> Observations:
+    """Keep every second, third .. load direction of a locus that has more than are needed.
+
+    Parameters
+    ----------
+    observations : Observations
+    most : int
+        Directions per load and speed.
+    """
+    kept = set()
+    tests: dict[tuple[float, float], list[float]] = {}
+    for one in observations.layout.locus:
+        tests.setdefault((one.load, one.speed), []).append(one.direction)
+    for (load, speed), directions in tests.items():
+        around = sorted(set(directions), key=lambda a: a % (2 * np.pi))
+        step = -(-len(around) // most)
+        kept |= {(load, speed, a) for a in around[::step]}
+    mine = np.array([
+        e.family not in {"locus", "load"} or (e.place("load"), e.place("speed"), e.place("direction")) in kept
+        for e in observations.elements
+    ])  # fmt: skip
+    if mine.all():
+        return observations
+    locus = tuple(t for t in observations.layout.locus if (t.load, t.speed, t.direction) in kept)
+    return replace(
+        observations, layout=replace(observations.layout, locus=locus), value=observations.value[mine],
+        covariance=observations.covariance[np.ix_(mine, mine)], sigma=observations.sigma[mine],
+        elements=tuple(e for e, m in zip(observations.elements, mine, strict=True) if m),
+    )  # fmt: skip

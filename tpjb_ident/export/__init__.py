@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tpjb_ident.callable_package import make_callable
 
 if TYPE_CHECKING:
-    from tpjb_ident.export.errors import ExportError
-    from tpjb_ident.export.formats import FORMATS, Format, export_format
+    from tpjb_ident.export.formats import FORMATS, ExportError, Format, export_format
     from tpjb_ident.export.points import COLUMNS, Chosen, StaticPoint, static_points
     from tpjb_ident.export.structural import sep005
     from tpjb_ident.export.write import Export, export
@@ -20,7 +19,7 @@ _HOMES = {
     "FORMATS": "formats",
     "Chosen": "points",
     "Export": "write",
-    "ExportError": "errors",
+    "ExportError": "formats",
     "Format": "formats",
     "StaticPoint": "points",
     "export": "write",

@@ -9,10 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigdata.near_names import nearest_name
-from tpjb_ident.export.errors import ExportError
+from tpjb_ident.errors import TpjbError
 
 if TYPE_CHECKING:
     from tpjb_ident.export.points import StaticPoint
+
+
+class ExportError(TpjbError):
+    """What was given cannot be exported; says which format, column or point, and what to do."""
+
 
 #: Writes points into an existing folder; the text says where they come from.
 Writer = Callable[[Path, "tuple[StaticPoint, ...]", str], None]
@@ -55,7 +60,7 @@ FORMATS: dict[str, Format] = {
     "csv": Format("table", "write_csv"),
     "parquet": Format("table", "write_parquet"),
     "excel": Format("table", "write_excel"),
-    "mat": Format("matlab", "write_mat"),
+    "mat": Format("table", "write_mat"),
     "xltrc": Format("rotor_programs", "write_xltrc", holds_intervals=False, note=_BY_SPEED),
     "dyrobes": Format("rotor_programs", "write_dyrobes", holds_intervals=False, note=_BY_SPEED),
     "ansys": Format("rotor_programs", "write_ansys", holds_intervals=False, note=_BY_SPEED),

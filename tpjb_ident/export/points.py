@@ -11,7 +11,7 @@ import numpy as np
 
 from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.condition_kinds import ERRORS
-from tpjb_ident.export.errors import ExportError
+from tpjb_ident.export.formats import ExportError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_COLUMNS, coefficient_column
 
 if TYPE_CHECKING:

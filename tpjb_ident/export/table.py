@@ -1,4 +1,4 @@
-"""A plain table of the coefficients: CSV, Parquet, or an Excel workbook; and the table of intervals beside the rest."""
+"""A plain table of the coefficients: CSV, Parquet, an Excel workbook, a MATLAB file; and the intervals beside the rest."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.export.errors import ExportError
+from tpjb_ident.export.formats import ExportError
 from tpjb_ident.export.points import COLUMNS, StaticPoint
 from tpjb_ident.runtime.tables import printable, safe_for_spreadsheets, write_atomic
 from tpjb_ident.schema import ENTRIES

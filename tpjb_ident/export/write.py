@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.errors import NotTrustedError
-from tpjb_ident.export.errors import ExportError
-from tpjb_ident.export.formats import export_format
+from tpjb_ident.export.formats import ExportError, export_format
 from tpjb_ident.export.points import Chosen, static_points
 from tpjb_ident.export.table import write_intervals
 

@@ -36,9 +36,9 @@ from tpjb_ident.diagnose.diagnose import ACCURACY, MESH, pose, solve
 from tpjb_ident.diagnose.forward.candidates import TERMS, Candidate
 from tpjb_ident.diagnose.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnose.forward.nuisance import predict
+from tpjb_ident.diagnose.observations.gap import coordinate, direct_scale
 from tpjb_ident.diagnose.observations.layout import Layout
 from tpjb_ident.diagnose.observations.observe import Observations
-from tpjb_ident.diagnose.observations.scale import coordinate, direct_scale
 from tpjb_ident.diagnose.plan.planned import around, dry, dynamic, planned_observations
 from tpjb_ident.diagnose.search.problem import Problem
 from tpjb_ident.diagnose.search.screen import visible

@@ -141,7 +141,7 @@ def _against_drawing(campaign: Campaign, known: list[Problem]) -> list[Problem]:
         return []
     from model.bearing import BearingError
     from rigdata.problem import Problem
-    from tpjb_ident.compare.bearing_checks import bearing_problems
+    from tpjb_ident.compare.static_tests import bearing_problems
 
     try:
         return bearing_problems(campaign, open_bearing(campaign, None)[0], known)

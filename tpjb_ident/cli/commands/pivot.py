@@ -45,7 +45,7 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
                      source.fingerprint() | given)  # fmt: skip
     _show_curves(curves, source.id, formula)
     print_line(f"Results: {target}")
-    from tpjb_ident.compare.bearing_checks import bearing_problems
+    from tpjb_ident.compare.static_tests import bearing_problems
 
     for problem in bearing_problems(source, drawn):  # what is wrong with the probes is wrong with the curves
         note_line("warning", str(problem))

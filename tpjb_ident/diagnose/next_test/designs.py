@@ -11,10 +11,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from model.arrays import ComplexArray
 from model.effects import Effect
+from model.instruments import Instruments, SensorMap
 from model.setup import Setup
 from tpjb_ident.diagnose.forward.forward import Change, Forward
-from tpjb_ident.diagnose.next_test.mirrored import mirrored, mirrored_layout, reversible
 from tpjb_ident.diagnose.observations.layout import DynamicTest, Layout
 from tpjb_ident.diagnose.observations.observe import Observations
 from tpjb_ident.diagnose.plan.planned import around, dry, dynamic, planned_observations
@@ -22,6 +25,11 @@ from tpjb_ident.diagnose.plan.planned import around, dry, dynamic, planned_obser
 HZ = 2 * math.pi
 #: Step of the supply temperature that a cooler can make [K].
 HOTTER = 10.0
+#: The model knows one sense of rotation: a shaft that turns clockwise is, seen in a mirror along the y axis, one that
+#: turns counter-clockwise. There x becomes -x, angles pi minus themselves, and a pad's leading edge its trailing one.
+_MIRROR = np.diag([-1.0, 1.0])
+#: How far from the middle of its pad a pivot may sit for the shaft to turn either way [share of the arc].
+CENTRAL = 0.05
 
 
 @dataclass(frozen=True)
@@ -202,7 +210,7 @@ def _other_rigs(setup: Setup, at: _Measured) -> list[Design]:
     if reversible(setup):
         out.append(
             Design("the load sweep repeated with the shaft turning the other way, with pad temperatures",
-                   mirrored_layout(sweep), change=mirrored)
+                   _mirrored_layout(sweep), change=mirrored)
         )  # fmt: skip
     return out
 
@@ -250,3 +258,46 @@ def _dry(layout: Layout, pads: int) -> list[Design]:
         Design("the dry tests repeated up to 8 kN on all pads",
                Layout((), dry=dry(range(1, pads + 1), (2000.0, 5000.0, 7600.0))))
     ]  # fmt: skip
+
+
+def reversible(setup: Setup) -> bool:
+    """Whether every pad would carry with the shaft turning the other way.
+
+    Parameters
+    ----------
+    setup : Setup
+        Bearing, oil, pivots, structure and instruments of the model.
+    """
+    return all(abs(pad.pivot_offset - 0.5) <= CENTRAL for pad in setup.bearing.pads)
+
+
+def mirrored(setup: Setup) -> Setup:
+    """The set-up as a mirror shows it: its answers at a mirrored layout are those of the other sense of rotation.
+
+    Parameters
+    ----------
+    setup : Setup
+        Bearing, oil, pivots, structure and instruments of the model.
+    """
+    angle, towards = setup.misalignment
+    turned = setup.change_pads(
+        lambda k, pad: replace(pad, pivot_angle=math.pi - pad.pivot_angle, pivot_offset=1.0 - pad.pivot_offset)
+    )
+    return turned.change(misalignment=(angle, math.pi - towards), instruments=_instruments(setup.instruments))
+
+
+def _mirrored_layout(layout: Layout) -> Layout:
+    """Dynamic tests as a mirror shows them, thermometers where they sit."""
+    tests = tuple(DynamicTest(t.load, math.pi - t.direction, t.speed, t.excitation, t.pads) for t in layout.dynamic)
+    return Layout(tests, temperature_position=tuple(1.0 - place for place in layout.temperature_position))
+
+
+def _instruments(read: Instruments) -> Instruments:
+    return replace(read, displacement=tuple(map(_map, read.displacement)), force=tuple(map(_map, read.force)))
+
+
+def _map(one: SensorMap) -> SensorMap:
+    def seen(omega: float) -> ComplexArray:
+        return np.asarray(_MIRROR @ one(omega) @ _MIRROR)
+
+    return seen

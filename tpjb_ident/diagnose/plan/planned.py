@@ -10,9 +10,9 @@ import numpy as np
 
 from model.setup import Setup
 from tpjb_ident.diagnose.forward.forward import Forward
+from tpjb_ident.diagnose.observations.gap import direct_scale
 from tpjb_ident.diagnose.observations.layout import DryTest, DynamicTest, Layout, LocusTest
 from tpjb_ident.diagnose.observations.observe import ENTRY_NAMES, Element, Observations
-from tpjb_ident.diagnose.observations.scale import direct_scale
 from tpjb_ident.diagnose.observations.tolerance import Tolerance
 
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tpjb_ident.arrays import FloatArray, IntArray
+from tpjb_ident.diagnose.observations.gap import coordinate
 from tpjb_ident.diagnose.observations.observe import Element, Observations
-from tpjb_ident.diagnose.observations.scale import coordinate
 
 #: Scales are fitted as logarithms, within what can still be told from nothing and what drowns everything.
 NOTHING, LOWEST, HIGHEST = math.log(1e-5), math.log(0.1**2), math.log(1e5)

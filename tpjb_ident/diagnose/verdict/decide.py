@@ -20,9 +20,8 @@ from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.diagnose.verdict.behaviour import behaviours
 from tpjb_ident.diagnose.verdict.closure import Closure, closure, effects_unseen, unseen
 from tpjb_ident.diagnose.verdict.drift import Drift, drifts
-from tpjb_ident.diagnose.verdict.localise import localise
 from tpjb_ident.diagnose.verdict.plausibility import plausible
-from tpjb_ident.diagnose.verdict.remainder import Excess, excess
+from tpjb_ident.diagnose.verdict.remainder import Excess, excess, localise
 from tpjb_ident.diagnose.verdict.verdict import (
     Assumption,
     FoundEffect,
