@@ -1,4 +1,4 @@
-"""A plain table of the coefficients: CSV, Parquet, an Excel workbook, a MATLAB file; and the intervals beside the rest."""
+"""Tables of the coefficients: CSV, Parquet, an Excel workbook, a MATLAB file; and the intervals beside the rest."""
 
 from __future__ import annotations
 
