@@ -17,6 +17,7 @@ hypothesis.settings.register_profile(
 )
 hypothesis.settings.load_profile("shared machine")
 ROOT = Path(__file__).resolve().parent.parent
+STRUCTURE = "tests/structure/"
 # every worker, and every command that tests start, imports the same thousand modules, and pytest rewrites the
 # assertions of each test file: who wants no bytecode beside the sources gets it kept in .venv
 if sys.dont_write_bytecode and sys.pycache_prefix is None and (ROOT / ".venv").is_dir():
@@ -35,6 +36,27 @@ def pytest_collection() -> Iterator[None]:
         gc.freeze()
         gc.enable()
         gc.set_threshold(50_000)  # tests leave little behind; the default walks it every 700 objects
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish() -> None:
+    """What is left in circles is looked through once, not three times: pytest does so again, in what came since."""
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """A file's tests stay on one worker; those of the structure all, which parse every source once between them."""
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class ByFile(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return STRUCTURE if nodeid.startswith(STRUCTURE) else super()._split_scope(nodeid)
+
+    return ByFile(config, log)
 
 
 @pytest.fixture(scope="session")

@@ -19,16 +19,30 @@ def relative(path: Path) -> str:
 
 
 @functools.cache
+def texts() -> dict[str, str]:
+    """Every source of the three packages by its path."""
+    return {relative(p): p.read_text(encoding="utf-8") for p in SOURCES}
+
+
+parsed = functools.cache(ast.parse)  # by text: what one test has parsed, the others need not
+
+
+@functools.cache
 def trees() -> dict[str, ast.Module]:
     """Every source of the three packages, parsed, by its path."""
-    return {relative(p): ast.parse(p.read_text(encoding="utf-8")) for p in SOURCES}
+    return {path: parsed(text) for path, text in texts().items()}
 
 
-def statements(tree: ast.AST) -> Iterator[ast.stmt]:
+@functools.cache
+def statements(tree: ast.AST) -> tuple[ast.stmt, ...]:
     """Every statement of `tree` at any depth; what stands inside expressions is not visited (a tenth of the nodes).
 
     What is imported for types only is left out.
     """
+    return tuple(_statements(tree))
+
+
+def _statements(tree: ast.AST) -> Iterator[ast.stmt]:
     waiting = [tree]
     while waiting:
         node = waiting.pop()
@@ -46,7 +60,7 @@ def statements(tree: ast.AST) -> Iterator[ast.stmt]:
 def imports_and_calls(source: str) -> tuple[Spoken, ...]:
     """Every import and every call in `source`, at any depth."""
     found: list[Spoken] = []
-    waiting: list[ast.AST] = [ast.parse(source)]
+    waiting: list[ast.AST] = [parsed(source)]
     while waiting:
         node = waiting.pop()
         if isinstance(node, Spoken):

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import ast
 import pickle
-from pathlib import Path
 
 import pytest
 
-from tests.structure.sources import imports_and_calls
+from tests.structure.sources import imports_and_calls, texts
 from tpjb_ident.condition_kinds import ERRORS, KINDS, NOTES, WARNINGS, UnknownConditionError
 from tpjb_ident.conditions import Condition, merged, sentences, untrusted
-
-PACKAGE = Path(__file__).parents[2] / "tpjb_ident"
 
 
 def stated_names(source):
@@ -24,11 +21,11 @@ def stated_names(source):
 
 
 def test_every_condition_of_the_code_is_in_the_registry_and_the_registry_holds_no_other():
-    code = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
+    code = {path: text for path, text in texts().items() if path.startswith("tpjb_ident/")}
     stated = {name for source in code.values() for name in stated_names(source)}
     assert len(stated) > 50
     assert stated - set(KINDS) == set()
-    elsewhere = "".join(source for path, source in code.items() if path.name != "condition_kinds.py")
+    elsewhere = "".join(source for path, source in code.items() if not path.endswith("/condition_kinds.py"))
     by_line = {name for name in KINDS if name.endswith(" on excitation line")}  # named after the line
     assert {name for name in set(KINDS) - by_line if f'"{name}"' not in elsewhere} == set()
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.structure.sources import ROOT, SOURCES, relative, statements, trees
+from tests.structure.sources import ROOT, statements, texts, trees
 
 FILES_A_FOLDER, LINES_A_FILE, LINES_A_FUNCTION, PARAMETERS = 20, 400, 60, 6
 #: Folders with more: the catalogue of effects, and three that are a file or two over.
@@ -176,7 +176,7 @@ def test_a_folder_shows_at_most_twenty_files():
 
 
 def test_files_are_short_enough_to_be_read():
-    lines = {relative(p): len(p.read_text(encoding="utf-8").splitlines()) for p in SOURCES}
+    lines = {path: len(text.splitlines()) for path, text in texts().items()}
     long = [path for path, n in lines.items() if n > LINES_A_FILE]
     assert len(long) <= FILES_TOO_LONG, long
 

@@ -6,7 +6,7 @@ import ast
 
 import pytest
 
-from tests.structure.sources import ROOT, SOURCES, imports_and_calls, relative
+from tests.structure.sources import SOURCES, imports_and_calls, texts
 
 #: Modules that run what they read, or reach out of the machine.
 MODULES = {
@@ -63,7 +63,7 @@ def _dangerous_call(node: ast.Call) -> list[str]:
 
 def test_no_source_runs_what_it_reads():
     assert len(SOURCES) > 30
-    found = {relative(path): set(dangers(path.read_text(encoding="utf-8"))) for path in SOURCES}
+    found = {path: set(dangers(text)) for path, text in texts().items()}
     assert not {name: more for name, seen in found.items() if (more := seen - ALLOWED.get(name, set()))}
 
 
@@ -87,10 +87,10 @@ def test_what_is_harmless_is_none(source):
 def test_raw_data_are_opened_for_reading_only():
     """In rigdata nothing but the virtual rig opens a file to write, or an HDF5 file other than with "r"."""
     found = []
-    for path in (ROOT / "rigdata").rglob("*.py"):
-        if "virtual_rig" in path.parts:
+    for path, text in texts().items():
+        if not path.startswith("rigdata/") or path.startswith("rigdata/virtual_rig/"):
             continue
-        for node in imports_and_calls(path.read_text(encoding="utf-8")):
+        for node in imports_and_calls(text):
             if isinstance(node, ast.Call):
                 function = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
                 values = [
@@ -107,5 +107,5 @@ def test_raw_data_are_opened_for_reading_only():
                     "touch",
                 }
                 if writes or (function in {"open", "File"} and any(set(m) & set("wax+") for m in modes)):
-                    found.append(f"{path.name}:{node.lineno} {function}")
+                    found.append(f"{path}:{node.lineno} {function}")
     assert not found

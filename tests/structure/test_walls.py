@@ -7,10 +7,11 @@ import functools
 import re
 import sys
 import tomllib
+from collections.abc import Iterable
 
 import pytest
 
-from tests.structure.sources import OURS, ROOT, SOURCES, imports_and_calls, relative
+from tests.structure.sources import OURS, ROOT, SOURCES, Spoken, imports_and_calls, texts
 
 #: The guard only looks whether the `model` found is ours.
 MAY_IMPORT_MODEL = ("compare", "diagnose", "cli", "model_guard.py")
@@ -19,8 +20,13 @@ MAY_IMPORT_MODEL = ("compare", "diagnose", "cli", "model_guard.py")
 @functools.cache
 def imported_modules(source: str) -> frozenset[str]:
     """Every module that `source` imports, at any depth, import_module("literal") included."""
+    return modules_of(imports_and_calls(source))
+
+
+def modules_of(nodes: Iterable[Spoken]) -> frozenset[str]:
+    """Every module that these imports and calls import."""
     found = set()
-    for node in imports_and_calls(source):
+    for node in nodes:
         if isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -53,8 +59,8 @@ def breaches(path: str, modules: frozenset[str]) -> list[str]:
 def test_no_import_goes_through_a_wall():
     assert len(SOURCES) > 30
     found = []
-    for path in SOURCES:
-        found += breaches(relative(path), imported_modules(path.read_text(encoding="utf-8")))
+    for path, text in texts().items():
+        found += breaches(path, imported_modules(text))
     assert not found, "\n".join(found)
 
 
@@ -95,15 +101,14 @@ def test_every_third_party_import_is_declared():
     declared = declared_names(project["dependencies"])
     extras = {name for needed in project["optional-dependencies"].values() for name in declared_names(needed)}
     found, at_top = {}, {}
-    for path in SOURCES:
-        text = path.read_text(encoding="utf-8")
+    for path, text in texts().items():
         for module in imported_modules(text):
             top = module.split(".")[0]
             if top not in sys.stdlib_module_names and top not in OURS and top != "bootstrap":
-                found.setdefault(top.lower(), path.name)
+                found.setdefault(top.lower(), path)
         # what an extra brings may be missing: only functions may import it
         body = [n for n in imports_and_calls(text) if isinstance(n, ast.Import | ast.ImportFrom) and not n.col_offset]
-        tops = {m.split(".")[0].lower() for m in imported_modules("\n".join(ast.unparse(n) for n in body))}
-        at_top |= dict.fromkeys((tops & extras) - declared, path.name)
+        tops = {m.split(".")[0].lower() for m in modules_of(body)}
+        at_top |= dict.fromkeys((tops & extras) - declared, path)
     assert not {top: name for top, name in found.items() if top not in declared | extras}
     assert not at_top
