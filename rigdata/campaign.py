@@ -16,8 +16,7 @@ from rigdata.manifest.manifest import MAX_MANIFEST, CsvSpec, Manifest, parse_man
 from rigdata.manifest.runs import RunEntry
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import RunReader
-from rigdata.readers.suffixes import TEXT
+from rigdata.readers.base import TEXT, RunReader
 from rigdata.run import Run
 from rigdata.safe_path import inside
 

@@ -6,9 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from rigdata.errors import RigError
-
 Severity = Literal["error", "warning", "note"]
+
+
+class RigError(ValueError):
+    """Something that this package was given cannot be used; the message says what, where and what to do."""
 
 
 @dataclass(frozen=True)

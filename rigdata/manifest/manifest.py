@@ -12,8 +12,7 @@ from typing import Any
 from rigdata.calibration import Channel
 from rigdata.manifest.channels import TextFile, read_channels
 from rigdata.manifest.runs import RunEntry, read_runs
-from rigdata.manifest.table import Findings, Table
-from rigdata.manifest.toml_lines import key_lines
+from rigdata.manifest.table import Findings, Table, key_lines
 from rigdata.problem import Problem, RigDataError
 
 SCHEMA = "tpjb-rig/1"

@@ -1,8 +1,9 @@
-"""What every reader of one run's record offers to `rigdata.campaign.Run`."""
+"""What every reader of one run's record offers to `rigdata.campaign.Run`, and which file names which reader takes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -17,6 +18,26 @@ MAX_SAMPLES = 2**31
 MAX_REQUEST = 2**29
 #: Sample rates beyond these are none [Hz]: times counted from them overflow.
 LEAST_RATE, MOST_RATE = 1e-6, 1e12
+#: Text in any national spelling.
+TEXT = (".csv", ".txt", ".asc", ".dat", ".tsv")
+#: Suffix -> module of `rigdata.readers`, extra that brings its library.
+FORMATS = {
+    ".tdms": ("formats.tdms", "tdms"),
+    ".lvm": ("text.lvm", ""),
+    ".uff": ("formats.uff58", "uff"),
+    ".unv": ("formats.uff58", "uff"),
+    ".58": ("formats.uff58", "uff"),
+    ".mf4": ("formats.mdf4", "mdf"),
+    ".mdf": ("formats.mdf4", "mdf"),
+    ".mat": ("formats.mat", ""),
+    ".parquet": ("formats.parquet", ""),
+}
+#: Suffixes of loggers and programs that write one of the known kinds on request.
+_EXPORTABLE = {
+    ".tdm": ".tdms or .csv", ".tdx": ".tdms or .csv", ".xlsx": ".csv", ".xls": ".csv", ".ods": ".csv", ".bin": ".csv",
+    ".dxd": ".mat or .csv", ".d7d": ".mat or .csv", ".ltd": ".uff", ".lms": ".uff", ".pro": ".uff",
+    ".wav": ".csv", ".npy": ".csv", ".npz": ".csv", ".rec": ".csv", ".sie": ".csv", ".tst": ".csv",
+}  # fmt: skip
 
 
 class RunReader(Protocol):
@@ -122,3 +143,22 @@ def rate_of_time(time: FloatArray) -> float:
     step = float(np.median(known[span:] - known[:-span])) / span
     # Ten digits: what a column of rounded times can tell; keeps 1000 Hz from being 999.9999999999.
     return float(f"{1.0 / step:.10g}") if step > 0 else float("nan")
+
+
+def suffix_hint(path: Path) -> str:
+    """What to do about a suffix that no reader is known by; "" where it is known.
+
+    Parameters
+    ----------
+    path : Path
+        Of a record, or of what was taken for one.
+    """
+    suffix = path.suffix.lower()
+    known = (*TEXT, *FORMATS)
+    if suffix in known:
+        return ""
+    if suffix in _EXPORTABLE:
+        return f"{suffix} files are not read; export it as {_EXPORTABLE[suffix]}"
+    near = nearest_name(suffix, known)
+    hint = f"did you mean {near}?" if near else f"known are {', '.join(known)}"
+    return f"the suffix {suffix or '(none)'} is not known; {hint}"

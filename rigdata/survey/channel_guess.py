@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from rigdata.calibration import DIMENSIONS
-from rigdata.readers.time_names import is_time
+from rigdata.readers.series import is_time
 from rigdata.units import UnitError, is_signal, parse_unit, unit_factor
 
 #: Words of rigs in several languages -> quantity; the first that fits counts.

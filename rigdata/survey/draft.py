@@ -203,8 +203,8 @@ def draft_manifest(found: Survey, name: str, bearing: str | None) -> str:
         "# After changes to channels, `tpjb init --update` guesses the rest anew; `tpjb check` lists what is left.",
         "# Signs and frame: docs/guide/mounting.md",
         'schema = "tpjb-rig/1"',
-        f"id = {toml_string(name)}",
-        f"bearing = {toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # bearing file, beside this one',
+        f"id = {_toml_string(name)}",
+        f"bearing = {_toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # bearing file, beside this one',
         'description = ""',
         "",
         "[housing]",
@@ -214,7 +214,7 @@ def draft_manifest(found: Survey, name: str, bearing: str | None) -> str:
     if not all(rate > 0 for rate in found.rates):
         lines += ["[acquisition]", f'sample_rate = "{MARK} Hz"   # some files hold no times', ""]
     if found.nameless:
-        names = ", ".join(toml_string(f"column{i + 1}") for i in range(found.nameless))
+        names = ", ".join(_toml_string(f"column{i + 1}") for i in range(found.nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
     if found.clock:
         head = f"[channels.{_key(found.clock)}]"
@@ -265,7 +265,7 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str) -> list[str]:
         lines.append(known if guess.axis else f"{known}   # {where}")
     if like:
         lines.append(
-            f"like = {toml_string(like)}   # (guess) a sensor of the same type; or its own unit, sensitivity, .."
+            f"like = {_toml_string(like)}   # (guess) a sensor of the same type; or its own unit, sensitivity, .."
         )
     else:
         lines.append(f'unit = "{guess.unit or MARK}"')
@@ -295,7 +295,7 @@ def run_lines(export: str, run: RunGuess, found: Survey) -> list[str]:
     kind = f'kind = "{MARK}"   # dynamic, dry_pivot, locus, clearance'
     if run.kind:
         kind = f'kind = "{run.kind}"   # (guess) {run.why}'
-    lines = ["[[runs]]", f"id = {toml_string(stem)}", f"file = {toml_string(export)}", kind]
+    lines = ["[[runs]]", f"id = {_toml_string(stem)}", f"file = {_toml_string(export)}", kind]
     if run.kind in ("dynamic", "locus", ""):
         if math.isfinite(run.speed):
             lines.append(_line("shaft_speed", run.speed, "Hz", run.why_speed))
@@ -325,16 +325,11 @@ def _line(key: str, value: float, unit: str, why: str, otherwise: str = "") -> s
     return f'{key} = "{MARK} {unit}"' + (f"   # {otherwise}" if otherwise else "")
 
 
-def toml_string(text: str) -> str:
-    """Write text as a TOML string: quoted, controls escaped.
-
-    Parameters
-    ----------
-    text : str
-    """
+def _toml_string(text: str) -> str:
+    """Write text as a TOML string: quoted, controls escaped."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _key(name: str) -> str:
     bare = name.isascii() and name.replace("_", "").replace("-", "").isalnum()
-    return name if bare else toml_string(name)
+    return name if bare else _toml_string(name)

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from rigdata.problem import Problem, RigDataError
+from rigdata.readers.base import FORMATS, TEXT, suffix_hint
 from rigdata.readers.formats.foreign import read_foreign
 from rigdata.readers.series import Series, without_twins
-from rigdata.readers.suffixes import FORMATS, TEXT, suffix_hint
 from rigdata.readers.text.catman import time_column
 from rigdata.readers.text.head import find_head
 

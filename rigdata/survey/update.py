@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.time_names import is_time, seconds
+from rigdata.readers.series import is_time, seconds
 from rigdata.survey.channel_guess import ChannelGuess
 from rigdata.survey.draft import MARK, Survey, channel_blocks, run_lines, survey
 from rigdata.survey.exports import Export
@@ -24,19 +24,8 @@ class _Block:
     data: dict[str, Any]
 
 
-def known_channels(text: str) -> dict[str, ChannelGuess]:
-    """Channels that a manifest describes, as far as it does.
-
-    Parameters
-    ----------
-    text : str
-        Of the manifest; open places may stand in it.
-
-    Raises
-    ------
-    RigDataError
-        It is no TOML.
-    """
+def _known_channels(text: str) -> dict[str, ChannelGuess]:
+    """Channels that a manifest describes, as far as it does."""
     try:
         tables = tomllib.loads(text).get("channels", {})
     except tomllib.TOMLDecodeError as error:
@@ -88,7 +77,7 @@ def updated_manifest(text: str, exports: Sequence[Export]) -> tuple[str, list[st
     changes : list of str
         One sentence each.
     """
-    given = known_channels(text)
+    given = _known_channels(text)
     before, after = survey(exports), survey(exports, given)
     blocks = _blocks(text)
     changes: list[str] = []

@@ -37,7 +37,7 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
     stiffness_point = actual if noise.set_point.stiffness_follows else run.point
     position_point = actual if noise.set_point.position_follows else run.point
     shaft_angle = rng.uniform(0, 2 * np.pi)
-    forces = actuator_forces(run, noise, rng)
+    forces = _actuator_forces(run, noise, rng)
     unbalance = noise.shaft.unbalance * actual.shaft_speed**2
     if unbalance:
         turning = unbalance * np.array([1.0, -1j]) * np.exp(1j * shaft_angle)
@@ -52,7 +52,7 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
         lines=lines,
         temperature=truth.temperatures(replace(position_point, excitation=0.0)),
         speed=actual.shaft_speed,
-        surface=surface_runout(noise, seed, shaft_angle),
+        surface=_surface_runout(noise, seed, shaft_angle),
     )
     time = np.arange(round(run.seconds * run.rate)) / run.rate
     return RunPhysics(time, motion, _facts(actual, motion))
@@ -77,15 +77,8 @@ def missed(point: OperatingPoint, noise: Noise, rng: np.random.Generator) -> Ope
     )
 
 
-def actuator_forces(run: PlannedRun, noise: Noise, rng: np.random.Generator) -> list[tuple[float, ComplexArray]]:
-    """Force phasors (2,) [N] of the actuators, with their frequencies [rad/s].
-
-    Parameters
-    ----------
-    run : PlannedRun
-    noise : Noise
-    rng : numpy.random.Generator
-    """
+def _actuator_forces(run: PlannedRun, noise: Noise, rng: np.random.Generator) -> list[tuple[float, ComplexArray]]:
+    """Force phasors (2,) [N] of the actuators, with their frequencies [rad/s]."""
     forces: list[tuple[float, ComplexArray]] = []
     if run.direction is None:
         return forces
@@ -131,17 +124,8 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
     )
 
 
-def surface_runout(noise: Noise, seed: int, shaft_angle: float) -> ComplexArray:
-    """Runout phasors of 1X, 2X, ... [m] at a shaft angle [rad]; the surface is the same in the whole campaign.
-
-    Parameters
-    ----------
-    noise : Noise
-    seed : int
-        Of the random numbers.
-    shaft_angle : float
-        [rad]
-    """
+def _surface_runout(noise: Noise, seed: int, shaft_angle: float) -> ComplexArray:
+    """Runout phasors of 1X, 2X, ... [m] at a shaft angle [rad]; the surface is the same in the whole campaign."""
     sizes = np.array(noise.shaft.runout, dtype=float)
     orders = np.arange(1, len(sizes) + 1)
     phases = stream(seed, "", "campaign").uniform(0, 2 * np.pi, len(sizes))

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.errors import RigError
 from rigdata.operating_point import OperatingPoint
+from rigdata.problem import RigError
 
 StiffnessLaw = Callable[[OperatingPoint], Any]
 PositionLaw = Callable[[OperatingPoint], Any]

@@ -20,10 +20,9 @@ from tpjb_ident.check.gain_evidence import (
     dynamic_difference,
     static_difference,
 )
-from tpjb_ident.check.lines import fit_lines
+from tpjb_ident.check.lines import fit_lines, turning_frequency
 from tpjb_ident.check.observation import observe
 from tpjb_ident.check.one_gain import gain_of_run, wrong_gains
-from tpjb_ident.check.rotation import turning_frequency
 from tpjb_ident.check.run_gains import probe_centres
 
 OMEGA = 2 * math.pi * 25.0

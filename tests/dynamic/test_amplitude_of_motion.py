@@ -10,8 +10,8 @@ from tests.studies.field.bearing import Bearing
 from tests.studies.field.campaign_file import plans_of, write_campaign
 from tests.studies.field.rig import Rig
 from tpjb_ident.dynamic.identify import identify
+from tpjb_ident.dynamic.instruments.amplitude import zero_amplitude
 from tpjb_ident.dynamic.instruments.harmonics import MAX_AMPLITUDE, NEVER_LINEAR, FilmChange, change_conditions
-from tpjb_ident.dynamic.instruments.zero_amplitude import zero_amplitude
 from tpjb_ident.dynamic.settings import IdentifySettings
 
 

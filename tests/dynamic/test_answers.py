@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.dynamic.phasor_cases import H, complex_normal
-from tpjb_ident.dynamic.estimators.drive_phase import aligned
+from tpjb_ident.dynamic.estimators.errors_in_variables import aligned
 from tpjb_ident.dynamic.estimators.estimate import METHODS, estimate_dynamic_stiffness, estimate_table
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
 from tpjb_ident.dynamic.estimators.phasor_table import phasor_table

@@ -17,7 +17,7 @@ from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.identify import assemble
 from tpjb_ident.dynamic.runs.finished_runs import digest
 from tpjb_ident.dynamic.runs.left_out import LeftOut
-from tpjb_ident.dynamic.runs.run_result import RunResult
+from tpjb_ident.dynamic.runs.run_store import RunResult
 from tpjb_ident.dynamic.settings import IdentifySettings
 
 LOADS = (3000.0, 8000.0)

@@ -18,11 +18,10 @@ from tests.studies.field.broadband import true_parameters
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.dynamic.broadband.band_equations import line_sums
 from tpjb_ident.dynamic.broadband.band_models import Shared, fit_band
-from tpjb_ident.dynamic.broadband.classic import h1_fit, h2_fit, hv_fit
+from tpjb_ident.dynamic.broadband.line_estimates import h1_fit, h2_fit, hv_fit, periods_fit
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
 from tpjb_ident.dynamic.broadband.local_regression import local_fit
-from tpjb_ident.dynamic.broadband.repeated_periods import periods_fit
-from tpjb_ident.dynamic.broadband.run_scatter import run_scatter
+from tpjb_ident.dynamic.broadband.shared_sources import run_scatter
 from tpjb_ident.dynamic.broadband.spectra.period import find_period, resampled
 from tpjb_ident.dynamic.broadband.spectra.samples import Samples
 from tpjb_ident.dynamic.identify import identify

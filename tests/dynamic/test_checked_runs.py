@@ -15,7 +15,7 @@ from tpjb_ident.check.observation import observe
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.records.kept_readings import beginning_of, with_kept_beginning
 from tpjb_ident.dynamic.records.run_data import PhasorSettings
-from tpjb_ident.dynamic.runs.kept_observation import packed, unpacked
+from tpjb_ident.dynamic.runs.run_store import packed, unpacked
 from tpjb_ident.dynamic.settings import IdentifySettings
 
 QUICK = replace(Rig(), seconds=1.5, rate=1000.0)

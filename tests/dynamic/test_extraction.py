@@ -19,7 +19,7 @@ from tpjb_ident.dynamic.records import extraction
 from tpjb_ident.dynamic.records.extraction import MAX_JITTER, extract
 from tpjb_ident.dynamic.records.phasors import LineFitter, fit_uneven
 from tpjb_ident.dynamic.records.run_data import PhasorSettings
-from tpjb_ident.dynamic.records.shaft_course import ShaftCourse
+from tpjb_ident.dynamic.records.shaft_speed import ShaftCourse
 from tpjb_ident.dynamic.records.stretches import open_stretches
 from tpjb_ident.dynamic.spectral_lines.lines import known_lines
 from tpjb_ident.dynamic.spectral_lines.windows import WindowSettings

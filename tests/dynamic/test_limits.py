@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import chi2
 from scipy.stats import t as student_t
 
-from tpjb_ident.dynamic.corrections.calibration_uncertainty import apparent_change, gain_draws
+from tpjb_ident.dynamic.corrections.systematic_sources import apparent_change, gain_draws
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.amplitude import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
 from tpjb_ident.dynamic.results.frequency_fit import REFUSED, fit_over_frequency, fits_per_load

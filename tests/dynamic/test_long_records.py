@@ -12,12 +12,11 @@ from rigdata.virtual_rig import Timing, write_campaign
 from tests.dynamic.test_identify import rig
 from tests.studies.bench_phasors import HeldRun
 from tpjb_ident.dynamic.records.extraction import extract
+from tpjb_ident.dynamic.records.kept_readings import SHORT, ShortRecord
 from tpjb_ident.dynamic.records.line_tuning import retuned
-from tpjb_ident.dynamic.records.phasors import LineFitter
+from tpjb_ident.dynamic.records.phasors import BLOCK, LineFitter, WaveBlocks
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
-from tpjb_ident.dynamic.records.short_record import SHORT, ShortRecord
 from tpjb_ident.dynamic.records.stretches import open_stretches
-from tpjb_ident.dynamic.records.wave_blocks import BLOCK, WaveBlocks
 from tpjb_ident.dynamic.spectral_lines.lines import known_lines
 from tpjb_ident.dynamic.spectral_lines.windows import WindowSettings, line_design
 

@@ -33,7 +33,7 @@ from tpjb_ident.dynamic.corrections.mains_angles import MainsEquations
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.records.mains_line import mains_line
+from tpjb_ident.dynamic.records.line_means import mains_line
 from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.dynamic.spectral_lines.lines import LineSettings, known_lines
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.dynamic.corrections.calibration_uncertainty import apparent_change, gain_draws
 from tpjb_ident.dynamic.corrections.static_load import load_misses, load_slopes, to_set_point, widened
+from tpjb_ident.dynamic.corrections.systematic_sources import apparent_change, gain_draws
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
 from tpjb_ident.dynamic.instruments.amplitude import amplitude_slope
 from tpjb_ident.dynamic.records.phasors import PhasorBlock

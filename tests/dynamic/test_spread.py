@@ -9,8 +9,7 @@ import pytest
 from scipy.stats import chi2
 
 from tests.dynamic.phasor_cases import H, complex_normal
-from tpjb_ident.dynamic.estimators.drive_phase import LOCKED, aligned
-from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats, eiv_fit, repeats
+from tpjb_ident.dynamic.estimators.errors_in_variables import LOCKED, Repeats, aligned, eiv_fit, repeats
 from tpjb_ident.dynamic.estimators.least_trimmed import (
     Regression,
     distance2,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigdata import load_campaign
-from rigdata.keyphasor import pulse_times
+from rigdata.run import pulse_times
 from tests.studies.field.campaign_file import plans_of, write_campaign
 from tests.studies.field.rig import Rig
 from tpjb_ident.conditions import untrusted

@@ -11,9 +11,9 @@ import pytest
 from scipy.io import savemat
 
 from rigdata.problem import RigDataError
-from rigdata.readers.formats import mat5_elements
+from rigdata.readers.formats import mat
 from rigdata.readers.formats.foreign import read_foreign
-from rigdata.readers.formats.mat5_elements import check_mat5
+from rigdata.readers.formats.mat import check_mat5
 
 TIME = np.arange(120) / 100.0
 
@@ -76,7 +76,7 @@ def test_a_compressed_bomb_is_refused_and_the_limit_can_be_moved(tmp_path, monke
     path = tmp_path / "bomb.mat"
     path.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
     assert path.stat().st_size < 2**14
-    monkeypatch.setattr(mat5_elements, "LARGEST", 2**20)
+    monkeypatch.setattr(mat, "LARGEST", 2**20)
     with pytest.raises(RigDataError, match="unpacks to more than 1 MB"):
         read_foreign(path, "bomb.mat")
 

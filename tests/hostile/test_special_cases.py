@@ -17,8 +17,8 @@ from model.pivots import load_pivots
 from model.units import UnitError
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
+from rigdata.readers.base import FORMATS
 from rigdata.readers.formats.foreign import read_foreign
-from rigdata.readers.suffixes import FORMATS
 
 pytestmark = pytest.mark.slow
 HEAD = 'schema = "tpjb-rig/1"\nid = "t"\nbearing = "b.toml"\n[acquisition]\nsample_rate = "10 Hz"\n'

@@ -22,7 +22,7 @@ from tpjb_ident.pivot.records.projection import PadDirection, project
 from tpjb_ident.pivot.records.refusals import check_directions, check_pickup, check_placement
 from tpjb_ident.pivot.records.settings import PivotSettings
 from tpjb_ident.pivot.records.steps import Hold
-from tpjb_ident.slow_records.flat_channels import refuse_flat_channels
+from tpjb_ident.slow_records.bad_samples import refuse_flat_channels
 from tpjb_ident.slow_records.noise import NoiseModel
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])

@@ -11,7 +11,7 @@ from scipy.interpolate import PchipInterpolator
 
 from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot import pads_table, pivot_table, pivots_text, write_pivots
-from tpjb_ident.pivot.contact import contact_onset, contact_onset_se
+from tpjb_ident.pivot.assemble import contact_onset, contact_onset_se
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
 from tpjb_ident.pivot.fit import LAWS
 from tpjb_ident.pivot.hysteresis import measure_loop

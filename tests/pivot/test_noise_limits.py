@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tpjb_ident.pivot.records.blocks import Blocks
-from tpjb_ident.pivot.records.noise_of_records import noise_about_curve, noise_within_holds
+from tpjb_ident.pivot.records.dry_record import noise_about_curve, noise_within_holds
 from tpjb_ident.pivot.records.pickup import PickupSignature, measure_pickup, mistakes
 from tpjb_ident.pivot.records.projection import Projection
 from tpjb_ident.slow_records.noise import DRIFT_OVER_FLICKER, NoiseModel, NoiseSeries, estimate_noise, flicker_kernel

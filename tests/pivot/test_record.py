@@ -7,7 +7,7 @@ import pytest
 
 from tpjb_ident.pivot.records.blocks import MOST_BLOCKS, Samples, cut_blocks
 from tpjb_ident.pivot.records.steps import MAINS_PERIOD, Hold, _bin, find_holds
-from tpjb_ident.slow_records.glitches import good_samples
+from tpjb_ident.slow_records.bad_samples import good_samples
 
 RATE = 500.0
 

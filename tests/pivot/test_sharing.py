@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from tpjb_ident.pivot.fit import LAWS
-from tpjb_ident.pivot.laws.choice import posterior_weights
+from tpjb_ident.pivot.laws.choice import ALIKE, posterior_weights, shared_priors, with_shared_shape
 from tpjb_ident.pivot.laws.law_fit import FitData, ShapePrior, fit_law
-from tpjb_ident.pivot.laws.shape_sharing import ALIKE, shared_priors, with_shared_shape
 from tpjb_ident.pivot.records.pickup import measure_pickup, mistakes
 
 REFERENCE = 2000.0

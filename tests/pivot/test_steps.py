@@ -8,7 +8,7 @@ import pytest
 from tpjb_ident.pivot.bad_holds import sticking
 from tpjb_ident.pivot.records.blocks import MOST_BLOCKS, Samples, cut_blocks
 from tpjb_ident.pivot.records.steps import find_holds
-from tpjb_ident.slow_records.glitches import good_samples
+from tpjb_ident.slow_records.bad_samples import good_samples
 
 RATE = 500.0
 

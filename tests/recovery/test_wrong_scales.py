@@ -13,7 +13,7 @@ from rigdata.virtual_rig import Fault
 from tests.command_line import tpjb
 from tests.good_campaigns import SMALL_PLAN, rocker_rig, written
 from tpjb_ident.clearance.measure import measure_run
-from tpjb_ident.clearance.probe_gains import gain_ratio
+from tpjb_ident.clearance.polygon import gain_ratio
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.settings import IdentifySettings
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rigdata.channel_response import ChannelResponse, parse_filter, parse_response_table
-from rigdata.keyphasor import speed_from_pulses
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
+from rigdata.run import speed_from_pulses
 from rigdata.units import UnitError
 
 MANIFEST = """schema = "tpjb-rig/1"

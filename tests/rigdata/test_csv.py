@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import rigdata
 from rigdata.problem import RigDataError
-from rigdata.readers.numbers import MISSING
+from rigdata.readers.text.cells import MISSING
 from tpjb_ident.check.campaign import check_campaign
 
 HEAD = """\

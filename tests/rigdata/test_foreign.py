@@ -11,11 +11,10 @@ import pytest
 
 from rigdata import RigDataError, load_campaign
 from rigdata.readers import series
+from rigdata.readers.base import FORMATS
 from rigdata.readers.formats.foreign import ForeignReader, is_foreign, read_foreign
-from rigdata.readers.series import Series, equidistant, on_one_clock
-from rigdata.readers.suffixes import FORMATS
+from rigdata.readers.series import Series, equidistant, is_time, on_one_clock, seconds
 from rigdata.readers.table_cache import TableCache
-from rigdata.readers.time_names import is_time, seconds
 from tpjb_ident.check.campaign import check_campaign
 
 RATE, COUNT = 1000.0, 2000

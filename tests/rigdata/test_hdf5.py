@@ -13,7 +13,7 @@ import pytest
 import rigdata
 from rigdata.problem import RigDataError
 from rigdata.readers.hdf5 import reader as hdf5
-from rigdata.readers.hdf5.heaps import too_long_text
+from rigdata.readers.hdf5.guards import too_long_text
 from tpjb_ident.check.campaign import check_campaign
 
 MANIFEST = """\

@@ -7,7 +7,7 @@ import pytest
 
 from rigdata import RigDataError, load_campaign
 from rigdata.readers.formats.foreign import read_foreign
-from rigdata.readers.text.stamps import stamp_seconds
+from rigdata.readers.text.cells import stamp_seconds
 from rigdata.survey.exports import read_export
 
 RATE, COUNT = 1000.0, 400

@@ -19,8 +19,7 @@ from rigdata.virtual_rig import (
     locus_points,
     operating_points,
 )
-from rigdata.virtual_rig.apparent import apparent_stiffness
-from rigdata.virtual_rig.ledger import campaign_truth
+from rigdata.virtual_rig.ledger import apparent_stiffness, campaign_truth
 
 K = np.array([[2.0e8, 1.3e7], [-1.1e7, 4.0e8]])
 C = np.array([[4.0e5, 2.0e4], [1.0e4, 6.0e5]])

@@ -22,8 +22,7 @@ from rigdata.virtual_rig import (
     locus_points,
     operating_points,
 )
-from rigdata.virtual_rig.noise_signals import channel_noise, flicker, slow_drift
-from rigdata.virtual_rig.sensing import converter_step, draw_glitches
+from rigdata.virtual_rig.sensing import channel_noise, converter_step, draw_glitches, flicker, slow_drift
 
 K = np.array([[2.0e8, 1.3e7], [-1.1e7, 4.0e8]])
 C = np.array([[4.0e5, 2.0e4], [1.0e4, 6.0e5]])

@@ -6,9 +6,8 @@ import ast
 
 import pytest
 
-from rigdata.errors import RigError
 from rigdata.near_names import nearest_name
-from rigdata.problem import RigDataError
+from rigdata.problem import RigDataError, RigError
 from rigdata.units import UnitError
 from tests.structure.sources import statements, trees
 from tpjb_ident.dynamic.estimators.rlm import ComplexInputError

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from rigdata.campaign import Campaign
-from rigdata.leftovers import leftovers
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.arguments import as_campaign
-from tpjb_ident.check.consistency import check_housing, check_load_ratios
+from tpjb_ident.check.consistency import check_housing, check_load_ratios, check_positions
 from tpjb_ident.check.findings import Finding, merge
 from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.check.positions import check_positions
 from tpjb_ident.check.redundant_channels import report_apart
 from tpjb_ident.check.response import check_accelerometers, check_responses
 from tpjb_ident.check.set_points import check_excitation, check_speed, check_static_loads
@@ -22,6 +21,8 @@ from tpjb_ident.check.slow_tests import check_dry, check_locus, check_shaft_foll
 
 _ORDER = {"error": 0, "warning": 1, "note": 2}
 Progress = Callable[[int, int], None]
+_LISTED = 5
+_MAX_LOOKED_AT = 10_000
 
 
 def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = None) -> list[Problem]:
@@ -51,7 +52,7 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
             progress(count, len(campaign.runs))
     findings: list[Finding] = [f for one in judged(campaign, seen) for f in one.report.found]
     merged = merge(findings, campaign.path.name, campaign.runs)
-    return _sorted([*campaign.notes, *merged, *leftovers(campaign)])
+    return _sorted([*campaign.notes, *merged, *_leftovers(campaign)])
 
 
 def judged(campaign: Campaign, seen: Sequence[Observation]) -> list[Observation]:
@@ -119,3 +120,47 @@ def _shared_record(one: Run, other: Run) -> bool:
 
 def _sorted(problems: Sequence[Problem]) -> list[Problem]:
     return sorted(dict.fromkeys(problems), key=lambda p: _ORDER[p.severity])
+
+
+def _leftovers(campaign: Campaign) -> list[Problem]:
+    """Note records without a run: forgotten in the manifest, or left from another campaign."""
+    if campaign.path.is_dir():
+        names = _files(campaign)
+        where, what = campaign.path.name, "file"
+    else:
+        names = _groups(campaign)
+        where, what = f"{campaign.path.name}:/runs", "group"
+    if not names:
+        return []
+    more = f", ... ({len(names)} in all)" if len(names) > _LISTED else ""
+    listed = ", ".join(ascii(n)[1:-1][:60] for n in names[:_LISTED])
+    text = f"no run names the {what}{'' if len(names) == 1 else 's'} {listed}{more}"
+    return [Problem("note", where, "", text, "Add them to the manifest, or nothing if they are not wanted")]
+
+
+def _files(campaign: Campaign) -> list[str]:
+    known = {p.resolve() for p in campaign.files.values()}
+    records = [p for n, p in campaign.files.items() if n not in {"campaign.toml", campaign.bearing_name}]
+    suffixes = {p.suffix.lower() for p in records}
+    found: list[Path] = []
+    for folder in sorted({p.parent for p in records}):
+        try:
+            beside = list(itertools.islice(folder.iterdir(), _MAX_LOOKED_AT))
+        except OSError:  # the folder is not there: the runs themselves say so
+            continue
+        found += [p for p in beside if p.suffix.lower() in suffixes and p.resolve() not in known and p.is_file()]
+    return sorted(p.name for p in found)
+
+
+def _groups(campaign: Campaign) -> list[str]:
+    from rigdata.readers.hdf5.guards import resolve
+    from rigdata.readers.hdf5.reader import open_readonly
+
+    known = {run.id for run in campaign.runs}
+    try:
+        with open_readonly(campaign.path, campaign.path.name) as handle:
+            runs = resolve(handle, "runs", campaign.path.name)
+            names = [] if runs is None else [str(n) for n in itertools.islice(runs, _MAX_LOOKED_AT)]
+    except RigDataError:  # the runs themselves say so
+        return []
+    return sorted(set(names) - known)

@@ -76,14 +76,8 @@ class Reporter:
         self.found.extend(Finding(p, f"{p.place} {p.what}") for p in problems)
 
 
-def is_shared(concerned: int, alike: int) -> bool:
-    """Whether a finding is one of the campaign: a third of the runs alike have it, three at least.
-
-    Parameters
-    ----------
-    concerned, alike : int
-        Runs that have it, and runs of the same kinds.
-    """
+def _is_shared(concerned: int, alike: int) -> bool:
+    """Whether a finding is one of the campaign: a third of the runs alike have it, three at least."""
     return concerned >= 3 and 3 * concerned >= alike
 
 
@@ -112,7 +106,7 @@ def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[P
         concerned = list(dict.fromkeys(p.run for p in group if p.run))
         kinds = {kind_of[r] for r in concerned}
         alike = sum(run.kind in kinds for run in runs)
-        if not is_shared(len(concerned), alike):
+        if not _is_shared(len(concerned), alike):
             merged.extend(group)
             continue
         first = group[0]
@@ -163,7 +157,7 @@ def verdicts(reports: Sequence[Reporter]) -> Verdicts:
         for run, problem in concerned.items():
             if severity == "warning":
                 found.doubtful.setdefault(run, []).append(problem)
-            elif severity == "error" and is_shared(len(concerned), alike):
+            elif severity == "error" and _is_shared(len(concerned), alike):
                 found.shared.setdefault(run, []).append(problem)
             elif severity == "error":
                 found.unusable.setdefault(run, problem)

@@ -15,11 +15,9 @@ from rigdata.manifest.manifest import MAINS_FREQUENCIES
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.arrays import ComplexArray, FloatArray
-from tpjb_ident.check.clock import check_clock
 from tpjb_ident.check.findings import Reporter
-from tpjb_ident.check.lines import RecordLines, band_lines, fit_lines, strongest_line
-from tpjb_ident.check.rotation import turning_frequency
-from tpjb_ident.check.signals import check_signal, needed
+from tpjb_ident.check.lines import RecordLines, band_lines, fit_lines, strongest_line, turning_frequency
+from tpjb_ident.check.signals import check_clock, check_signal, needed
 
 #: Samples read at a time; signs and lines are judged on the first block [samples].
 BLOCK = 2**19

@@ -16,8 +16,7 @@ from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.presentation import Presented, shown_by
-from tpjb_ident.slow_records.flat_channels import refuse_flat_channels
-from tpjb_ident.slow_records.glitches import good_samples
+from tpjb_ident.slow_records.bad_samples import good_samples, refuse_flat_channels
 from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ import numpy as np
 
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.clearance.polygon import Centre, CentreRule, corners, find_centre, normals
-from tpjb_ident.clearance.probe_gains import gain_ratio
+from tpjb_ident.clearance.polygon import Centre, CentreRule, corners, find_centre, gain_ratio, normals
 from tpjb_ident.clearance.side_fit import SideFit, fit_sides
 from tpjb_ident.clearance.sweep import Touch, read_sweep
 from tpjb_ident.conditions import Condition, sentences

@@ -141,7 +141,7 @@ def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> p
     for other in others:
         change = clearance_change(base, other)
         light, heavy = sorted((base, other), key=lambda p: p.push_load)
-        same = same_condition(base, other)
+        same = _same_condition(base, other)
         spring = radial_stiffness(light, heavy) if same and _rises(light, heavy) else None
         for k in range(len(base.angles)):
             row = {
@@ -162,14 +162,8 @@ def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> p
     return pd.DataFrame(rows)
 
 
-def same_condition(one: ClearancePolygon, other: ClearancePolygon) -> bool:
-    """Whether two sweeps were made at one speed and one temperature (or nobody knows better).
-
-    Parameters
-    ----------
-    one : ClearancePolygon
-    other : ClearancePolygon
-    """
+def _same_condition(one: ClearancePolygon, other: ClearancePolygon) -> bool:
+    """Whether two sweeps were made at one speed and one temperature (or nobody knows better)."""
     apart = abs(one.temperature - other.temperature)
     return one.point.shaft_speed == other.point.shaft_speed and not apart > SAME_WARMTH
 

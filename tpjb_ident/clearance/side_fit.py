@@ -66,17 +66,8 @@ class SideFit:
     misfit: float
 
 
-def known_give(curves: Sequence[PivotCurve], pad: IntArray, load: FloatArray) -> FloatArray:
-    """Deflection (m,) [m] of pads (m,) (index from 0) at loads (m,) [N]; zero for pads without a curve.
-
-    Parameters
-    ----------
-    curves : sequence of PivotCurve
-    pad : (m,) ndarray of int
-        From 0.
-    load : (m,) ndarray
-        [N]
-    """
+def _known_give(curves: Sequence[PivotCurve], pad: IntArray, load: FloatArray) -> FloatArray:
+    """Deflection (m,) [m] of pads (m,) (index from 0) at loads (m,) [N]; zero for pads without a curve."""
     give = np.zeros(len(load))
     for curve in curves:
         mine = pad == curve.pad - 1
@@ -135,7 +126,7 @@ def fit_sides(touch: Touch, angles: FloatArray, reached: BoolArray, curves: Sequ
     usable = reached[touch.pad] & _consistent(touch, place)
     used, place = touch.take(usable), place[usable]
     noise = _noise(used, place)
-    give = known_give(curves or (), used.pad, used.load)
+    give = _known_give(curves or (), used.pad, used.load)
     whitener = _whitener(used, angles, noise, SLIDING * give * used.alone)
     system = _System(used, place, whitener, np.flatnonzero(reached), len(angles), noise)
     return _solve_unknown(system) if curves is None else _solve_known(system, curves)
@@ -216,8 +207,8 @@ def _design(system: _System) -> FloatArray:
 def _solve_known(system: _System, curves: Sequence[PivotCurve]) -> SideFit:
     """Sides with the pivots' give from their curves, times one common factor near one."""
     every = np.arange(system.count)
-    full = known_give(curves, every, np.full(system.count, system.touch.push))
-    give = known_give(curves, system.touch.pad, system.touch.load)
+    full = _known_give(curves, every, np.full(system.count, system.touch.push))
+    give = _known_give(curves, system.touch.pad, system.touch.load)
     w = np.maximum(system.touch.load, 0.0) / system.touch.push
     shape = full[system.touch.pad] * (np.cbrt(w) ** 2 - w)
     design = np.column_stack([_design(system), shape, give])

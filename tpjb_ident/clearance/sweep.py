@@ -15,8 +15,7 @@ import numpy as np
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.clearance.polygon import normals
-from tpjb_ident.slow_records.flat_channels import refuse_flat_channels
-from tpjb_ident.slow_records.glitches import good_samples
+from tpjb_ident.slow_records.bad_samples import good_samples, refuse_flat_channels
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run

@@ -13,27 +13,29 @@ from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.check.redundant_channels import widened
 from tpjb_ident.conditions import merged
-from tpjb_ident.dynamic.broadband.band_point import BandSettings
-from tpjb_ident.dynamic.broadband.band_runs import is_broadband
+from tpjb_ident.dynamic.broadband.band_point import BandSettings, is_broadband
 from tpjb_ident.dynamic.broadband.identify_bands import IdentifiedBands, identify_bands
-from tpjb_ident.dynamic.corrections.calibration_uncertainty import GainDraws, apparent_change, gain_draws
 from tpjb_ident.dynamic.corrections.cell_zero import cell_zero_uncertainty
 from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
 from tpjb_ident.dynamic.corrections.mains import MAINS_ON_LINE, force_pickup, force_pickup_spread
-from tpjb_ident.dynamic.corrections.systematic_sources import SystematicSources, systematic_sources
+from tpjb_ident.dynamic.corrections.systematic_sources import (
+    GainDraws,
+    SystematicSources,
+    apparent_change,
+    gain_draws,
+    systematic_sources,
+)
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.identify_point import Completion, first_estimate, own_method, point_figures, point_result
+from tpjb_ident.dynamic.instruments.amplitude import ZeroAmplitude, zero_amplitude
 from tpjb_ident.dynamic.instruments.findings import InstrumentFindings, film_change_at, look_at_instruments
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions, change_spread
-from tpjb_ident.dynamic.instruments.zero_amplitude import ZeroAmplitude, zero_amplitude
-from tpjb_ident.dynamic.results.budget import with_systematic
 from tpjb_ident.dynamic.results.identification import Identification
-from tpjb_ident.dynamic.results.left_out_runs import lost_points, named_at_points
-from tpjb_ident.dynamic.results.point_result import PointResult
-from tpjb_ident.dynamic.results.probe_scale import with_probe_doubts
+from tpjb_ident.dynamic.results.identification_tables import with_systematic
+from tpjb_ident.dynamic.results.point_result import PointResult, lost_points, named_at_points
+from tpjb_ident.dynamic.results.probes import swept_probes, with_probe_doubts
 from tpjb_ident.dynamic.results.run_gains import Pairs, channel_pairs, gain_doubts
-from tpjb_ident.dynamic.results.swept_probes import swept_probes
 from tpjb_ident.dynamic.runs.baseline import measured_baseline
 from tpjb_ident.dynamic.runs.checked_runs import check_conditions, check_finished
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
+from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table
@@ -23,10 +23,13 @@ from tpjb_ident.dynamic.results.quality import (
     flags,
     rejected_windows,
 )
-from tpjb_ident.dynamic.runs.nominal_drive import nominal_drive
-from tpjb_ident.dynamic.runs.point_data import PointData
-from tpjb_ident.dynamic.runs.temperatures import pad_means
+from tpjb_ident.dynamic.runs.point_data import PointData, pad_means
 from tpjb_ident.dynamic.settings import IdentifySettings
+
+#: Windows that a run needs, for its mean to be nearly free of each window's own noise.
+MIN_WINDOWS = 5
+#: Smallest sine of the angle between two excitation directions that counts as two.
+MIN_SINE = 0.1
 
 
 def first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffness:
@@ -115,7 +118,7 @@ def point_figures(data: PointData, settings: IdentifySettings, differ: bool, kno
     known : float, optional
         Force of another phase in every run that the intervals allow for [N].
     """
-    by_method = all_methods(data, settings, differ)
+    by_method = _all_methods(data, settings, differ)
     best = by_method[settings.method]
     weights = best.weights.min(axis=1)
     figure = coherence(data.D, data.F, best.h, weights)
@@ -189,23 +192,8 @@ def point_result(
     )
 
 
-def all_methods(data: PointData, settings: IdentifySettings, differ: bool) -> dict[str, DynamicStiffness]:
-    """Every method that was asked for and applies, the default one in any case.
-
-    Parameters
-    ----------
-    data : PointData
-        Corrected windows of the point.
-    settings : IdentifySettings
-        Which methods are asked for.
-    differ : bool
-        Whether the runs differ by more than their windows scatter.
-
-    Returns
-    -------
-    dict of str to DynamicStiffness
-        One estimate for each method.
-    """
+def _all_methods(data: PointData, settings: IdentifySettings, differ: bool) -> dict[str, DynamicStiffness]:
+    """Every method that was asked for and applies, the default one in any case."""
     drive = nominal_drive(data)
     table = phasor_table(data.D, data.F, data.run_index, drive)
     table = replace(table, directions_differ=differ)
@@ -239,3 +227,35 @@ def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[
     if not found:
         return ()
     return (Condition("methods-disagree", f"{', '.join(found)} away from {default}"),)
+
+
+def nominal_drive(data: PointData) -> ComplexArray | None:
+    """Instruments (n, 2) [N] of one point's windows; None where the campaign cannot give them.
+
+    The format has no channel for the actuators' command. But every run states the direction of its excitation, and the
+    part of its own mean force along that direction has the size and phase of the command: averaged over the run's
+    windows it knows next to nothing of a single window's noise, and nothing of the displacements' noise.
+
+    Parameters
+    ----------
+    data : PointData
+
+    Returns
+    -------
+    (n, 2) complex ndarray or None
+        None where a run states no direction, has too few windows, or all directions are alike.
+    """
+    angles = [run.direction for run in data.runs]
+    known = np.array([a for a in angles if a is not None])
+    if len(known) < len(angles) or len(known) < 2 or np.abs(np.sin(known - known[0])).max() < MIN_SINE:
+        return None
+    result = np.full(data.F.shape, np.nan + 0j)
+    for i, angle in enumerate(known):
+        mine = data.run_index == i
+        along = data.F[mine] @ np.array([np.cos(angle), np.sin(angle)])
+        along = along[np.isfinite(along)]
+        if len(along) < MIN_WINDOWS:
+            return None
+        drive = np.median(along.real) + 1j * np.median(along.imag)
+        result[mine] = drive * np.array([np.cos(angle), np.sin(angle)])
+    return result

@@ -13,13 +13,11 @@ from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.pivot.assemble import Choice, assemble_curve
 from tpjb_ident.pivot.bad_holds import bad_blocks
 from tpjb_ident.pivot.curve import PivotCurve
-from tpjb_ident.pivot.laws.choice import keep_likely, posterior_weights
+from tpjb_ident.pivot.laws.choice import keep_likely, posterior_weights, with_shared_shape
 from tpjb_ident.pivot.laws.law_fit import FitData, LawFit, ShapePrior, fit_law
 from tpjb_ident.pivot.laws.laws import Bilinear, HertzLine, HertzPoint, Law, Linear, PointInSeries, Power
-from tpjb_ident.pivot.laws.shape_sharing import with_shared_shape
 from tpjb_ident.pivot.laws.spline_law import SplineLaw
-from tpjb_ident.pivot.records.dry_record import DryRecord, read_dry_run
-from tpjb_ident.pivot.records.noise_of_records import noise_about_curve, noise_within_holds
+from tpjb_ident.pivot.records.dry_record import DryRecord, noise_about_curve, noise_within_holds, read_dry_run
 from tpjb_ident.pivot.records.projection import PadDirection
 from tpjb_ident.pivot.records.refusals import check_directions, check_pickup, check_placement, structure_of
 from tpjb_ident.pivot.records.settings import PivotSettings

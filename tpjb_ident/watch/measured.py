@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rigdata.campaign import Campaign
-from rigdata.errors import RigError
 from rigdata.operating_point import OperatingPoint
+from rigdata.problem import RigError
 from rigdata.run import Run
 from tpjb_ident.clearance.measure import ClearancePolygon, measure_clearance
 from tpjb_ident.dynamic.identify import identify

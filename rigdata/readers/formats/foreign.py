@@ -15,9 +15,8 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import missing_channel, rate_of_time, undescribed
+from rigdata.readers.base import FORMATS, missing_channel, rate_of_time, suffix_hint, undescribed
 from rigdata.readers.series import Columns, Series, on_one_clock
-from rigdata.readers.suffixes import FORMATS, suffix_hint
 from rigdata.readers.table_cache import TableCache
 
 #: Larger files are refused: these formats are read whole [bytes].

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rigdata.readers.series import Series, equidistant, set_aside
-from rigdata.readers.time_names import is_time, seconds
+from rigdata.readers.series import Series, equidistant, is_time, seconds, set_aside
 
 
 def read_series(path: Path) -> list[Series]:

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.readers.series import Series, equidistant, set_aside
-from rigdata.readers.time_names import is_time, seconds
+from rigdata.readers.series import Series, equidistant, is_time, seconds, set_aside
 
 
 def read_series(path: Path) -> list[Series]:

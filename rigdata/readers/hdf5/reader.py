@@ -16,8 +16,7 @@ from rigdata.calibration import Channel
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, rate_of_time, undescribed
 from rigdata.readers.hdf5.content_hash import TEXT, group_hash, is_plain
-from rigdata.readers.hdf5.heaps import broken_heap, too_long_text
-from rigdata.readers.hdf5.links import chunk_bytes, has_link, resolve
+from rigdata.readers.hdf5.guards import broken_heap, chunk_bytes, has_link, resolve, too_long_text
 
 #: Filters that the HDF5 library brings along; any other would load foreign code.
 _FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.series import Series
+from rigdata.readers.series import Series, is_time, seconds
 from rigdata.readers.text.csv_table import Source, read_table
 from rigdata.readers.text.head import find_head
-from rigdata.readers.time_names import is_time, seconds
 
 _UNIT = re.compile(r"\s*[\[(]([^\])]*)[\])]\s*$")
 _SPARE = re.compile(r"\s+(?:\d+\s*)?-.*$")  # "Time  1 - default sample rate"

@@ -12,8 +12,7 @@ from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import missing_channel, rate_of_time, undescribed
-from rigdata.readers.suffixes import suffix_hint
+from rigdata.readers.base import missing_channel, rate_of_time, suffix_hint, undescribed
 from rigdata.readers.table_cache import TableCache
 from rigdata.readers.text.csv_table import Source, Table, read_table
 from rigdata.readers.text.dialect import Dialect, DialectFinder

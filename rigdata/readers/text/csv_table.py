@@ -12,7 +12,6 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import MAX_SAMPLES
-from rigdata.readers.numbers import MISSING, is_missing, is_number, number_pattern
 from rigdata.readers.text.byte_stream import (
     AsciiOnly,
     all_lines,
@@ -22,8 +21,8 @@ from rigdata.readers.text.byte_stream import (
     skip_to,
     squeeze_blanks,
 )
+from rigdata.readers.text.cells import MISSING, is_missing, is_number, is_stamp, number_pattern, stamp_seconds
 from rigdata.readers.text.dialect import Dialect, split_line
-from rigdata.readers.text.stamps import is_stamp, stamp_seconds
 
 #: Lines longer than this are refused [bytes].
 _BLOCK = 2**22

@@ -10,9 +10,8 @@ from pathlib import Path
 
 from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.numbers import is_missing, is_number, looks_like
 from rigdata.readers.text.byte_stream import HEAD, codec_of_bytes, head_lines, text_encoding
-from rigdata.readers.text.stamps import is_stamp
+from rigdata.readers.text.cells import is_missing, is_number, is_stamp, looks_like
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _SUFFIX = re.compile(r"\s*[\[(].*[\])]\s*$")

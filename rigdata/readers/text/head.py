@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.numbers import is_missing, is_number
 from rigdata.readers.text.byte_stream import codec_of_bytes, head_lines, text_encoding
+from rigdata.readers.text.cells import is_date, is_missing, is_number, is_stamp
 from rigdata.readers.text.dialect import Dialect, columns_of, split_line
-from rigdata.readers.text.stamps import is_date, is_stamp
 
 DELIMITERS = (";", "\t", ",", "|", " ")
 _UNIT = re.compile(r"[\[(]([^\])]*)[\])]\s*$")

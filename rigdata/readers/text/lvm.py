@@ -13,7 +13,7 @@ from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.series import Series, equidistant
 from rigdata.readers.text.byte_stream import all_lines, codec_of_bytes, text_encoding
-from rigdata.readers.text.stamps import stamp_seconds
+from rigdata.readers.text.cells import stamp_seconds
 
 _MAGIC, _END = "LabVIEW Measurement", "***End_of_Header***"
 _X, _COMMENT = "X_Value", "Comment"

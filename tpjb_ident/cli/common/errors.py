@@ -12,7 +12,7 @@ from typing import Any, TextIO, TypeVar
 
 import typer
 
-from rigdata.errors import RigError
+from rigdata.problem import RigError
 from tpjb_ident.cli.common.terminal import error_line, note_line
 from tpjb_ident.errors import NotTrustedError, TpjbError
 

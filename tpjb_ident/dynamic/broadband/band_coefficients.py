@@ -20,7 +20,7 @@ from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.results.quality import feeds_motion
-from tpjb_ident.dynamic.runs.temperatures import pad_means
+from tpjb_ident.dynamic.runs.point_data import pad_means
 
 
 def band_points(

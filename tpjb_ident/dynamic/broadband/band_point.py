@@ -1,4 +1,4 @@
-"""One operating point's broadband runs, read and transformed."""
+"""One operating point's broadband runs: which belong together, read and transformed, accelerometers against cells."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rigdata.operating_point import OperatingPoint
-from rigdata.problem import RigDataError
+from rigdata.problem import Problem, RigDataError
+from rigdata.run import Run
 from tpjb_ident.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.broadband.band_balance import band_balance
-from tpjb_ident.dynamic.broadband.band_runs import BandGroup
-from tpjb_ident.dynamic.broadband.line_plan import LinePlan, line_plan, line_rows
-from tpjb_ident.dynamic.broadband.line_rows import LineRows
+from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.broadband.line_rows import LinePlan, LineRows, line_plan, line_rows
 from tpjb_ident.dynamic.broadband.spectra.clock_rate import common_rates
 from tpjb_ident.dynamic.broadband.spectra.run_spectra import (
     OPEN_ENDS,
@@ -24,12 +22,39 @@ from tpjb_ident.dynamic.broadband.spectra.run_spectra import (
     run_spectra,
 )
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
+from tpjb_ident.dynamic.instruments.housing_balance import BalanceRun, balances
 from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.left_out import LeftOut
 from tpjb_ident.errors import BadInputError
 
 #: Kinds that excite every frequency again and again: what a sweep does once tells nothing of clocks.
 TELL_CLOCKS = ("multisine", "random", "impact")
+SINE = "sine"
+#: Parts of the band that are judged one by one: a lag shows at the top, a sign everywhere.
+PARTS = 8
+#: Lines that a part has at least.
+LEAST = 6
+
+
+@dataclass(frozen=True)
+class BandGroup:
+    """Runs at one operating point, excited alike.
+
+    Attributes
+    ----------
+    point : OperatingPoint
+        Its excitation frequency is zero.
+    kind : str
+        ``"multisine"``, ``"sweep"``, ``"random"`` or ``"impact"``.
+    band : (float, float)
+        What all of the runs were excited over [Hz].
+    runs : tuple of rigdata.run.Run
+    """
+
+    point: OperatingPoint
+    kind: str
+    band: tuple[float, float]
+    runs: tuple[Run, ...]
 
 
 @dataclass(frozen=True)
@@ -138,7 +163,7 @@ def read_point(
             left.append(LeftOut(run.id, run.point, error))
     if not spectra:
         return None, left
-    late, told = band_balance(_alike(spectra))
+    late, told = _band_balance(_alike(spectra))
     # how late the cells are is not put right, as with sines, but stands in the interval
     spectra = [replace(s, start=float(np.hypot(s.start, late))) for s in spectra]
     return BandPoint(group, spectra, line_plan(spectra), baseline, told), left
@@ -162,13 +187,7 @@ def _spectra_settings(group: BandGroup, settings: BandSettings) -> SpectraSettin
 
 
 def _alike(spectra: Sequence[RunSpectra]) -> Sequence[RunSpectra]:
-    """Runs with the same bins.
-
-    Raises
-    ------
-    BadInputError
-        Some of them are periodic and others not, or their periods differ.
-    """
+    """Runs with the same bins."""
     first = spectra[0]
     for other in spectra[1:]:
         same = len(other.frequencies) == len(first.frequencies)
@@ -179,3 +198,80 @@ def _alike(spectra: Sequence[RunSpectra]) -> Sequence[RunSpectra]:
                 "excite the runs of one point with one period, or list them as different kinds of excitation"
             )
     return spectra
+
+
+def is_broadband(run: Run) -> bool:
+    """Whether a run is excited over a band, not by a sine.
+
+    Parameters
+    ----------
+    run : rigdata.run.Run
+    """
+    return getattr(run, "excitation_kind", SINE) != SINE
+
+
+def band_groups(runs: tuple[Run, ...]) -> list[BandGroup]:
+    """Group broadband runs by operating point and kind of excitation, sorted.
+
+    Parameters
+    ----------
+    runs : tuple of rigdata.run.Run
+
+    Raises
+    ------
+    RigDataError
+        The bands of runs that belong together have nothing in common.
+    """
+    groups: dict[tuple[object, ...], list[Run]] = {}
+    for run in runs:
+        p = run.point
+        key = (p.static_load, p.static_load_direction_deg, p.shaft_speed_hz, run.excitation_kind)
+        groups.setdefault(key, []).append(run)
+    return [_group(groups[key]) for key in sorted(groups, key=repr)]
+
+
+def _group(runs: list[Run]) -> BandGroup:
+    bands = [run.band for run in runs if run.band is not None]
+    low, high = max(b[0] for b in bands), min(b[1] for b in bands)
+    first = runs[0]
+    if not low < high:
+        what = f"runs at {first.point} have no common excitation_band"
+        raise RigDataError(Problem("error", first.file, "excitation_band", what, "Check the bands", first.id))
+    p = first.point
+    point = OperatingPoint(p.static_load, p.static_load_direction, p.shaft_speed, 0.0)
+    return BandGroup(point, first.excitation_kind, (low, high), tuple(runs))
+
+
+def _band_balance(spectra: Sequence[RunSpectra]) -> tuple[float, tuple[Condition, ...]]:
+    """By how much the cells are late [s], zero where that is not clear, and what to say of the accelerometers.
+
+    The housing is a mass on springs at every line, so neighbouring lines tell the same ratio once each is brought to
+    one frequency by its square. A period's line counts by its repeats, a bin of a whole record by what the others
+    scatter.
+    """
+    if spectra[0].phasors.acceleration is None:
+        return 0.0, ()
+    free = np.flatnonzero(~np.any([s.taken for s in spectra], axis=0))
+    parts = np.array_split(free, min(PARTS, max(len(free) // LEAST, 1)))
+    found = balances([run for part in parts for s in spectra for run in _lines(s, part.tolist())])
+    told = merged(*(found[f].conditions for f in sorted(found, reverse=True)))
+    if "accelerometers-contradict-cells" in told:  # where the housing's inertia is larger
+        told = tuple(c for c in told if c != "accelerometers-doubtful")
+    lags = [verdict.phase / (2 * np.pi * f) for f, verdict in found.items()]
+    return max(lags, default=0.0), told
+
+
+def _lines(spectra: RunSpectra, part: Sequence[int]) -> list[BalanceRun]:
+    """Every line of a part of the band, brought to the part's middle: acceleration grows with the square."""
+    if not len(part):
+        return []
+    middle = float(np.median(spectra.frequencies[list(part)]))
+    mass, windows = spectra.phasors.housing_mass, len(spectra.D)
+    found = []
+    for k in part:
+        every = spectra.A[:, k] * (middle / spectra.frequencies[k]) ** 2
+        A, own, F = every.mean(axis=0), spectra.A[:, k].mean(axis=0), spectra.F[:, k].mean(axis=0)
+        variance = float(np.sum(np.abs(every - A) ** 2)) / max(4 * (windows - 1), 1)
+        share = float(mass * np.linalg.norm(own) / max(float(np.linalg.norm(F)), 1e-300))
+        found.append(BalanceRun(middle, F - mass * own, A, share, mass, variance, windows))
+    return found

@@ -16,15 +16,19 @@ from tpjb_ident.check.redundant_channels import widened
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.broadband.band_coefficients import band_points
 from tpjb_ident.dynamic.broadband.band_models import MODELS, BandModel, Shared, between, fit_band, supported
-from tpjb_ident.dynamic.broadband.band_point import BandPoint, BandSettings, read_point
+from tpjb_ident.dynamic.broadband.band_point import BandPoint, BandSettings, band_groups, is_broadband, read_point
 from tpjb_ident.dynamic.broadband.band_result import BandLine, BandResult
-from tpjb_ident.dynamic.broadband.band_runs import band_groups, is_broadband
-from tpjb_ident.dynamic.broadband.findings import band_conditions
-from tpjb_ident.dynamic.broadband.line_estimates import LineEstimates, estimate_line
+from tpjb_ident.dynamic.broadband.line_estimates import STRONG, LineEstimates, estimate_line
 from tpjb_ident.dynamic.broadband.line_fit import LineFit
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
-from tpjb_ident.dynamic.broadband.run_scatter import RunScatter, run_scatter
-from tpjb_ident.dynamic.broadband.shared_sources import SharedSources, shared_sources, slope_over_load
+from tpjb_ident.dynamic.broadband.shared_sources import (
+    RunScatter,
+    SharedSources,
+    run_scatter,
+    shared_sources,
+    slope_over_load,
+)
+from tpjb_ident.dynamic.broadband.spectra.run_spectra import RunSpectra
 from tpjb_ident.dynamic.corrections.cell_zero import cell_zero_uncertainty
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, load_conditions, load_misses
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
@@ -33,6 +37,12 @@ from tpjb_ident.dynamic.runs.checked_runs import campaign_verdicts, check_condit
 from tpjb_ident.dynamic.runs.left_out import LISTED, LeftOut, named_runs
 
 Progress = Callable[[str, int, int], None]
+#: Share of the lines that must be told from noise.
+LEAST_LINES = 0.5
+#: Condition number of the directions of motion from which errors are strongly amplified.
+ILL_CONDITIONED = 30.0
+#: Coherence below which a band is doubted where no instrument speaks for it.
+LOW_COHERENCE = 0.9
 
 
 @dataclass(frozen=True)
@@ -187,7 +197,7 @@ def _finish(
         missing,
         *(s.phasors.conditions for s in point.spectra),
         scatter.conditions,
-        band_conditions(point.spectra, [line for _, _, line in estimates], lines),
+        _band_conditions(point.spectra, [line for _, _, line in estimates], lines),
     )
     width = 2 * point.plan.half_width or 1 / (point.spectra[0].period or np.inf)
     ids = tuple(s.phasors.run for s in point.spectra)
@@ -238,3 +248,39 @@ def _stiffness(omega: float, fit: LineFit, method: str) -> DynamicStiffness:
     return DynamicStiffness(
         fit.h, omega, fit.covariance(), fit.real_dof, method, np.empty((0, 2)), condition=fit.condition
     )
+
+
+def _band_conditions(
+    spectra: Sequence[RunSpectra], estimates: Sequence[LineEstimates], lines: Sequence[BandLine]
+) -> tuple[Condition, ...]:
+    """Conditions of one operating point."""
+    found = []
+    conditions = np.array([line.fit.condition for line in estimates])
+    if len(estimates) and np.median(conditions) > 1e6:
+        told = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
+        found.append(Condition("fewer-than-two-directions", told))
+    elif len(lines) < LEAST_LINES * len(estimates):
+        told = f"{len(lines)} of {len(estimates)} lines stand {STRONG:g} times (F ratio) above the noise"
+        found.append(Condition("excitation-too-weak", told))
+    elif np.median(conditions) > ILL_CONDITIONED:
+        told = f"condition number {np.median(conditions):.0f} (median over the band)"
+        found.append(Condition("ill-conditioned", told))
+    if spectra[0].disturbances:
+        held = [d for d in spectra[0].disturbances if _inside(spectra[0], d.frequency)]
+        if held:
+            named = ", ".join(f"{d.name} {d.frequency:.4g} Hz" for d in held[:6])
+            more = f" and {len(held) - 6} more" if len(held) > 6 else ""
+            found.append(Condition("lines-left-out", f"{named}{more}"))
+    if lines and lines[0].method == "hv":
+        low = float(np.median([line.coherence.min() for line in lines]))
+        told = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {low:.3f})"
+        found.append(Condition("no-instrument", told))
+        if low < LOW_COHERENCE:
+            found.append(Condition("low-coherence", f"{low:.2f}, median over the band"))
+    if spectra[0].phasors.acceleration is None and spectra[0].phasors.housing_mass > 0:
+        found.append(Condition("inertia-not-corrected", "no accelerometers"))
+    return tuple(found)
+
+
+def _inside(spectra: RunSpectra, frequency: float) -> bool:
+    return bool(spectra.frequencies[0] <= frequency <= spectra.frequencies[-1])

@@ -1,22 +1,27 @@
-"""All estimates of one line, and which of them counts."""
+"""All estimates of one line (periods, instruments, H1, H2, Hv), and which of them counts.
+
+S_FD is the sum of F D^H over the rows. H1 = S_FD S_DD^-1 holds where only the force is noisy, H2 = S_FF S_DF^-1 where
+only the displacement is, Hv (total least squares, every channel in units of its own size) where both are alike. Bendat
+and Piersol, Random Data, 4th ed. 2010, chapter 9; Rocklin, Crowley and Vold 1985 for Hv.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
-from tpjb_ident.dynamic.broadband.classic import coherence, h1_fit, h2_fit, hv_fit
-from tpjb_ident.dynamic.broadband.line_fit import LineFit
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.dynamic.broadband.line_fit import LineFit, by_runs, no_fit, runs_apart
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
-from tpjb_ident.dynamic.broadband.local_regression import H_ORDER, local_fit
-from tpjb_ident.dynamic.broadband.repeated_periods import periods_fit
+from tpjb_ident.dynamic.broadband.local_regression import H_ORDER, local_fit, without_slopes
 
 #: F ratio from which an excitation tells the displacements from their noise.
 STRONG = 10.0
 #: Coherence of the force with the displacements that a line needs where nothing else tells signal from noise.
 LEAST_COHERENCE = 0.5
+#: Share of a channel's power that is taken for noise at least, so that exact data can be solved.
+ROUNDING = 1e-24
 
 
 @dataclass(frozen=True)
@@ -89,3 +94,158 @@ def estimate_line(rows: LineRows, classic: bool = True) -> LineEstimates:
     method = next(name for name in ("periods", "iv", "hv") if name in fits)
     explained = coherence(rows, fits["h1"]) if "h1" in fits else np.full(2, np.nan)
     return LineEstimates(rows.omega, method, fits, explained, len(rows.D))
+
+
+def _period_means(rows: LineRows) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+    """Means (n_runs, 4) of X, Y, Fx, Fy, covariance (n_runs, 4, 4) of one period about them, periods (n_runs,)."""
+    z = np.concatenate([rows.D, rows.F], axis=1)
+    means, spreads, counts = [], [], []
+    for r in range(rows.n_runs):
+        mine = z[rows.run == r]
+        mean = mine.mean(axis=0)
+        left = mine - mean
+        means.append(mean)
+        spreads.append(np.einsum("ni,nk->ik", left, left.conj()) / max(len(mine) - 1, 1))
+        counts.append(len(mine))
+    return np.array(means), np.array(spreads), np.array(counts, dtype=float)
+
+
+def periods_fit(rows: LineRows) -> LineFit:
+    """Estimate h from the means over periods.
+
+    The mean over a run's periods has the noise of one divided by their number, and its covariance is that of the
+    repeats (Pintelon and Schoukens, System Identification, 2nd ed. 2012, chapters 2 and 8). From two runs H = F D^-1;
+    from more, generalised total least squares with that covariance.
+
+    Parameters
+    ----------
+    rows : LineRows
+        Periods of two runs or more, two periods each at least.
+    """
+    if rows.n_runs < 2 or min(np.bincount(rows.run)) < 2:
+        return no_fit(rows.n_runs)
+    means, spreads, counts = _period_means(rows)
+    scale = np.repeat([np.linalg.norm(means[:, :2]), np.linalg.norm(means[:, 2:])], 2)
+    if not (scale > 0).all():
+        return no_fit(rows.n_runs)
+    h, fitted = _through(means / scale, spreads / np.outer(scale, scale), counts)
+    condition = np.linalg.cond(fitted[:, :2])
+    if not condition < 1e12:
+        return no_fit(rows.n_runs)
+    h = h * (scale[2] / scale[0])
+    g = np.linalg.pinv((fitted[:, :2] * scale[0]).T)
+    every = np.arange(rows.n_runs)
+    leverage, share = by_runs(fitted[:, :2] * scale[0], g, every, rows.n_runs)
+    leverage = leverage / counts[:, None, None]
+    equation = np.concatenate([-h, np.eye(2)], axis=1)
+    noise = np.einsum("ia,rab,kb->rik", equation, spreads, equation.conj())
+    apart = runs_apart(fitted[:, :2] * scale[0] @ h.T, means @ equation.T, noise / counts[:, None, None], every)
+    strength = _strength(fitted[:, :2] * scale[0], spreads[:, :2, :2], counts)
+    slopes = np.empty((0, 2, 2), complex)
+    return LineFit(h, leverage, noise, counts - 1, float(condition), slopes, strength, share, apart)
+
+
+def _through(z: ComplexArray, spreads: ComplexArray, counts: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """H with [F, D] nearest to the means in the metric of their noise, and the means on it."""
+    if len(z) == 2:
+        return np.asarray(np.linalg.solve(z[:, :2], z[:, 2:]).T, dtype=complex), z
+    weight = (counts - 1) / (counts - 1).sum()
+    pooled = np.einsum("r,rab->ab", weight, spreads) + np.diag(ROUNDING + 1e-6 * np.mean(np.abs(spreads)) * np.ones(4))
+    root = np.linalg.cholesky(pooled)
+    # rows z^T: noise covariance of row vectors is the transpose
+    white = np.linalg.solve(root, z.T).T * np.sqrt(counts)[:, None]
+    signal = np.linalg.svd(white)[2][:2]
+    directions = signal @ root.T
+    h = np.linalg.solve(directions[:, :2], directions[:, 2:]).T
+    fitted = (white @ signal.conj().T) @ directions / np.sqrt(counts)[:, None]
+    return np.asarray(h), np.asarray(fitted)
+
+
+def _strength(D: ComplexArray, spreads: ComplexArray, counts: FloatArray) -> float:
+    """F ratio of the weaker direction of motion over the noise of the means."""
+    _, singular, right = np.linalg.svd(D, full_matrices=False)
+    noise = np.einsum("r,rab->ab", 1 / counts, spreads)
+    weak = right[1]
+    power = float((weak @ noise.conj() @ weak.conj()).real) / len(D) * 2
+    return float(singular[1] ** 2 / power) if power > 0 else np.inf
+
+
+def h1_fit(rows: LineRows) -> LineFit:
+    """Least squares of force on displacement: noise on the displacement pulls it towards zero.
+
+    Parameters
+    ----------
+    rows : LineRows
+    """
+    return local_fit(rows, order=_order(rows))
+
+
+def h2_fit(rows: LineRows) -> LineFit:
+    """The force as instrument: noise on the force pushes it away from zero.
+
+    Parameters
+    ----------
+    rows : LineRows
+    """
+    return local_fit(rows, rows.F, order=_order(rows))
+
+
+def hv_fit(rows: LineRows, first: LineFit) -> LineFit:
+    """Total least squares, with the leverage and noise of H1 behind its interval.
+
+    Parameters
+    ----------
+    rows : LineRows
+    first : LineFit
+        H1 of these rows.
+    """
+    if not first.found:
+        return first
+    flat = without_slopes(rows, first)
+    z = np.concatenate([flat.D, flat.F], axis=1)
+    scale = np.sqrt(np.mean(np.abs(z) ** 2, axis=0))
+    signal = np.linalg.svd(z / scale, full_matrices=False)[2][:2] * scale
+    h = np.linalg.solve(signal[:, :2], signal[:, 2:]).T
+    return replace(first, h=h)
+
+
+def coherence(rows: LineRows, fit: LineFit) -> FloatArray:
+    """Multiple coherence of the force along X and Y with the displacements, (2,), free of the few rows' bias.
+
+    Parameters
+    ----------
+    rows : LineRows
+    fit : LineFit
+        Any of these rows, for how h changes over them.
+    """
+    flat = without_slopes(rows, fit)
+    basis = np.linalg.qr(flat.D)[0]
+    left = flat.F - basis @ (basis.conj().T @ flat.F)
+    n, spent = len(rows.D), _spent(rows)
+    power = np.mean(np.abs(flat.F) ** 2, axis=0) * n / max(n - spent, 1)
+    noise = np.sum(np.abs(left) ** 2, axis=0) / max(n - spent - 2, 1)
+    with np.errstate(invalid="ignore", divide="ignore"):  # no force at all has no coherence
+        return np.asarray(np.clip(1 - noise / power, 0.0, 1.0))
+
+
+def spectra(rows: LineRows) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """S_FF, S_FD and S_DD summed over the rows, (2, 2) each.
+
+    Parameters
+    ----------
+    rows : LineRows
+    """
+    D, F = rows.D, rows.F
+    return (
+        np.einsum("ni,nk->ik", F, F.conj()),
+        np.einsum("ni,nk->ik", F, D.conj()),
+        np.einsum("ni,nk->ik", D, D.conj()),
+    )
+
+
+def _order(rows: LineRows) -> int:
+    return 0 if rows.repeated else 2
+
+
+def _spent(rows: LineRows) -> int:
+    return 3 * rows.n_runs if rows.ends else 0

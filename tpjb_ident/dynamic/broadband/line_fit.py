@@ -102,7 +102,7 @@ class LineFit:
             In place of the line's own.
         """
         sigma = self.noise if noise is None else noise
-        return np.array([real_covariance(outer_matrix(s, a)) for s, a in zip(sigma, self.leverage)])
+        return np.array([_real_covariance(outer_matrix(s, a)) for s, a in zip(sigma, self.leverage)])
 
     @property
     def real_dof(self) -> FloatArray:
@@ -169,14 +169,8 @@ def outer_matrix(a: ComplexArray, b: ComplexArray) -> ComplexArray:
     return (a[:, None, :, None] * b[None, :, None, :]).reshape(len(a) * len(b), -1)
 
 
-def real_covariance(gamma: ComplexArray) -> FloatArray:
-    """Covariance of real and imaginary parts, (2 m, 2 m), of circular complex errors.
-
-    Parameters
-    ----------
-    gamma : (m, m) complex ndarray
-        E[x x^H].
-    """
+def _real_covariance(gamma: ComplexArray) -> FloatArray:
+    """Covariance of real and imaginary parts, (2 m, 2 m), of circular complex errors."""
     half = 0.5 * gamma
     return np.block([[half.real, -half.imag], [half.imag, half.real]])
 

@@ -1,15 +1,44 @@
-"""What one spectral line is estimated from: rows of displacement and force phasors, and what excited them.
+"""Lines that a point's spectra give, and what each is estimated from: rows of displacement and force phasors.
 
 A row is one period of a periodic excitation, or one bin of a whole record's transform next to the line.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.dynamic.broadband.spectra.run_spectra import RunSpectra
+from tpjb_ident.errors import BadInputError
+
+#: Lines over a band where a record resolves more, and bins that a line takes at least.
+LINES, BINS = 60, 18
+#: Bins of a line that must be left when those of shaft and mains are gone.
+LEAST_BINS = 12
+#: Lines that a band must give.
+LEAST_LINES = 3
+
+
+@dataclass(frozen=True)
+class LinePlan:
+    """Bins that belong to each line; no bin belongs to two, so that lines of a record err apart from each other.
+
+    Attributes
+    ----------
+    bins : tuple of (k,) ndarray of int
+    frequencies : (n_lines,) ndarray
+        [Hz]
+    half_width : float
+        Half the width of a line [Hz]; 0 for single bins.
+    """
+
+    bins: tuple[IntArray, ...]
+    frequencies: FloatArray
+    half_width: float
 
 
 @dataclass(frozen=True)
@@ -83,3 +112,73 @@ class LineRows:
             run=zero,
             place=self.place[mine],
         )
+
+
+def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
+    """Lines of runs that have the same bins.
+
+    Parameters
+    ----------
+    spectra : sequence of RunSpectra
+
+    Raises
+    ------
+    BadInputError
+        The records are too short for the band.
+    """
+    frequencies = spectra[0].frequencies
+    free = ~np.any([s.taken for s in spectra], axis=0)
+    if spectra[0].period is not None:
+        kept = np.flatnonzero(free)
+        return LinePlan(tuple(np.array([k]) for k in kept), frequencies[kept], 0.0)
+    n = len(frequencies)
+    width = max(BINS, math.ceil(n / LINES))
+    count = n // width
+    if count < LEAST_LINES:
+        have = 1 / (frequencies[1] - frequencies[0]) if n > 1 else 0.0
+        need = have * LEAST_LINES * BINS / max(n, 1)
+        raise BadInputError(
+            f"run {spectra[0].phasors.run}: {have:.3g} s resolve {n} bins of its band, {LEAST_LINES * BINS} are "
+            f"needed; record {need:.3g} s or excite a wider band"
+        )
+    bins = [part[free[part]] for part in np.array_split(np.arange(n), count)]
+    bins = [part for part in bins if len(part) >= LEAST_BINS]
+    middles = np.array([0.5 * (frequencies[b[0]] + frequencies[b[-1]]) for b in bins])
+    return LinePlan(tuple(bins), middles, 0.5 * width * float(frequencies[1] - frequencies[0]))
+
+
+def line_rows(spectra: Sequence[RunSpectra], plan: LinePlan, k: int, ends: bool) -> LineRows:
+    """Rows of one line from all runs.
+
+    Parameters
+    ----------
+    spectra : sequence of RunSpectra
+    plan : LinePlan
+    k : int
+        Number of the line.
+    ends : bool
+        Whether records may begin and end in motion.
+    """
+    bins = plan.bins[k]
+    counts = [len(s.D) * len(bins) for s in spectra]
+    place = np.zeros(len(bins)) if not plan.half_width else _place(spectra[0].frequencies[bins], plan, k)
+
+    def rows(name: str) -> np.ndarray:
+        return np.concatenate([getattr(s, name)[:, bins].reshape(-1, 2) for s in spectra])
+
+    return LineRows(
+        2 * np.pi * float(plan.frequencies[k]),
+        rows("D"),
+        rows("F"),
+        rows("A"),
+        rows("command") if all(s.command is not None for s in spectra) else None,
+        np.repeat(np.arange(len(spectra)), counts),
+        np.concatenate([np.tile(place, len(s.D)) for s in spectra]),
+        repeated=spectra[0].period is not None,
+        ends=ends and spectra[0].period is None,
+        step=2 * np.pi * plan.half_width,
+    )
+
+
+def _place(frequencies: FloatArray, plan: LinePlan, k: int) -> FloatArray:
+    return np.asarray((frequencies - plan.frequencies[k]) / plan.half_width)

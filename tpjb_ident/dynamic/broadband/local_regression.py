@@ -127,16 +127,7 @@ def remainder(columns: ComplexArray) -> ComplexArray:
 
 
 def _noise(residual: ComplexArray, maker: ComplexArray, rows: LineRows) -> tuple[ComplexArray, FloatArray]:
-    """Covariance of the equation noise in each run, and its complex degrees of freedom.
-
-    Parameters
-    ----------
-    residual : (n, 2) complex ndarray
-        [N]
-    maker : (n, n) complex ndarray
-        What makes residuals of noise: its rows say how much of each row's noise is left.
-    rows : LineRows
-    """
+    """Covariance of the equation noise in each run, and its complex degrees of freedom."""
     left = np.sum(np.abs(maker) ** 2, axis=1)
     noise = np.empty((rows.n_runs, 2, 2), dtype=complex)
     dof = np.empty(rows.n_runs)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
-from tpjb_ident.dynamic.estimators.ols import ols_fit
+from tpjb_ident.dynamic.estimators.r_matrix import ols_fit
 
 _STARTS = 2000
 _SWEEPS = 25

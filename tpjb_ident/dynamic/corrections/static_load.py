@@ -175,13 +175,7 @@ def _slopes_over_load(
 
 
 def _log_gradient(values: FloatArray, log_load: FloatArray) -> FloatArray:
-    """Slope over ln W; entries that keep their sign are taken as power laws between loads.
-
-    Parameters
-    ----------
-    values : (n, 2, 2) ndarray
-    log_load : (n,) ndarray
-    """
+    """Slope over ln W; entries that keep their sign are taken as power laws between loads."""
     order: Literal[1, 2] = 2 if len(log_load) > 2 else 1
     plain = np.asarray(np.gradient(values, log_load, axis=0, edge_order=order))
     one_sign = np.abs(np.sign(values).sum(axis=0)) == len(values)

@@ -91,3 +91,18 @@ def real_rows(R: ComplexArray, f: ComplexArray) -> tuple[FloatArray, FloatArray]
     """
     real = np.block([[R.real, -R.imag], [R.imag, R.real]])
     return real, np.concatenate([f.real, f.imag])
+
+
+def ols_fit(D: ComplexArray, F: ComplexArray) -> ComplexArray:
+    """Solve F = H D in the least-squares sense.
+
+    Parameters
+    ----------
+    D, F : (n, 2) complex ndarray
+
+    Returns
+    -------
+    (2, 2) complex ndarray
+        H; both force equations share the displacements, so Eq. (15) falls into two problems of two unknowns.
+    """
+    return np.asarray(np.linalg.lstsq(D, F, rcond=None)[0], dtype=complex).T

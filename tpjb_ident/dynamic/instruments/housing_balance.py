@@ -16,7 +16,7 @@ import numpy as np
 from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.records.mains_line import complex_median
+from tpjb_ident.dynamic.records.line_means import complex_median
 from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: Phase between cells and accelerometers [rad] beyond which one of them is late; housings on bolted joints have 0.01.

@@ -7,17 +7,73 @@ and g the channels' complex gains at a line, P diag(1/g) U undoes them; exact fo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rigdata.calibration import VECTOR_QUANTITIES
+from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
+from rigdata.run import Run
 from rigdata.vector import inverse_directions
 from tpjb_ident.arrays import ComplexArray, FloatArray
-from tpjb_ident.dynamic.records.measured_run import MeasuredRun
+from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
-from tpjb_ident.dynamic.records.run_data import RunPhasors
-from tpjb_ident.dynamic.records.slower_channels import SlowerChannel
+from tpjb_ident.dynamic.records.run_data import MeasuredRun, RunPhasors
+
+#: Samples that are looked at.
+RHYTHM_LOOK = 2**13
+#: Share of the samples that must be straight (or flat), at least.
+STRAIGHT = 0.15
+#: A bend is none below this share of the usual one.
+NO_BEND = 0.01
+#: How much of the bends must come in one rhythm, of what a strict one has,
+RHYTHM = 0.8
+#: and how far their number may be off.
+COUNT_OFF = 0.25
+#: Samples from the start that are looked at.
+LOOK = 2**14
+#: A channel with more of its samples at a limit than this is of no use.
+CLIPPED = 0.05
+
+
+@dataclass(frozen=True)
+class SlowerChannel:
+    """How a channel was filled up.
+
+    Attributes
+    ----------
+    rate : float
+        At which it was sampled [Hz].
+    export_rate : float
+        At which it was written [Hz].
+    held : bool
+        Steps in place of straight lines.
+    """
+
+    rate: float
+    export_rate: float
+    held: bool
+
+    def at(self, frequency: FloatArray) -> ComplexArray:
+        """What the filling does to a sine of `frequency` (n,) [Hz]: sinc^2 for lines, sinc and half a step for steps.
+
+        Where the rates divide evenly the sums over the samples of a period take the place of the integrals.
+
+        Parameters
+        ----------
+        frequency : float
+            [rad/s]
+        """
+        f = np.asarray(frequency, dtype=float)
+        ratio = self.export_rate / self.rate
+        even = abs(ratio - round(ratio)) < 1e-6 * ratio
+        small = np.sin(np.pi * f / self.export_rate) * ratio if even else np.pi * f / self.rate
+        one = np.where(f > 0, np.sin(np.pi * f / self.rate) / np.where(f > 0, small, 1.0), 1.0)
+        if not self.held:
+            return np.asarray(one**2, dtype=complex)
+        late = 0.5 / self.rate - (0.5 / self.export_rate if even else 0.0)
+        return np.asarray(one * np.exp(-2j * np.pi * f * late))
 
 
 def compensated(result: RunPhasors, run: MeasuredRun, slower: Mapping[str, SlowerChannel]) -> RunPhasors:
@@ -77,3 +133,114 @@ def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: Meas
         cure = "Extend filter_table, or check filter"
         raise RigDataError(Problem("error", getattr(run, "file", ""), f"channel {name}", what, cure, run.id))
     return np.where(known, gain, 1.0)
+
+
+def slower_channel(readings: FloatArray, export_rate: float) -> SlowerChannel | None:
+    """Tell whether a channel was filled up, from the beginning of its readings.
+
+    Logger programs write groups of different rates into one table by interpolation. A sine comes out of that smaller
+    (and late, where values are held), by a factor that the two rates alone determine: it is taken out of the phasors as
+    a filter is. What gives such a channel away is that its bends (or steps) come in a strict rhythm.
+
+    Parameters
+    ----------
+    readings : (n,) ndarray
+        As the file holds them.
+    export_rate : float
+        [Hz]
+    """
+    values = readings[:RHYTHM_LOOK]
+    if len(values) < 200 or not np.isfinite(values).all():
+        return None
+    for held, changes in ((True, np.abs(np.diff(values))), (False, np.abs(np.diff(values, 2)))):
+        usual = 2 * float(changes.mean())
+        bent = changes > NO_BEND * usual
+        if not usual > 0 or bent.mean() > 1 - STRAIGHT:
+            continue
+        rate = _rhythm(bent.astype(float), export_rate, held)
+        if rate is not None:
+            return SlowerChannel(rate, export_rate, held)
+    return None
+
+
+def _rhythm(bent: FloatArray, export_rate: float, held: bool) -> float | None:
+    """Rate at which the bends come [Hz]; None where they do not come in a rhythm."""
+    n = len(bent)
+    padded = 8 * n
+    spectrum = np.abs(np.fft.rfft(bent - bent.mean(), padded))
+    step = export_rate / padded
+    low, top = int(8 * padded / n), int(0.505 * export_rate / step)
+    found = spectrum[low : top + 1]
+    if not len(found) or not found.max() > 0:
+        return None
+    # the first line of a rhythm is the rate, the others are its multiples
+    peak = low + int(np.flatnonzero(found > 0.7 * found.max())[0])
+    while peak + 1 < len(spectrum) and spectrum[peak + 1] > spectrum[peak]:
+        peak += 1
+    ratio = 1 / (peak * step / export_rate)
+    # a corner between two samples of the export bends the line at both
+    each = 1 if held or bent.mean() < 1.5 / ratio else 2
+    expected = each / ratio
+    strict = abs(bent.mean() / expected - 1) < COUNT_OFF and spectrum[peak] > RHYTHM * np.sinc(expected) * bent.sum()
+    return _sharpened(bent, peak * step, export_rate) if strict and expected < 1 - STRAIGHT else None
+
+
+def _sharpened(bent: FloatArray, rate: float, export_rate: float) -> float:
+    """The rate to a part in a million: the even ratio next to it, or the phase advance between the halves."""
+    ratio = export_rate / rate
+    n = len(bent)
+    if abs(ratio - round(ratio)) * n / ratio**2 < 0.5:
+        return export_rate / round(ratio)
+    place = np.arange(n) * rate / export_rate
+    wave = bent * np.exp(-2j * np.pi * place)
+    turn = np.angle(wave[n // 2 :].sum() * wave[: n // 2].sum().conj()) / (2 * np.pi)
+    return rate + turn * export_rate / (n / 2)
+
+
+def look_at_readings(run: MeasuredRun) -> tuple[dict[str, SlowerChannel], tuple[Condition, ...]]:
+    """Channels that were sampled slower than the export, by name, and what to say of them.
+
+    What a single channel's device did is lost once two channels are turned into a vector: that it was driven into its
+    limits, or sampled slower than the others.
+
+    Parameters
+    ----------
+    run : rigdata.run.Run
+        What only looks like one is not judged.
+
+    Raises
+    ------
+    RigDataError
+        A channel is clipped: its phasors are those of another signal.
+    """
+    if not isinstance(run, Run):
+        return {}, ()
+    names = [c.name for c in run.channels.values() if c.quantity in VECTOR_QUANTITIES and c.axis is not None]
+    readings = run.reader.read(names, 0, min(run.length, LOOK))
+    slower: dict[str, SlowerChannel] = {}
+    clipped: list[Problem] = []
+    rate = run.sample_rate
+    for name, values in zip(names, readings):
+        if run.channels[name].quantity != "acceleration":
+            clipped += _clipped(run, name, values)
+        found = slower_channel(values, rate)
+        if found is not None:
+            slower[name] = found
+    if clipped:
+        raise RigDataError(clipped)
+    if not slower:
+        return {}, ()
+    told = ", ".join(f"{n} {'held' if s.held else 'interpolated'} from {s.rate:.4g} Hz" for n, s in slower.items())
+    return slower, (Condition("slower-channels", f"{told}; what that does to a sine was taken out"),)
+
+
+def _clipped(run: Run, name: str, values: np.ndarray) -> list[Problem]:
+    statistics = ChannelStatistics()
+    statistics.add(values)
+    share = 0.0 if statistics.constant else statistics.clipped_share()
+    if share <= CLIPPED:
+        return []
+    unit = run.channels[name].unit
+    what = f"{share:.1%} of the samples sit at a limit (from {statistics.low:g} to {statistics.high:g} {unit}): clipped"
+    cure = "Widen the channel's range and repeat the run; what was cut off cannot be had back"
+    return [Problem("error", run.file, f"channel {name}", what, cure, run.id)]

@@ -9,11 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tpjb_ident.arrays import FloatArray, IntArray
-from tpjb_ident.dynamic.records.measured_run import MeasuredRun
 from tpjb_ident.dynamic.records.phasors import SCALE_LIMIT, LineFitter, PhasorBlock, fit_uneven, usual_scale
-from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
-from tpjb_ident.dynamic.records.shaft_course import ShaftCourse
-from tpjb_ident.dynamic.records.shaft_speed import window_speeds
+from tpjb_ident.dynamic.records.run_data import MeasuredRun, PhasorSettings, RunPhasors
+from tpjb_ident.dynamic.records.shaft_speed import ShaftCourse, window_speeds
 from tpjb_ident.dynamic.records.stretches import Stretches, open_stretches
 from tpjb_ident.dynamic.spectral_lines.lines import LineSet
 from tpjb_ident.dynamic.spectral_lines.windows import plan_windows

@@ -12,9 +12,8 @@ import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.measured_run import MeasuredRun
-from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
-from tpjb_ident.dynamic.records.shaft_course import ShaftCourse
+from tpjb_ident.dynamic.records.run_data import MeasuredRun, PhasorSettings, RunPhasors
+from tpjb_ident.dynamic.records.shaft_speed import ShaftCourse
 from tpjb_ident.dynamic.spectral_lines.lines import LineSet, known_lines
 
 #: Name of the condition that a shaft's changing speed gives rise to.

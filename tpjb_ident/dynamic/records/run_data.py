@@ -1,18 +1,88 @@
-"""Settings of the phasor extraction, and what it keeps of a run."""
+"""What the phasor extraction needs to know of a run, its settings, and what it keeps: phasors and the oil force."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
+from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
+from rigdata.record import Record, VectorRecord
+from rigdata.rows import RowReader
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.oil_force import oil_force
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.spectral_lines.lines import LineSet, LineSettings
 from tpjb_ident.dynamic.spectral_lines.windows import WindowSettings
+from tpjb_ident.errors import BadInputError
+
+
+class MeasuredRun(Protocol):
+    """A dynamic run whose samples can be asked for; the members are those of `rigdata.run.Run`."""
+
+    @property
+    def id(self) -> str:
+        """Name of the run."""
+
+    @property
+    def point(self) -> OperatingPoint:
+        """Set points, SI."""
+
+    @property
+    def excitation_direction(self) -> float | None:
+        """Direction of the excitation [rad]; None where not stated."""
+
+    @property
+    def channels(self) -> Mapping[str, Channel]:
+        """Channels with a quantity, by name."""
+
+    @property
+    def length(self) -> int:
+        """Samples per channel."""
+
+    @property
+    def sample_rate(self) -> float:
+        """Nominal sample rate [Hz]."""
+
+    def vector(self, quantity: str, start: int | None = None, stop: int | None = None) -> VectorRecord:
+        """X and Y of a quantity, SI.
+
+        Parameters
+        ----------
+        quantity : str
+            ``"displacement"``, ``"force"`` or ``"acceleration"``.
+        start : int or None, optional
+            First sample.
+        stop : int or None, optional
+            Sample after the last.
+        """
+
+    def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
+        """Shaft speed by the tachometer [rad/s]; None where there is none.
+
+        Parameters
+        ----------
+        start : int or None, optional
+            First sample; default the first of all.
+        stop : int or None, optional
+            Sample after the last; default the end.
+        """
+
+    def row_reader(self, quantities: Sequence[str]) -> RowReader:
+        """Reader of several quantities at once.
+
+        Parameters
+        ----------
+        quantities : sequence of str
+            With X and Y.
+        """
+
+    def kept_open(self) -> AbstractContextManager[None]:
+        """Keep the file open while the block runs."""
 
 
 @dataclass(frozen=True)
@@ -90,3 +160,35 @@ class RunPhasors:
         """
         a = None if self.acceleration is None else self.acceleration.phasors[:, line]
         return oil_force(self.cell_force.phasors[:, line], a, 0.0 if a is None else self.housing_mass)
+
+
+def oil_force(cell_force: ComplexArray, housing_acceleration: ComplexArray | None, housing_mass: float) -> ComplexArray:
+    """Oil-film force phasors.
+
+    Housing balance: F_oil = F_cell + m_h a_h, with F_cell the force with which the housing pushes the cells and a_h the
+    absolute acceleration of the housing.
+
+    Parameters
+    ----------
+    cell_force : (..., 2) complex ndarray
+        Load-cell force in X, Y [N].
+    housing_acceleration : (..., 2) complex ndarray or None
+        [m/s^2]; None when the rig has no accelerometers, then the cell force stands uncorrected.
+    housing_mass : float
+        Mass between oil film and load cells [kg].
+
+    Returns
+    -------
+    (..., 2) complex ndarray
+        [N].
+
+    Raises
+    ------
+    BadInputError
+        The mass is not a finite number >= 0.
+    """
+    if not (np.isfinite(housing_mass) and housing_mass >= 0):
+        raise BadInputError(f"housing mass must be finite and not negative, got {housing_mass} kg")
+    if housing_acceleration is None:
+        return np.asarray(cell_force, dtype=complex)
+    return np.asarray(cell_force + housing_mass * housing_acceleration, dtype=complex)

@@ -10,15 +10,13 @@ from dataclasses import replace
 
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.records.compensation import compensated
+from tpjb_ident.dynamic.records.compensation import compensated, look_at_readings
 from tpjb_ident.dynamic.records.extra_lines import unexpected_lines
 from tpjb_ident.dynamic.records.extraction import extract
+from tpjb_ident.dynamic.records.kept_readings import SHORT, ShortRecord
 from tpjb_ident.dynamic.records.line_tuning import DRIFT, retuned, tuned
-from tpjb_ident.dynamic.records.measured_run import MeasuredRun
-from tpjb_ident.dynamic.records.raw_look import look_at_readings
-from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.dynamic.records.run_data import MeasuredRun, PhasorSettings, RunPhasors
 from tpjb_ident.dynamic.records.shaft_speed import shaft_speed
-from tpjb_ident.dynamic.records.short_record import SHORT, ShortRecord
 from tpjb_ident.dynamic.spectral_lines.lines import LineSet, known_lines
 from tpjb_ident.dynamic.spectral_lines.windows import RecordTooShortError
 

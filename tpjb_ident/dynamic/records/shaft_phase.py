@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigdata.keyphasor import pulse_times
-from rigdata.run import Run
+from rigdata.run import Run, pulse_times
 from tpjb_ident.arrays import ComplexArray
-from tpjb_ident.dynamic.records.measured_run import MeasuredRun
-from tpjb_ident.dynamic.records.run_data import RunPhasors
+from tpjb_ident.dynamic.records.run_data import MeasuredRun, RunPhasors
 from tpjb_ident.dynamic.spectral_lines.lines import LineSettings
 
 #: Mean of the unit phasors of pulses or windows below which drive and shaft are not locked.

@@ -1,17 +1,45 @@
-"""Shaft speed of a run, as a whole and window by window, from its tachometer channel."""
+"""Shaft speed of a run: as a whole and window by window from its tachometer, and its course as the records show it."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.measured_run import MeasuredRun
+from tpjb_ident.dynamic.records.run_data import MeasuredRun
 
 #: Samples from which the speed of the run is taken.
 FIRST_LOOK = 2**17
 #: A tachometer this far from the set point is not believed.
 MAX_DEPARTURE = 0.05
+
+
+@dataclass(frozen=True)
+class ShaftCourse:
+    """Shaft speed over a run, whatever windows it was found in: a second fit may cut the run otherwise.
+
+    Attributes
+    ----------
+    time : (n,) ndarray
+        Middle of the windows in which it was found [s].
+    speed : (n,) ndarray
+        [Hz]; finite.
+    """
+
+    time: FloatArray
+    speed: FloatArray
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Speed at `time` (m,) [s], [Hz].
+
+        Parameters
+        ----------
+        time : (n,) ndarray
+            [s]
+        """
+        return np.interp(time, self.time, self.speed)
 
 
 def shaft_speed(run: MeasuredRun) -> tuple[float, tuple[Condition, ...]]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from rigdata.rows import RowReader as Stretches
-from tpjb_ident.dynamic.records.measured_run import MeasuredRun
+from tpjb_ident.dynamic.records.run_data import MeasuredRun
 
 
 @contextmanager

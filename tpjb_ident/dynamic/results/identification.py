@@ -9,12 +9,13 @@ import numpy as np
 
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.results.budget import BUDGET_COLUMNS, budget_rows
 from tpjb_ident.dynamic.results.frequency_fit import LoadFits, fits_per_load
 from tpjb_ident.dynamic.results.identification_tables import (
+    BUDGET_COLUMNS,
     FIT_COLUMNS,
     POINT_COLUMNS,
     WINDOW_COLUMNS,
+    budget_rows,
     coefficient_columns,
     estimate_row,
     fit_row,

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.amplitude import AmplitudeSlope
+from tpjb_ident.dynamic.runs.left_out import LISTED, LeftOut
 
 
 @dataclass(frozen=True)
@@ -113,3 +115,53 @@ class PointResult:
     def attenuation(self) -> FloatArray:
         """What noise on the displacements would do to a plain regression; see `DynamicStiffness`."""
         return self.stiffness.attenuation
+
+
+def named_at_points(
+    points: Sequence[PointResult], left: Sequence[LeftOut], any_excitation: bool
+) -> tuple[PointResult, ...]:
+    """The points, each saying which of its runs were left out.
+
+    Parameters
+    ----------
+    points : sequence of PointResult
+    left : sequence of LeftOut
+    any_excitation : bool
+        Whether a record holds several excitation lines, so that it belongs to all points of its load.
+    """
+    return tuple(_named(point, [one.run for one in left if _same(one, point, any_excitation)]) for point in points)
+
+
+def lost_points(points: Sequence[PointResult], left: Sequence[LeftOut], any_excitation: bool) -> tuple[Condition, ...]:
+    """Name the operating points that have no run left.
+
+    Parameters
+    ----------
+    points : sequence of PointResult
+    left : sequence of LeftOut
+    any_excitation : bool
+        Whether a record holds several excitation lines.
+    """
+    lost = [one for one in left if not any(_same(one, point, any_excitation) for point in points)]
+    places = dict.fromkeys(f"{one.point.static_load / 1e3:g} kN, {one.point.excitation_hz:g} Hz" for one in lost)
+    if not places:
+        return ()
+    runs = ", ".join(one.run for one in lost[:LISTED]) + (", ..." if len(lost) > LISTED else "")
+    return (Condition("point-lost", f"no usable run at {'; '.join(places)}: {runs}"),)
+
+
+def _named(point: PointResult, runs: list[str]) -> PointResult:
+    if not runs:
+        return point
+    condition = Condition("run-left-out", f"without {', '.join(runs)}, which cannot be used")
+    return replace(point, quality=merged(point.quality, (condition,)))
+
+
+def _same(one: LeftOut, result: PointResult, any_excitation: bool) -> bool:
+    mine, other = one.point, result.point
+    alike = (mine.static_load, mine.static_load_direction_deg, mine.shaft_speed_hz) == (
+        other.static_load,
+        other.static_load_direction_deg,
+        other.shaft_speed_hz,
+    )
+    return alike and (any_excitation or mine.excitation_hz == other.excitation_hz)

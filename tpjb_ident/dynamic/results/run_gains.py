@@ -17,7 +17,7 @@ from tpjb_ident.check.gain_evidence import PointReadings
 from tpjb_ident.check.one_gain import wrong_gains
 from tpjb_ident.check.run_gains import gain_in_words
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.results.swept_probes import SweptProbe
+from tpjb_ident.dynamic.results.probes import SweptProbe
 from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: Name of the condition.

@@ -19,14 +19,12 @@ from rigdata.run import Run
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.line_means import LineMean, second_harmonics
-from tpjb_ident.dynamic.records.mains_line import mains_force, mains_line
+from tpjb_ident.dynamic.records.line_means import LineMean, mains_force, mains_line, second_harmonics
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.runs.left_out import DEAD_ACCELEROMETER, LeftOut
 from tpjb_ident.dynamic.runs.point_data import finite_mean
-from tpjb_ident.dynamic.runs.run_result import RunResult
-from tpjb_ident.dynamic.runs.run_store import RunStore
+from tpjb_ident.dynamic.runs.run_store import RunResult, RunStore
 
 #: Bytes of phasors that stay in memory.
 ROOM = 8 * 2**20

@@ -1,14 +1,19 @@
-"""All windows of one operating point, gathered from its runs."""
+"""All windows of one operating point, gathered from its runs, and the film temperatures over them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rigdata.operating_point import OperatingPoint
+from rigdata.run import Run
 from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.records.run_phasors import RunPhasors
+
+#: Samples from which a run's temperatures are taken.
+TEMPERATURE_SAMPLES = 2**17
 
 
 @dataclass(frozen=True)
@@ -143,3 +148,33 @@ def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> 
 def _found(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> float:
     middle = float(np.median([run.lines.excitation[i].frequency for run, i in members]))
     return 0.0 if abs(middle - point.excitation_hz) < 1e-6 else 2 * np.pi * middle
+
+
+def mean_temperatures(run: Run) -> dict[int, float]:
+    """Mean temperature per pad over a run [K]; pads with several sensors give their mean.
+
+    Parameters
+    ----------
+    run : Run
+    """
+    found: dict[int, list[float]] = {}
+    for sensor in run.temperatures():
+        if sensor.pad is None:
+            continue
+        values = run.record(sensor.channel, 0, TEMPERATURE_SAMPLES).values
+        known = values[np.isfinite(values)]
+        if len(known):
+            found.setdefault(sensor.pad, []).append(float(known.mean()))
+    return {pad: float(np.mean(values)) for pad, values in sorted(found.items())}
+
+
+def pad_means(runs: Sequence[dict[int, float]]) -> dict[int, float]:
+    """Mean temperature by pad over the runs that have it [K].
+
+    Parameters
+    ----------
+    runs : sequence of dict
+        Temperature by pad number, per run.
+    """
+    pads = sorted({pad for run in runs for pad in run})
+    return {pad: float(np.mean([run[pad] for run in runs if pad in run])) for pad in pads}

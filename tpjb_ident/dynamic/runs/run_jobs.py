@@ -13,26 +13,27 @@ from typing import Any
 import numpy as np
 
 from rigdata.campaign import Campaign
-from rigdata.problem import RigDataError
+from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.records.kept_readings import beginning_of, with_kept_beginning
+from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.dynamic.records.shaft_phase import shaft_phases
-from tpjb_ident.dynamic.runs.dead_channels import dead_accelerometers
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
-from tpjb_ident.dynamic.runs.kept_observation import of_run
-from tpjb_ident.dynamic.runs.left_out import LeftOut
-from tpjb_ident.dynamic.runs.point_data import point_of
-from tpjb_ident.dynamic.runs.run_result import RunResult
-from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
-from tpjb_ident.dynamic.runs.temperatures import mean_temperatures
+from tpjb_ident.dynamic.runs.left_out import DEAD_ACCELEROMETER, LeftOut
+from tpjb_ident.dynamic.runs.point_data import mean_temperatures, point_of
+from tpjb_ident.dynamic.runs.run_store import RunResult, RunStore, fingerprint, of_run
 from tpjb_ident.dynamic.spectral_lines.windows import RecordTooShortError
 from tpjb_ident.runtime.executors import InProcessWorkers, Workers, each_finished
 
 Progress = Callable[[str, int, int], None]
+#: A channel whose lines are below this share of the vector's may be dead.
+NOTHING = 1e-6
+#: The same of its mean: what rounding leaves of a constant.
+ROUNDING = 1e-10
 
 
 def all_runs(
@@ -165,7 +166,7 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResul
             phasors = run_phasors(kept, housing_mass, settings)
         except RecordTooShortError as error:
             raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
-        conditions = merged(phasors.conditions, dead_accelerometers(kept, phasors), _mended(run))
+        conditions = merged(phasors.conditions, _dead_accelerometers(kept, phasors), _mended(run))
         result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(kept, phasors))
         return RunResult(result, mean_temperatures(kept), _seen(run, kept, phasors))
 
@@ -188,3 +189,42 @@ def _mended(run: Run) -> tuple[Condition, ...]:
     problems = run.reader.problems() if hasattr(run, "reader") else ()
     mended = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
     return (Condition("record-damaged", "; ".join(mended)),) if mended else ()
+
+
+def _dead_accelerometers(run: Run, phasors: RunPhasors) -> tuple[Condition, ...]:
+    """Refuse a run with a dead probe or cell; tell of a dead accelerometer.
+
+    A dead cell or accelerometer leaves phasors that look like any other: of the vector, not of the channel. Turned back
+    to the channels' axes they vanish. Only then is the run read once more and held against the rules of
+    `rigdata.check_campaign`, which know a computed record without noise from a dead sensor.
+    """
+    found = _dead(run, phasors)
+    grave = [p for name, p in found.items() if run.channels[name].quantity != "acceleration"]
+    if grave:
+        raise RigDataError(grave)
+    return tuple(Condition(DEAD_ACCELEROMETER, f"{p.place} of {run.id} {p.what}") for p in found.values())
+
+
+def _dead(run: Run, phasors: RunPhasors) -> dict[str, Problem]:
+    blocks = {"displacement": phasors.displacement, "force": phasors.cell_force, "acceleration": phasors.acceleration}
+    silent = [
+        name
+        for name, channel in run.channels.items()
+        if channel.axis is not None and (block := blocks.get(channel.quantity)) is not None
+        if _silent(block, channel.axis)
+    ]
+    if not silent:
+        return {}
+    errors = {f.key: f.problem for f in observe(run).report.found if f.problem.severity == "error"}
+    return {name: errors[f"dead {name}"] for name in silent if f"dead {name}" in errors}
+
+
+def _silent(block: PhasorBlock, axis: float) -> bool:
+    """Whether no window shows any line along an axis; False where no window shows anything at all."""
+    known = np.isfinite(block.phasors).all(axis=(1, 2))
+    if not known.any():
+        return False
+    vector, mean = block.phasors[known], block.mean[known]
+    along = np.array([np.cos(axis), np.sin(axis)])
+    size = float(np.abs(vector @ along).max())
+    return size <= max(NOTHING * float(np.abs(vector).max()), ROUNDING * float(np.abs(mean).max()))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,13 +16,12 @@ from tpjb_ident.pivot.records.pickup import PickupSignature, measure_pickup
 from tpjb_ident.pivot.records.projection import Projection, pad_axes, project
 from tpjb_ident.pivot.records.settings import PivotSettings
 from tpjb_ident.pivot.records.steps import Hold, find_holds
-from tpjb_ident.slow_records.flat_channels import refuse_flat_channels
-from tpjb_ident.slow_records.glitches import good_samples
+from tpjb_ident.slow_records.bad_samples import good_samples, refuse_flat_channels
+from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
 
 if TYPE_CHECKING:
     from rigdata.calibration import Channel
     from rigdata.campaign import Run
-
 
 FEWEST_SAMPLES = 50
 MOST_LOST = 0.5  # share of samples lost to gaps and glitches above which a record is refused
@@ -172,3 +171,81 @@ def refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
         What to do.
     """
     return RigDataError(Problem("error", run.file, place, f"run {run.id} {what}", cure, run=run.id))
+
+
+def noise_within_holds(records: Sequence[DryRecord], drift_rate: float) -> NoiseModel:
+    """Noise from what happens within holds alone: every hold's level is free, so a bad step does no harm.
+
+    Parameters
+    ----------
+    records : sequence of DryRecord
+    drift_rate : float
+        Centre of the prior of the drift rate [m/s].
+    """
+    series: list[NoiseSeries] = []
+    for record in _with_holds(records):
+        used = record.blocks.hold >= 0
+        if not used.any():
+            series += _smooth_series(record, np.ones(len(record.blocks), dtype=bool))
+            continue
+        blocks = record.blocks.take(used)
+        levels = np.unique(blocks.hold)
+        mean = (blocks.hold[:, None] == levels[None, :]).astype(float)
+        for values in (record.projection.deflection, record.projection.across):
+            series.append(NoiseSeries(blocks.time, blocks.duration, values[used], mean))
+    return estimate_noise(series, drift_rate, learn_drift=_any_hold(records))
+
+
+def _any_hold(records: Sequence[DryRecord]) -> bool:
+    return any(record.holds for record in records)
+
+
+def _with_holds(records: Sequence[DryRecord]) -> Sequence[DryRecord]:
+    """The records that have holds, since only they tell drift from deflection; all, where none has."""
+    return [record for record in records if record.holds] or records
+
+
+def noise_about_curve(records: Sequence[DryRecord], good: Sequence[BoolArray], drift_rate: float) -> NoiseModel:
+    """Noise about any smooth load-deflection curve: sees the slow part of 1/f noise as well.
+
+    Parameters
+    ----------
+    records : sequence of DryRecord
+        One campaign.
+    good : sequence of (m,) ndarray of bool
+        Blocks to use of each record.
+    drift_rate : float
+        Centre of the prior [m/s].
+
+    Returns
+    -------
+    NoiseModel
+    """
+    series = []
+    for record, mask in zip(records, good, strict=True):
+        if _any_hold(records) and not record.holds:
+            continue
+        held = record.blocks.hold >= 0
+        series += _smooth_series(record, mask & held if (mask & held).sum() > 20 else mask)
+    return estimate_noise(series, drift_rate, learn_drift=_any_hold(records))
+
+
+def _smooth_series(record: DryRecord, used: BoolArray) -> list[NoiseSeries]:
+    blocks = record.blocks.take(used)
+    mean = _smooth_columns(record.projection.load[used], blocks)
+    return [
+        NoiseSeries(blocks.time, blocks.duration, values[used], mean)
+        for values in (record.projection.deflection, record.projection.across)
+    ]
+
+
+def _smooth_columns(load: FloatArray, blocks: Blocks) -> FloatArray:
+    """Columns (m, p) that span every law of `laws.py` well within the noise, and a soft toe."""
+    u = np.maximum(load / np.max(load), 1e-3)
+    columns = [np.ones_like(u), u, u * np.log(u), np.exp(-u / 0.06), np.exp(-u / 0.15)]
+    if np.all(blocks.hold < 0):
+        columns.append(np.cbrt(u) ** 2)  # a ramp has points enough for a sphere's law as it is
+    if len(np.unique(blocks.branch)) > 1:
+        down = (blocks.branch < 0).astype(float)
+        columns += [down, down * u]
+    return np.column_stack(columns)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,13 +14,58 @@ from tpjb_ident.pivot.records.dry_record import DryRecord, axial_channels, refus
 from tpjb_ident.pivot.records.pickup import mistakes
 from tpjb_ident.pivot.records.projection import PadDirection, displacement_direction, load_direction
 from tpjb_ident.pivot.records.settings import PivotSettings
-from tpjb_ident.pivot.records.structure import Structure, structure_behind
 from tpjb_ident.slow_records.noise import NoiseModel
 
 ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
 ASIDE_SPREAD = 5.0  # robust standard deviations of the campaign's own runs, where they stand less orderly than that
 ALONG = 0.5  # of the clearance: pads may differ, but not by this much
 CURE = "Check the run's pad number, the channels' axes, polarities and order, and the pad angles of the bearing file"
+#: Pads that must be there: two numbers are fitted.
+FEWEST = 4
+#: Slack when the spring's own movement is compared with what was read, as a share of it.
+SLACK = 0.1
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A compliance that explains the directions of all dry tests.
+
+    Attributes
+    ----------
+    compliance : float
+        Difference of its principal values [m/N].
+    direction : float
+        Of the softer one [rad], within -90 .. 90 degrees.
+    """
+
+    compliance: float
+    direction: float
+
+    def across(self, angle: float) -> float:
+        """What it moves a shaft across a pad at an angle [rad], per newton [m/N].
+
+        Parameters
+        ----------
+        angle : float
+            Angle of the pad [rad].
+        """
+        return -0.5 * self.compliance * math.sin(2.0 * (angle - self.direction))
+
+    def along(self, angle: float) -> float:
+        """What it moves at least along the pad [m/N].
+
+        Parameters
+        ----------
+        angle : float
+            Angle of the pad [rad].
+        """
+        return self.compliance * math.cos(angle - self.direction) ** 2
+
+    def __str__(self) -> str:
+        return (
+            f"a structure that gives {1e9 * self.compliance:.2g} nm/N more along {math.degrees(self.direction):.0f} "
+            "deg than across it explains the displacement directions of all dry tests"
+        )
 
 
 def check_directions(
@@ -201,3 +247,49 @@ def _centre(starts: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, float]
         # least absolute distance: one run in a wrong place does not move the centre
         weights = 1.0 / np.maximum(miss, 0.02 * max(float(np.median(miss)), 1e-9))
     return solution[:2], abs(float(solution[2]))
+
+
+def structure_behind(
+    angles: Sequence[float], slopes: Sequence[float], moved: Sequence[PadDirection], limit: float
+) -> Structure | None:
+    """Look for one compliance behind displacements that point elsewhere than at their pads.
+
+    Where a pad at phi with normal n is pushed with the load W, a structure with the symmetric compliance S moves the
+    shaft by W S n beside what the pivot gives, W c n. Across the pad that is
+
+        t . S n = (S_yy - S_xx) / 2 sin 2 phi + S_xy cos 2 phi,
+
+    two numbers for all pads. Exchanged channels make a similar pattern, but one that no spring can: a spring of this
+    size along its own direction would move the shaft further along some pads than it moved.
+
+    Parameters
+    ----------
+    angles : sequence of float
+        Directions of the pads that were pushed [rad], one per record.
+    slopes : sequence of float
+        Growth of the displacement along each pad with the load [m/N].
+    moved : sequence of PadDirection
+        Directions of the displacements from their pads.
+    limit : float
+        Angle that a displacement may still be off once the structure is allowed for [rad].
+
+    Returns
+    -------
+    Structure or None
+        None where too few pads were pushed, a shaft moved away from its pad, or the pattern is not that of a spring.
+    """
+    phi, along = np.asarray(angles, float), np.asarray(slopes, float)
+    if len(set(np.round(phi, 6))) < FEWEST or np.any(along <= 0.0):
+        return None
+    if any(abs(d.angle) >= 0.5 * math.pi for d in moved):
+        return None
+    across = along * np.tan([d.angle for d in moved])
+    design = np.column_stack([np.sin(2 * phi), np.cos(2 * phi)])
+    p, q = np.linalg.lstsq(design, across, rcond=None)[0]
+    # t . S n = -(D / 2) sin 2 (phi - psi) = -(D / 2) (sin 2 phi cos 2 psi - cos 2 phi sin 2 psi)
+    found = Structure(2.0 * math.hypot(p, q), 0.5 * math.atan2(q, -p))
+    left = np.array([a - found.across(float(f)) for f, a in zip(phi, across, strict=True)])
+    own = np.array([a - found.along(float(f)) for f, a in zip(phi, along, strict=True)])
+    if np.any(own < -SLACK * along) or np.any(np.abs(left) > math.tan(limit) * along):
+        return None
+    return found

@@ -22,12 +22,10 @@ from tpjb_ident.dynamic.broadband.spectra.disturbing_lines import (
 from tpjb_ident.dynamic.broadband.spectra.period import Period, find_period, resampled
 from tpjb_ident.dynamic.broadband.spectra.samples import Samples, read_samples
 from tpjb_ident.dynamic.instruments.findings import START
-from tpjb_ident.dynamic.records.compensation import compensated
-from tpjb_ident.dynamic.records.oil_force import oil_force
+from tpjb_ident.dynamic.records.compensation import compensated, look_at_readings
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
-from tpjb_ident.dynamic.records.raw_look import look_at_readings
-from tpjb_ident.dynamic.records.run_data import RunPhasors
-from tpjb_ident.dynamic.runs.temperatures import mean_temperatures
+from tpjb_ident.dynamic.records.run_data import RunPhasors, oil_force
+from tpjb_ident.dynamic.runs.point_data import mean_temperatures
 from tpjb_ident.dynamic.spectral_lines.lines import Line, LineSet
 
 #: Kinds that may repeat themselves; those that never do are not asked.
@@ -155,7 +153,7 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
         clean = without_disturbances(cut, lines, length)
     result = _transformed(run, clean, length, housing_mass, settings)
     phasors = compensated(result, run, slower)
-    phasors = replace(phasors, conditions=merged(samples.conditions, told, clock_conditions(clocks)))
+    phasors = replace(phasors, conditions=merged(samples.conditions, told, _clock_conditions(clocks)))
     frequencies = phasors.lines.frequencies
     phasors = _undelayed(phasors, settings.delays)
     a = None if phasors.acceleration is None else phasors.acceleration.phasors
@@ -178,14 +176,8 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
     )
 
 
-def clock_conditions(clocks: dict[str, ClockRate]) -> tuple[Condition, ...]:
-    """What to say of clocks that differ.
-
-    Parameters
-    ----------
-    clocks : dict of str to ClockRate
-        By quantity.
-    """
+def _clock_conditions(clocks: dict[str, ClockRate]) -> tuple[Condition, ...]:
+    """What to say of clocks that differ."""
     if not clocks:
         return ()
     told = ", ".join(f"{q} {1e6 * c.rate:+.1f} ppm (standard error {1e6 * c.error:.1f})" for q, c in clocks.items())

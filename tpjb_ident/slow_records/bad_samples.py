@@ -1,4 +1,4 @@
-"""Glitches in slow records: samples that jump out of the signal and come back.
+"""Bad samples of slow records: glitches, which jump out of the signal and come back, and channels that stand still.
 
 A staircase, a ramp and a shaft that slides from corner to corner all move monotonically over the length of
 a glitch. So a sample belongs to the signal when it lies between the median of what came before and the
@@ -8,15 +8,25 @@ ramp.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy import ndimage
 
+from rigdata.channel_statistics import ChannelStatistics
+from rigdata.problem import Problem, RigDataError
 from tpjb_ident.arrays import BoolArray, FloatArray
+
+if TYPE_CHECKING:
+    from rigdata.campaign import Run
 
 ROUNDING = 1e-9  # of the reading, for a component that does not move at all
 SMALLEST = 1e-4  # of the range: in a computed record without noise rounding is no glitch
 NOTHING = 1e-15  # [m] or [N]: below what any sensor knows
 THRESHOLD = 7.0  # noise standard deviations beyond both medians
+SHORTEST = 50  # samples
+TIMES_EXPECTED = 10.0
+NOISE_FREE = 0.5  # share of repeated readings, apart from the longest stretch: a computed record, or a coarse converter
 
 
 def good_samples(values: FloatArray, longest: int = 60) -> BoolArray:
@@ -73,3 +83,53 @@ def _noise(x: FloatArray, median: FloatArray) -> float:
     steps = steps[steps > 1e-6 * np.ptp(x)]
     resolution = float(np.min(steps)) if len(steps) else 0.0
     return max(spread, resolution / 2.0, SMALLEST * float(np.ptp(x)), ROUNDING * float(np.max(np.abs(x))), NOTHING)
+
+
+def refuse_flat_channels(run: Run) -> None:
+    """Refuse a run one of whose force or displacement channels stands still for a while.
+
+    A force or displacement that stops in the middle of a staircase looks like a very stiff or very soft pivot: nothing
+    in the curve itself gives it away, but readings without noise do.
+
+    Parameters
+    ----------
+    run : Run
+        Of any kind.
+
+    Raises
+    ------
+    RigDataError
+        Names every such channel, from when on, and for how long.
+    """
+    problems = []
+    for quantity in ("force", "displacement"):
+        seen = {name: _statistics(run, name) for name, c in run.channels.items() if c.quantity == quantity}
+        if any(_repeated(s) > NOISE_FREE for s in seen.values() if not s.constant):
+            # noise below the converter's step: standing still says nothing here
+            continue
+        problems += [_problem(run, name, s) for name, s in seen.items() if _stands_still(s)]
+    if problems:
+        raise RigDataError(problems)
+
+
+def _statistics(run: Run, name: str) -> ChannelStatistics:
+    seen = ChannelStatistics()
+    seen.add(np.asarray(run.record(name).values))
+    return seen
+
+
+def _repeated(seen: ChannelStatistics) -> float:
+    """Share of samples equal to the one before, apart from the longest stretch."""
+    return (seen.repeats - seen.longest_flat + 1) / max(seen.values - seen.longest_flat, 1)
+
+
+def _stands_still(seen: ChannelStatistics) -> bool:
+    return seen.longest_flat >= max(SHORTEST, TIMES_EXPECTED * seen.expected_flat())
+
+
+def _problem(run: Run, name: str, seen: ChannelStatistics) -> Problem:
+    start, share = seen.flat_start / run.sample_rate, seen.longest_flat / max(seen.samples, 1)
+    how_long = f"from {start:.2f} s on for {100 * share:.0f} % of the run"
+    what = f"run {run.id}: stands still {how_long}: stuck, clipped or dead"
+    cure = "Check sensor, range and logger, and repeat the run"
+    return Problem("error", run.file, f"channel {name}", what, cure, run=run.id)

@@ -1,4 +1,4 @@
-"""Columns of date and time of day, as loggers write them in place of seconds."""
+"""What a cell of a text export says: a number, a missing value, date and time of day in place of seconds."""
 
 from __future__ import annotations
 
@@ -16,6 +16,75 @@ _ISO = r"(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})[T ]\s?"
 _STAMP = re.compile(rf"(?:{_ISO}|(\d{{1,2}})[./](\d{{1,2}})[./](\d{{4}})[T ]\s?)?{_CLOCK}{_ZONE}")
 _DATE = re.compile(r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[./]\d{1,2}[./]\d{4}")
 _DAY = 86400.0
+#: Ways in which loggers and spreadsheets write "no value".
+MISSING = (
+    "",
+    "NaN",
+    "nan",
+    "NAN",
+    "-NaN",
+    "-nan",
+    "-nan(ind)",
+    "-",
+    "--",
+    "---",
+    "----",
+    "-----",
+    "*",
+    "***",
+    "?",
+    "NA",
+    "N/A",
+    "n/a",
+    "#N/A",
+    "#NA",
+    "#NV",
+    "#VALUE!",
+    "#WERT!",
+    "#DIV/0!",
+    "null",
+    "NULL",
+    "None",
+    "none",
+    "1.#QNAN",
+    "-1.#QNAN",
+    "1.#IND",
+    "-1.#IND",
+    "1.#INF",
+    "-1.#INF",
+    "1,#QNAN",
+    "-1,#QNAN",
+    "1,#IND",
+    "-1,#IND",
+    "1,#INF",
+    "-1,#INF",
+    "1.#R",
+    "OVL",
+    "+OVL",
+    "-OVL",
+    "OL",
+    "+OL",
+    "-OL",
+    "OVER",
+    "OVERLOAD",
+    "OVERFLOW",
+    "Overflow",
+    "INVALID",
+    "Invalid",
+    "ERR",
+    "inf",
+    "-inf",
+    "+inf",
+    "Inf",
+    "-Inf",
+    "INF",
+    "-INF",
+)
+_MISSING = frozenset(MISSING)
+_NUMBER = {
+    mark: re.compile(rf"[+-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")
+    for mark in ".,"
+}
 
 
 def is_stamp(cell: str) -> bool:
@@ -104,3 +173,49 @@ def _spread(time: FloatArray) -> FloatArray:
     slope, start = np.polyfit(index, time, 1)
     even = start + slope * index
     return even - even[0] if np.abs(even - time).max() <= 1.5 * resolution else time
+
+
+def is_missing(cell: str) -> bool:
+    """Whether `cell` (stripped) stands for no value.
+
+    Parameters
+    ----------
+    cell : str
+        Stripped.
+    """
+    return cell in _MISSING
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Whether `cell` (stripped) is a number with that decimal mark.
+
+    Parameters
+    ----------
+    cell : str
+        Stripped.
+    decimal : str
+        Decimal mark, a point or a comma.
+    """
+    return _NUMBER[decimal].fullmatch(cell) is not None
+
+
+def looks_like(cell: str) -> bool:
+    """Whether `cell` is a number with either decimal mark.
+
+    Parameters
+    ----------
+    cell : str
+        Stripped.
+    """
+    return is_number(cell, ".") or is_number(cell, ",")
+
+
+def number_pattern(decimal: str) -> str:
+    """Regular expression (RE2) of a number, for whole columns.
+
+    Parameters
+    ----------
+    decimal : str
+        Decimal mark, a point or a comma.
+    """
+    return f"^(?:{_NUMBER[decimal].pattern})$"
