@@ -364,19 +364,6 @@ TABLES: dict[str, tuple[Column, ...]] = {
 }
 
 
-def unknown_columns(table: str, names: list[str]) -> list[str]:
-    """Names that the schema does not know in a table.
-
-    Parameters
-    ----------
-    table : str
-        File name without suffix, a key of `TABLES`.
-    names : list of str
-    """
-    known = re.compile("|".join(column.pattern() for column in TABLES[table]))
-    return [name for name in names if not known.fullmatch(name)]
-
-
 def markdown(table: str) -> str:
     """Rows of the documentation's table of one file: name, unit, meaning.
 

@@ -15,7 +15,7 @@ from tpjb_ident.diagnose.forward.candidates import candidates
 from tpjb_ident.diagnose.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnose.forward.tolerances import Tolerances
 from tpjb_ident.diagnose.next_test.designs import Design
-from tpjb_ident.diagnose.next_test.rank import rank_designs, say
+from tpjb_ident.diagnose.next_test.rank import ranked, say, separated
 from tpjb_ident.diagnose.observations.folds import folds, held_out
 from tpjb_ident.diagnose.observations.gap import gap, residuals
 from tpjb_ident.diagnose.observations.layout import Layout
@@ -153,10 +153,10 @@ def test_next_test_ranks_the_test_that_separates(setup):
         Design("with sensors", Layout(point)),
         Design("without", Layout((replace(point[0], pads=()),))),
     )
-    ranked = rank_designs(setup, thin, [warm], [without, with_sensors], Tolerances())
-    assert ranked[0].design is with_sensors
-    assert ranked[0].expected > 3 * ranked[1].expected
-    assert "with sensors" in say(ranked[:1], "a", "b")
+    tests = ranked([separated(setup, d, thin, [warm], Tolerances()) for d in (without, with_sensors)])
+    assert tests[0].design is with_sensors
+    assert tests[0].expected > 3 * tests[1].expected
+    assert "with sensors" in say(tests[:1], "a", "b")
 
 
 @pytest.mark.slow

@@ -17,8 +17,9 @@ from tpjb_ident.diagnose.next_test.rank import (
     Separation,
     chance,
     options_for,
-    rank_designs,
+    ranked,
     say,
+    separated,
     suggested,
     together,
 )
@@ -63,26 +64,26 @@ def test_probes_on_the_housing_do_not_see_its_spring(setup):
     point = Layout(dynamic([5000.0], [SPEED], SPEED, -math.pi / 2, 0))
     (blind,) = (d for d in designs(setup, point) if "housing_flexibility" in d.blind)
     seeing, not_seeing = Design("from the frame", point), Design("from the housing", point, blind.blind)
-    ranked = rank_designs(setup, spring, [[]], [seeing, not_seeing], Tolerances())
-    assert [s.design.words for s in ranked] == ["from the frame", "from the housing"]
-    assert ranked[0].expected > 3.0
-    assert ranked[1].expected == 0.0
+    tests = ranked([separated(setup, d, spring, [[]], Tolerances()) for d in (seeing, not_seeing)])
+    assert [s.design.words for s in tests] == ["from the frame", "from the housing"]
+    assert tests[0].expected > 3.0
+    assert tests[1].expected == 0.0
 
 
 def test_checks_are_ranked_beside_tests_on_the_rig(setup):
     slow, heavy = [Effect("channel_delay", delay=2e-5)], [Effect("fluid_inertia", added_mass=40.0)]
     options = [o for o in options_for(setup, Layout(())) if isinstance(o, Check)]
     assert len(options) == len(CHECKS)
-    ranked = rank_designs(setup, slow, [heavy], options, Tolerances())
-    assert ranked[0].design is by_effect("channel_delay")
+    tests = ranked([separated(setup, o, slow, [heavy], Tolerances()) for o in options])
+    assert tests[0].design is by_effect("channel_delay")
 
 
 @pytest.mark.parametrize(
     ("expected", "count", "apart"), [((6.0, 5.0), 1, 6.0), ((4.0, 3.0), 2, 5.0), ((1.0, 0.5), 2, math.hypot(1.0, 0.5))]
 )
 def test_a_second_test_is_suggested_where_one_is_not_enough(expected, count, apart):
-    ranked = [Separation(CHECKS[i], (d,)) for i, d in enumerate(expected)]
-    chosen = suggested(ranked)
+    tests = [Separation(CHECKS[i], (d,)) for i, d in enumerate(expected)]
+    chosen = suggested(tests)
     assert len(chosen) == count
     assert together(chosen) == pytest.approx(apart)
     words = say(chosen, "a", "b")

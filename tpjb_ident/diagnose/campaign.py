@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
-    from tpjb_ident.diagnose.forward.memory import Memory
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.pivot import PivotCurve
 
@@ -130,7 +129,6 @@ def diagnose_campaign(
     baseline: Baseline | None = None,
     settings: DiagnoseSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    estimator: IdentifySettings | None = None,
 ) -> CampaignDiagnosis:
     """Identify a campaign and find what its model lacks.
 
@@ -143,7 +141,6 @@ def diagnose_campaign(
         Tolerances that the bearing file and the campaign's manifest state take the place of defaults.
     progress : callable, optional
         ``progress(text, done, total)``.
-    estimator : IdentifySettings, optional
 
     Raises
     ------
@@ -151,7 +148,7 @@ def diagnose_campaign(
         The campaign has no dynamic runs.
     """
     settings = settings or DiagnoseSettings()
-    measured = measure_campaign(campaign, bearing, settings.tolerances, progress, estimator)
+    measured = measure_campaign(campaign, bearing, settings.tolerances, progress)
     return _diagnose_measured(measured, bearing, baseline, settings, progress)
 
 
@@ -160,13 +157,12 @@ def measure_campaign(
     bearing: Bearing,
     known: Tolerances | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    estimator: IdentifySettings | None = None,
 ) -> Measured:
     """Identify a campaign and measure its static tests.
 
     Parameters
     ----------
-    campaign, bearing, progress, estimator
+    campaign, bearing, progress
         As of `diagnose_campaign`.
     known : Tolerances, optional
         What counts where bearing file and manifest are silent; what the command line states counts in any case.
@@ -180,7 +176,7 @@ def measure_campaign(
     if not campaign.of_kind("dynamic"):
         raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to diagnose")
     least = min(pad.assembled_clearance for pad in bearing.pads)
-    chosen = replace(estimator or IdentifySettings(), clearance=least)
+    chosen = IdentifySettings(clearance=least)
     found = identify(campaign, chosen, lambda text, done, total: tell(f"identifying, {text}", 20 * done, 100 * total))
     tell("pivot curves, clearance and locus", 20, 100)
     static = measure_static(campaign, bearing)
@@ -199,7 +195,6 @@ def _diagnose_measured(
     baseline: Baseline | None = None,
     settings: DiagnoseSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    memory: Memory | None = None,
 ) -> CampaignDiagnosis:
     """Find what the model of an identified campaign lacks."""
     baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
@@ -220,7 +215,6 @@ def _diagnose_measured(
         setup,
         settings,
         lambda text, share: tell(f"diagnosing, {text}", 30 + int(70 * share), 100),
-        memory,
     )
     return CampaignDiagnosis(result, found, setup)
 

@@ -95,18 +95,16 @@ class Grouped(TyperCommand):
                     formatter.write_dl(records)
 
 
-def add_command(app: typer.Typer, command: Callable[..., None], name: str | None = None) -> None:
+def add_command(app: typer.Typer, command: Callable[..., None]) -> None:
     """Register a command with the common options and its examples.
 
     Parameters
     ----------
     app : Typer
     command : callable
-        Guarded already.
-    name : str, optional
-        Default: the function's own.
+        Guarded already; its name is the function's own.
     """
-    name = name or command.__name__
+    name = command.__name__
     app.command(name, cls=Grouped, epilog=_examples_text(name))(_with_output_options(command, name))
 
 

@@ -71,29 +71,6 @@ def options_for(setup: Setup, layout: Layout) -> tuple[Design | Check, ...]:
     return (*designs(setup, layout), *CHECKS)
 
 
-def rank_designs(
-    setup: Setup,
-    one: Sequence[Effect],
-    rivals: Sequence[Sequence[Effect]],
-    options: Sequence[Design | Check],
-    known: Tolerances,
-) -> tuple[Separation, ...]:
-    """Expected separation of an explanation from its rivals by every design, best first.
-
-    Parameters
-    ----------
-    setup : Setup
-        Baseline.
-    one : sequence of Effect
-    rivals : sequence of sequence of Effect
-        At least one.
-    options : sequence of Design or Check
-    known : Tolerances
-    """
-    found = [separated(setup, design, one, rivals, known) for design in options]
-    return ranked([each for each in found if each is not None])
-
-
 def separated(
     setup: Setup, design: Design | Check, one: Sequence[Effect], rivals: Sequence[Sequence[Effect]], known: Tolerances
 ) -> Separation | None:
@@ -101,9 +78,13 @@ def separated(
 
     Parameters
     ----------
-    setup, one, rivals, known
-        As of `rank_designs`.
+    setup : Setup
+        Baseline.
     design : Design or Check
+    one : sequence of Effect
+    rivals : sequence of sequence of Effect
+        At least one.
+    known : Tolerances
     """
     if isinstance(design, Check):
         return Separation(design, tuple(design.separation(one, other) for other in rivals))
@@ -150,8 +131,8 @@ def apart(seen: Observations, columns: FloatArray, difference: FloatArray) -> fl
     return float(np.linalg.norm(np.linalg.solve(usual_factor(seen, columns), difference)))
 
 
-def chance(separation: float, margin: float = MARGIN) -> float:
-    """Probability that chi-square of the wrong explanation exceeds the right one's by `margin`.
+def chance(separation: float) -> float:
+    """Probability that chi-square of the wrong explanation exceeds the right one's by `MARGIN`.
 
     The difference is normal with mean d^2 and standard deviation 2 d, d being the separation.
 
@@ -159,10 +140,8 @@ def chance(separation: float, margin: float = MARGIN) -> float:
     ----------
     separation : float
         Distance of two explanations in standard deviations.
-    margin : float
-        By how much chi-square must differ.
     """
-    return float(ndtr((separation**2 - margin) / (2.0 * separation))) if separation > 0.0 else 0.0
+    return float(ndtr((separation**2 - MARGIN) / (2.0 * separation))) if separation > 0.0 else 0.0
 
 
 def suggested(tests: Sequence[Separation]) -> tuple[Separation, ...]:
@@ -171,7 +150,7 @@ def suggested(tests: Sequence[Separation]) -> tuple[Separation, ...]:
     Parameters
     ----------
     tests : sequence of Separation
-        As `rank_designs` gives them.
+        As `ranked` gives them.
     """
     if len(tests) < 2 or tests[0].expected >= ENOUGH:
         return tuple(tests[:1])

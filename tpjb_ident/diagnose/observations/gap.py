@@ -66,19 +66,26 @@ def gap(observations: Observations, prediction: FloatArray, chosen: BoolArray | 
     return float(np.sqrt(np.mean(z**2))) if len(z) else float("nan")
 
 
-def noise_floor(observations: Observations, chosen: BoolArray | None = None) -> float:
+def noise_square(observations: Observations) -> float:
+    """Square of the gap that measurement noise alone would leave under a perfect model.
+
+    Parameters
+    ----------
+    observations : Observations
+        What was measured, with its covariance.
+    """
+    return float(np.mean(np.diag(observations.covariance) / observations.total_sigma**2))
+
+
+def noise_floor(observations: Observations) -> float:
     """Gap that measurement noise alone would leave under a perfect model.
 
     Parameters
     ----------
     observations : Observations
         What was measured, with its covariance.
-    chosen : array of bool, shape (n,), optional
-        Elements that count; all by default.
     """
-    share = np.diag(observations.covariance) / observations.total_sigma**2
-    share = share if chosen is None else share[chosen]
-    return float(np.sqrt(np.mean(share)))
+    return math.sqrt(noise_square(observations))
 
 
 def gap_by_observable(

@@ -114,19 +114,6 @@ def masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArr
     return {**masks, "E": np.ones(len(elements), dtype=bool)}
 
 
-def _part_of(layout: Layout, name: str) -> Layout:
-    """Tests of a layout that belong to a data set, ``"A"`` to ``"D"``."""
-    line = _usual(np.array([w for t in layout.dynamic for w in t.excitation]))
-    plain = tuple(replace(t, pads=()) for t in layout.dynamic)
-    if name == "A":
-        return Layout(tuple(replace(t, excitation=(line,)) for t in plain if line in t.excitation))
-    return {
-        "B": Layout(plain),
-        "C": replace(layout, dynamic=plain, dry=()),
-        "D": layout,
-    }[name]
-
-
 def _usual(lines: FloatArray) -> float:
     """The frequency that is there at the most loads, the middle one among equals."""
     found, counts = np.unique(lines, return_counts=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,35 +14,12 @@ from tpjb_ident.diagnose.observations.layout import DryTest, DynamicTest, Layout
 from tpjb_ident.diagnose.observations.observe import ENTRY_NAMES, Element, Observations
 from tpjb_ident.diagnose.observations.tolerance import Tolerance
 
-
-@dataclass(frozen=True)
-class ExpectedNoise:
-    """Standard errors that a well-run test reaches (the sample campaigns' own).
-
-    Attributes
-    ----------
-    stiffness : float
-        Share of the mean direct coefficient.
-    position : float
-        [m]
-    temperature : float
-        [K]
-    dry : float
-        Relative, of a tangent compliance.
-    angle : float
-        Of a polygon side [rad].
-    """
-
-    stiffness: float = 0.001
-    position: float = 0.1e-6
-    temperature: float = 0.05
-    dry: float = 0.008
-    angle: float = 3e-4
+#: Standard errors that a well-run test reaches (the sample campaigns' own): share of the mean direct coefficient,
+#: position [m], temperature [K], share of a dry compliance, angle of a polygon side [rad].
+STIFFNESS, POSITION, TEMPERATURE, DRY, ANGLE = 0.001, 0.1e-6, 0.05, 0.008, 3e-4
 
 
-def planned_observations(
-    setup: Setup, layout: Layout, tolerance: Tolerance | None = None, noise: ExpectedNoise | None = None
-) -> Observations:
+def planned_observations(setup: Setup, layout: Layout) -> Observations:
     """What the baseline predicts for a layout, with the covariance one may expect.
 
     Parameters
@@ -52,28 +28,24 @@ def planned_observations(
         Bearing, oil, pivots, structure and instruments of the model.
     layout : Layout
         Tests, with their operating points.
-    tolerance : Tolerance, optional
-        By how much the model itself may be wrong.
-    noise : ExpectedNoise, optional
-        Noise to be expected of a test.
 
     Raises
     ------
     NoEquilibriumError
         The baseline has none at some point of the layout.
     """
-    tolerance, noise = tolerance or Tolerance(), noise or ExpectedNoise()
+    tolerance = Tolerance()
     elements = _elements(layout, [pad.pivot_angle for pad in setup.bearing.pads])
     value = Forward(setup, layout, elements)()
     scale = direct_scale(elements, value)
     table: dict[str, tuple[np.ndarray | float, np.ndarray | float]] = {
-        "h": (noise.stiffness * scale, tolerance.stiffness * scale),
-        "temperature": (noise.temperature, tolerance.temperature),
-        "locus": (noise.position, tolerance.position),
+        "h": (STIFFNESS * scale, tolerance.stiffness * scale),
+        "temperature": (TEMPERATURE, tolerance.temperature),
+        "locus": (POSITION, tolerance.position),
         "load": (tolerance.load_miss, tolerance.load),
-        "dry": (noise.dry, tolerance.dry),
-        "clearance": (noise.position, tolerance.position),
-        "side": (noise.angle, tolerance.angle),
+        "dry": (DRY, tolerance.dry),
+        "clearance": (POSITION, tolerance.position),
+        "side": (ANGLE, tolerance.angle),
     }
     columns = np.zeros((2, len(value)))
     for i, e in enumerate(elements):

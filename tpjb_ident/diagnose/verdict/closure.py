@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, FloatArray
-from tpjb_ident.diagnose.observations.gap import gap
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.diagnose.observations.gap import gap, noise_square
 from tpjb_ident.diagnose.search.fit import Fit
 from tpjb_ident.diagnose.search.problem import Problem
 
@@ -77,7 +77,7 @@ def closure(problem: Problem, baseline: Fit, model: Fit, less: tuple[Fit | None,
         The model without each of its effects.
     """
     before, after = (gap(problem.observations, unseen(problem, f)) for f in (baseline, model))
-    floor = _noise(problem)
+    floor = noise_square(problem.observations)
     room = before**2 - floor
     closed = 1.0 - max(after**2 - floor, 0.0) / room if room > 0.0 and model.candidates else float("nan")
     parts = []
@@ -85,9 +85,3 @@ def closure(problem: Problem, baseline: Fit, model: Fit, less: tuple[Fit | None,
         opened = gap(problem.observations, unseen(problem, one)) ** 2 - after**2 if one is not None else np.inf
         parts.append(opened / room if room > 0.0 else float("nan"))
     return Closure(before, after, closed, tuple(parts))
-
-
-def _noise(problem: Problem, chosen: BoolArray | None = None) -> float:
-    """Mean square that measurement noise alone leaves."""
-    share = np.diag(problem.observations.covariance) / problem.sigma**2
-    return float(np.mean(share if chosen is None else share[chosen]))

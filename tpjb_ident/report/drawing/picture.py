@@ -228,7 +228,7 @@ def add_colour_bar(axes: Axes, image: Any, text: str) -> None:
     bar.set_label(text, fontsize=FONT_SIZE, color=LIGHT["ink"])
 
 
-def mark_extrapolated(axes: Axes, start: float, text: str = "extrapolated") -> None:
+def mark_extrapolated(axes: Axes, start: float) -> None:
     """Shade everything right of `start` (in the panel's units) and say why.
 
     Parameters
@@ -236,14 +236,12 @@ def mark_extrapolated(axes: Axes, start: float, text: str = "extrapolated") -> N
     axes : Axes
     start : float
         In the panel's units.
-    text : str, optional
-        Why.
     """
     end = axes.get_xlim()[1]
     if end > start:
         axes.axvspan(start, end, color=LIGHT["rule"], alpha=0.35, linewidth=0, zorder=0)
         axes.text(
-            start, 0.02, f" {text}", transform=axes.get_xaxis_transform(), fontsize=FONT_SIZE - 1.5,
+            start, 0.02, " extrapolated", transform=axes.get_xaxis_transform(), fontsize=FONT_SIZE - 1.5,
             color=LIGHT["grey"], va="bottom", ha="left",
         )  # fmt: skip
         axes.set_xlim(right=end)
