@@ -50,8 +50,8 @@ _HOMES = {
     "load_pivots": "model.pivots",
     "Prediction": "model.prediction",
     "predict": "model.predict",
-    "CompareSettings": "tpjb_ident.compare",
-    "compare_campaign": "tpjb_ident.compare",
+    "CompareSettings": "tpjb_ident.compare.comparison",
+    "compare_campaign": "tpjb_ident.compare.comparison",
     "write_report": "tpjb_ident.report",
     "plots": "tpjb_ident.report",
 }

@@ -3,15 +3,9 @@
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tpjb_ident.callable_package import make_callable
-
-if TYPE_CHECKING:
-    from tpjb_ident.export.formats import FORMATS, ExportError, Format, export_format
-    from tpjb_ident.export.points import COLUMNS, Chosen, StaticPoint, static_points
-    from tpjb_ident.export.structural import sep005
-    from tpjb_ident.export.write import Export, export
 
 #: Imported on first use: the command line asks for the names of the formats alone.
 _HOMES = {
@@ -28,20 +22,7 @@ _HOMES = {
     "static_points": "points",
 }
 
-__all__ = [
-    "COLUMNS",
-    "FORMATS",
-    "Chosen",
-    "Export",
-    "ExportError",
-    "Format",
-    "StaticPoint",
-    "export",
-    "export_format",
-    "sep005",
-    "static_points",
-]
-
+__all__ = sorted(_HOMES)
 
 make_callable(__name__, "tpjb_ident.export.write:export")  # ti.export(...)
 

@@ -15,36 +15,89 @@ from tpjb_ident.diagnose.search.assessment import Assessment, Linear, assess
 from tpjb_ident.diagnose.search.problem import Problem
 
 
+def build(candidates: Sequence[Candidate], amplitudes: Sequence[FloatArray]) -> tuple[Effect, ...]:
+    """Effects of candidates at amplitudes.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+    amplitudes : sequence of (k_i,) ndarray
+        In the nearly linear forms.
+    """
+    return tuple(c.effect(a) for c, a in zip(candidates, amplitudes, strict=True))
+
+
 @dataclass(frozen=True)
-class Fit:
-    """Effects fitted together, nuisances beside them.
+class Start:
+    """Where a model stands: where a fit begins, or a step leads.
 
     Attributes
     ----------
     candidates : tuple of Candidate
     amplitudes : tuple of (k_i,) ndarray
         In the nearly linear forms.
-    nuisance : (m,) ndarray
-        Where the model was taken, in standard deviations.
-    prediction : (n,) ndarray
-        There, readings included.
     jacobian : (n, k) ndarray
-        Per unit of every amplitude.
+        Per unit of every amplitude, as known from nearby; steps correct it.
+    nuisance : (m,) ndarray
+        Where nuisances stand while amplitudes move, in standard deviations.
     columns : (n, m) ndarray
         Per standard deviation of every nuisance.
+    """
+
+    candidates: tuple[Candidate, ...]
+    amplitudes: tuple[FloatArray, ...]
+    jacobian: FloatArray = field(repr=False)
+    nuisance: FloatArray = field(repr=False)
+    columns: FloatArray = field(repr=False)
+
+    @property
+    def free(self) -> FloatArray:
+        """Amplitudes and nuisances, counted from their priors' means, (k + m,)."""
+        moved = [a - c.origin for c, a in zip(self.candidates, self.amplitudes, strict=True)]
+        return np.concatenate([*moved, self.nuisance]) if moved else self.nuisance
+
+    @property
+    def width(self) -> FloatArray:
+        """Standard deviations of their priors, (k + m,)."""
+        return np.concatenate([*(c.width for c in self.candidates), np.ones(len(self.nuisance))])
+
+    def split(self, flat: FloatArray) -> tuple[FloatArray, ...]:
+        """Amplitudes by candidate, inside their bounds.
+
+        Parameters
+        ----------
+        flat : (k,) ndarray
+            All of them, one after the other.
+        """
+        out, at = [], 0
+        for c in self.candidates:
+            low, high = c.limits
+            out.append(np.clip(flat[at : at + len(low)], low, high))
+            at += len(low)
+        return tuple(out)
+
+
+@dataclass(frozen=True)
+class Fit(Start):
+    """Effects fitted together, nuisances beside them.
+
+    Attributes
+    ----------
+    prediction : (n,) ndarray
+        Where the model stands, readings included.
     assessment : Assessment
     settled : bool
         Whether the derivatives were taken here, and propose no step.
     """
 
-    candidates: tuple[Candidate, ...]
-    amplitudes: tuple[FloatArray, ...]
-    nuisance: FloatArray = field(repr=False)
     prediction: FloatArray = field(repr=False)
-    jacobian: FloatArray = field(repr=False)
-    columns: FloatArray = field(repr=False)
     assessment: Assessment = field(repr=False)
     settled: bool = field(default=False, repr=False)
+
+    @property
+    def start(self) -> Start:
+        """Where it stands, without what it is worth: little to send to another process."""
+        return Start(self.candidates, self.amplitudes, self.jacobian, self.nuisance, self.columns)
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -98,74 +151,7 @@ class Fit:
             Amplitudes and nuisances, counted from their priors' means.
         """
         columns = np.column_stack([self.jacobian, self.columns])
-        return self.prediction + columns @ (free - _free_numbers(self.candidates, self.amplitudes, self.nuisance))
-
-
-def build(candidates: Sequence[Candidate], amplitudes: Sequence[FloatArray]) -> tuple[Effect, ...]:
-    """Effects of candidates at amplitudes.
-
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-    amplitudes : sequence of (k_i,) ndarray
-        In the nearly linear forms.
-    """
-    return tuple(c.effect(a) for c, a in zip(candidates, amplitudes, strict=True))
-
-
-def _free_numbers(
-    candidates: Sequence[Candidate], amplitudes: Sequence[FloatArray], nuisance: FloatArray
-) -> FloatArray:  # fmt: skip
-    """All free numbers, counted from their priors' means, (k + m,)."""
-    moved = [a - c.origin for c, a in zip(candidates, amplitudes, strict=True)]
-    return np.concatenate([*moved, nuisance]) if moved else nuisance
-
-
-@dataclass(frozen=True)
-class Start:
-    """Where a fit begins.
-
-    Attributes
-    ----------
-    candidates : tuple of Candidate
-    amplitudes : tuple of (k_i,) ndarray
-    jacobian : (n, k) ndarray
-        Derivatives that are known from nearby; steps correct them.
-    nuisance : (m,) ndarray
-        Where nuisances stand while amplitudes move.
-    columns : (n, m) ndarray
-    """
-
-    candidates: tuple[Candidate, ...]
-    amplitudes: tuple[FloatArray, ...]
-    jacobian: FloatArray = field(repr=False)
-    nuisance: FloatArray = field(repr=False)
-    columns: FloatArray = field(repr=False)
-
-    @property
-    def free(self) -> FloatArray:
-        """Amplitudes and nuisances, counted from their priors' means, (k + m,)."""
-        return _free_numbers(self.candidates, self.amplitudes, self.nuisance)
-
-    @property
-    def width(self) -> FloatArray:
-        """Standard deviations of their priors, (k + m,)."""
-        return np.concatenate([*(c.width for c in self.candidates), np.ones(len(self.nuisance))])
-
-    def split(self, flat: FloatArray) -> tuple[FloatArray, ...]:
-        """Amplitudes by candidate, inside their bounds.
-
-        Parameters
-        ----------
-        flat : (k,) ndarray
-            All of them, one after the other.
-        """
-        out, at = [], 0
-        for c in self.candidates:
-            low, high = c.limits
-            out.append(np.clip(flat[at : at + len(low)], low, high))
-            at += len(low)
-        return tuple(out)
+        return self.prediction + columns @ (free - self.free)
 
 
 def linear(problem: Problem, start: Start, prediction: FloatArray, slack: float = 1.0) -> Linear:
@@ -202,4 +188,4 @@ def fitted(problem: Problem, start: Start, prediction: FloatArray, scales: Float
         Of the model's error, to begin with.
     """
     found = assess(problem.basis, linear(problem, start, prediction), scales)
-    return Fit(start.candidates, start.amplitudes, start.nuisance, prediction, start.jacobian, start.columns, found)
+    return Fit(start.candidates, start.amplitudes, start.jacobian, start.nuisance, start.columns, prediction, found)

@@ -153,8 +153,7 @@ class Proposals:
                 parts.append(np.column_stack([model.jacobian[:, at], np.zeros((len(model.prediction), more))]))
                 amplitudes.append(np.append(a, [new.about.get("direction", 0.0)] * more))
             model = replace(model, candidates=swapped, amplitudes=tuple(amplitudes), jacobian=np.column_stack(parts))
-            start = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
-            model = fitted(self.problem, start, model.prediction, model.assessment.scales)
+            model = fitted(self.problem, model.start, model.prediction, model.assessment.scales)
         return settle(self.run, self.problem, model, ROUNDS_ON_THE_WAY)
 
     def renewed(self, model: Fit) -> dict[Candidate, FloatArray]:
@@ -178,7 +177,7 @@ class Proposals:
         ----------
         model : Fit
         """
-        start = Start(model.candidates, model.amplitudes, model.jacobian, np.zeros_like(model.nuisance), model.columns)
+        start = replace(model.start, nuisance=np.zeros_like(model.nuisance))
         (y,) = self.run(attempt, [(start,)])
         return model if y is None else fitted(self.problem, start, y)
 

@@ -79,10 +79,9 @@ def survey(run: Map, model: Fit, pool: Sequence[Candidate]) -> Survey:
     model : Fit
     pool : sequence of Candidate
     """
-    slim = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
     # the longest ones begin: nobody waits for them at the end
     order = sorted(pool, key=lambda c: c.name not in SLOW)
-    found = dict(zip(order, run(_surveyed, [(slim, model.prediction, c) for c in order]), strict=True))
+    found = dict(zip(order, run(_surveyed, [(model.start, model.prediction, c) for c in order]), strict=True))
     secants, slopes = ({c: found[c][i] for c in pool} for i in range(2))
     return Survey(secants, slopes, {c: course for c in pool if (course := found[c][2]) is not None})
 
@@ -134,8 +133,7 @@ def columns(run: Map, model: Fit, pool: Sequence[Candidate]) -> dict[Candidate, 
     pool : sequence of Candidate
         Candidates that are asked about.
     """
-    slim = Start(model.candidates, model.amplitudes, model.jacobian, model.nuisance, model.columns)
-    jobs = [(slim, model.prediction, c, i) for c in pool for i in range(len(c.steps))]
+    jobs = [(model.start, model.prediction, c, i) for c in pool for i in range(len(c.steps))]
     found = iter(run(_column, jobs))
     return {c: np.column_stack([next(found) for _ in c.steps]) for c in pool}
 

@@ -34,8 +34,7 @@ def settle(run: Map, problem: Problem, found: Fit, rounds: int = ROUNDS) -> Fit:
     """
     if found.settled:
         return found
-    start = Start(found.candidates, found.amplitudes, found.jacobian, found.nuisance, found.columns)
-    here = Place(start, found.prediction)
+    here = Place(found.start, found.prediction)
     scales = found.assessment.scales
     for number in range(rounds):
         if number:
@@ -81,7 +80,7 @@ def _stepped(run: Map, problem: Problem, here: Place, found: Fit) -> tuple[Place
     cost = here.cost(problem, weight)
     for share in (1.0, 0.4, 0.1):
         start = _moved(here.start, now + share * (free - now))
-        (y,) = tuple(run(_attempt, [(start,)]))
+        (y,) = tuple(run(attempt, [(start,)]))
         if y is not None:
             there = Place(start, y)
             if there.cost(problem, weight) < cost:
@@ -114,7 +113,3 @@ def _column(forward: ForwardModel, problem: Problem, start: Start, y: FloatArray
         return column_of(forward, effects, problem.nuisances, start.nuisance, y, index - count)
     except NoEquilibriumError:
         return np.asarray(start.columns[:, index - count])
-
-
-def _attempt(forward: ForwardModel, problem: Problem, start: Start) -> FloatArray | None:
-    return attempt(forward, problem, start)
