@@ -117,9 +117,7 @@ def pose(observations: Observations, forward: Forward, settings: DiagnoseSetting
     Parameters
     ----------
     observations : Observations
-        What was measured, with its covariance.
     forward : ForwardModel
-        The model at the points that were observed.
     settings : DiagnoseSettings
         Settings of the diagnosis.
     """
@@ -141,9 +139,7 @@ def solve(problem: Problem, forward: ForwardModel, settings: DiagnoseSettings) -
     Parameters
     ----------
     problem : Problem
-        Observations beside the baseline, with nuisances and candidates.
     forward : ForwardModel
-        The model at the points that were observed.
     settings : DiagnoseSettings
         Settings of the diagnosis.
     """

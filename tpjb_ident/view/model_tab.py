@@ -26,7 +26,6 @@ def model_tab(session: Session) -> Any:
     Parameters
     ----------
     session : Session
-        What the page shows.
     """
     from bokeh.layouts import column
     from bokeh.models import Div

@@ -74,7 +74,6 @@ def build(document: Any, session: Session) -> None:
     document : object
         A Bokeh document.
     session : Session
-        What the page shows.
     """
     from bokeh.layouts import column
     from bokeh.models import Div, TabPanel, Tabs

@@ -60,7 +60,6 @@ class Solved:
         Parameters
         ----------
         setup : Setup
-            Bearing, oil, pivots, structure and instruments of the model.
         lines : tuple of float
             Excitation frequencies [rad/s].
         """

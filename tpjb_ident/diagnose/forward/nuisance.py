@@ -176,11 +176,8 @@ def at_baseline(
     Parameters
     ----------
     forward : ForwardModel
-        The model at the points that were observed.
     effects : sequence of Effect
-        Effects that act.
     setup : Setup
-        Bearing, oil, pivots, structure and instruments of the model.
     known : Tolerances
         Stated tolerances.
     base : array, shape (n,)
@@ -199,9 +196,7 @@ def column_of(
     Parameters
     ----------
     forward : ForwardModel
-        The model at the points that were observed.
     effects : sequence of Effect
-        Effects that act.
     known : sequence of Nuisance
         Everything that is free within a tolerance.
     at : array, shape (m,)
@@ -228,9 +223,7 @@ def predict(
     Parameters
     ----------
     forward : ForwardModel
-        The model at the points that were observed.
     effects : sequence of Effect
-        Effects that act.
     known : sequence of Nuisance
         Everything that is free within a tolerance.
     size : array, shape (m,)

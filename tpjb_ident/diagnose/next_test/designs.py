@@ -60,7 +60,6 @@ class Design:
         Parameters
         ----------
         effects : sequence of Effect
-            Effects that act.
         """
         return tuple(e for e in effects if e.name not in self.blind)
 
@@ -74,7 +73,6 @@ class Design:
         Parameters
         ----------
         setup : Setup
-            Bearing, oil, pivots, structure and instruments of the model.
 
         Raises
         ------
@@ -88,7 +86,6 @@ class Design:
         Parameters
         ----------
         setup : Setup
-            Bearing, oil, pivots, structure and instruments of the model.
         seen : Observations
             What `planned` gave.
         """
@@ -240,7 +237,6 @@ def grown(setup: Setup) -> Setup:
     Parameters
     ----------
     setup : Setup
-        Bearing, oil, pivots, structure and instruments of the model.
     """
     by = setup.clearance_change
     hot = setup.change_pads(lambda k, pad: replace(pad, assembled_clearance=pad.assembled_clearance + by))
@@ -266,7 +262,6 @@ def reversible(setup: Setup) -> bool:
     Parameters
     ----------
     setup : Setup
-        Bearing, oil, pivots, structure and instruments of the model.
     """
     return all(abs(pad.pivot_offset - 0.5) <= CENTRAL for pad in setup.bearing.pads)
 
@@ -277,7 +272,6 @@ def mirrored(setup: Setup) -> Setup:
     Parameters
     ----------
     setup : Setup
-        Bearing, oil, pivots, structure and instruments of the model.
     """
     angle, towards = setup.misalignment
     turned = setup.change_pads(

@@ -64,9 +64,7 @@ def options_for(setup: Setup, layout: Layout) -> tuple[Design | Check, ...]:
     Parameters
     ----------
     setup : Setup
-        Bearing, oil, pivots, structure and instruments of the model.
     layout : Layout
-        Tests, with their operating points.
     """
     return (*designs(setup, layout), *CHECKS)
 

@@ -67,7 +67,6 @@ def held_out(observations: Observations) -> BoolArray:
     Parameters
     ----------
     observations : Observations
-        What was measured, with its covariance.
     """
     out = np.zeros(len(observations), dtype=bool)
     for fold in folds(observations):

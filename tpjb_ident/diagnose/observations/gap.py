@@ -20,7 +20,6 @@ def residuals(observations: Observations, prediction: FloatArray) -> FloatArray:
     Parameters
     ----------
     observations : Observations
-        What was measured, with its covariance.
     prediction : array, shape (n,)
         In the units of the observations.
     """
@@ -37,7 +36,6 @@ def centre_shifts(elements: Sequence[Element]) -> FloatArray:
     Parameters
     ----------
     elements : sequence of Element
-        What each of the n numbers is.
     """
     out = np.zeros((len(elements), 2))
     for i, e in enumerate(elements):
@@ -55,7 +53,6 @@ def gap(observations: Observations, prediction: FloatArray, chosen: BoolArray | 
     Parameters
     ----------
     observations : Observations
-        What was measured, with its covariance.
     prediction : array, shape (n,)
         In the units of the observations.
     chosen : array of bool, shape (n,), optional
@@ -72,7 +69,6 @@ def noise_square(observations: Observations) -> float:
     Parameters
     ----------
     observations : Observations
-        What was measured, with its covariance.
     """
     return float(np.mean(np.diag(observations.covariance) / observations.total_sigma**2))
 
@@ -83,7 +79,6 @@ def noise_floor(observations: Observations) -> float:
     Parameters
     ----------
     observations : Observations
-        What was measured, with its covariance.
     """
     return math.sqrt(noise_square(observations))
 
@@ -96,7 +91,6 @@ def gap_by_observable(
     Parameters
     ----------
     observations : Observations
-        What was measured, with its covariance.
     before : array, shape (n,)
         Prediction of the baseline.
     after : array, shape (n,)
@@ -124,7 +118,6 @@ def direct_scale(elements: Sequence[Element], value: FloatArray) -> FloatArray:
     Parameters
     ----------
     elements : sequence of Element
-        What each of the n numbers is.
     value : array, shape (n,)
         Measured or predicted.
     """
@@ -142,7 +135,6 @@ def coordinate(elements: Sequence[Element], name: str) -> FloatArray:
     Parameters
     ----------
     elements : sequence of Element
-        What each of the n numbers is.
     name : str
         Coordinate of the operating point.
     """

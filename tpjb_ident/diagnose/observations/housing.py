@@ -35,7 +35,6 @@ def with_housing(setup: Setup, campaign: Campaign) -> Setup:
     Parameters
     ----------
     setup : Setup
-        Bearing, oil, pivots, structure and instruments of the model.
     campaign : Campaign
         The campaign that is diagnosed.
     """

@@ -130,9 +130,7 @@ def plan(
     Parameters
     ----------
     setup : Setup
-        Bearing, oil, pivots, structure and instruments of the model.
     layout : Layout
-        Tests, with their operating points.
     known : Tolerances, optional
         Stated tolerances; by default those of a good workshop.
     pool : sequence of Candidate, optional
@@ -185,9 +183,7 @@ def signatures(
     Parameters
     ----------
     setup : Setup
-        Bearing, oil, pivots, structure and instruments of the model.
     layout : Layout
-        Tests, with their operating points.
     chosen : sequence of Candidate
         Effects that are asked about.
     known : Tolerances, optional

@@ -25,9 +25,7 @@ def planned_observations(setup: Setup, layout: Layout) -> Observations:
     Parameters
     ----------
     setup : Setup
-        Bearing, oil, pivots, structure and instruments of the model.
     layout : Layout
-        Tests, with their operating points.
 
     Raises
     ------

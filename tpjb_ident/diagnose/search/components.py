@@ -62,7 +62,6 @@ def components(observations: Observations) -> tuple[Component, ...]:
     Parameters
     ----------
     observations : Observations
-        What was measured, with its covariance.
     """
     scale = observations.total_sigma
     everything = np.arange(len(observations))

@@ -79,7 +79,6 @@ class Problem:
         Parameters
         ----------
         candidate : Candidate
-            Effect that is tried.
         """
         names = {candidate.name, candidate.label}
         return [i for i, one in enumerate(self.nuisances) if names & one.twins]

@@ -75,7 +75,6 @@ def survey(run: Map, model: Fit, pool: Sequence[Candidate]) -> Survey:
     Parameters
     ----------
     run : Map
-        See `workers`.
     model : Fit
     pool : sequence of Candidate
     """
@@ -129,7 +128,6 @@ def columns(run: Map, model: Fit, pool: Sequence[Candidate]) -> dict[Candidate, 
     run : callable
         Maps a task over jobs, in this process or in workers.
     model : Fit
-        A fitted model.
     pool : sequence of Candidate
         Candidates that are asked about.
     """
@@ -270,7 +268,6 @@ def with_model(model: Fit, score: Score, table: Columns, courses: Courses | None
     Parameters
     ----------
     model : Fit
-        A fitted model.
     score : Score
         What was scored beside the model.
     table : mapping of Candidate to array
@@ -295,7 +292,6 @@ def instead(problem: Problem, model: Fit, table: Columns, beyond: float) -> list
     ----------
     problem : Problem
     model : Fit
-        A fitted model.
     table : mapping of Candidate to (n, k) ndarray
         Derivatives by candidate.
     beyond : float
@@ -323,11 +319,8 @@ def visible(problem: Problem, model: Fit, candidate: Candidate, column: FloatArr
     Parameters
     ----------
     problem : Problem
-        Observations beside the baseline, with nuisances and candidates.
     model : Fit
-        A fitted model.
     candidate : Candidate
-        Effect that is tried.
     column : array, shape (n, k)
         Derivatives of the prediction for the candidate.
     """
@@ -341,7 +334,6 @@ def without(model: Fit, gone: Sequence[int]) -> Linear:
     Parameters
     ----------
     model : Fit
-        A fitted model.
     gone : sequence of int
         Numbers of the nuisances to be left out.
     """

@@ -63,7 +63,6 @@ def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Pro
     Parameters
     ----------
     run : Map
-        See `workers`.
     problem : Problem
     settings : DiagnoseSettings
     progress : callable, optional
@@ -114,7 +113,6 @@ def baseline_fit(problem: Problem) -> Fit:
     Parameters
     ----------
     problem : Problem
-        Observations beside the baseline, with nuisances and candidates.
     """
     n, m = problem.columns.shape
     return fitted(problem, Start((), (), np.zeros((n, 0)), np.zeros(m), problem.columns), problem.base)

@@ -26,7 +26,6 @@ def settle(run: Map, problem: Problem, found: Fit, rounds: int = ROUNDS) -> Fit:
     Parameters
     ----------
     run : Map
-        See `workers`.
     problem : Problem
     found : Fit
     rounds : int

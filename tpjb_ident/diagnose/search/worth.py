@@ -41,13 +41,10 @@ def worth(problem: Problem, model: Fit, less: Fit, candidate: Candidate) -> Wort
     Parameters
     ----------
     problem : Problem
-        Observations beside the baseline, with nuisances and candidates.
     model : Fit
-        A fitted model.
     less : Fit
         The same model without the candidate.
     candidate : Candidate
-        Effect that is tried.
     """
     at = [f.assessment.free[f.jacobian.shape[1] :] for f in (model, less)]
     stand_in = np.flatnonzero((np.abs(at[1]) > STAND_IN) & (np.abs(at[1]) > np.abs(at[0]) + 1.0))

@@ -38,9 +38,7 @@ def unseen(problem: Problem, fitted: Fit) -> FloatArray:
     Parameters
     ----------
     problem : Problem
-        Observations beside the baseline, with nuisances and candidates.
     fitted : Fit
-        A fitted model.
     """
     out = fitted.prediction.copy()
     for fold in problem.folds:
