@@ -165,7 +165,8 @@ def _section(data: dict[str, Any], key: str, name: str) -> dict[str, Any]:
             raise BearingError(f"{name}, {key}: must be a table, got {section!r}. Write it as [{key}].")
     known = set(_KEYS[key]) | {k[len(key) + 1 if key else 0 :].split(".")[0] for k in _KEYS if _is_child(k, key)}
     for unknown in set(section) - known:
-        raise BearingError(f"{name}, [{key}] {unknown}: unknown key. {hint(unknown, sorted(known), 'Known keys:')}")
+        place = f"[{key}] {unknown}" if key else f"[{unknown}]" if isinstance(section[unknown], dict) else unknown
+        raise BearingError(f"{name}, {place}: unknown key. {hint(unknown, sorted(known), 'Known keys:')}")
     return section
 
 

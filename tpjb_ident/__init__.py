@@ -56,8 +56,13 @@ _HOMES = {
     "plots": "tpjb_ident.report",
 }
 
-#: Functions that take a campaign or a bearing: the path of one does as well.
-_TAKES_PATHS = {"identify", "fit_pivots", "measure_locus", "measure_clearance", "compare_campaign", "predict"}
+#: Arguments that are looked at before a function is called: the path of a campaign or a bearing does as well.
+_CHECKED = {
+    "identify": "campaign", "fit_pivots": "campaign", "measure_locus": "campaign", "measure_clearance": "campaign",
+    "compare_campaign": "campaign bearing", "predict": "bearing", "load_campaign": "path", "load_bearing": "source",
+    "load_effects": "path", "load_pivots": "path", "pivot_table": "curves", "write_pivots": "path curves",
+    "write_report": "folder comparison",
+}  # fmt: skip
 
 __all__ = sorted([*_HOMES, "__version__"])
 
@@ -76,10 +81,10 @@ def __getattr__(name: str) -> Any:
         check_model()
     module = importlib.import_module(home)
     value: Any = module if home == f"tpjb_ident.{name}" else getattr(module, name)  # a package that can be called
-    if name in _TAKES_PATHS:
-        from tpjb_ident.arguments import takes_paths
+    if name in _CHECKED:
+        from tpjb_ident.arguments import checked
 
-        value = takes_paths(value)
+        value = checked(value, name, _CHECKED[name])
     globals()[name] = value
     return value
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,24 +43,60 @@ def as_campaign(given: Any, name: str) -> Campaign:
     return campaign
 
 
-def takes_paths(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Let the arguments of a function that are a campaign or a bearing be paths as well.
+def _path(given: Any, name: str) -> Any:
+    if not isinstance(given, (str, os.PathLike)):
+        raise ArgumentError(f"{name}: must be a path, got {type(given).__name__}.")
+    return given
+
+
+def _folder(given: Any, name: str) -> Path:
+    return Path(_path(given, name))
+
+
+def _curves(given: Any, name: str) -> Any:
+    curves = tuple(given) if isinstance(given, Iterable) else (given,)
+    for one in curves:
+        if not hasattr(one, "stiffness_band"):
+            raise ArgumentError(f"{name}: must hold what fit_pivots gives, got {type(one).__name__}.")
+    return curves
+
+
+def _comparison(given: Any, name: str) -> Any:
+    if not hasattr(given, "variants"):
+        raise ArgumentError(f"{name}: must be what compare_campaign gives, got {type(given).__name__}.")
+    return given
+
+
+def _bearing(given: Any, name: str) -> Any:
+    return shown_by("diagnose.from_python", "as_bearing")(given)
+
+
+#: What arguments of these names may be.
+_CHECKS: dict[str, Callable[[Any, str], Any]] = {
+    "campaign": as_campaign, "bearing": _bearing, "source": _path, "path": _path, "folder": _folder, "curves": _curves,
+    "comparison": _comparison,
+}  # fmt: skip
+
+
+def checked(function: Callable[..., Any], called: str, names: str) -> Callable[..., Any]:
+    """Let a function take paths for a campaign or a bearing, and refuse in our own words what it cannot take.
 
     Parameters
     ----------
     function : callable
-        Its parameters named ``campaign`` and ``bearing`` are meant.
+    called : str
+        Its public name.
+    names : str
+        Of the parameters that are checked, keys of `_CHECKS`.
     """
     signature = inspect.signature(function)
 
     @functools.wraps(function)
     def wrapper(*args: Any, **kwargs: Any) -> Any:
         given = signature.bind(*args, **kwargs)
-        found = given.arguments
-        if "campaign" in found:
-            found["campaign"] = as_campaign(found["campaign"], f"{function.__name__}: campaign")
-        if "bearing" in found:
-            found["bearing"] = shown_by("diagnose.from_python", "as_bearing")(found["bearing"])
+        for name in names.split():
+            if name in given.arguments:
+                given.arguments[name] = _CHECKS[name](given.arguments[name], f"{called}: {name}")
         return function(*given.args, **given.kwargs)
 
     return wrapper

@@ -163,6 +163,19 @@ def test_predict_every_combination(rocker_file, tmp_path):
     assert frame["converged"].all()
 
 
+@pytest.mark.parametrize("command", ["predict", "simulate", "compare", "diagnose"])
+def test_an_effect_that_the_bearing_cannot_have_is_refused_with_its_file(
+    command, rocker_file, small_campaign, tmp_path
+):
+    effects = tmp_path / "nine.toml"
+    effects.write_text('schema = "tpjb-effects/1"\n[[effects]]\nname = "soft_pivot"\npad = 9\nstiffness_factor = 0.3\n')
+    source = (rocker_file,) if command in ("predict", "simulate") else (small_campaign, "--bearing", rocker_file)
+    result = tpjb(command, *source, "--effects", effects, "--out", tmp_path / "o")
+    assert result.exit_code == 2
+    assert "--effects nine.toml: soft_pivot: pad 9 does not exist; the bearing has 5 pads." in result.stderr
+    assert not (tmp_path / "o").exists()
+
+
 def test_predict_takes_an_effects_file(rocker_file, tmp_path):
     effects = tmp_path / "e.toml"
     effects.write_text('[[effects]]\nname = "probe_gain"\nfactor = 1.25\n')

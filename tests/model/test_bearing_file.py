@@ -114,7 +114,7 @@ def test_negative_values_are_named(text, section, key):
 
 @pytest.mark.parametrize("section", [s for s in SECTIONS if "." not in s])
 def test_missing_sections_are_named(text, section):
-    refused(text.replace(f"[{section}]", "[elsewhere]", 1), "elsewhere", "unknown key")
+    refused(text.replace(f"[{section}]", "[elsewhere]", 1), ", [elsewhere]: unknown key")
     start = text.index(f"[{section}]\n")
     following = text.find("\n[", start + 1)
     while section == "pads" and text[following + 2 :].startswith("pads."):

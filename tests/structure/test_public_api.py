@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import tpjb_ident as ti
+from tpjb_ident.errors import TpjbError
 
 ROOT = Path(__file__).parents[2]
 PROMISED = [
@@ -108,6 +109,27 @@ def test_a_path_does_where_a_bearing_is_wanted(rocker_file):
     assert found.converged
     with pytest.raises(ValueError, match="bearing: must be a Bearing or the path of a bearing file, got int"):
         ti.predict(5, load=5000.0, speed=138.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: ti.load_bearing(3), "load_bearing: source: must be a path, got int"),
+        (lambda: ti.load_campaign(3), "load_campaign: path: must be a path, got int"),
+        (lambda: ti.load_effects(3), "load_effects: path: must be a path, got int"),
+        (lambda: ti.load_pivots(3), "load_pivots: path: must be a path, got int"),
+        (lambda: ti.pivot_table(4), "pivot_table: curves: must hold what fit_pivots gives, got int"),
+        (lambda: ti.write_pivots("p.toml", [4], "x"), "write_pivots: curves: must hold what fit_pivots gives, got int"),
+        (lambda: ti.write_report(3, 4), "write_report: folder: must be a path, got int"),
+        (lambda: ti.write_report("r", 4), "write_report: comparison: must be what compare_campaign gives, got int"),
+        (lambda: ti.export(3, "csv", "r"), "source: must be a result, a table or the path of one, got int"),
+    ],
+)
+def test_what_cannot_be_taken_is_refused_in_our_own_words(call, says, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(TpjbError, match=says):
+        call()
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_open_campaign_is_checked_as_its_path_is(small_campaign):

@@ -143,4 +143,6 @@ def _table(source: Identification | pd.DataFrame | str | Path) -> tuple[pd.DataF
 
     if isinstance(source, Identification):
         return source.to_frame(), source.campaign
+    if not hasattr(source, "columns"):
+        raise ExportError(f"source: must be a result, a table or the path of one, got {type(source).__name__}.")
     return source, "a table"

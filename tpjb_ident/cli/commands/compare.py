@@ -11,7 +11,7 @@ import typer
 from tpjb_ident.cli.commands.identify import identify_settings, refuse_untrusted, write_identification
 from tpjb_ident.cli.commands.predict import model_settings
 from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import open_bearing, open_campaign, table_inputs
+from tpjb_ident.cli.common.inputs import open_bearing, open_campaign, refuse_impossible, table_inputs
 from tpjb_ident.cli.common.options import (
     BearingOption,
     Coefficients,
@@ -86,6 +86,7 @@ def _from_campaign(
     source = open_campaign(campaign)
     settings = replace(settings, identify=identify_settings(source, options["method"], options["norm"]))
     drawn, given = open_bearing(source, bearing)
+    refuse_impossible(settings.effects, options["effects"], drawn)
     options = {**options, "bearing": bearing or source.bearing_name}
     inputs = source.fingerprint() | given | files
     with output_folder(target, "compare", (campaign,)) as folder:
@@ -109,6 +110,7 @@ def _from_table(
 
     drawn, error, inputs = table_inputs("compare", path, bearing, options["reading_error"])
     inputs |= files
+    refuse_impossible(settings.effects, options["effects"], drawn)
     with output_folder(target, "compare", (path,)) as folder:
         with progress("comparing") as show:
             result = compare_table(path, drawn, settings, error, show)

@@ -11,7 +11,7 @@ import typer
 from tpjb_ident.cli.commands.identify import refuse_untrusted, write_identification
 from tpjb_ident.cli.commands.predict import model_settings, pivot_choice
 from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import open_bearing, open_campaign, table_inputs
+from tpjb_ident.cli.common.inputs import open_bearing, open_campaign, refuse_impossible, table_inputs
 from tpjb_ident.cli.common.options import (
     BearingOption,
     Coefficients,
@@ -126,6 +126,7 @@ def _from_campaign(asked: _Asked, campaign: Path, bearing: Path | None) -> None:
 
     source = open_campaign(campaign)
     drawn, given = open_bearing(source, bearing)
+    refuse_impossible(asked.baseline.effects, asked.options["effects"], drawn)
     inputs = source.fingerprint() | given | asked.files
     options = {**asked.options, "bearing": bearing or source.bearing_name}
     with output_folder(asked.target, "diagnose", (campaign,)) as folder:
@@ -150,6 +151,7 @@ def _from_table(asked: _Asked, path: Path, bearing: Path | None, reading_error: 
 
     drawn, error, inputs = table_inputs("diagnose", path, bearing, reading_error)
     inputs |= asked.files
+    refuse_impossible(asked.baseline.effects, asked.options["effects"], drawn)
     source = TableSource(path.stem)
     with output_folder(asked.target, "diagnose", (path,)) as folder:
         with progress("diagnosing") as show:

@@ -11,7 +11,7 @@ import typer
 
 from rigdata.near_names import nearest_name
 from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import refuse_special
+from tpjb_ident.cli.common.inputs import refuse_impossible, refuse_special
 from tpjb_ident.cli.common.options import (
     BearingPath,
     EffectsFile,
@@ -148,6 +148,7 @@ def predict(
 
     refuse_counted_twice(choice, settings.effects, effects)
     loaded = load_bearing(bearing)
+    refuse_impossible(settings.effects, effects, loaded)
     target = out_folder(out, "predict")
     inputs = {p.name: sha256(p) for p in (bearing, effects, choice) if isinstance(p, Path)}
     with output_folder(target, "predict") as folder:

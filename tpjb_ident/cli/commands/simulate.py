@@ -11,7 +11,7 @@ import typer
 from rigdata.near_names import nearest_name
 from tpjb_ident.cli.commands.predict import model_settings, operating_points, pivot_choice
 from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import refuse_special
+from tpjb_ident.cli.common.inputs import refuse_impossible, refuse_special
 from tpjb_ident.cli.common.options import (
     BearingPath,
     EffectsFile,
@@ -68,7 +68,7 @@ def simulate(
     refuse_special(bearing)
     from rigdata.virtual_rig import write_campaign
 
-    rig = _rig(bearing, settings, seed, noise)
+    rig = _rig(bearing, settings, seed, noise, effects)
     rig = replace(rig, campaign=name, plan=_plan(plan, load, excitation, speed, repeats), faults=_faults(fault or []))
     target = out_folder(out, "simulate")
     inputs = {p.name: sha256(p) for p in (bearing, effects, settings.pivots) if isinstance(p, Path)}
@@ -82,12 +82,13 @@ def simulate(
     print_line(f"Results: {target / file}, the truth in {target / 'truth.json'}")
 
 
-def _rig(bearing: Path, settings: Any, seed: int, noise: float) -> Any:
+def _rig(bearing: Path, settings: Any, seed: int, noise: float, effects: Path | None) -> Any:
     from model.bearing_file import load_bearing
     from rigdata.virtual_rig import Instruments, Noise, VirtualRig
     from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 
     loaded = load_bearing(bearing)
+    refuse_impossible(settings.effects, effects, loaded)
     text = bearing.read_text(encoding="utf-8-sig")
     instruments = Instruments.like_paper(len(loaded.pads), seed)
     return VirtualRig(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from tpjb_ident.runtime.provenance import sha256
 
 if TYPE_CHECKING:
     from model.bearing import Bearing
+    from model.effects import Effect
     from rigdata.campaign import Campaign
 
 HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
@@ -91,6 +93,32 @@ def open_bearing(campaign: Campaign, given: Path | None) -> tuple[Bearing, dict[
             "Give one with --bearing FILE."
         )
     return parse_bearing(campaign.bearing_text, campaign.bearing_name), {}
+
+
+def refuse_impossible(effects: Sequence[Effect], path: Path | None, bearing: Bearing) -> None:
+    """Refuse effects of a file that a bearing cannot have, such as one of a pad that it lacks.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+    path : Path, optional
+        The file they come from.
+    bearing : Bearing
+
+    Raises
+    ------
+    BadInputError
+    """
+    if path is None:
+        return
+    from model.effects import EffectError, apply_effects
+    from model.pivots import pivot_laws
+    from model.setup import Setup
+
+    try:
+        apply_effects(Setup(bearing, pivot_laws("rigid", bearing)), effects)
+    except EffectError as error:
+        raise BadInputError(f"--effects {path.name}: {error}") from error
 
 
 def table_inputs(
