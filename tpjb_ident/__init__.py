@@ -52,10 +52,12 @@ _HOMES = {
     "predict": "model.predict",
     "CompareSettings": "tpjb_ident.compare.comparison",
     "compare_campaign": "tpjb_ident.compare.comparison",
-    "write_report": "tpjb_ident.report",
-    "plots": "tpjb_ident.report",
+    "write_report": "tpjb_ident.report.comparison_page",
+    "plots": "tpjb_ident.report.plots",
 }
 
+#: Names of packages; the first two can be called.
+_PACKAGES = {"diagnose", "export", "plots"}
 #: Arguments that are looked at before a function is called: the path of a campaign or a bearing does as well.
 _CHECKED = {
     "identify": "campaign", "fit_pivots": "campaign", "measure_locus": "campaign", "measure_clearance": "campaign",
@@ -80,7 +82,7 @@ def __getattr__(name: str) -> Any:
 
         check_model()
     module = importlib.import_module(home)
-    value: Any = module if home == f"tpjb_ident.{name}" else getattr(module, name)  # a package that can be called
+    value: Any = module if name in _PACKAGES else getattr(module, name)
     if name in _CHECKED:
         from tpjb_ident.arguments import checked
 

@@ -11,8 +11,14 @@ import pytest
 
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.export import COLUMNS, FORMATS, ExportError, export, export_format, sep005, static_points
-from tpjb_ident.export.ross import ross_text, write_ross
-from tpjb_ident.export.rotor_programs import speed_tables, write_ansys, write_dyrobes, write_xltrc
+from tpjb_ident.export.rotor_programs import (
+    ross_text,
+    speed_tables,
+    write_ansys,
+    write_dyrobes,
+    write_ross,
+    write_xltrc,
+)
 from tpjb_ident.export.table import write_csv, write_excel, write_mat, write_parquet
 
 

@@ -29,7 +29,7 @@ from tests.report.plot_cases import (
 )
 from tpjb_ident.report import plots
 from tpjb_ident.report.drawing.colours import LIGHT
-from tpjb_ident.report.plots.residual_table import residual_frame
+from tpjb_ident.report.plots.residual_map import residual_frame
 
 #: Root mean square difference of grey levels, out of 255, that another freetype or anti-aliasing may make.
 TOLERANCE = 5.0

@@ -52,7 +52,7 @@ class Format:
 _BY_SPEED = "this program knows K and C over shaft speed only: one file per excitation frequency."
 FORMATS: dict[str, Format] = {
     "ross": Format(
-        "ross",
+        "rotor_programs",
         "write_ross",
         holds_intervals=False,
         note="ROSS extrapolates outside the frequencies given; K holds Re h, the masses are zero.",

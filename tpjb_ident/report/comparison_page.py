@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,18 +22,16 @@ from tpjb_ident.report.comparison_tables import (
     predicted_table,
 )
 from tpjb_ident.report.drawing.colours import VARIANT_LABEL
-from tpjb_ident.report.figure import Panel, save_panels
 from tpjb_ident.report.laboratory_sections import budget_table, evidence_section, set_up_section
-from tpjb_ident.report.page import Page, Section, Table, render_page
+from tpjb_ident.report.page import Page, Section, Table, grouped, write_page
 from tpjb_ident.report.panels import coefficient_panels, pivot_panels, position_panels
 from tpjb_ident.rounding import percent
-from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
 
 
-def write_comparison_report(
+def write_report(
     folder: Path,
     comparison: Comparison,
     settings: Mapping[str, Any] | None = None,
@@ -60,42 +57,23 @@ def write_comparison_report(
     Path
         report.html; the figures lie beside it in ``figures`` as SVG and PNG.
     """
-    page = replace(comparison_page(comparison, settings, inputs), then=then)
-    panels = [panel for section in page.sections for panel in section.panels]
-    texts = save_panels(panels, folder / "figures")
-    path = folder / "report.html"
-    write_text(path, render_page(page, texts))
-    return path
-
-
-def comparison_page(
-    comparison: Comparison, settings: Mapping[str, Any] | None = None, inputs: Mapping[str, str] | None = None
-) -> Page:
-    """Gather the content of the report; see `write_comparison_report`.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    settings : mapping of str to object, optional
-        How it was made; default: the comparison's own settings.
-    inputs : mapping of str to str, optional
-        SHA-256 by file name.
-    """
     frame = comparison_frame(comparison)
     answer, *more = summary_sentences(comparison, frame)
     campaign, bearing = comparison.campaign, comparison.bearing
     own = {} if isinstance(campaign, TableSource) else campaign.fingerprint()
     described = f": {campaign.description}" if campaign.description else ""
-    return Page(
+    page = Page(
         title=f"{campaign.id}: predicted and measured dynamic coefficients",
         subtitle=f"{bearing.name}{described}",
         answer=answer,
         more=more,
+        then=then,
         key_table=_key_table(deviations(comparison, frame)),
         sections=_sections(comparison, frame),
         settings={name: _setting(value) for name, value in (settings or _own_settings(comparison)).items()},
         inputs=dict(own if inputs is None else inputs),
     )
+    return write_page(folder, page)
 
 
 def _setting(value: Any) -> str:
@@ -131,12 +109,7 @@ def _key_table(found: tuple[Deviation, ...]) -> Table:
 
 
 def _sections(comparison: Comparison, frame: pd.DataFrame) -> list[Section]:
-    panels = coefficient_panels(frame)
-    groups: dict[str, list[Panel]] = {}
-    for panel in panels:
-        groups.setdefault(panel.group, []).append(panel)
-    sections = [Section(heading, panels=group) for heading, group in groups.items()]
-    sections += _pivot_sections(comparison) + _position_sections(comparison)
+    sections = [*grouped(coefficient_panels(frame)), *_pivot_sections(comparison), *_position_sections(comparison)]
     campaign = comparison.campaign
     table = isinstance(campaign, TableSource)
     evidence = None if isinstance(campaign, TableSource) else evidence_section(campaign, comparison.identification)

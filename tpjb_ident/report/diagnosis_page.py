@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from tpjb_ident.effect_words import UNITS, WORDS, finding, label_in_words
 from tpjb_ident.report.diagnosis_coefficients import before_and_after, median_deviations
 from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_rows, place, verdict_sentences
-from tpjb_ident.report.figure import Panel, panel, save_panels
-from tpjb_ident.report.page import Page, Section, Table, render_page
+from tpjb_ident.report.figure import Panel, panel
+from tpjb_ident.report.page import Page, Section, Table, grouped, write_page
 from tpjb_ident.report.panels import coefficient_panels
 from tpjb_ident.report.plots.gap import gap
-from tpjb_ident.report.plots.residual_map import residual_map
+from tpjb_ident.report.plots.residual_map import residual_frame, residual_map
 from tpjb_ident.report.plots.residual_series import residual_series
-from tpjb_ident.report.plots.residual_table import residual_frame
 from tpjb_ident.rounding import signed
-from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,45 +72,21 @@ def write_diagnosis_report(
     Path
         The page.
     """
-    page = replace(diagnosis_page(campaign, result, settings, inputs), then=then)
-    texts = save_panels([panel for section in page.sections for panel in section.panels], folder / "figures")
-    path = folder / "report.html"
-    write_text(path, render_page(page, texts))
-    return path
-
-
-def diagnosis_page(
-    campaign: Campaign, result: CampaignDiagnosis, settings: Mapping[str, Any], inputs: Mapping[str, str]
-) -> Page:
-    """Gather the content of the report; see `write_diagnosis_report`.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        The campaign that was diagnosed.
-    result : CampaignDiagnosis
-        Diagnosis with identification and setup.
-    settings, inputs : mapping
-        As there.
-
-    Returns
-    -------
-    Page
-        To be rendered.
-    """
     verdict = result.diagnosis.verdict
     table = before_and_after(result.diagnosis, result.identification)
     answer, *more = verdict_sentences(campaign.id, verdict, median_deviations(table))
-    return Page(
+    page = Page(
         title=f"{campaign.id}: what the model lacks",
         subtitle=f"{result.setup.bearing.name}{': ' + campaign.description if campaign.description else ''}",
         answer=answer,
         more=more,
+        then=then,
         key_table=_effects_table(verdict) if verdict.effects else _gap_table(verdict),
         sections=_sections(result, table),
         settings={k: "none" if v is None else str(v) for k, v in settings.items()},
         inputs=dict(inputs),
     )
+    return write_page(folder, page)
 
 
 def _effects_table(verdict: Verdict) -> Table:
@@ -145,10 +118,7 @@ def _effect_sections(verdict: Verdict) -> list[Section]:
 
 def _coefficient_sections(table: pd.DataFrame) -> list[Section]:
     """K and C over load and frequency: measured, before and after."""
-    groups: dict[str, list[Panel]] = {}
-    for one in coefficient_panels(table) if len(table) else ():
-        groups.setdefault(one.group, []).append(one)
-    return [Section(heading, panels=panels) for heading, panels in groups.items()]
+    return grouped(coefficient_panels(table)) if len(table) else []
 
 
 def _other_explanations(verdict: Verdict) -> list[Section]:

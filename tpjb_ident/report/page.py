@@ -5,16 +5,16 @@ from __future__ import annotations
 import base64
 import datetime
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import jinja2
 import markupsafe
 
-from tpjb_ident.report.figure import Panel, inline_svg, shape
+from tpjb_ident.report.figure import Panel, inline_svg, save_panels, shape
 from tpjb_ident.runtime.provenance import versions
-from tpjb_ident.runtime.tables import printable, readable
+from tpjb_ident.runtime.tables import printable, readable, write_text
 
 
 @dataclass(frozen=True)
@@ -127,6 +127,34 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
         versions=versions(),
         finished=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
     )
+
+
+def write_page(folder: Path, page: Page) -> Path:
+    """Write ``report.html`` and its figures, as SVG and PNG in ``figures``.
+
+    Parameters
+    ----------
+    folder : Path
+        Existing; what stands in it under the same names is replaced.
+    page : Page
+    """
+    texts = save_panels([panel for section in page.sections for panel in section.panels], folder / "figures")
+    path = folder / "report.html"
+    write_text(path, render_page(page, texts))
+    return path
+
+
+def grouped(panels: Iterable[Panel]) -> list[Section]:
+    """A section for every group of panels, in their order.
+
+    Parameters
+    ----------
+    panels : iterable of Panel
+    """
+    groups: dict[str, list[Panel]] = {}
+    for panel in panels:
+        groups.setdefault(panel.group, []).append(panel)
+    return [Section(heading, panels=group) for heading, group in groups.items()]
 
 
 def _element(svg: str, panel: Panel) -> markupsafe.Markup:

@@ -41,25 +41,9 @@ def write_watch_page(folder: Path, snapshot: Snapshot, refresh: int, settings: M
     settings : mapping of str to str
         How it was made, for the reader.
     """
-    page = watch_page(snapshot, refresh, settings)
-    panels = [p for section in page.sections for p in section.panels]
-    path = folder / "watch.html"
-    write_text(path, render_page(page, {p.name: svg_text(p.figure, p.name) for p in panels}))
-    return path
-
-
-def watch_page(snapshot: Snapshot, refresh: int, settings: Mapping[str, str]) -> Page:
-    """Gather the content of the page; see `write_watch_page`.
-
-    Parameters
-    ----------
-    snapshot : Snapshot
-    refresh : int
-    settings : mapping of str to str
-    """
     answer, *more = [step.text for step in snapshot.steps] or ["Nothing to do: records are being written."]
     landed = snapshot.count("good", "look", "repeat", "replaced")
-    return Page(
+    page = Page(
         title=f"{snapshot.campaign.id}: while it is measured",
         subtitle=f"{landed} of {len(snapshot.states)} runs have landed, {snapshot.count('repeat')} to be repeated, "
         f"{snapshot.count('to run')} to run",
@@ -72,6 +56,10 @@ def watch_page(snapshot: Snapshot, refresh: int, settings: Mapping[str, str]) ->
         refresh=refresh,
         beside="coefficients.csv and watch.json are beside this file.",
     )
+    panels = [p for section in page.sections for p in section.panels]
+    path = folder / "watch.html"
+    write_text(path, render_page(page, {p.name: svg_text(p.figure, p.name) for p in panels}))
+    return path
 
 
 def coverage_table(snapshot: Snapshot) -> Table:

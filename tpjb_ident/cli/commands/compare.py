@@ -106,7 +106,7 @@ def _from_table(
 ) -> None:  # fmt: skip
     from tpjb_ident.compare.from_table import compare_table
     from tpjb_ident.compare.tables import comparison_frame
-    from tpjb_ident.report.comparison_page import write_comparison_report
+    from tpjb_ident.report.comparison_page import write_report
 
     drawn, error, inputs = table_inputs("compare", path, bearing, options["reading_error"])
     inputs |= files
@@ -116,7 +116,7 @@ def _from_table(
             result = compare_table(path, drawn, settings, error, show)
         write_table(folder, "comparison", comparison_frame(result))
         then = next_command(result, f"--coefficients {path}", bearing)
-        write_comparison_report(folder, result, options, inputs, then)
+        write_report(folder, result, options, inputs, then)
         write_record(folder, target, "compare", options, inputs)
     show_comparison(result, then)
     print_line(f"Report: {target / 'report.html'}")
@@ -157,7 +157,7 @@ def write_comparison(
     from tpjb_ident.compare.positions import locus_frame
     from tpjb_ident.compare.tables import comparison_frame
     from tpjb_ident.pivot import pivot_table, write_pivots
-    from tpjb_ident.report.comparison_page import write_comparison_report
+    from tpjb_ident.report.comparison_page import write_report
 
     show("writing tables", 0, 2)
     write_identification(folder, result.identification)
@@ -173,7 +173,7 @@ def write_comparison(
         write_table(folder, "locus_comparison", locus_frame(result))
     show("drawing figures", 1, 2)
     named = {name: getattr(value, "name", value) for name, value in options.items()}
-    write_comparison_report(folder, result, named, inputs, then)
+    write_report(folder, result, named, inputs, then)
 
 
 def show_comparison(result: Comparison, then: str = "") -> None:

@@ -17,9 +17,8 @@ from tpjb_ident.diagnose.search.problem import Problem
 from tpjb_ident.diagnose.search.screen import visible
 from tpjb_ident.diagnose.search.search import Search, baseline_fit
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
-from tpjb_ident.diagnose.verdict.behaviour import behaviours
+from tpjb_ident.diagnose.verdict.behaviour import Drift, behaviours, drifts
 from tpjb_ident.diagnose.verdict.closure import Closure, closure, effects_unseen, unseen
-from tpjb_ident.diagnose.verdict.drift import Drift, drifts
 from tpjb_ident.diagnose.verdict.plausibility import plausible
 from tpjb_ident.diagnose.verdict.remainder import Excess, excess, localise
 from tpjb_ident.diagnose.verdict.verdict import (

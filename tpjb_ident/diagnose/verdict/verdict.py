@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from model.effects import Effect, kind_of
-from tpjb_ident.diagnose.verdict.behaviour import Behaviour
-from tpjb_ident.diagnose.verdict.drift import Drift
+from tpjb_ident.diagnose.verdict.behaviour import Behaviour, Drift
 
 VerdictName = Literal["consistent", "named", "ambiguous", "partly-explained", "unexplained"]
 

@@ -1,4 +1,4 @@
-"""Residual map: where model and measurement part, by coefficient, load and frequency."""
+"""Residual map: where model and measurement part, by coefficient, load and frequency; and the table behind it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import DIVERGING, LIGHT, VARIANT_LABEL
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_colour_bar, label, new_pictures, shrink
-from tpjb_ident.report.plots.residual_table import ENTRIES, residual_frame
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, coefficient_column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,10 +19,77 @@ if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.diagnose.diagnose import Diagnosis
 
+ENTRIES = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
+COLUMNS = ("model", "entry", "static_load_N", "excitation_Hz", "z")
+TWO_SIDED_95 = 1.959964
 ON_COLOUR = "#1b1f23"  # ink that stays dark on its coloured ground when the page turns dark
 CELL, SHORTEST = 0.42, 4.4  # width of a cell and of the whole picture [inches]
 HEIGHT = 2.9
 LINEAR = 2.0  # within two standard deviations the colour hardly changes: that is noise
+
+
+def residual_frame(source: Diagnosis | Comparison | pd.DataFrame) -> pd.DataFrame:
+    """(measured - predicted) / sigma of every coefficient.
+
+    Parameters
+    ----------
+    source : Diagnosis, Comparison or DataFrame
+        A diagnosis gives two models (``before``: the baseline, ``after``: with the effects that were found), sigma as
+        in its gap. A comparison, or its table, gives one model per pivot law; sigma is that of the measurement alone.
+        A table with the columns ``model``, ``entry``, ``static_load_N``, ``excitation_Hz``, ``z`` is taken as it is.
+
+    Returns
+    -------
+    DataFrame
+        Columns as above.
+    """
+    import pandas as pd
+
+    if isinstance(source, pd.DataFrame):
+        return source if set(COLUMNS) <= set(source.columns) else _of_comparison(source)
+    from tpjb_ident.compare.comparison import Comparison
+
+    if isinstance(source, Comparison):
+        from tpjb_ident.compare.tables import comparison_frame
+
+        return _of_comparison(comparison_frame(source))
+    return _of_diagnosis(source)
+
+
+def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
+    import pandas as pd
+
+    from tpjb_ident.diagnose.observations.gap import residuals
+
+    rows = []
+    for model, prediction in (("before", diagnosis.problem.base), ("after", diagnosis.after)):
+        z = residuals(diagnosis.observations, prediction)
+        for element, value in zip(diagnosis.observations.elements, z, strict=True):
+            if element.family == "h":
+                frequency = element.place("excitation") / (2 * np.pi)
+                rows.append((model, element.observable, element.place("load"), round(frequency, 6), float(value)))
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _of_comparison(table: pd.DataFrame) -> pd.DataFrame:
+    import pandas as pd
+
+    frames = []
+    for entry in ENTRIES:
+        key = coefficient_column(entry)
+        sigma = (table[f"{key}_hi"] - table[f"{key}_lo"]) / (2 * TWO_SIDED_95)
+        frames.append(
+            pd.DataFrame(
+                {
+                    "model": table["pivots"],
+                    "entry": entry,
+                    "static_load_N": table["static_load_N"],
+                    "excitation_Hz": table["excitation_Hz"],
+                    "z": (table[key] - table[f"{key}_predicted"]) / sigma,
+                }
+            )
+        )
+    return pd.concat(frames, ignore_index=True)
 
 
 def residual_map(source: Diagnosis | Comparison | pd.DataFrame, *, title: str | None = None) -> Figure:

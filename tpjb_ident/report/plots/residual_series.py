@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from tpjb_ident.report.drawing.colours import LIGHT, VARIANT_LABEL
 from tpjb_ident.report.drawing.picture import add_legend, new_picture
 from tpjb_ident.report.drawing.series import AXES
-from tpjb_ident.report.plots.residual_table import residual_frame
+from tpjb_ident.report.plots.residual_map import residual_frame
 
 if TYPE_CHECKING:
     import pandas as pd
