@@ -6,29 +6,18 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 from tpjb_ident.rounding import fixed, plain, with_interval
 
 
-class Found(Protocol):
-    """A parameter's value with its 95 % interval, SI."""
+@dataclass(frozen=True)
+class Found:
+    """A parameter's value with its 95 % interval, SI; "1" is the unit of a ratio, "pad" that of a pad number."""
 
-    @property
-    def value(self) -> float:
-        """As fitted."""
-
-    @property
-    def lo(self) -> float:
-        """Lower end of its interval."""
-
-    @property
-    def hi(self) -> float:
-        """Upper end."""
-
-    @property
-    def unit(self) -> str:
-        """SI unit as text, "1" for a ratio, "pad" for a pad number."""
+    value: float
+    lo: float
+    hi: float
+    unit: str = "1"
 
 
 Parameters = Mapping[str, Found]
@@ -85,18 +74,8 @@ def _entries(p: Parameters) -> str:
 
 def _away(found: Found, more: str, less: str) -> str:
     """How far a factor is from one: ``"5.0 ± 0.4 % softer"``."""
-    off = Shifted(found.value - 1.0, found.lo - 1.0, found.hi - 1.0)
+    off = Found(found.value - 1.0, found.lo - 1.0, found.hi - 1.0)
     return f"{amount(off, size=True)} {more if off.value > 0 else less}"
-
-
-@dataclass(frozen=True)
-class Shifted:
-    """A ratio moved to its distance from one."""
-
-    value: float
-    lo: float
-    hi: float
-    unit: str = "1"
 
 
 @dataclass(frozen=True)
@@ -358,24 +337,6 @@ WORDS: dict[str, EffectWords] = {
         "filters and amplifiers of both sorts of channel",
     ),
 }
-
-
-@dataclass(frozen=True)
-class Fixed:
-    """A parameter without an interval."""
-
-    value: float
-    unit: str
-
-    @property
-    def lo(self) -> float:
-        """The value itself."""
-        return self.value
-
-    @property
-    def hi(self) -> float:
-        """The value itself."""
-        return self.value
 
 
 def finding(name: str, parameters: Parameters) -> str:

@@ -12,7 +12,7 @@ from model.effects import kind_of
 from tpjb_ident.compare.pivot_formula import printed_formula
 from tpjb_ident.compare.positions import locus_distance
 from tpjb_ident.compare.tables import DIRECT, comparison_frame
-from tpjb_ident.effect_words import Fixed, finding
+from tpjb_ident.effect_words import Found, finding
 from tpjb_ident.rounding import percent, signed
 
 if TYPE_CHECKING:
@@ -132,15 +132,13 @@ def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
     if not effects:
         return ()
     pads = len(comparison.bearing.pads)
-    listed = "; ".join(
-        finding(
-            e.name, {p.name: Fixed(float(e.parameters[p.name]), p.unit) for p in kind_of(e.name).parameters_of(pads)}
-        )
-        for e in effects
-    )
+    listed = []
+    for e in effects:
+        sizes = {p.name: (float(e.parameters[p.name]), p.unit) for p in kind_of(e.name).parameters_of(pads)}
+        listed.append(finding(e.name, {name: Found(v, v, v, unit) for name, (v, unit) in sizes.items()}))
     return (
-        f"The model holds effects: {listed}. Where `tpjb diagnose` found them in this campaign they were fitted to "
-        "these data, and agreement with them is no independent proof.",
+        f"The model holds effects: {'; '.join(listed)}. Where `tpjb diagnose` found them in this campaign they were "
+        "fitted to these data, and agreement with them is no independent proof.",
     )
 
 

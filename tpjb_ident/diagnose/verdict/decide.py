@@ -24,12 +24,12 @@ from tpjb_ident.diagnose.verdict.remainder import Excess, excess, localise
 from tpjb_ident.diagnose.verdict.verdict import (
     Assumption,
     FoundEffect,
-    FoundParameter,
     RankedCandidate,
     Remainder,
     Verdict,
     VerdictName,
 )
+from tpjb_ident.effect_words import Found
 
 
 @dataclass(frozen=True)
@@ -210,7 +210,7 @@ def _effects(problem: Problem, found: Search, judged: Judged) -> tuple[FoundEffe
     return tuple(e for _, e in sorted(rows, key=lambda row: -row[0]))
 
 
-def _stands_in(problem: Problem, name: str, parameters: dict[str, FoundParameter]) -> str:
+def _stands_in(problem: Problem, name: str, parameters: dict[str, Found]) -> str:
     pads = sum(n.name == "clearance_scatter" for n in problem.nuisances)
     words = []
     for key, value in parameters.items():
@@ -220,7 +220,7 @@ def _stands_in(problem: Problem, name: str, parameters: dict[str, FoundParameter
     return "; ".join(w for w in words if w)
 
 
-def parameters_of(fitted: Fit, index: int) -> dict[str, FoundParameter]:
+def parameters_of(fitted: Fit, index: int) -> dict[str, Found]:
     """Parameters of one candidate of a fit with their 95 % intervals.
 
     Parameters
@@ -235,17 +235,17 @@ def parameters_of(fitted: Fit, index: int) -> dict[str, FoundParameter]:
     if candidate.basis:
         spread = np.sqrt((np.asarray(candidate.basis).T ** 2) @ errors**2)
         units = {p.name: p.unit for p in candidate.free}
-        return {p.name: FoundParameter(value[p.name], value[p.name] - 1.96 * s, value[p.name] + 1.96 * s, units[p.name])
+        return {p.name: Found(value[p.name], value[p.name] - 1.96 * s, value[p.name] + 1.96 * s, units[p.name])
                 for p, s in zip(candidate.free, spread, strict=True)}  # fmt: skip
     out = {}
     for k, parameter in enumerate(candidate.free):
         step = np.zeros(len(amplitudes))
         step[k] = 1.96 * errors[k]
         ends = [candidate.values(amplitudes + s * step)[parameter.name] for s in (-1.0, 1.0)]
-        out[parameter.name] = FoundParameter(value[parameter.name], min(ends), max(ends), parameter.unit)
+        out[parameter.name] = Found(value[parameter.name], min(ends), max(ends), parameter.unit)
     for name, fixed in candidate.fixed.items():
         unit = next((p.unit for p in kind_of(candidate.name).parameters if p.name == name), "1")
-        out[name] = FoundParameter(fixed, fixed, fixed, "1" if unit == "pad" else unit)
+        out[name] = Found(fixed, fixed, fixed, "1" if unit == "pad" else unit)
     return out
 
 

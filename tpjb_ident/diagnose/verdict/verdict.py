@@ -9,18 +9,9 @@ from typing import Any, Literal
 
 from model.effects import Effect, kind_of
 from tpjb_ident.diagnose.verdict.behaviour import Behaviour, Drift
+from tpjb_ident.effect_words import Found
 
 VerdictName = Literal["consistent", "named", "ambiguous", "partly-explained", "unexplained"]
-
-
-@dataclass(frozen=True)
-class FoundParameter:
-    """A fitted parameter with its 95 % interval, SI."""
-
-    value: float
-    lo: float
-    hi: float
-    unit: str
 
 
 @dataclass(frozen=True)
@@ -30,13 +21,13 @@ class FoundEffect:
     Attributes
     ----------
     name : str
-    parameters : dict of str to FoundParameter
+    parameters : dict of str to Found
     stands_in : str
         What to say where an amplitude is beyond what its source allows; empty otherwise.
     """
 
     name: str
-    parameters: dict[str, FoundParameter]
+    parameters: dict[str, Found]
     stands_in: str = ""
 
     @property
