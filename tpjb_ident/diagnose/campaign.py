@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from tpjb_ident.compare.comparison import ComparisonError
 from tpjb_ident.compare.measured_pivots import measured_laws
 from tpjb_ident.compare.static_tests import measure_static
-from tpjb_ident.diagnose.diagnose import Diagnosis, diagnose
+from tpjb_ident.diagnose.diagnose import Diagnosis, before_and_after, diagnose, median_deviations
 from tpjb_ident.diagnose.forward.forward import SENSOR
 from tpjb_ident.diagnose.forward.tolerances import Stated, Tolerances
 from tpjb_ident.diagnose.observations.from_table import observe_table
@@ -73,13 +73,10 @@ class CampaignDiagnosis(Presented):
 
     def to_dataframe(self) -> pd.DataFrame:
         """K and C measured, predicted before, and predicted with the effects found: columns as comparison.csv."""
-        both = shown_by("report.diagnosis_coefficients", "before_and_after")
-        frame: pd.DataFrame = both(self.diagnosis, self.identification)
-        return frame
+        return before_and_after(self.diagnosis, self.identification)
 
     def summary(self) -> str:
         """What was found, and what it rests on."""
-        median_deviations = shown_by("report.diagnosis_coefficients", "median_deviations")
         verdict_sentences = shown_by("report.diagnosis_words", "verdict_sentences")
         name = self.identification.campaign if self.identification is not None else "table"
         off = median_deviations(self.to_dataframe())

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from tpjb_ident.diagnose.diagnose import before_and_after, median_deviations
 from tpjb_ident.effect_words import UNITS, WORDS, finding, label_in_words
-from tpjb_ident.report.diagnosis_coefficients import before_and_after, median_deviations
 from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_rows, place, verdict_sentences
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Page, Section, Table, grouped, write_page

@@ -190,7 +190,7 @@ def _show(name: str, asked: _Asked, result: CampaignDiagnosis, then: str) -> Non
 
 def _show_verdict(name: str, result: CampaignDiagnosis, then: str) -> None:
     """Print the verdict, the effects with their intervals, and the gap, in the units that people read."""
-    from tpjb_ident.report.diagnosis_coefficients import before_and_after, median_deviations
+    from tpjb_ident.diagnose.diagnose import before_and_after, median_deviations
     from tpjb_ident.report.diagnosis_words import parameter_rows, verdict_sentences
 
     verdict = result.diagnosis.verdict

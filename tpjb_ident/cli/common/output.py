@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -127,9 +126,11 @@ def output_of(command: str, as_json: bool, quiet: bool) -> Iterator[CommandOutpu
     finally:
         mine, _current = _current, before
         if as_json:
+            from tpjb_ident.presentation import json_data
+
             # escapes where standard output is not UTF-8, which every program that reads JSON expects
             ascii_only = "utf" not in (sys.stdout.encoding or "").lower()
-            typer.echo(json.dumps(_plain(mine.document(code)), indent=1, ensure_ascii=ascii_only, allow_nan=False))
+            typer.echo(json.dumps(json_data(mine.document(code)), indent=1, ensure_ascii=ascii_only, allow_nan=False))
 
 
 def _data(folder: Path, outputs: Sequence[str]) -> dict[str, Any]:
@@ -151,14 +152,3 @@ def _records(path: Path) -> Any:
     table = pq.ParquetFile(path)
     rows = table.metadata.num_rows
     return table.read().to_pylist() if rows <= MOST_ROWS else {"rows": rows, "file": path.name}
-
-
-def _plain(value: Any) -> Any:
-    """Numbers that JSON cannot hold become null."""
-    if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if isinstance(value, (str, int, bool)) or value is None else str(value)

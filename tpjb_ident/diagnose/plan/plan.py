@@ -23,6 +23,7 @@ from tpjb_ident.diagnose.observations.layout import Layout
 from tpjb_ident.diagnose.observations.observe import Observations
 from tpjb_ident.diagnose.plan.planned import planned_observations
 from tpjb_ident.diagnose.search.components import usual_factor
+from tpjb_ident.presentation import json_data
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,11 +88,9 @@ class CampaignPlan:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``plan.json``."""
-        rows = self.to_frame().to_dict("records")
-        effects = [{str(k): _finite(v) for k, v in row.items()} for row in rows]
         return {
             "schema": "tpjb-plan/1",
-            "effects": effects,
+            "effects": json_data(self.to_frame().to_dict("records")),
             "below_floor": list(self.below_floor),
             "confusable": [list(pair) for pair in self.confusable],
             "pairs": self.pairs,
@@ -116,10 +115,6 @@ class CampaignPlan:
                 }
             )
         return pd.DataFrame(rows)
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def plan(

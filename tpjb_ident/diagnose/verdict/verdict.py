@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from model.effects import Effect, kind_of
 from tpjb_ident.diagnose.verdict.behaviour import Behaviour, Drift
 from tpjb_ident.effect_words import Found
+from tpjb_ident.presentation import json_data
 
 VerdictName = Literal["consistent", "named", "ambiguous", "partly-explained", "unexplained"]
 
@@ -175,7 +175,7 @@ class Verdict:
 
     def to_json(self) -> str:
         """Serialise as JSON text; not-a-number becomes null, as JSON knows no other."""
-        return json.dumps(_plain(self.to_dict()), indent=2, allow_nan=False) + "\n"
+        return json.dumps(json_data(self.to_dict()), indent=2, allow_nan=False) + "\n"
 
     def effects_toml(self, before: tuple[Effect, ...] = (), from_measured: bool = False) -> str:
         """Serialise as ``updated.effects.toml``, which ``predict --effects`` reads.
@@ -213,14 +213,3 @@ class Verdict:
             values = [f"{k} = {v!r}" for k, v in b.parameters.items()]
             lines += ["[[effects]]", f'name = "{b.effect}"', *values, f"# {b.words}", ""]
         return "\n".join(lines)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, float) or hasattr(value, "dtype"):
-        number = value.item() if hasattr(value, "item") else value
-        return number if not isinstance(number, float) or math.isfinite(number) else None
-    return value
