@@ -14,7 +14,6 @@ from model.setup import Mesh, Setup
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnose.forward.candidates import candidates
 from tpjb_ident.diagnose.forward.forward import Forward, ForwardModel, NoEquilibriumError
-from tpjb_ident.diagnose.forward.memory import Memory
 from tpjb_ident.diagnose.forward.nuisance import Nuisance, column_of, nuisances
 from tpjb_ident.diagnose.forward.tolerances import Tolerances
 from tpjb_ident.diagnose.forward.workers import Map, workers
@@ -77,7 +76,6 @@ def diagnose(
     setup: Setup,
     settings: DiagnoseSettings | None = None,
     progress: Progress | None = None,
-    memory: Memory | None = None,
 ) -> Diagnosis:
     """Find the effects that a baseline lacks to describe a campaign.
 
@@ -90,8 +88,6 @@ def diagnose(
     settings : DiagnoseSettings, optional
     progress : callable, optional
         Called with a text and a share done.
-    memory : Memory, optional
-        Answers known from before; it is not changed.
 
     Raises
     ------
@@ -99,11 +95,9 @@ def diagnose(
         The baseline itself has no equilibrium at an operating point of the campaign.
     """
     settings = settings or DiagnoseSettings()
-    observations = thinned(observations)
+    observations = _thinned(observations)
     quick = setup.change(accuracy=ACCURACY, mesh=MESH if setup.mesh == Mesh() else setup.mesh)
     forward = Forward(quick, observations.layout, observations.elements)
-    if memory is not None:
-        forward = forward.knowing(memory)
     problem = pose(observations, forward, settings)
     with workers(forward, problem, settings.workers) as run:
         found = search(run, problem, settings, progress)
@@ -142,21 +136,6 @@ def pose(observations: Observations, forward: Forward, settings: DiagnoseSetting
 
 def _column(forward: ForwardModel, base: FloatArray, known: tuple[Nuisance, ...], index: int) -> FloatArray:
     return column_of(forward, (), known, np.zeros(len(known)), base, index)
-
-
-def solve(problem: Problem, forward: ForwardModel, settings: DiagnoseSettings) -> tuple[Verdict, Search]:
-    """Search and decide in this process, whatever stands behind the model; without a next test.
-
-    Parameters
-    ----------
-    problem : Problem
-    forward : ForwardModel
-    settings : DiagnoseSettings
-        Settings of the diagnosis.
-    """
-    with workers(forward, problem, 1) as run:
-        found = search(run, problem, settings)
-    return decide(problem, found, settings), found
 
 
 def _next_test(
@@ -210,22 +189,15 @@ def _rivals(found: Search) -> list[Fit]:
     return list(kept.values())[:IMPOSTORS]
 
 
-def thinned(observations: Observations, most: int = DIRECTIONS) -> Observations:
-    """Keep every second, third .. load direction of a locus that has more than are needed.
-
-    Parameters
-    ----------
-    observations : Observations
-    most : int
-        Directions per load and speed.
-    """
+def _thinned(observations: Observations) -> Observations:
+    """Keep every second, third .. load direction of a locus that has more than `DIRECTIONS`."""
     kept = set()
     tests: dict[tuple[float, float], list[float]] = {}
     for one in observations.layout.locus:
         tests.setdefault((one.load, one.speed), []).append(one.direction)
     for (load, speed), directions in tests.items():
         around = sorted(set(directions), key=lambda a: a % (2 * np.pi))
-        step = -(-len(around) // most)
+        step = -(-len(around) // DIRECTIONS)
         kept |= {(load, speed, a) for a in around[::step]}
     mine = np.array([
         e.family not in {"locus", "load"} or (e.place("load"), e.place("speed"), e.place("direction")) in kept

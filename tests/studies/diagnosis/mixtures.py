@@ -32,18 +32,20 @@ from model.setup import Setup
 from tests.studies.diagnosis.emulated import emulate
 from tests.studies.diagnosis.tables import tables
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.diagnose.diagnose import ACCURACY, MESH, pose, solve
+from tpjb_ident.diagnose.diagnose import ACCURACY, MESH, pose
 from tpjb_ident.diagnose.forward.candidates import TERMS, Candidate
-from tpjb_ident.diagnose.forward.forward import Forward, NoEquilibriumError
+from tpjb_ident.diagnose.forward.forward import Forward, ForwardModel, NoEquilibriumError
 from tpjb_ident.diagnose.forward.nuisance import predict
+from tpjb_ident.diagnose.forward.workers import workers
 from tpjb_ident.diagnose.observations.gap import coordinate, direct_scale
 from tpjb_ident.diagnose.observations.layout import Layout
 from tpjb_ident.diagnose.observations.observe import Observations
 from tpjb_ident.diagnose.plan.planned import around, dry, dynamic, planned_observations
 from tpjb_ident.diagnose.search.problem import Problem
 from tpjb_ident.diagnose.search.screen import visible
-from tpjb_ident.diagnose.search.search import baseline_fit
+from tpjb_ident.diagnose.search.search import Search, baseline_fit, search
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+from tpjb_ident.diagnose.verdict.decide import decide
 from tpjb_ident.diagnose.verdict.verdict import Verdict
 
 HERE, BEARINGS = Path(__file__).parent, Path(__file__).parents[3] / "model" / "bearings"
@@ -130,8 +132,8 @@ def bench(name: str, folder: Path | None, skip: frozenset[str] = SKIPPED) -> Ben
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         memory = emulate(model, new, folder / f"{name}.table")
-    forward = Forward(setup, layout, observations.elements, 0, memory)
-    elsewhere = Forward(setup, new, planned_observations(setup, new).elements, 0, memory)
+    forward = Forward(setup, layout, observations.elements, memory)
+    elsewhere = Forward(setup, new, planned_observations(setup, new).elements, memory)
     problem = pose(observations, forward, DiagnoseSettings(workers=1, skip=skip))
     base = baseline_fit(problem)
     seen = {}
@@ -284,6 +286,13 @@ def _noise(observations: Observations, value: FloatArray, rng: np.random.Generat
         smooth += np.where(mine, size * scale * (a + b * coordinate(observations.elements, "load")), 0.0)
     factor = np.sqrt(np.diag(observations.covariance))
     return np.asarray(smooth + factor * rng.standard_normal(len(value)))
+
+
+def solve(problem: Problem, forward: ForwardModel, settings: DiagnoseSettings) -> tuple[Verdict, Search]:
+    """Search and decide in this process, whatever stands behind the model; without a next test."""
+    with workers(forward, problem, 1) as run:
+        found = search(run, problem, settings)
+    return decide(problem, found, settings), found
 
 
 def run(one: Bench, kind: str, seed: int, settings: DiagnoseSettings) -> dict[str, Any] | None:

@@ -52,7 +52,6 @@ class Forward:
     setup: Setup
     layout: Layout
     elements: tuple[Element, ...] = field(repr=False)
-    calls: int = 0
     memory: Memory = field(default_factory=Memory, repr=False)
     _shares: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)
 
@@ -77,7 +76,6 @@ class Forward:
         setup = apply_effects(self.setup, effects)
         if change is not None:
             setup = change(setup)
-        self.calls += 1
         table = _Answers(setup)
         for test in self.layout.dynamic:
             point = (test.load, test.direction, test.speed)
@@ -96,17 +94,7 @@ class Forward:
 
     def fresh(self) -> Forward:
         """Return a copy that knows what this one knows now, whatever this one goes on to solve."""
-        return Forward(self.setup, self.layout, self.elements, 0, self.memory.copy(), dict(self._shares))
-
-    def knowing(self, memory: Memory) -> Forward:
-        """Return a copy that begins with what is known of its bearing.
-
-        Parameters
-        ----------
-        memory : Memory
-            Equilibria that are solved already; it is copied.
-        """
-        return Forward(self.setup, self.layout, self.elements, 0, memory.copy())
+        return Forward(self.setup, self.layout, self.elements, self.memory.copy(), dict(self._shares))
 
     def pad_shares(self) -> FloatArray:
         """Share of the static load on the pad of every temperature element at the last call; NaN elsewhere, (n,)."""
