@@ -34,6 +34,8 @@ CONTRACTS = {
     **{("rigdata/virtual_rig/motion.py", name): ("rigdata/virtual_rig/motion.py", "Motion")
        for name in ("at", "runout")},
     **{("rigdata/readers/", name): ("rigdata/readers/base.py", "RunReader") for name in ("read", "time")},
+    **{("tpjb_ident/export/", f"write_{name}"): ("tpjb_ident/export/formats.py", "Format")
+       for name in ("csv", "parquet", "excel", "mat", "ross", "xltrc", "dyrobes", "ansys")},
     ("tpjb_ident/runtime/executors.py", "outcomes"): ("tpjb_ident/runtime/executors.py", "Workers"),
 }  # fmt: skip
 COMMANDS = "tpjb_ident/cli/commands/"

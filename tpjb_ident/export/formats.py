@@ -25,7 +25,9 @@ Writer = Callable[[Path, "tuple[StaticPoint, ...]", str], None]
 
 @dataclass(frozen=True)
 class Format:
-    """One form of export.
+    """One form of export; its writer puts files of some points into an existing folder.
+
+    A writer is called with the folder, the points (tuple of StaticPoint) and a text that says where they come from.
 
     Attributes
     ----------

@@ -64,15 +64,7 @@ def _list(values: FloatArray) -> str:
 
 
 def write_ross(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write one TOML file per static point: ROSS reads the first table of a file.
-
-    Parameters
-    ----------
-    folder : Path
-    points : tuple of StaticPoint
-    source : str
-        Where the coefficients come from.
-    """
+    """Write one TOML file per static point: ROSS reads the first table of a file."""
     for point in points:
         write_text(folder / f"ross_{point.tag}.toml", ross_text(point, source))
 
@@ -192,42 +184,18 @@ def _one_line(text: str) -> str:
 
 
 def write_xltrc(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write xltrc_*.txt, one per load and excitation frequency.
-
-    Parameters
-    ----------
-    folder : Path
-    points : tuple of StaticPoint
-    source : str
-        Where the coefficients come from.
-    """
+    """Write xltrc_*.txt, one per load and excitation frequency."""
     for table in speed_tables(points):
         write_text(folder / f"xltrc_{table.name}.txt", _xltrc_text(table, source))
 
 
 def write_dyrobes(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write dyrobes_*.txt, one per load and excitation frequency.
-
-    Parameters
-    ----------
-    folder : Path
-    points : tuple of StaticPoint
-    source : str
-        Where the coefficients come from.
-    """
+    """Write dyrobes_*.txt, one per load and excitation frequency."""
     for table in speed_tables(points):
         write_text(folder / f"dyrobes_{table.name}.txt", _dyrobes_text(table, source))
 
 
 def write_ansys(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write ansys_*.txt, one per load and excitation frequency.
-
-    Parameters
-    ----------
-    folder : Path
-    points : tuple of StaticPoint
-    source : str
-        Where the coefficients come from.
-    """
+    """Write ansys_*.txt, one per load and excitation frequency."""
     for table in speed_tables(points):
         write_text(folder / f"ansys_{table.name}.txt", _ansys_text(table, source))

@@ -62,15 +62,7 @@ def coefficient_table(points: tuple[StaticPoint, ...]) -> pd.DataFrame:
 
 
 def write_csv(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write bearing_coefficients.csv into an existing folder.
-
-    Parameters
-    ----------
-    folder : Path
-    points : tuple of StaticPoint
-    source : str
-        Where the coefficients come from.
-    """
+    """Write bearing_coefficients.csv into an existing folder."""
     _write_csv(folder / f"{NAME}.csv", points)
 
 
@@ -91,14 +83,7 @@ def _write_csv(path: Path, points: tuple[StaticPoint, ...]) -> None:
 
 
 def write_parquet(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write bearing_coefficients.parquet; the source stands in the table's metadata.
-
-    Parameters
-    ----------
-    folder : Path
-    points : tuple of StaticPoint
-    source : str
-    """
+    """Write bearing_coefficients.parquet; the source stands in the table's metadata."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -112,12 +97,6 @@ def write_excel(folder: Path, points: tuple[StaticPoint, ...], source: str) -> N
 
     Every text is written as text, so that no cell from outside can become a formula. Rows that are not to be trusted
     are red.
-
-    Parameters
-    ----------
-    folder : Path
-    points : tuple of StaticPoint
-    source : str
 
     Raises
     ------
@@ -171,13 +150,6 @@ def write_mat(folder: Path, points: tuple[StaticPoint, ...], source: str) -> Non
 
     K and C are 2 x 2 x n, so are ``K_lo``, ``K_hi``, ``C_lo``, ``C_hi``, the ends of their 95 % intervals (NaN where
     there are none); ``quality`` is a cell array of n texts, ``trusted`` n truth values.
-
-    Parameters
-    ----------
-    folder : Path
-    points : tuple of StaticPoint
-    source : str
-        Where the coefficients come from.
     """
     from scipy.io import savemat
 

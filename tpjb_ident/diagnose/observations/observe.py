@@ -100,11 +100,6 @@ class Observations:
         return np.array([e.block for e in self.elements])
 
     @property
-    def families(self) -> TextArray:
-        """Family of every element."""
-        return np.array([e.family for e in self.elements])
-
-    @property
     def total_sigma(self) -> FloatArray:
         """Measurement and stated model tolerance together: the sigma of the gap."""
         return np.sqrt(np.diag(self.covariance) + self.sigma**2)
