@@ -21,8 +21,8 @@ FILES_A_FOLDER, LINES_A_FILE, LINES_A_FUNCTION, PARAMETERS = 20, 400, 60, 6
 FULL_FOLDERS = {"model/effects"}
 #: Functions that may be long: the model's front door, every argument a name of the field.
 LONG_FUNCTIONS = {"model/predict.py:predict"}
-#: How many there may be: these numbers may only fall (today 0, 4 and 9).
-FILES_TOO_LONG, FUNCTIONS_WITH_MANY_PARAMETERS, WITHOUT_PARAMETERS = 0, 4, 9
+#: How many there may be: these numbers may only fall (today 0, 4 and 1).
+FILES_TOO_LONG, FUNCTIONS_WITH_MANY_PARAMETERS, WITHOUT_PARAMETERS = 0, 4, 1
 #: Functions that fill a contract, by folder or file and name: told once, where the contract stands.
 #: The commands tell theirs in the help of every option.
 CONTRACTS = {
