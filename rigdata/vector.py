@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -17,6 +17,21 @@ COLLINEAR_SINE = 0.05
 _LEAST_SINGULAR = math.sqrt(1.0 - math.sqrt(1.0 - COLLINEAR_SINE**2))
 
 
+def directions(axes: Sequence[float] | FloatArray) -> FloatArray:
+    """Unit vectors along `axes`: what turns X and Y into components.
+
+    Parameters
+    ----------
+    axes : (..., m) array_like
+        Directions [rad].
+
+    Returns
+    -------
+    (..., m, 2) ndarray
+    """
+    return np.stack([np.cos(axes), np.sin(axes)], axis=-1)
+
+
 @functools.lru_cache(maxsize=256)
 def inverse_directions(axes: tuple[float, ...]) -> FloatArray:
     """(2, m) matrix from components along `axes` [rad] to X and Y; NaN where they span no plane.
@@ -26,10 +41,10 @@ def inverse_directions(axes: tuple[float, ...]) -> FloatArray:
     axes : tuple of float
         Directions [rad].
     """
-    directions = np.stack([np.cos(axes), np.sin(axes)], axis=1)
-    if len(axes) < 2 or np.linalg.svd(directions, compute_uv=False)[-1] <= _LEAST_SINGULAR:
+    along = directions(axes)
+    if len(axes) < 2 or np.linalg.svd(along, compute_uv=False)[-1] <= _LEAST_SINGULAR:
         return np.full((2, len(axes)), np.nan)
-    inverse = np.linalg.pinv(directions)
+    inverse = np.linalg.pinv(along)
     inverse.setflags(write=False)
     return np.asarray(inverse)
 

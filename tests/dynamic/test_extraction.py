@@ -20,7 +20,6 @@ from tpjb_ident.dynamic.records.extraction import MAX_JITTER, extract
 from tpjb_ident.dynamic.records.phasors import LineFitter, fit_uneven
 from tpjb_ident.dynamic.records.run_data import PhasorSettings
 from tpjb_ident.dynamic.records.shaft_speed import ShaftCourse
-from tpjb_ident.dynamic.records.stretches import open_stretches
 from tpjb_ident.dynamic.spectral_lines.lines import known_lines
 from tpjb_ident.dynamic.spectral_lines.windows import WindowSettings
 
@@ -82,7 +81,8 @@ def test_two_channels_become_rows_in_one_request(axes, zero, polarity):
     run = run_of(data, [*probes(axes, zero, polarity), tach, *cells])
     expected = run.vector("displacement", 7, 30).values.T
     run.reader.asked.clear()
-    with open_stretches(run, ("displacement",)) as stretches:
+    with run.kept_open():
+        stretches = run.row_reader(("displacement",))
         found = stretches.read(7, 30)
     assert run.reader.asked == [("X0", "X1", "K")]
     np.testing.assert_allclose(found.rows["displacement"], expected, rtol=1e-9, atol=1e-12)
@@ -96,7 +96,8 @@ def test_a_reading_that_is_none_is_none(bad, name):
     data = readings(2)
     data[name][20] = bad
     run = run_of(data, probes((45.0, 135.0)), stamps=0.5 + np.arange(50) / RATE)
-    with open_stretches(run, ("displacement",)) as stretches:
+    with run.kept_open():
+        stretches = run.row_reader(("displacement",))
         found = stretches.read(10, 40)
         sound = stretches.read(30, 40)
         none = stretches.read(5, 5)
@@ -110,20 +111,19 @@ def test_a_reading_that_is_none_is_none(bad, name):
 
 def test_three_channels_and_those_without_an_axis_are_left_to_the_run():
     run = run_of(readings(3), probes((45.0, 135.0, 80.0)))
-    with open_stretches(run, ("displacement",)) as stretches:
+    with run.kept_open():
+        stretches = run.row_reader(("displacement",))
         rows = stretches.read(0, 50).rows["displacement"]
     np.testing.assert_array_equal(rows, run.vector("displacement").values.T)
     other = Channel("T", "displacement", "um", 1e-6)
     two = run_of(readings(2) | {"T": np.zeros(50)}, [*probes((45.0, 135.0)), other])
-    with open_stretches(two, ("displacement",)) as stretches:
+    with two.kept_open():
+        stretches = two.row_reader(("displacement",))
         rows = stretches.read(0, 50).rows["displacement"]
     np.testing.assert_allclose(rows, two.vector("displacement").values.T, rtol=1e-12)
     for axes in ((45.0, 47.5), (45.0, 225.0)):
-        with (
-            open_stretches(run_of(readings(2), probes(axes)), ("displacement",)) as stretches,
-            pytest.raises(RigDataError, match="all measure along one line"),
-        ):
-            stretches.read(0, 50)
+        with pytest.raises(RigDataError, match="all measure along one line"):
+            run_of(readings(2), probes(axes)).row_reader(("displacement",)).read(0, 50)
 
 
 LINES = known_lines((DRIVEN,), 22.0, RATE)

@@ -13,7 +13,7 @@ from tests.dynamic.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.identify import directions_differ
-from tpjb_ident.dynamic.identify_point import disagreement, identify_point
+from tpjb_ident.dynamic.identify_point import Completion, disagreement, point_figures, point_result
 from tpjb_ident.dynamic.results.quality import (
     amplitude,
     coherence,
@@ -250,7 +250,8 @@ def test_a_point_gathers_what_its_runs_say():
     data = data_of(D, runs, per_run=6)
     temperatures = {"r0": {1: 300.0, 2: 310.0}, "r1": {1: 302.0}, "r9": {1: 900.0}}
     settings = IdentifySettings(methods=("ols", "mm", "iv"), clearance=1e3)
-    found = identify_point(data, temperatures, settings)
+    figures = point_figures(data, settings, differ=False)
+    found = point_result(data, figures, Completion(figures.by_method), temperatures, settings)
     assert list(found.by_method) == ["ols", "mm", "iv", "mm-eiv"]
     assert found.stiffness is found.by_method["mm-eiv"]
     assert all(est.method == name for name, est in found.by_method.items())

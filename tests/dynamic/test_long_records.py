@@ -16,7 +16,6 @@ from tpjb_ident.dynamic.records.kept_readings import SHORT, ShortRecord
 from tpjb_ident.dynamic.records.line_tuning import retuned
 from tpjb_ident.dynamic.records.phasors import BLOCK, LineFitter, WaveBlocks
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
-from tpjb_ident.dynamic.records.stretches import open_stretches
 from tpjb_ident.dynamic.spectral_lines.lines import known_lines
 from tpjb_ident.dynamic.spectral_lines.windows import WindowSettings, line_design
 
@@ -44,7 +43,8 @@ def test_blocks_are_the_plain_columns(length):
 
 
 def test_stretches_are_what_the_run_says(run):
-    with open_stretches(run, ("displacement", "force")) as stretches:
+    with run.kept_open():
+        stretches = run.row_reader(("displacement", "force"))
         for start, stop in ((0, 1000), (7777, 9000), (run.length - 5, run.length)):
             stretch = stretches.read(start, stop)
             for quantity, rows in stretch.rows.items():
@@ -65,7 +65,8 @@ def test_missing_values_and_overflows_are_those_of_the_run(run, tmp_path):
         file[f"runs/{run.id}/X1A"][100:110] = np.nan
         file[f"runs/{run.id}/L1H"][150] = 3e38
     broken = load_campaign(path).of_kind("dynamic")[0]
-    with open_stretches(broken, ("displacement", "force")) as stretches:
+    with broken.kept_open():
+        stretches = broken.row_reader(("displacement", "force"))
         rows = stretches.read(0, 300).rows
     assert np.flatnonzero(np.isnan(rows["displacement"]).any(axis=0)).tolist() == list(range(100, 110))
     assert np.flatnonzero(np.isnan(rows["force"]).any(axis=0)).tolist() == [150]

@@ -23,6 +23,7 @@ from tpjb_ident.dynamic.estimators.phasor_table import displacement_condition, p
 from tpjb_ident.dynamic.estimators.uncertainty import (
     CLEAR,
     DirectionMeans,
+    DirectionShares,
     complex_to_real_covariance,
     direction_effect,
     information,
@@ -52,11 +53,11 @@ def test_leaving_directions_out_gives_the_variance_of_a_mean():
     score = 0.01 * balanced_scores(g)
     parts = np.broadcast_to(np.eye(4, dtype=complex), (g, 4, 4))
     repeat = 1e-14 * np.eye(4, dtype=complex)
-    found = spread_of(score, parts, repeat, 2.0, 100.0, known_effect=True)
+    covariance, dof = spread_of(DirectionShares(score, parts, repeat, 100.0), 2.0, known_effect=True)
     expected = 0.01**2 / (g * (g - 1)) * g * np.eye(8)
-    np.testing.assert_allclose(found.covariance, expected, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(covariance, expected, rtol=1e-6, atol=1e-12)
     # all directions say the same of the variance: as many degrees of freedom as a mean has
-    np.testing.assert_allclose(found.dof, g - 1, rtol=1e-6)
+    np.testing.assert_allclose(dof, g - 1, rtol=1e-6)
 
 
 def test_repeat_noise_is_what_remains_where_directions_agree_better_than_it():
@@ -64,16 +65,17 @@ def test_repeat_noise_is_what_remains_where_directions_agree_better_than_it():
     parts = np.broadcast_to(np.eye(4, dtype=complex), (g, 4, 4))
     repeat = hermitian(np.random.default_rng(1), 4)
     known = complex_to_real_covariance(repeat)
-    small = spread_of(1e-6 * balanced_scores(g), parts, repeat, 3.0, 40.0, known_effect=True)
-    np.testing.assert_allclose(small.covariance, known, rtol=1e-9)
-    np.testing.assert_allclose(small.dof, 40.0, rtol=1e-6)
+    covariance, dof = spread_of(DirectionShares(1e-6 * balanced_scores(g), parts, repeat, 40.0), 3.0, known_effect=True)
+    np.testing.assert_allclose(covariance, known, rtol=1e-9)
+    np.testing.assert_allclose(dof, 40.0, rtol=1e-6)
     for chi_square in (0.3, 1.0, np.nan):
-        calm = spread_of(100 * balanced_scores(g), parts, repeat, chi_square, 40.0)
-        np.testing.assert_array_equal(calm.covariance, known)
-        np.testing.assert_array_equal(calm.dof, 40.0)
-    two = spread_of(balanced_scores(16)[:2], parts[:2], repeat, 9.0, 0.2, known_effect=True)
-    np.testing.assert_array_equal(two.covariance, known)
-    np.testing.assert_array_equal(two.dof, 1.0)
+        covariance, dof = spread_of(DirectionShares(100 * balanced_scores(g), parts, repeat, 40.0), chi_square)
+        np.testing.assert_array_equal(covariance, known)
+        np.testing.assert_array_equal(dof, 40.0)
+    two = DirectionShares(balanced_scores(16)[:2], parts[:2], repeat, 0.2)
+    covariance, dof = spread_of(two, 9.0, known_effect=True)
+    np.testing.assert_array_equal(covariance, known)
+    np.testing.assert_array_equal(dof, 1.0)
 
 
 def test_what_directions_add_grows_with_the_doubt_and_is_whole_at_its_95_per_cent():
@@ -84,8 +86,8 @@ def test_what_directions_add_grows_with_the_doubt_and_is_whole_at_its_95_per_cen
     sure = chi2.ppf(0.95, 4 * (g - 2)) / (4 * (g - 2))
 
     def added(chi_square, known_effect=False):
-        score = 0.3 * balanced_scores(g)
-        return spread_of(score, parts, repeat, chi_square, 40.0, known_effect).covariance - known
+        shares = DirectionShares(0.3 * balanced_scores(g), parts, repeat, 40.0)
+        return spread_of(shares, chi_square, known_effect)[0] - known
 
     whole = added(sure)
     np.testing.assert_allclose(added(1 + 0.25 * (sure - 1)), 0.25 * whole, rtol=1e-9, atol=1e-15)
@@ -587,6 +589,6 @@ def test_directions_that_contradict_one_another_a_million_times_have_wide_interv
     rng = np.random.default_rng(3)
     score, parts = complex_normal(rng, 6, 4), np.tile(np.eye(4, dtype=complex), (6, 1, 1))
     repeat = np.diag([1e-7, 1e-7, 1e-7, -1e-9]).astype(complex)
-    spread = spread_of(score, parts, repeat, 1e6, 200.0)
-    assert np.linalg.eigvalsh(spread.covariance)[0] > 0
-    assert np.sqrt(np.diag(spread.covariance)).min() > 0.05  # as far as the directions differ
+    covariance, _ = spread_of(DirectionShares(score, parts, repeat, 200.0), 1e6)
+    assert np.linalg.eigvalsh(covariance)[0] > 0
+    assert np.sqrt(np.diag(covariance)).min() > 0.05  # as far as the directions differ

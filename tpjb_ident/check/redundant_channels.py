@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rigdata.calibration import Channel
+from rigdata.vector import directions
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.set_points import excited
@@ -92,13 +93,12 @@ def channels_apart(runs: Sequence[Observation]) -> tuple[ApartChannels, ...]:
 
 def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) -> ApartChannels | None:
     """Judge the phasors (n, m) of one set of channels: one of every sine, several of an excitation over a band."""
-    axes = np.array([float(c.axis or 0.0) for c in channels])
-    directions = np.stack([np.cos(axes), np.sin(axes)], axis=1)
-    if len(phasors) < MIN_RUNS or np.linalg.matrix_rank(directions) < 2:
+    along = directions([float(c.axis or 0.0) for c in channels])
+    if len(phasors) < MIN_RUNS or np.linalg.matrix_rank(along) < 2:
         return None
-    beyond = np.linalg.svd(directions)[0][:, 2:]  # (m, m - 2): what no vector of the plane does
-    vectors = phasors @ np.linalg.pinv(directions).T
-    seen = vectors @ directions.T
+    beyond = np.linalg.svd(along)[0][:, 2:]  # (m, m - 2): what no vector of the plane does
+    vectors = phasors @ np.linalg.pinv(along).T
+    seen = vectors @ along.T
     # every run is one vote of its own size: beyond^T (gain * seen) = beyond^T phasor
     size = np.linalg.norm(seen, axis=1)
     design = np.concatenate([(beyond.T * (s / n)) for s, n in zip(seen, size)])

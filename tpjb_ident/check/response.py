@@ -18,7 +18,7 @@ from tpjb_ident.check.agreement import check_agreement
 from tpjb_ident.check.answers import Answer, answer_of, misfit_of, robust_stiffness
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.run_gains import check_gains, point_readings, probe_centres
-from tpjb_ident.check.set_points import excited, to_plane
+from tpjb_ident.check.set_points import excited, plane_of, to_plane
 from tpjb_ident.check.wiring import name_fault
 from tpjb_ident.dynamic.records.shaft_phase import shaft_order
 
@@ -86,8 +86,8 @@ def mirrored(channels: Sequence[Channel], repair: FloatArray) -> FloatArray:
     repair : (2, 2) ndarray
         On the readings of the two channels.
     """
-    inverse = np.stack([to_plane(channels, e) for e in np.eye(2)], axis=1)
-    return np.asarray(inverse @ repair @ np.linalg.inv(inverse))
+    plane = plane_of(channels)
+    return np.asarray(plane @ repair @ np.linalg.inv(plane))
 
 
 def _check_signs(group: Sequence[Answer], stiffness: ComplexArray) -> None:
@@ -112,8 +112,7 @@ def _check_signs(group: Sequence[Answer], stiffness: ComplexArray) -> None:
 def _check_scales(group: Sequence[Answer], stiffness: ComplexArray, names: str) -> None:
     """A film is not many times stiffer along one probe than along the other."""
     channels = group[0].channels
-    along = np.stack([to_plane(channels, e) for e in np.eye(2)], axis=1)
-    sizes = np.linalg.norm(stiffness @ along, axis=0)
+    sizes = np.linalg.norm(stiffness @ plane_of(channels), axis=0)
     if sizes.max() < _MAX_ANISOTROPY * sizes.min():
         return
     large, small = channels[int(np.argmin(sizes))].name, channels[int(np.argmax(sizes))].name

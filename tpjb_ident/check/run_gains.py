@@ -13,7 +13,7 @@ from tpjb_ident.check.answers import Answer
 from tpjb_ident.check.gain_evidence import PointReadings
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.one_gain import WrongGain, wrong_gains
-from tpjb_ident.check.set_points import to_plane
+from tpjb_ident.check.set_points import plane_of, to_plane
 
 #: Median of the amplitude of a noise line, in standard deviations of its real part (Rayleigh).
 _MEDIAN = math.sqrt(2 * math.log(2))
@@ -66,14 +66,14 @@ def point_readings(group: Sequence[Answer], centres: dict[str, float]) -> PointR
     if len(names) != 2 or len(lines) < len(group) or any([c.name for c in _cells(one)] != names for one in seen):
         return None
     places = [(one.pick("displacement"), one.pick("force")) for one in seen]
-    cell_plane, cell_phasors = _plane(cells), np.stack([f.phasor[c] for f, (_, c) in zip(lines, places, strict=True)])
+    cell_plane, cell_phasors = plane_of(cells), np.stack([f.phasor[c] for f, (_, c) in zip(lines, places, strict=True)])
     return PointReadings(
         probes=np.stack([a.readings for a in group]),
         cells=cell_phasors,
         inertia=np.stack([a.force for a in group]) - cell_phasors @ cell_plane.T,
         probe_means=np.stack([f.mean[p] for f, (p, _) in zip(lines, places, strict=True)]),
         cell_means=np.stack([f.mean[c] for f, (_, c) in zip(lines, places, strict=True)]),
-        probe_plane=_plane(probes),
+        probe_plane=plane_of(probes),
         cell_plane=cell_plane,
         centre=(centres.get(probes[0].name), centres.get(probes[1].name)),
         noise=np.stack([np.concatenate([f.floor[p], f.floor[c]]) for f, (p, c) in zip(lines, places, strict=True)])
@@ -83,11 +83,6 @@ def point_readings(group: Sequence[Answer], centres: dict[str, float]) -> PointR
 
 def _cells(seen: Observation) -> list[Channel]:
     return [seen.channels[i] for i in seen.pick("force")]
-
-
-def _plane(channels: Sequence[Channel]) -> FloatArray:
-    """From two readings to X and Y, (2, 2)."""
-    return np.stack([to_plane(channels, unit) for unit in np.eye(2)], axis=1)
 
 
 def probe_centres(sweeps: Sequence[Observation]) -> dict[str, float]:

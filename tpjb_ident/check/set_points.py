@@ -10,7 +10,7 @@ import numpy as np
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
 from rigdata.vector import inverse_directions
-from tpjb_ident.arrays import AnyArray, ComplexArray
+from tpjb_ident.arrays import AnyArray, ComplexArray, FloatArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.wiring import guess_wiring, repairs
 from tpjb_ident.dynamic.records.run_data import oil_force as film_force
@@ -22,6 +22,16 @@ _LINE_OVER_FLOOR = 8.0
 NO_STATIC = (0.002, 0.02)
 
 
+def plane_of(channels: Sequence[Channel]) -> FloatArray:
+    """Matrix (2, m) from one reading per channel to X, Y.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+    """
+    return inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
+
+
 def to_plane(channels: Sequence[Channel], readings: AnyArray) -> AnyArray:
     """X, Y from one value per channel; complex stays complex.
 
@@ -31,8 +41,7 @@ def to_plane(channels: Sequence[Channel], readings: AnyArray) -> AnyArray:
     readings : (m,) or (m, n) ndarray
         One row per channel, SI.
     """
-    inverse = inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
-    return np.asarray(inverse @ readings)
+    return np.asarray(plane_of(channels) @ readings)
 
 
 def plane_vector(seen: Observation, quantity: str, values: AnyArray) -> AnyArray | None:

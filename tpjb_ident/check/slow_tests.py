@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigdata.problem import Severity
+from rigdata.vector import directions
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.response import definiteness, mirrored
@@ -39,12 +40,13 @@ def _planes(seen: Observation) -> tuple[FloatArray, FloatArray] | None:
     if np.count_nonzero(rows) < 20:
         return None
     samples = seen.samples[rows]
-    axes_force = np.array([seen.channels[i].axis for i in force])
-    axes_shaft = np.array([seen.channels[i].axis for i in shaft])
-    return (
-        samples[:, force] @ np.linalg.pinv(np.stack([np.cos(axes_force), np.sin(axes_force)], axis=1)).T,
-        samples[:, shaft] @ np.linalg.pinv(np.stack([np.cos(axes_shaft), np.sin(axes_shaft)], axis=1)).T,
-    )
+    planes = (samples[:, own] @ np.linalg.pinv(_directions(seen, own)).T for own in (force, shaft))
+    return next(planes), next(planes)
+
+
+def _directions(seen: Observation, where: Sequence[int]) -> FloatArray:
+    """Unit vectors (m, 2) of some channels."""
+    return directions(np.array([seen.channels[i].axis for i in where]))
 
 
 def check_dry(runs: Sequence[Observation]) -> None:
@@ -105,9 +107,7 @@ def _check_push(seen: Observation, shows: float, push: FloatArray) -> None:
     where = seen.pick("force")
     channels = [seen.channels[i] for i in where]
     wanted = np.array([math.cos(math.radians(says)), math.sin(math.radians(says))])
-    axes = np.array([c.axis for c in channels])
-    readings = np.stack([np.cos(axes), np.sin(axes)], axis=1) @ push
-    guess = guess_wiring(channels, readings, wanted)
+    guess = guess_wiring(channels, _directions(seen, where) @ push, wanted)
     severity: Severity = "error" if off > _ANGLE_ERROR else "warning"
     if guess:
         seen.report.doubts.add("force")
@@ -127,9 +127,7 @@ def _check_follows(seen: Observation, planes: tuple[FloatArray, FloatArray], pus
         return
     where = seen.pick("displacement")
     channels = [seen.channels[i] for i in where]
-    axes = np.array([c.axis for c in channels])
-    readings = np.stack([np.cos(axes), np.sin(axes)], axis=1) @ slope
-    guess = guess_wiring(channels, readings, unit, within=20.0)
+    guess = guess_wiring(channels, _directions(seen, where) @ slope, unit, within=20.0)
     goes, pushed = math.degrees(math.atan2(slope[1], slope[0])), math.degrees(math.atan2(unit[1], unit[0]))
     what = f"the shaft goes toward {goes:.0f} deg while the load pushes toward {pushed:.0f} deg{guess}"
     cure = "Check axis, polarity and cables of the probes"

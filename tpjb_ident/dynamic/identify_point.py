@@ -62,27 +62,6 @@ def own_method(method: str) -> str:
     return "mm-eiv" if method == "iv" else method.partition(":")[0]
 
 
-def identify_point(
-    data: PointData,
-    temperatures: dict[str, dict[int, float]],
-    settings: IdentifySettings,
-    differ: bool = False,
-) -> PointResult:
-    """All methods on one operating point, and the figures that go with it.
-
-    Parameters
-    ----------
-    data : PointData
-    temperatures : dict
-        Mean temperature per run and pad [K].
-    settings : IdentifySettings
-    differ : bool
-        Whether runs are known to differ by more than their windows do.
-    """
-    figures = point_figures(data, settings, differ)
-    return point_result(data, figures, Completion(figures.by_method), temperatures, settings)
-
-
 @dataclass(frozen=True)
 class Figures:
     """What the windows of a point say before its uncertainties are known."""

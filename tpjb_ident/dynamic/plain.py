@@ -16,6 +16,7 @@ import numpy as np
 
 from rigdata.campaign import Campaign
 from tpjb_ident.arrays import ComplexArray
+from tpjb_ident.dynamic.broadband.band_point import is_broadband
 from tpjb_ident.dynamic.estimators.r_matrix import r_matrix
 from tpjb_ident.dynamic.estimators.rlm import RlmSettings, rlm_fit
 from tpjb_ident.dynamic.records.extraction import extract
@@ -94,7 +95,7 @@ def plain_points(
     """
     phasors = PhasorSettings(windows=WindowSettings(length=settings.window, max_inflation=np.inf, min_cycles=1.0))
     runs = []
-    every = campaign.of_kind("dynamic")
+    every = [run for run in campaign.of_kind("dynamic") if not is_broadband(run)]
     for count, run in enumerate(every):
         lines = LineSet((Line("excitation", run.point.excitation_hz),), (), (), run.point.shaft_speed_hz)
         runs.append(extract(run, campaign.housing_mass, phasors, lines))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from tpjb_ident.dynamic.estimators.methods import TABLED
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
 from tpjb_ident.presentation import changed
+
+#: Methods of ``estimators.csv``; ``"rlm:tukey"`` names a norm.
+TABLED = ("ols", "rlm:huber", "rlm:tukey", "mm", "mm-eiv", "iv")
 
 
 @dataclass(frozen=True)

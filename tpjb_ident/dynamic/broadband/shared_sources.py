@@ -25,6 +25,7 @@ from tpjb_ident.dynamic.corrections.systematic_sources import (
     SystematicSources,
     apparent_change,
     gain_draws,
+    paired_draws,
     systematic_sources,
 )
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
@@ -141,11 +142,10 @@ def shared_sources(campaign: Campaign, n: int, seed: int) -> SharedSources:
         Draws, in pairs of opposite sign.
     seed : int
     """
-    half = np.random.default_rng(seed + 2).standard_normal((max(n // 2, 1), 2, 4))
     return SharedSources(
         gain_draws(campaign.channels, n, seed),
         systematic_sources(campaign, n, seed + 1),
-        np.concatenate([half, -half]),
+        paired_draws(np.random.default_rng(seed + 2), n, 2, 4),
     )
 
 
@@ -193,8 +193,7 @@ def run_scatter(fits: Sequence[LineFit], n: int) -> RunScatter:
         Draws.
     """
     n_runs = len(fits[0].dof) if fits else 0
-    half = np.random.default_rng(n_runs).standard_normal((max(n // 2, 1), max(n_runs, 1)))
-    draws = np.concatenate([half, -half])
+    draws = paired_draws(np.random.default_rng(n_runs), n, max(n_runs, 1))
     if n_runs < 2 or not fits:
         return RunScatter(0.0, draws)
     if n_runs == 2:

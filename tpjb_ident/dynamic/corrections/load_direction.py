@@ -23,6 +23,7 @@ import numpy as np
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.corrections.static_load import MAX_SIDEWAYS, LoadMiss
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.records.line_means import complex_median
 from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: Plausible relative slope [1/rad] and its change per unit of ln W, one standard deviation.
@@ -118,13 +119,9 @@ def _ratio(displacement: ComplexArray, force: ComplexArray) -> tuple[ComplexArra
     if not np.all(np.abs(d[:, large]) > 0):
         return None
     shape = np.ones(2, dtype=complex)
-    shape[1 - large] = _median(d[:, [1 - large]] / d[:, [large]])[0]
+    shape[1 - large] = complex_median(d[:, [1 - large]] / d[:, [large]])[0]
     length = float(np.linalg.norm(shape))
-    return np.asarray(shape / length, complex), np.asarray(_median(f / d[:, [large]]) / length, complex)
-
-
-def _median(values: ComplexArray) -> ComplexArray:
-    return np.asarray(np.median(values.real, axis=0) + 1j * np.median(values.imag, axis=0))
+    return np.asarray(shape / length, complex), np.asarray(complex_median(f / d[:, [large]]) / length, complex)
 
 
 def direction_slopes(families: Iterable[tuple[float, ...]], ratios: Sequence[RunRatios | None]) -> list[Turn | None]:

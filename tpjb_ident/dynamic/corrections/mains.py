@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rigdata.vector import directions
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.mains_angles import MainsEquations
@@ -64,13 +65,13 @@ def mains_pickup(lines: Sequence[ComplexArray | None], axes: FloatArray) -> Pick
     axes : (m,) ndarray
         Probe axes [rad].
     """
-    directions = np.stack([np.cos(axes), np.sin(axes)], axis=1)
-    seen = [directions @ line for line in lines if line is not None]
+    along = directions(axes)
+    seen = [along @ line for line in lines if line is not None]
     if len(seen) < MIN_RUNS:
         return None
     probes = np.array(seen)
     size = np.median(np.abs(probes), axis=0)
-    back = np.linalg.pinv(directions).T
+    back = np.linalg.pinv(along).T
     relative = probes * np.exp(-1j * np.angle(probes[:, :1]))
     locked = np.abs(np.exp(1j * np.angle(relative)).mean(axis=0)).min() > LOCKED
     if locked:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from rigdata.campaign import Campaign
-from tpjb_ident.arrays import ComplexArray, FloatArray
+from rigdata.vector import directions
+from tpjb_ident.arrays import AnyArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.runs.point_data import PointData
@@ -65,18 +66,21 @@ def gain_draws(channels: Mapping[str, Any], n: int, seed: int) -> GainDraws:
         sigma = np.array([c.uncertainty or 0.0 for c in chosen])
         if quantity != "acceleration":
             unstated += [c.name for c in chosen if c.uncertainty is None]
-        half = rng.standard_normal((max(n // 2, 1), len(chosen)))
-        errors = np.concatenate([half, -half]) * sigma
-        matrices[quantity] = _vector_gains([float(c.axis) for c in chosen], errors)
+        errors = paired_draws(rng, n, len(chosen)) * sigma
+        matrices[quantity] = _on_vectors(np.array([float(c.axis) for c in chosen]), 1 + errors)
     return GainDraws(matrices["displacement"], matrices["force"], matrices["acceleration"], tuple(unstated))
 
 
-def _vector_gains(axes: list[float], errors: FloatArray) -> FloatArray:
-    """Channels along `axes` with relative errors -> matrices on (X, Y), shape (n, 2, 2)."""
+def _on_vectors(axes: FloatArray, gains: AnyArray) -> AnyArray:
+    """What gains (n, m) of channels along `axes` (m,) do to X and Y, (n, 2, 2)."""
     if len(axes) < 2:
-        return np.broadcast_to(np.eye(2), (len(errors), 2, 2)).copy()
-    directions = np.stack([np.cos(axes), np.sin(axes)], axis=1)
-    return np.einsum("ac,nc,cb->nab", np.linalg.pinv(directions), 1 + errors, directions)
+        return _unit(len(gains))
+    along = directions(axes)
+    return np.einsum("ac,nc,cb->nab", np.linalg.pinv(along), gains, along)
+
+
+def _unit(n: int) -> FloatArray:
+    return np.broadcast_to(np.eye(2), (n, 2, 2))
 
 
 def apparent_change(data: PointData, stiffness: DynamicStiffness, draws: GainDraws) -> FloatArray:
@@ -151,25 +155,17 @@ class SystematicSources:
     def _turned(self, quantity: str) -> FloatArray:
         axes = self.axes[quantity]
         if quantity not in self.turns or len(axes) < 2:
-            return _unit(self.turns)
-        real = axes + self.turns[quantity]
-        return np.einsum("ac,ncb->nab", np.linalg.pinv(_directions(axes)), _directions(real))
+            return _unit(_count(self.turns))
+        return np.einsum("ac,ncb->nab", np.linalg.pinv(directions(axes)), directions(axes + self.turns[quantity]))
 
-    def _delayed(self, quantity: str, omega: float) -> ComplexArray | FloatArray:
-        axes = self.axes[quantity]
-        if quantity not in self.delays or len(axes) < 2:
-            return _unit(self.delays)
-        gains = np.exp(-1j * omega * self.delays[quantity])
-        return np.einsum("ac,nc,cb->nab", np.linalg.pinv(_directions(axes)), gains, _directions(axes))
+    def _delayed(self, quantity: str, omega: float) -> AnyArray:
+        if quantity not in self.delays:
+            return _unit(_count(self.delays))
+        return _on_vectors(self.axes[quantity], np.exp(-1j * omega * self.delays[quantity]))
 
 
-def _directions(axes: FloatArray) -> FloatArray:
-    return np.stack([np.cos(axes), np.sin(axes)], axis=-1)
-
-
-def _unit(draws: Mapping[str, FloatArray]) -> FloatArray:
-    n = len(next(iter(draws.values())))
-    return np.broadcast_to(np.eye(2), (n, 2, 2))
+def _count(draws: Mapping[str, FloatArray]) -> int:
+    return len(next(iter(draws.values())))
 
 
 def systematic_sources(campaign: Campaign, n: int, seed: int) -> SystematicSources:
@@ -191,18 +187,28 @@ def systematic_sources(campaign: Campaign, n: int, seed: int) -> SystematicSourc
     for quantity, channels in chosen.items():
         sigma = np.array([getattr(c, "axis_uncertainty", 0.0) for c in channels])
         if sigma.any():
-            turns[quantity] = _pairs(rng, n, len(channels)) * sigma
+            turns[quantity] = paired_draws(rng, n, len(channels)) * sigma
         late = np.array([getattr(c, "delay_uncertainty", 0.0) for c in channels])
         if late.any():
             for channel in channels:
-                devices.setdefault(channel.clock or quantity, _pairs(rng, n, 1)[:, 0])
+                devices.setdefault(channel.clock or quantity, paired_draws(rng, n, 1)[:, 0])
             delays[quantity] = np.stack([devices[c.clock or quantity] for c in channels], axis=1) * late
     uncertain = getattr(campaign, "mass_uncertainty", 0.0)
-    mass = _pairs(rng, n, 1)[:, 0] * uncertain / campaign.housing_mass if uncertain else np.empty(0)
+    mass = paired_draws(rng, n, 1)[:, 0] * uncertain / campaign.housing_mass if uncertain else np.empty(0)
     axes = {q: np.array([float(c.axis or 0.0) for c in channels]) for q, channels in chosen.items()}
     return SystematicSources(axes, turns, delays, mass)
 
 
-def _pairs(rng: np.random.Generator, n: int, m: int) -> FloatArray:
-    half = rng.standard_normal((max(n // 2, 1), m))
+def paired_draws(rng: np.random.Generator, n: int, *shape: int) -> FloatArray:
+    """Standard normal draws in pairs of opposite sign, so that they have no mean, (n, *shape).
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    n : int
+        Draws, an even number.
+    *shape : int
+        Of each.
+    """
+    half = rng.standard_normal((max(n // 2, 1), *shape))
     return np.concatenate([half, -half])

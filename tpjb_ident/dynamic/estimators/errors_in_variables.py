@@ -17,6 +17,7 @@ from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable
 from tpjb_ident.dynamic.estimators.robust_constants import trimming_limits, trimming_weight
 from tpjb_ident.dynamic.estimators.uncertainty import (
     DirectionMeans,
+    DirectionShares,
     direction_covariances,
     direction_effect,
     information,
@@ -166,8 +167,9 @@ def eiv_fit(repeats: Repeats, directions_differ: bool = False) -> EivFit:
     parts = np.einsum("gac,gb,gd->gabcd", inverse, D_true.conj(), D_true).reshape(-1, 4, 4)
     pooled = pooled_effect(residual, means) if len(means) > 2 else None
     repeat = bread @ meat @ bread.conj().T
-    spread = spread_of(score, parts, repeat, chi_square, 2 * repeats.spare, directions_differ, pooled)
-    return EivFit(h, spread.covariance, spread.dof, chi_square, _attenuation(means, noise))
+    shares = DirectionShares(score, parts, repeat, 2 * repeats.spare, pooled)
+    covariance, dof = spread_of(shares, chi_square, directions_differ)
+    return EivFit(h, covariance, dof, chi_square, _attenuation(means, noise))
 
 
 def _attenuation(means: DirectionMeans, noise: ComplexArray) -> FloatArray:

@@ -13,7 +13,6 @@ from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, repeats
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
-from tpjb_ident.dynamic.estimators.methods import METHODS
 from tpjb_ident.dynamic.estimators.mm import mm_fit
 from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable, displacement_condition, phasor_table
 from tpjb_ident.dynamic.estimators.r_matrix import ols_fit
@@ -282,7 +281,7 @@ def _many_rejected(weights: FloatArray) -> Condition | None:
     return Condition("many-windows-rejected", f"{100 * share:.0f} % of the windows got no weight (limit 40 %)")
 
 
-#: What solves Eq. (15) by each method: a new estimator is a function here and a name in `methods`.
+#: What solves Eq. (15) by each method: a new estimator is a function here.
 SOLVERS: dict[str, Callable[[PhasorTable, float, str], DynamicStiffness]] = {
     "ols": _ols,
     "rlm": _rlm,
@@ -290,5 +289,6 @@ SOLVERS: dict[str, Callable[[PhasorTable, float, str], DynamicStiffness]] = {
     "mm-eiv": _mm_eiv,
     "iv": _iv,
 }
+METHODS = tuple(SOLVERS)
 
 __all__ = ["METHODS", "NORMS", "estimate_dynamic_stiffness", "estimate_table"]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tpjb_ident.arrays import FloatArray
+from tpjb_ident.conditions import Condition
 
 #: Thresholds in scales, statsmodels' own.
 HUBER, TUKEY = 1.345, 4.685
@@ -29,8 +30,8 @@ class Norm:
 
 
 @dataclass(frozen=True)
-class RobustFit:
-    """What statsmodels' ``RLM(...).fit(conv="coefs")`` tells of a fit.
+class RlmSolution:
+    """One real robust regression: what statsmodels' ``RLM(...).fit(conv="coefs")`` tells of it.
 
     Attributes
     ----------
@@ -40,6 +41,7 @@ class RobustFit:
     weights : (m,) ndarray
     scale : float
     iterations : int
+    conditions : tuple of Condition
     """
 
     params: FloatArray
@@ -47,11 +49,12 @@ class RobustFit:
     weights: FloatArray
     scale: float
     iterations: int
+    conditions: tuple[Condition, ...] = ()
 
 
 def robust_fit(
     design: FloatArray, response: FloatArray, norm: str, max_iterations: int, tolerance: float
-) -> RobustFit:  # fmt: skip
+) -> RlmSolution:  # fmt: skip
     """Robust regression by iteratively reweighted least squares.
 
     Parameters
@@ -88,7 +91,7 @@ def robust_fit(
             break
     sizes = residual / scale if scale != 0.0 else np.zeros(len(response))
     rank = int(np.linalg.matrix_rank(design))
-    return RobustFit(params, _spread(chosen, sizes, scale, rank) * inverse.dot(inverse.T), weights, scale, iterations)
+    return RlmSolution(params, _spread(chosen, sizes, scale, rank) * inverse.dot(inverse.T), weights, scale, iterations)
 
 
 def _mad(residual: FloatArray) -> float:

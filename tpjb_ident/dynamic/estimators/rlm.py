@@ -11,7 +11,7 @@ weights of their own, and the M-estimator has no breakdown against bad displacem
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from rigdata.near_names import unknown_name
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.irls import NORMS as OWN_NORMS
-from tpjb_ident.dynamic.estimators.irls import RobustFit, robust_fit
+from tpjb_ident.dynamic.estimators.irls import RlmSolution, robust_fit
 from tpjb_ident.dynamic.estimators.r_matrix import real_rows
 from tpjb_ident.errors import ArgumentError, TpjbError
 
@@ -69,29 +69,6 @@ class RlmSettings:
     library: bool = False
 
 
-@dataclass(frozen=True)
-class RlmSolution:
-    """One real robust regression.
-
-    Attributes
-    ----------
-    params : (p,) ndarray
-    covariance : (p, p) ndarray
-        statsmodels' H1, scaled as it is.
-    weights : (m,) ndarray
-    scale : float
-    iterations : int
-    conditions : tuple of Condition
-    """
-
-    params: FloatArray
-    covariance: FloatArray
-    weights: FloatArray
-    scale: float
-    iterations: int
-    conditions: tuple[Condition, ...]
-
-
 def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | None = None) -> RlmSolution:
     """Run statsmodels' RLM on a real system, guarded.
 
@@ -121,10 +98,10 @@ def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | 
     size = float(np.abs(response).max(initial=0.0))
     if not fit.scale > 1e-14 * size:
         conditions.append(Condition("zero-scale", "more than half of the rows fit exactly; no standard errors exist"))
-    return RlmSolution(fit.params, fit.covariance, fit.weights, fit.scale, fit.iterations, tuple(conditions))
+    return replace(fit, conditions=tuple(conditions))
 
 
-def _fit(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RobustFit:
+def _fit(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RlmSolution:
     if settings.norm in OWN_NORMS and settings.scale == "mad" and not settings.library:
         return robust_fit(design, response, settings.norm, settings.max_iterations, settings.tolerance)
     from statsmodels.robust.robust_linear_model import RLM
@@ -132,7 +109,7 @@ def _fit(design: FloatArray, response: FloatArray, settings: RlmSettings) -> Rob
     fit = RLM(response, design, M=_norm(settings.norm)).fit(
         maxiter=settings.max_iterations, tol=settings.tolerance, conv="coefs", scale_est=_scale(settings.scale)
     )
-    return RobustFit(
+    return RlmSolution(
         np.asarray(fit.params), np.asarray(fit.bcov_scaled), np.asarray(fit.weights), float(fit.scale),
         int(fit.fit_history["iteration"]),
     )  # fmt: skip

@@ -134,28 +134,30 @@ def direction_covariances(means: DirectionMeans, noise: ComplexArray, T: Complex
 
 
 @dataclass(frozen=True)
-class Spread:
-    """Covariance of H, told apart by where it comes from.
+class DirectionShares:
+    """What every direction contributes to the estimating equations of h, and what their repeats say.
 
     Attributes
     ----------
-    covariance : (8, 8) ndarray
-    dof : (8,) ndarray
+    score : (g, 4) complex ndarray
+        To the equations.
+    parts : (g, 4, 4) complex ndarray
+        To their matrix.
+    repeat : (4, 4) complex ndarray
+        E[e e^H] of h from repeat noise alone.
+    dof_repeat : float
+    pooled : (8, 8) ndarray or None
+        Covariance of H by `pooled_effect`, which stands beside the jackknife where the directions are few.
     """
 
-    covariance: FloatArray
-    dof: FloatArray
+    score: ComplexArray
+    parts: ComplexArray
+    repeat: ComplexArray
+    dof_repeat: float
+    pooled: FloatArray | None = None
 
 
-def spread_of(
-    score: ComplexArray,
-    parts: ComplexArray,
-    repeat: ComplexArray,
-    chi_square: float,
-    dof_repeat: float,
-    known_effect: bool = False,
-    pooled: FloatArray | None = None,
-) -> Spread:
+def spread_of(shares: DirectionShares, chi_square: float, known_effect: bool = False) -> tuple[FloatArray, FloatArray]:
     """Repeat noise as known, plus what leaving out one direction at a time shows beyond it.
 
     A direction effect is no circular noise: a static load that is off changes K and hardly C, one entry
@@ -165,25 +167,23 @@ def spread_of(
 
     Parameters
     ----------
-    score : (g, 4) complex ndarray
-        Contribution of every direction to the estimating equations of h.
-    parts : (g, 4, 4) complex ndarray
-        Contribution of every direction to the matrix of those equations.
-    repeat : (4, 4) complex ndarray
-        E[e e^H] of h from repeat noise alone.
+    shares : DirectionShares
     chi_square : float
         Reduced chi-square of the direction means against repeat noise.
-    dof_repeat : float
     known_effect : bool
         That directions differ is known from elsewhere; then this point's own chi-square is not asked.
-    pooled : (8, 8) ndarray, optional
-        Covariance of H by `pooled_effect`, which stands beside the jackknife where the directions are few.
+
+    Returns
+    -------
+    covariance : (8, 8) ndarray
+    dof : (8,) ndarray
     """
-    known = _positive(complex_to_real_covariance(repeat))
+    score, parts, pooled, dof_repeat = shares.score, shares.parts, shares.pooled, shares.dof_repeat
+    known = _positive(complex_to_real_covariance(shares.repeat))
     g = len(score)
     spare = 4.0 * (g - 2)
     if g <= 2 or not (known_effect or chi_square > 1.0):
-        return Spread(known, np.full(8, max(dof_repeat, 1.0)))
+        return known, np.full(8, max(dof_repeat, 1.0))
     limit = 2.0 * gammaincinv(spare / 2, 0.95) / spare
     certain = min(1.0, (chi_square - 1.0) / (limit - 1.0)) if not known_effect else 1.0
     moved = np.linalg.solve(parts.sum(axis=0) - parts, score[:, :, None])[:, :, 0]
@@ -194,7 +194,7 @@ def spread_of(
         stretch = np.sqrt(np.maximum(np.diag(jackknife) / np.diag(pooled), 1.0))
         total = known + certain * pooled * np.outer(stretch, stretch)
         between = np.full(8, POOLED_DOF * (g - 2))
-        return Spread(total, mixed_dof(np.diag(total), np.diag(known), dof_repeat, between))
+        return total, mixed_dof(np.diag(total), np.diag(known), dof_repeat, between)
     # Beyond repeat noise, in coordinates where that is the unit matrix; never negative.
     root = np.linalg.cholesky(known)
     white = np.linalg.solve(root, np.linalg.solve(root, jackknife).T)
@@ -203,7 +203,7 @@ def spread_of(
     total = known + extra
     effective = np.maximum((moved**2).sum(axis=0) ** 2 / (moved**4).sum(axis=0) - 1.0, 1.0)
     dof = mixed_dof(np.diag(total), np.diag(known), dof_repeat, np.maximum(effective, 0.5 * (g - 1)))
-    return Spread(0.5 * (total + total.T), dof)
+    return 0.5 * (total + total.T), dof
 
 
 def _positive(covariance: FloatArray) -> FloatArray:
@@ -318,16 +318,9 @@ def with_repeats(
     small = correction * noise / means.count[:, None, None]
     meat = information(scaled, scaled, np.broadcast_to(small, (len(means), 2, 2)))
     score = np.einsum("ga,gb->gab", mean[kept, 4:] * means.count[:, None], means.D.conj()).reshape(-1, 4)
-    spread = spread_of(
-        score,
-        parts[kept],
-        bread @ meat @ bread.conj().T,
-        chi_square,
-        2 * spare,
-        table.directions_differ,
-        pooled_effect(mean[kept, 4:], means) if kept.sum() > 2 else None,
-    )
-    return spread.covariance, spread.dof, chi_square
+    pooled = pooled_effect(mean[kept, 4:], means) if kept.sum() > 2 else None
+    shares = DirectionShares(score, parts[kept], bread @ meat @ bread.conj().T, 2 * spare, pooled)
+    return (*spread_of(shares, chi_square, table.directions_differ), chi_square)
 
 
 def _regression_parts(table: PhasorTable, weights: FloatArray) -> ComplexArray:

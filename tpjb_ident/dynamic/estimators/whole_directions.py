@@ -16,6 +16,7 @@ from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats, eiv_fit, repeats
 from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable
 from tpjb_ident.dynamic.estimators.robust_constants import trimming_limits
+from tpjb_ident.dynamic.records.line_means import complex_median
 
 #: A direction with less than this share of its windows accepted counts as rejected.
 REJECTED = 0.2
@@ -56,8 +57,7 @@ def _agreeing(table: PhasorTable, direction: int, others: Repeats) -> BoolArray:
     """Windows of a direction that lie together within the noise of the other directions."""
     mine = table.direction == direction
     z = np.concatenate([table.D, table.F], axis=1)
-    centre = np.median(z[mine].real, axis=0) + 1j * np.median(z[mine].imag, axis=0)
-    deviation = z - centre
+    deviation = z - complex_median(z[mine])
     u2 = 2.0 * np.einsum("na,an->n", deviation.conj(), np.linalg.solve(others.noise, deviation.T)).real
     return np.asarray(mine & (u2 <= 2.0 * trimming_limits(8)[1]))
 

@@ -7,7 +7,7 @@ and g the channels' complex gains at a line, P diag(1/g) U undoes them; exact fo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,10 +15,9 @@ from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from rigdata.vector import inverse_directions
+from rigdata.vector import directions, inverse_directions
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, RunPhasors
 
 #: Samples that are looked at.
@@ -91,19 +90,12 @@ def compensated(result: RunPhasors, run: MeasuredRun, slower: Mapping[str, Slowe
         A table of a channel's response does not reach the excitation.
     """
     frequencies, driven = result.lines.frequencies, len(result.lines.excitation)
-    blocks: dict[str, PhasorBlock | None] = {
-        "displacement": result.displacement,
-        "force": result.cell_force,
-        "acceleration": result.acceleration,
-    }
-    for quantity, block in blocks.items():
-        undo = None if block is None else _undoing(run, quantity, slower, frequencies, driven)
-        if block is not None and undo is not None:
-            blocks[quantity] = replace(block, phasors=np.einsum("lab,nlb->nla", undo, block.phasors))
-    displacement, force = blocks["displacement"], blocks["force"]
-    assert displacement is not None
-    assert force is not None
-    return replace(result, displacement=displacement, cell_force=force, acceleration=blocks["acceleration"])
+
+    def undone(quantity: str, phasors: ComplexArray) -> ComplexArray:
+        undo = _undoing(run, quantity, slower, frequencies, driven)
+        return phasors if undo is None else np.einsum("lab,nlb->nla", undo, phasors)
+
+    return result.changed(undone)
 
 
 def _undoing(
@@ -121,8 +113,7 @@ def _undoing(
         if channel.name in slower:
             gains[:, k] *= slower[channel.name].at(frequencies)
     axes = tuple(float(c.axis or 0.0) for c in chosen)
-    readings = np.stack([np.cos(axes), np.sin(axes)], axis=1)
-    return np.einsum("ac,lc,cb->lab", inverse_directions(axes), 1 / gains, readings)
+    return np.einsum("ac,lc,cb->lab", inverse_directions(axes), 1 / gains, directions(axes))
 
 
 def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: MeasuredRun, name: str) -> ComplexArray:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigdata.rows import RowReader
 from tpjb_ident.arrays import FloatArray, IntArray
 from tpjb_ident.dynamic.records.phasors import SCALE_LIMIT, LineFitter, PhasorBlock, fit_uneven, usual_scale
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, PhasorSettings, RunPhasors
 from tpjb_ident.dynamic.records.shaft_speed import ShaftCourse, window_speeds
-from tpjb_ident.dynamic.records.stretches import Stretches, open_stretches
 from tpjb_ident.dynamic.spectral_lines.lines import LineSet
 from tpjb_ident.dynamic.spectral_lines.windows import plan_windows
 
@@ -45,7 +45,8 @@ def extract(
     speeds = None if follow is None else follow.at(np.asarray(middles, dtype=float))
     work = _Work(length, run.sample_rate, lines, speeds, run.point.shaft_speed_hz)
     parts: list[_Fitted] = []
-    with open_stretches(run, quantities) as stretches:
+    with run.kept_open():
+        stretches = run.row_reader(quantities)
         for first, stop in _chunks(length, count):
             parts.append(work.fit(stretches, first, stop))
         blocks = {q: _joined([part.blocks[q] for part in parts]) for q in quantities}
@@ -53,20 +54,20 @@ def extract(
             _look_again(work, stretches, blocks)
     starts = np.concatenate([part.start for part in parts])
     tach = np.concatenate([part.speeds for part in parts])
-    found = {q: _undelayed(block, lines, settings.delays.get(q, 0.0)) for q, block in blocks.items()}
-    return RunPhasors(
+    recorded = RunPhasors(
         run.id,
         run.point,
         run.excitation_direction,
         lines,
         starts,
         length / run.sample_rate,
-        found["displacement"],
-        found["force"],
-        found.get("acceleration"),
+        blocks["displacement"],
+        blocks["force"],
+        blocks.get("acceleration"),
         housing_mass,
         tach,
     )
+    return recorded.advanced(settings.delays)
 
 
 def _chunks(length: int, count: int) -> Iterator[tuple[int, int]]:
@@ -75,7 +76,7 @@ def _chunks(length: int, count: int) -> Iterator[tuple[int, int]]:
         yield first, min(first + step, count)
 
 
-def _look_again(work: _Work, stretches: Stretches, blocks: dict[str, PhasorBlock]) -> None:
+def _look_again(work: _Work, stretches: RowReader, blocks: dict[str, PhasorBlock]) -> None:
     """Fit windows anew that are noisier than the run's usual one: a chunk alone may hold nothing to compare with."""
     usual = {q: usual_scale(block.noise) for q, block in blocks.items()}
     with np.errstate(invalid="ignore"):  # a window without phasors has no noise and stays as it is
@@ -105,7 +106,7 @@ class _Work:
         self.fitter = LineFitter(length, rate, lines.frequencies)
         self.followers = _Followers(length, rate, lines, speeds)
 
-    def fit(self, stretches: Stretches, first: int, stop: int, usual: dict[str, FloatArray] | None = None) -> _Fitted:
+    def fit(self, stretches: RowReader, first: int, stop: int, usual: dict[str, FloatArray] | None = None) -> _Fitted:
         """Read and fit windows first..stop-1; `usual` is the residual scale that windows of the run have."""
         stretch = stretches.read(first * self.length, stop * self.length)
         times = _times(stretch.time, first, stop, self.fitter)
@@ -183,13 +184,6 @@ class _Followers:
 def _put(block: PhasorBlock, i: int, single: PhasorBlock) -> None:
     block.phasors[i], block.mean[i] = single.phasors[0], single.mean[0]
     block.noise[i], block.lost[i] = single.noise[0], single.lost[0]
-
-
-def _undelayed(block: PhasorBlock, lines: LineSet, delay: float) -> PhasorBlock:
-    if delay == 0.0:
-        return block
-    advance = np.exp(2j * np.pi * lines.frequencies * delay)
-    return PhasorBlock(block.phasors * advance[None, :, None], block.mean, block.noise, block.lost)
 
 
 def _joined(parts: list[PhasorBlock]) -> PhasorBlock:

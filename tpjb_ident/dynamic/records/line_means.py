@@ -57,11 +57,7 @@ def _mean(run: RunPhasors, line: int) -> LineMean:
         none = np.full(2, np.nan + 0j)
         return LineMean(none, none, np.nan, np.nan)
     d, f = d[good], f[good]
-    return LineMean(_median(d), _median(f), _error(d), _error(f))
-
-
-def _median(z: ComplexArray) -> ComplexArray:
-    return np.asarray(np.median(z.real, axis=0) + 1j * np.median(z.imag, axis=0))
+    return LineMean(complex_median(d), complex_median(f), _error(d), _error(f))
 
 
 def _error(z: ComplexArray) -> float:

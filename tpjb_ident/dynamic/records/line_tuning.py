@@ -67,14 +67,7 @@ def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
     if np.abs(shift).max() * result.length > MAX_RETUNED:
         return None
     turn = np.exp(-2j * np.pi * np.multiply.outer(result.start + 0.5 * result.length, shift))[:, :, None]
-    acceleration = result.acceleration
-    return replace(
-        result,
-        lines=lines,
-        displacement=replace(result.displacement, phasors=result.displacement.phasors * turn),
-        cell_force=replace(result.cell_force, phasors=result.cell_force.phasors * turn),
-        acceleration=None if acceleration is None else replace(acceleration, phasors=acceleration.phasors * turn),
-    )
+    return replace(result.changed(lambda _, phasors: phasors * turn), lines=lines)
 
 
 def frequency_slip(phasors: ComplexArray, start: FloatArray, noise: float) -> float:

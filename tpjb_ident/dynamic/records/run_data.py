@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -149,6 +149,35 @@ class RunPhasors:
     speeds: FloatArray
     conditions: tuple[Condition, ...] = ()
     shaft_phase: ComplexArray = field(default_factory=lambda: np.empty(0, complex))
+
+    @property
+    def blocks(self) -> dict[str, PhasorBlock]:
+        """What was measured, by quantity."""
+        found = {"displacement": self.displacement, "force": self.cell_force, "acceleration": self.acceleration}
+        return {quantity: block for quantity, block in found.items() if block is not None}
+
+    def changed(self, change: Callable[[str, ComplexArray], ComplexArray]) -> RunPhasors:
+        """The run with other phasors.
+
+        Parameters
+        ----------
+        change : callable
+            (quantity, phasors (n, n_lines, 2)) -> phasors.
+        """
+        new = {q: replace(block, phasors=change(q, block.phasors)) for q, block in self.blocks.items()}
+        acceleration = new.get("acceleration")
+        return replace(self, displacement=new["displacement"], cell_force=new["force"], acceleration=acceleration)
+
+    def advanced(self, delays: Mapping[str, float]) -> RunPhasors:
+        """The run without delays of whole quantities.
+
+        Parameters
+        ----------
+        delays : mapping of str to float
+            Lateness by quantity [s].
+        """
+        ahead = {q: np.exp(2j * np.pi * self.lines.frequencies * delay) for q, delay in delays.items() if delay}
+        return self.changed(lambda q, z: z * ahead[q][None, :, None] if q in ahead else z) if ahead else self
 
     def oil_force(self, line: int = 0) -> ComplexArray:
         """Oil-force phasors at one line, shape (n, 2) [N].

@@ -17,6 +17,7 @@ from tpjb_ident.check.gain_evidence import PointReadings
 from tpjb_ident.check.one_gain import wrong_gains
 from tpjb_ident.check.run_gains import gain_in_words
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.records.line_means import complex_median
 from tpjb_ident.dynamic.results.probes import SweptProbe
 from tpjb_ident.dynamic.runs.point_data import PointData
 
@@ -104,7 +105,7 @@ def _medians(data: PointData, k: int) -> tuple[ComplexArray, ComplexArray, Compl
     if not good.any():
         nothing = np.full(2, np.nan + 0j)
         return nothing, nothing, nothing
-    first, second, third = (np.median(b[good].real, axis=0) + 1j * np.median(b[good].imag, axis=0) for b in blocks)
+    first, second, third = (complex_median(b[good]) for b in blocks)
     return first, second, third
 
 

@@ -20,7 +20,6 @@ from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.line_means import LineMean, mains_force, mains_line, second_harmonics
-from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.runs.left_out import DEAD_ACCELEROMETER, LeftOut
 from tpjb_ident.dynamic.runs.point_data import finite_mean
@@ -105,22 +104,11 @@ def slim(phasors: RunPhasors) -> RunPhasors:
     phasors : RunPhasors
     """
     n = len(phasors.lines.excitation)
-
-    def cut(block: PhasorBlock) -> PhasorBlock:
-        return replace(block, phasors=block.phasors[:, :n].copy())
-
-    acceleration = phasors.acceleration
-    return replace(
-        phasors,
-        displacement=cut(phasors.displacement),
-        cell_force=cut(phasors.cell_force),
-        acceleration=None if acceleration is None else cut(acceleration),
-    )
+    return phasors.changed(lambda _, every: every[:, :n].copy())
 
 
 def _bytes(phasors: RunPhasors) -> int:
-    blocks = [b for b in (phasors.displacement, phasors.cell_force, phasors.acceleration) if b is not None]
-    arrays = [a for b in blocks for a in (b.phasors, b.mean, b.noise, b.lost)]
+    arrays = [a for b in phasors.blocks.values() for a in (b.phasors, b.mean, b.noise, b.lost)]
     return sum(a.nbytes for a in (*arrays, phasors.start, phasors.speeds))
 
 

@@ -206,11 +206,10 @@ def _dead_accelerometers(run: Run, phasors: RunPhasors) -> tuple[Condition, ...]
 
 
 def _dead(run: Run, phasors: RunPhasors) -> dict[str, Problem]:
-    blocks = {"displacement": phasors.displacement, "force": phasors.cell_force, "acceleration": phasors.acceleration}
     silent = [
         name
         for name, channel in run.channels.items()
-        if channel.axis is not None and (block := blocks.get(channel.quantity)) is not None
+        if channel.axis is not None and (block := phasors.blocks.get(channel.quantity)) is not None
         if _silent(block, channel.axis)
     ]
     if not silent:

@@ -155,7 +155,7 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
     phasors = compensated(result, run, slower)
     phasors = replace(phasors, conditions=merged(samples.conditions, told, _clock_conditions(clocks)))
     frequencies = phasors.lines.frequencies
-    phasors = _undelayed(phasors, settings.delays)
+    phasors = phasors.advanced(settings.delays)
     a = None if phasors.acceleration is None else phasors.acceleration.phasors
     F = oil_force(phasors.cell_force.phasors, a, housing_mass)
     D = phasors.displacement.phasors
@@ -239,17 +239,3 @@ def _transformed(run: Run, samples: Samples, length: int, housing_mass: float, s
 def _block(phasors: ComplexArray) -> PhasorBlock:
     n = len(phasors)
     return PhasorBlock(phasors, np.zeros((n, 2)), np.full((n, 2), np.nan), np.zeros(n))
-
-
-def _undelayed(phasors: RunPhasors, delays: dict[str, float]) -> RunPhasors:
-    def moved(block: PhasorBlock, quantity: str) -> PhasorBlock:
-        ahead = np.exp(2j * np.pi * phasors.lines.frequencies * delays.get(quantity, 0.0))
-        return replace(block, phasors=block.phasors * ahead[None, :, None])
-
-    acceleration = phasors.acceleration
-    return replace(
-        phasors,
-        displacement=moved(phasors.displacement, "displacement"),
-        cell_force=moved(phasors.cell_force, "force"),
-        acceleration=None if acceleration is None else moved(acceleration, "acceleration"),
-    )
