@@ -40,18 +40,7 @@ class AnalogFilter:
     corner: float
 
     def at(self, frequency: FloatArray) -> ComplexArray:
-        """Complex gain at `frequency` (n,) [Hz].
-
-        Parameters
-        ----------
-        frequency : array, shape (n,)
-            Frequencies [Hz].
-
-        Returns
-        -------
-        array, shape (n,)
-            Complex gain.
-        """
+        """Complex gain at `frequency` (n,) [Hz]."""
         from scipy.signal import bessel, butter, freqs_zpk
 
         corner = 2 * math.pi * self.corner
@@ -109,18 +98,7 @@ class ResponseTable:
     phase: tuple[float, ...]
 
     def at(self, frequency: FloatArray) -> ComplexArray:
-        """Complex gain at `frequency` (n,) [Hz], linear between the lines of the table, NaN outside it.
-
-        Parameters
-        ----------
-        frequency : array, shape (n,)
-            Frequencies [Hz].
-
-        Returns
-        -------
-        array, shape (n,)
-            Complex gain.
-        """
+        """Complex gain at `frequency` (n,) [Hz], linear between the lines of the table, NaN outside it."""
         f = np.asarray(frequency, dtype=float)
         gain = np.interp(f, self.frequency, self.gain, left=np.nan, right=np.nan)
         phase = np.interp(f, self.frequency, self.phase)

@@ -87,15 +87,7 @@ class VectorRows:
         self._run, self._quantities = run, quantities
 
     def read(self, start: int, stop: int) -> Rows:
-        """Samples start..stop-1.
-
-        Parameters
-        ----------
-        start : int
-            First sample.
-        stop : int
-            Sample after the last.
-        """
+        """Samples start..stop-1."""
         records = {q: self._run.vector(q, start, stop) for q in self._quantities}
         speed = self._run.speed(start, stop)
         time = next(iter(records.values())).time
@@ -130,15 +122,7 @@ class FileRows:
         self._counted = counted is not None and counted()
 
     def read(self, start: int, stop: int) -> Rows:
-        """Samples start..stop-1.
-
-        Parameters
-        ----------
-        start : int
-            First sample.
-        stop : int
-            Sample after the last.
-        """
+        """Samples start..stop-1."""
         planned = [plan for plan in self._plans.values() if plan is not None]
         names = [name for plan in planned for name in plan.names] + [c.name for c in self._tach]
         readings = dict(zip(names, self._reader.read(names, start, stop))) if names else {}

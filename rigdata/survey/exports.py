@@ -110,7 +110,7 @@ def read_export(path: Path, name: str | None = None) -> Export:
     if path.suffix.lower() not in TEXT:
         return Export(name, series)
     head = find_head(path)
-    if head.header_line:
+    if head.dialect.header_line:
         return Export(name, series, time_column(path))
     times = next((s for s in series if _counts_evenly(s)), None)
     if times is not None:

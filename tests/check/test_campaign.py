@@ -21,7 +21,7 @@ from tpjb_ident.check.findings import Finding, Reporter, merge
 from tpjb_ident.check.lines import fit_lines, strongest_line
 from tpjb_ident.check.response import definiteness, mirrored
 from tpjb_ident.check.wiring import guess_wiring, name_fault, repairs
-from tpjb_ident.dynamic.spectral_lines.line_fit import GLITCH_MARGIN
+from tpjb_ident.dynamic.records.line_fit import GLITCH_MARGIN
 
 SAMPLES = Path(__file__).parents[2].parent / "shared" / "samples"
 PROBES = (

@@ -11,7 +11,7 @@ from tests.dynamic.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.estimators.errors_in_variables import aligned
 from tpjb_ident.dynamic.estimators.estimate import METHODS, estimate_dynamic_stiffness, estimate_table
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
-from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
+from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.uncertainty import complex_to_real_covariance, with_repeats
 
 OMEGA = 160.0

@@ -21,9 +21,9 @@ from tpjb_ident.dynamic.broadband.band_models import Shared, fit_band
 from tpjb_ident.dynamic.broadband.line_estimates import h1_fit, h2_fit, hv_fit, periods_fit
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
 from tpjb_ident.dynamic.broadband.local_regression import local_fit
+from tpjb_ident.dynamic.broadband.period import find_period, resampled
+from tpjb_ident.dynamic.broadband.samples import Samples
 from tpjb_ident.dynamic.broadband.shared_sources import run_scatter
-from tpjb_ident.dynamic.broadband.spectra.period import find_period, resampled
-from tpjb_ident.dynamic.broadband.spectra.samples import Samples
 from tpjb_ident.dynamic.identify import identify
 
 H = np.array([[1.6e8 + 6e7j, 1.5e7 + 2e6j], [-1.2e7 - 3e6j, 2.4e8 + 9e7j]])

@@ -10,8 +10,7 @@ import pytest
 from tests.dynamic.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats, eiv_fit, repeats
 from tpjb_ident.dynamic.estimators.mm import mm_fit
-from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
-from tpjb_ident.dynamic.estimators.r_matrix import real_rows
+from tpjb_ident.dynamic.estimators.r_matrix import phasor_table, real_rows
 from tpjb_ident.dynamic.estimators.rlm import ComplexInputError, RlmSettings, rlm_fit, solve_rlm
 from tpjb_ident.dynamic.estimators.robust_constants import (
     bisquare_weight,

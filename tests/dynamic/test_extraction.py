@@ -17,11 +17,11 @@ from rigdata.rows import VectorRows
 from rigdata.run import Run
 from tpjb_ident.dynamic.records import extraction
 from tpjb_ident.dynamic.records.extraction import MAX_JITTER, extract
+from tpjb_ident.dynamic.records.lines import known_lines
 from tpjb_ident.dynamic.records.phasors import LineFitter, fit_uneven
 from tpjb_ident.dynamic.records.run_data import PhasorSettings
-from tpjb_ident.dynamic.records.shaft_speed import ShaftCourse
-from tpjb_ident.dynamic.spectral_lines.lines import known_lines
-from tpjb_ident.dynamic.spectral_lines.windows import WindowSettings
+from tpjb_ident.dynamic.records.shaft import ShaftCourse
+from tpjb_ident.dynamic.records.windows import WindowSettings
 
 RATE = 1000.0
 #: No whole number of cycles in a second, so that a wrong origin of time shows.

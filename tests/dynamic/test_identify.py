@@ -14,10 +14,10 @@ from tests.studies.bench_phasors import HeldRun
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.records.extraction import extract
 from tpjb_ident.dynamic.records.line_tuning import speeds_from_runout
+from tpjb_ident.dynamic.records.lines import known_lines
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
+from tpjb_ident.dynamic.records.windows import RecordTooShortError
 from tpjb_ident.dynamic.settings import IdentifySettings
-from tpjb_ident.dynamic.spectral_lines.lines import known_lines
-from tpjb_ident.dynamic.spectral_lines.windows import RecordTooShortError
 
 
 def stiffness(point):

@@ -12,9 +12,9 @@ from rigdata.operating_point import OperatingPoint
 from tests.dynamic.phasor_cases import H, complex_normal
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
-from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
+from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.records.shaft_speed import FIRST_LOOK, MAX_DEPARTURE, shaft_speed, window_speeds
+from tpjb_ident.dynamic.records.shaft import FIRST_LOOK, MAX_DEPARTURE, shaft_speed, window_speeds
 from tpjb_ident.dynamic.runs.point_data import finite_mean, group, point_data
 
 NORMAL = 1.959963984540054  # of 95 %

@@ -14,10 +14,10 @@ from tpjb_ident.diagnose.observations.load_scatter import moved_by_miss
 from tpjb_ident.dynamic.corrections.load_direction import direction_slopes, run_ratios, turned_back
 from tpjb_ident.dynamic.corrections.static_load import load_misses
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
+from tpjb_ident.dynamic.records.lines import known_lines
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.runs.point_data import gather
-from tpjb_ident.dynamic.spectral_lines.lines import known_lines
 
 OMEGA = 2 * np.pi * 25.0
 WINDOWS = 6

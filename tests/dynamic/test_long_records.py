@@ -14,10 +14,10 @@ from tests.studies.bench_phasors import HeldRun
 from tpjb_ident.dynamic.records.extraction import extract
 from tpjb_ident.dynamic.records.kept_readings import SHORT, ShortRecord
 from tpjb_ident.dynamic.records.line_tuning import retuned
+from tpjb_ident.dynamic.records.lines import known_lines
 from tpjb_ident.dynamic.records.phasors import BLOCK, LineFitter, WaveBlocks
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
-from tpjb_ident.dynamic.spectral_lines.lines import known_lines
-from tpjb_ident.dynamic.spectral_lines.windows import WindowSettings, line_design
+from tpjb_ident.dynamic.records.windows import WindowSettings, line_design
 
 FREQUENCIES = np.array([25.0, 22.0, 44.0, 50.0])
 

@@ -34,8 +34,8 @@ from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.records.line_means import mains_line
+from tpjb_ident.dynamic.records.lines import LineSettings, known_lines
 from tpjb_ident.dynamic.runs.point_data import PointData
-from tpjb_ident.dynamic.spectral_lines.lines import LineSettings, known_lines
 
 H = np.array([[2.1e8 + 6.3e7j, 2.0e7 + 3.1e6j], [-1.5e7 + 1.6e6j, 5.0e8 + 9.4e7j]])
 OMEGA = 2 * math.pi * 50.0

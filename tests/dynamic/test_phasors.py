@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tpjb_ident.dynamic.records.lines import LineSettings, known_lines
 from tpjb_ident.dynamic.records.phasors import LineFitter, fit_uneven
 from tpjb_ident.dynamic.records.run_data import oil_force
-from tpjb_ident.dynamic.spectral_lines.lines import LineSettings, known_lines
-from tpjb_ident.dynamic.spectral_lines.windows import (
+from tpjb_ident.dynamic.records.windows import (
     RecordTooShortError,
     WindowSettings,
     plan_windows,

@@ -12,12 +12,12 @@ from tpjb_ident.dynamic.corrections.static_load import load_misses, load_slopes,
 from tpjb_ident.dynamic.corrections.systematic_sources import apparent_change, gain_draws
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
 from tpjb_ident.dynamic.instruments.amplitude import amplitude_slope
+from tpjb_ident.dynamic.records.lines import known_lines
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.results.frequency_fit import fit_over_frequency
 from tpjb_ident.dynamic.results.quality import amplitude, coherence, directional_pattern, flags, rejected_windows
 from tpjb_ident.dynamic.runs.point_data import PointData, gather
-from tpjb_ident.dynamic.spectral_lines.lines import known_lines
 
 OMEGA = 2 * np.pi * 25.0
 H = np.array([[2.1e8 + 6.3e7j, 2.0e7 + 3.1e6j], [-1.5e7 + 1.6e6j, 5.0e8 + 9.4e7j]])

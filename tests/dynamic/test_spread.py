@@ -19,7 +19,7 @@ from tpjb_ident.dynamic.estimators.least_trimmed import (
     scatter,
 )
 from tpjb_ident.dynamic.estimators.mm import mm_fit
-from tpjb_ident.dynamic.estimators.phasor_table import displacement_condition, phasor_table
+from tpjb_ident.dynamic.estimators.r_matrix import displacement_condition, phasor_table
 from tpjb_ident.dynamic.estimators.uncertainty import (
     CLEAR,
     DirectionMeans,

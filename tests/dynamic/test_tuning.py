@@ -21,9 +21,9 @@ from tpjb_ident.dynamic.records.line_tuning import (
     speeds_from_runout,
     tuned,
 )
+from tpjb_ident.dynamic.records.lines import known_lines
 from tpjb_ident.dynamic.records.phasors import LineFitter, PhasorBlock
 from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
-from tpjb_ident.dynamic.spectral_lines.lines import known_lines
 
 RATE, LENGTH, WINDOWS = 1000.0, 0.4, 12
 START = LENGTH * np.arange(WINDOWS)

@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 
 from tests.studies.estimator_cases import Case, draw
-from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
-from tpjb_ident.dynamic.estimators.r_matrix import real_rows
+from tpjb_ident.dynamic.estimators.r_matrix import phasor_table, real_rows
 from tpjb_ident.dynamic.estimators.rlm import RlmSettings, solve_rlm
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "mass_rlm.json").read_text(encoding="utf-8"))

@@ -10,8 +10,8 @@ import numpy as np
 
 from rigdata.run import Run
 from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from tpjb_ident.dynamic.spectral_lines.line_fit import GLITCH_LIMIT, fit_without_glitches
-from tpjb_ident.dynamic.spectral_lines.windows import line_design
+from tpjb_ident.dynamic.records.line_fit import GLITCH_LIMIT, fit_without_glitches
+from tpjb_ident.dynamic.records.windows import line_design
 
 #: A line whose amplitude may change needs this distance from all others [1 / record length].
 _PARTED = 2.5

@@ -10,7 +10,7 @@ from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table
-from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
+from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.rlm import RlmSettings
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.amplitude import AmplitudeSlope, amplitude_slope

@@ -78,13 +78,16 @@ def codec_of_bytes(encoding: str) -> str:
     return encoding if is_ascii_based(encoding) and encoding != "utf-8-sig" else "utf-8"
 
 
-class _Transcoder(io.RawIOBase):
-    """Reads a file of any encoding as UTF-8."""
+class _Rewritten(io.RawIOBase):
+    """A stream that gives its bytes in another form, block by block; what is written anew may grow or shrink."""
 
-    def __init__(self, path: Path, encoding: str) -> None:
-        self._stream = path.open("rb")
-        self._decoder = codecs.getincrementaldecoder(encoding)("replace")
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
         self._rest = b""
+
+    def _form(self, block: bytes) -> bytes:
+        """The next block in the other form; an empty one is the end."""
+        raise NotImplementedError
 
     def readable(self) -> bool:
         return True
@@ -92,7 +95,7 @@ class _Transcoder(io.RawIOBase):
     def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
         while not self._rest:
             block = self._stream.read(2**18)
-            self._rest = self._decoder.decode(block, final=not block).encode("utf-8", "replace")
+            self._rest = self._form(block)
             if not block:
                 break
         size = min(len(buffer), len(self._rest))
@@ -103,6 +106,17 @@ class _Transcoder(io.RawIOBase):
     def close(self) -> None:
         self._stream.close()
         super().close()
+
+
+class _Transcoder(_Rewritten):
+    """Reads a file of any encoding as UTF-8."""
+
+    def __init__(self, path: Path, encoding: str) -> None:
+        super().__init__(path.open("rb"))
+        self._decoder = codecs.getincrementaldecoder(encoding)("replace")
+
+    def _form(self, block: bytes) -> bytes:
+        return self._decoder.decode(block, final=not block).encode("utf-8", "replace")
 
 
 def open_ascii(path: Path, encoding: str) -> BinaryIO:
@@ -232,31 +246,13 @@ def squeeze_blanks(stream: BinaryIO) -> BinaryIO:
     return io.BufferedReader(_Squeezer(stream), 2**18)  # type: ignore[return-value]
 
 
-class _Squeezer(io.RawIOBase):
+class _Squeezer(_Rewritten):
     """See `squeeze_blanks`."""
 
-    def __init__(self, stream: BinaryIO) -> None:
-        self._stream = stream
-        self._line_part = b""
-        self._rest = b""
+    _line_part = b""
 
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
-        while not self._rest:
-            block = self._stream.read(2**18)
-            text = self._line_part + block
-            cut = len(text) if not block else text.rfind(b"\n") + 1
-            self._line_part = text[cut:]
-            self._rest = re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", text[:cut]))
-            if not block:
-                break
-        size = min(len(buffer), len(self._rest))
-        buffer[:size] = self._rest[:size]
-        self._rest = self._rest[size:]
-        return size
-
-    def close(self) -> None:
-        self._stream.close()
-        super().close()
+    def _form(self, block: bytes) -> bytes:
+        text = self._line_part + block
+        cut = len(text) if not block else text.rfind(b"\n") + 1
+        self._line_part = text[cut:]
+        return re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", text[:cut]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +57,7 @@ def read_series(path: Path) -> list[Series]:
     head = find_head(path)
     labels = tuple(f"{i}:{_short(n)}" for i, n in enumerate(head.names))  # names need not be unique, labels must
     numbers = [label for i, label in enumerate(labels) if i not in head.dates]
-    table = read_table(Source(path, path.name, None, head.dialect(labels)), numbers)
+    table = read_table(Source(path, path.name, None, replace(head.dialect, names=labels)), numbers)
     clock: np.ndarray | None = None
     found = []
     for i, (name, label) in enumerate(zip(head.names, labels, strict=True)):

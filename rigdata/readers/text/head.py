@@ -24,52 +24,22 @@ class TextHead:
 
     Attributes
     ----------
-    encoding, delimiter, decimal : str
-    names, units : tuple of str
+    dialect : Dialect
+        As the CSV parser wants it; `header_line` is 0 where the columns have no names.
+    units : tuple of str
         One per column; "" where there is none.
-    header_line, data_line : int
-        1-based; `header_line` is 0 where the columns have no names.
-    data_offset : int
-        Byte at which the numbers begin.
-    preamble : tuple of str
-        Lines above the names.
-    stamps : frozenset of int
-        Columns of times of day, with or without a date.
     dates : frozenset of int
         Columns of dates alone.
     """
 
-    encoding: str
-    delimiter: str
-    decimal: str
-    names: tuple[str, ...]
+    dialect: Dialect
     units: tuple[str, ...]
-    header_line: int
-    data_line: int
-    data_offset: int
-    preamble: tuple[str, ...]
-    stamps: frozenset[int] = frozenset()
     dates: frozenset[int] = frozenset()
 
-    def dialect(self, labels: tuple[str, ...]) -> Dialect:
-        """Describe the file as the CSV parser wants it.
-
-        Parameters
-        ----------
-        labels : tuple of str
-            What its columns are called.
-        """
-        return Dialect(
-            encoding=self.encoding,
-            delimiter=self.delimiter,
-            decimal=self.decimal,
-            header_line=self.header_line,
-            data_line=self.data_line,
-            data_offset=self.data_offset,
-            names=labels,
-            sure=True,
-            stamps=self.stamps,
-        )
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One per column; "" where there is none."""
+        return self.dialect.names
 
 
 def find_head(path: Path) -> TextHead:
@@ -101,19 +71,17 @@ def find_head(path: Path) -> TextHead:
     width, first, delimiter, decimal = best
     sample = [c for c in (_cells(t, delimiter) for t in lines[first : first + _SAMPLE]) if c]
     header, names = _names(lines, first, width, delimiter)
-    return TextHead(
+    dialect = Dialect(
         encoding=encoding,
         delimiter=delimiter,
         decimal=decimal,
-        names=names,
-        units=_units(lines, header, first, names, delimiter),
         header_line=header + 1,
         data_line=first + 1,
         data_offset=raw[first][1],
-        preamble=tuple(lines[: max(header, 0)]),
+        names=names,
         stamps=columns_of(is_stamp, sample),
-        dates=columns_of(is_date, sample),
     )
+    return TextHead(dialect, _units(lines, header, first, names, delimiter), columns_of(is_date, sample))
 
 
 def _table_start(lines: list[str], delimiter: str, decimal: str) -> tuple[int, int] | None:

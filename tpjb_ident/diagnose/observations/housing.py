@@ -14,10 +14,10 @@ import numpy as np
 
 from model.setup import Setup
 from rigdata.manifest.manifest import MAINS_FREQUENCIES
-from tpjb_ident.dynamic.broadband.spectra.run_spectra import SpectraSettings, run_spectra
+from tpjb_ident.dynamic.broadband.run_spectra import SpectraSettings, run_spectra
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.records.run_phasors import run_phasors
-from tpjb_ident.dynamic.spectral_lines.windows import RecordTooShortError
+from tpjb_ident.dynamic.records.windows import RecordTooShortError
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign

@@ -12,9 +12,9 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.broadband.clock_rate import common_rates
 from tpjb_ident.dynamic.broadband.line_rows import LinePlan, LineRows, line_plan, line_rows
-from tpjb_ident.dynamic.broadband.spectra.clock_rate import common_rates
-from tpjb_ident.dynamic.broadband.spectra.run_spectra import (
+from tpjb_ident.dynamic.broadband.run_spectra import (
     OPEN_ENDS,
     RunSpectra,
     SpectraSettings,

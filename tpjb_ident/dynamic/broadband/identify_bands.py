@@ -14,13 +14,13 @@ from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.check.redundant_channels import widened
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.broadband.band_coefficients import band_points
 from tpjb_ident.dynamic.broadband.band_models import MODELS, BandModel, Shared, between, fit_band, supported
 from tpjb_ident.dynamic.broadband.band_point import BandPoint, BandSettings, band_groups, is_broadband, read_point
-from tpjb_ident.dynamic.broadband.band_result import BandLine, BandResult
+from tpjb_ident.dynamic.broadband.band_result import BandLine, BandResult, band_points
 from tpjb_ident.dynamic.broadband.line_estimates import STRONG, LineEstimates, estimate_line
 from tpjb_ident.dynamic.broadband.line_fit import LineFit
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
+from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 from tpjb_ident.dynamic.broadband.shared_sources import (
     RunScatter,
     SharedSources,
@@ -28,7 +28,6 @@ from tpjb_ident.dynamic.broadband.shared_sources import (
     shared_sources,
     slope_over_load,
 )
-from tpjb_ident.dynamic.broadband.spectra.run_spectra import RunSpectra
 from tpjb_ident.dynamic.corrections.cell_zero import cell_zero_uncertainty
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, load_conditions, load_misses
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness

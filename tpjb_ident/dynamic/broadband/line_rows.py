@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
-from tpjb_ident.dynamic.broadband.spectra.run_spectra import RunSpectra
+from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 from tpjb_ident.errors import BadInputError
 
 #: Lines over a band where a record resolves more, and bins that a line takes at least.

@@ -17,7 +17,7 @@ from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.broadband.line_fit import LineFit
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
-from tpjb_ident.dynamic.broadband.spectra.run_spectra import RunSpectra
+from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 from tpjb_ident.dynamic.corrections.load_direction import PLAUSIBLE
 from tpjb_ident.dynamic.corrections.static_load import UNKNOWN_EXPONENT, LoadMiss
 from tpjb_ident.dynamic.corrections.systematic_sources import (

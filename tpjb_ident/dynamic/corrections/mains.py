@@ -18,7 +18,7 @@ from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.mains_angles import MainsEquations
 from tpjb_ident.dynamic.estimators.errors_in_variables import repeats
-from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
+from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.records.line_means import complex_median
 from tpjb_ident.dynamic.runs.point_data import PointData

@@ -14,8 +14,7 @@ from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, repeats
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
 from tpjb_ident.dynamic.estimators.mm import mm_fit
-from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable, displacement_condition, phasor_table
-from tpjb_ident.dynamic.estimators.r_matrix import ols_fit
+from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, displacement_condition, ols_fit, phasor_table
 from tpjb_ident.dynamic.estimators.rlm import NORMS, RlmSettings, rlm_fit
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.estimators.uncertainty import homoscedastic, with_repeats

@@ -13,8 +13,7 @@ import numpy as np
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.mm import mm_fit
-from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable
-from tpjb_ident.dynamic.estimators.r_matrix import ols_fit
+from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, ols_fit
 from tpjb_ident.errors import ArgumentError
 
 

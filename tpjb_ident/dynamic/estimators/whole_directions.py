@@ -14,7 +14,7 @@ from scipy.special import fdtri
 
 from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats, eiv_fit, repeats
-from tpjb_ident.dynamic.estimators.phasor_table import PhasorTable
+from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable
 from tpjb_ident.dynamic.estimators.robust_constants import trimming_limits
 from tpjb_ident.dynamic.records.line_means import complex_median
 

@@ -13,7 +13,7 @@ from scipy.ndimage import median_filter
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, RunPhasors
-from tpjb_ident.dynamic.spectral_lines.windows import line_design
+from tpjb_ident.dynamic.records.windows import line_design
 
 #: Samples that are looked at.
 LOOK = 2**15

@@ -10,11 +10,11 @@ import numpy as np
 
 from rigdata.rows import RowReader
 from tpjb_ident.arrays import FloatArray, IntArray
+from tpjb_ident.dynamic.records.lines import LineSet
 from tpjb_ident.dynamic.records.phasors import SCALE_LIMIT, LineFitter, PhasorBlock, fit_uneven, usual_scale
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, PhasorSettings, RunPhasors
-from tpjb_ident.dynamic.records.shaft_speed import ShaftCourse, window_speeds
-from tpjb_ident.dynamic.spectral_lines.lines import LineSet
-from tpjb_ident.dynamic.spectral_lines.windows import plan_windows
+from tpjb_ident.dynamic.records.shaft import ShaftCourse, window_speeds
+from tpjb_ident.dynamic.records.windows import plan_windows
 
 QUANTITIES = ("displacement", "force", "acceleration")
 #: Samples of one channel held at a time: few enough for X and Y to stay in a core's cache.
@@ -97,14 +97,14 @@ class _Fitted:
 
 
 class _Work:
-    """What all windows of a run are fitted with."""
+    """What all windows of a run are fitted with, with each window's own shaft speed where speeds are known."""
 
     def __init__(
         self, length: int, rate: float, lines: LineSet, speeds: FloatArray | None, nominal_speed: float
     ) -> None:
-        self.length, self.nominal_speed = length, nominal_speed
+        self.length, self.rate, self.lines = length, rate, lines
+        self.speeds, self.nominal_speed = speeds, nominal_speed
         self.fitter = LineFitter(length, rate, lines.frequencies)
-        self.followers = _Followers(length, rate, lines, speeds)
 
     def fit(self, stretches: RowReader, first: int, stop: int, usual: dict[str, FloatArray] | None = None) -> _Fitted:
         """Read and fit windows first..stop-1; `usual` is the residual scale that windows of the run have."""
@@ -114,8 +114,20 @@ class _Work:
         for quantity, values in stretch.rows.items():
             rows = values.reshape(2, stop - first, self.length)
             blocks[quantity] = _fit_windows(self.fitter, rows, times, None if usual is None else usual[quantity])
-            self.followers.refit(blocks[quantity], rows, times, first)
+            if self.speeds is not None:
+                self._refit(blocks[quantity], rows, times, self.speeds[first:stop])
         return _Fitted(blocks, times.start, window_speeds(stretch.speed, stop - first, self.nominal_speed))
+
+    def _refit(self, block: PhasorBlock, rows: FloatArray, times: _Times, speeds: FloatArray) -> None:
+        """Fit every window once more with its own speed."""
+        usual = usual_scale(block.noise)
+        for i, speed in enumerate(speeds.tolist()):
+            if np.isfinite(speed) and i not in times.uneven:
+                _put(block, i, self._at(speed).fit(rows[:, i : i + 1], times.start[i : i + 1], usual))
+
+    @functools.lru_cache(maxsize=64)  # noqa: B019 -- lives as long as the run's extraction
+    def _at(self, speed: float) -> LineFitter:
+        return LineFitter(self.length, self.rate, self.lines.at_speed(speed).frequencies)
 
 
 @dataclass(frozen=True)
@@ -158,27 +170,6 @@ def _fit_windows(fitter: LineFitter, rows: FloatArray, times: _Times, usual: Flo
         if good.sum() > 2 * fitter.design.shape[1]:
             _put(block, int(i), fit_uneven(rows[:, i, good].T, times.stamps[i][good], fitter.frequencies, 0.0))
     return block
-
-
-class _Followers:
-    """Fitters with each window's own shaft speed; nothing to do where the speed is steady."""
-
-    def __init__(self, length: int, rate: float, lines: LineSet, speeds: FloatArray | None) -> None:
-        self.length, self.rate, self.lines, self.speeds = length, rate, lines, speeds
-
-    def refit(self, block: PhasorBlock, rows: FloatArray, times: _Times, first: int) -> None:
-        """Fit every window once more with its own speed, where the speeds are known."""
-        if self.speeds is None:
-            return
-        usual = usual_scale(block.noise)
-        for i in range(rows.shape[1]):
-            speed = float(self.speeds[first + i])
-            if np.isfinite(speed) and i not in times.uneven:
-                _put(block, i, self._at(speed).fit(rows[:, i : i + 1], times.start[i : i + 1], usual))
-
-    @functools.lru_cache(maxsize=64)  # noqa: B019 -- lives as long as the run's extraction
-    def _at(self, speed: float) -> LineFitter:
-        return LineFitter(self.length, self.rate, self.lines.at_speed(speed).frequencies)
 
 
 def _put(block: PhasorBlock, i: int, single: PhasorBlock) -> None:

@@ -50,39 +50,21 @@ class ShortRecord:
         self._speed: tuple[Record | None] | None = None
 
     def vector(self, quantity: str, start: int | None = None, stop: int | None = None) -> VectorRecord:
-        """As the run's own.
-
-        Parameters
-        ----------
-        quantity : str
-        start, stop : int, optional
-            Samples, as in a Python slice; default all.
-        """
+        """As the run's own."""
         if quantity not in self._kept:
             self._kept[quantity] = self._run.vector(quantity, 0, self.length)
         kept = self._kept[quantity]
         return replace(kept, values=kept.values[start:stop], time=kept.time[start:stop])
 
     def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
-        """As the run's own.
-
-        Parameters
-        ----------
-        start, stop : int, optional
-            Samples, as in a Python slice; default all.
-        """
+        """As the run's own."""
         if self._speed is None:
             self._speed = (self._run.speed(0, self.length),)
         (kept,) = self._speed
         return None if kept is None else replace(kept, values=kept.values[start:stop], time=kept.time[start:stop])
 
     def row_reader(self, quantities: Sequence[str]) -> RowReader:
-        """Rows of what is kept.
-
-        Parameters
-        ----------
-        quantities : sequence of str
-        """
+        """Rows of what is kept."""
         return VectorRows(self, quantities)
 
     def kept_open(self) -> AbstractContextManager[None]:
@@ -113,27 +95,14 @@ class KeptReadings:
         return getattr(self._reader, name)
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of `names`, (stop - start,) each; not to be written to.
-
-        Parameters
-        ----------
-        names : sequence of str
-        start, stop : int
-            First sample, and the one after the last.
-        """
+        """Raw readings of `names`, (stop - start,) each; not to be written to."""
         kept = self._beginning() if stop <= self.samples else {}
         if all(name in kept for name in names):
             return [kept[name][start:stop] for name in names]
         return list(self._reader.read(names, start, stop))
 
     def time(self, start: int, stop: int) -> FloatArray:
-        """Seconds of samples start..stop-1.
-
-        Parameters
-        ----------
-        start, stop : int
-            First sample, and the one after the last.
-        """
+        """Seconds of samples start..stop-1."""
         if stop > self.samples:
             return np.asarray(self._reader.time(start, stop))
         if self._time is None:

@@ -12,9 +12,9 @@ import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.records.lines import LineSet, known_lines
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, PhasorSettings, RunPhasors
-from tpjb_ident.dynamic.records.shaft_speed import ShaftCourse
-from tpjb_ident.dynamic.spectral_lines.lines import LineSet, known_lines
+from tpjb_ident.dynamic.records.shaft import ShaftCourse
 
 #: Name of the condition that a shaft's changing speed gives rise to.
 DRIFT = "speed drifts"

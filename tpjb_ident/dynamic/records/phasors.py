@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
-from tpjb_ident.dynamic.spectral_lines.line_fit import GLITCH_LIMIT, SCALE_LIMIT, beside, fit_without_glitches
-from tpjb_ident.dynamic.spectral_lines.windows import line_design
+from tpjb_ident.dynamic.records.line_fit import GLITCH_LIMIT, SCALE_LIMIT, beside, fit_without_glitches
+from tpjb_ident.dynamic.records.windows import line_design
 
 #: Outlying samples up to this share are told by leaving them out, again and again, until fit and verdict agree.
 FEW = 0.1

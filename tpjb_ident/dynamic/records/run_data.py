@@ -15,9 +15,9 @@ from rigdata.record import Record, VectorRecord
 from rigdata.rows import RowReader
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.records.lines import LineSet, LineSettings
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
-from tpjb_ident.dynamic.spectral_lines.lines import LineSet, LineSettings
-from tpjb_ident.dynamic.spectral_lines.windows import WindowSettings
+from tpjb_ident.dynamic.records.windows import WindowSettings
 from tpjb_ident.errors import BadInputError
 
 

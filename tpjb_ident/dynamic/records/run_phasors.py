@@ -15,10 +15,10 @@ from tpjb_ident.dynamic.records.extra_lines import unexpected_lines
 from tpjb_ident.dynamic.records.extraction import extract
 from tpjb_ident.dynamic.records.kept_readings import SHORT, ShortRecord
 from tpjb_ident.dynamic.records.line_tuning import DRIFT, retuned, tuned
+from tpjb_ident.dynamic.records.lines import LineSet, known_lines
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, PhasorSettings, RunPhasors
-from tpjb_ident.dynamic.records.shaft_speed import shaft_speed
-from tpjb_ident.dynamic.spectral_lines.lines import LineSet, known_lines
-from tpjb_ident.dynamic.spectral_lines.windows import RecordTooShortError
+from tpjb_ident.dynamic.records.shaft import shaft_speed
+from tpjb_ident.dynamic.records.windows import RecordTooShortError
 
 
 def run_phasors(run: MeasuredRun, housing_mass: float, settings: PhasorSettings | None = None) -> RunPhasors:

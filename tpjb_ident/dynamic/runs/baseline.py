@@ -14,7 +14,7 @@ from rigdata.campaign import Campaign
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.estimate import estimate_table
-from tpjb_ident.dynamic.estimators.phasor_table import phasor_table
+from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.dynamic.runs.point_data import PointData, gather

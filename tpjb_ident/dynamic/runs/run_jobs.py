@@ -21,12 +21,12 @@ from tpjb_ident.dynamic.records.kept_readings import beginning_of, with_kept_beg
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
-from tpjb_ident.dynamic.records.shaft_phase import shaft_phases
+from tpjb_ident.dynamic.records.shaft import shaft_phases
+from tpjb_ident.dynamic.records.windows import RecordTooShortError
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 from tpjb_ident.dynamic.runs.left_out import DEAD_ACCELEROMETER, LeftOut
 from tpjb_ident.dynamic.runs.point_data import mean_temperatures, point_of
 from tpjb_ident.dynamic.runs.run_store import RunResult, RunStore, fingerprint, of_run
-from tpjb_ident.dynamic.spectral_lines.windows import RecordTooShortError
 from tpjb_ident.runtime.executors import InProcessWorkers, Workers, each_finished
 
 Progress = Callable[[str, int, int], None]

@@ -29,9 +29,9 @@ from tpjb_ident.check.findings import Finding, Reporter
 from tpjb_ident.check.lines import RecordLines
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.records.lines import Line, LineSet
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
-from tpjb_ident.dynamic.spectral_lines.lines import Line, LineSet
 from tpjb_ident.runtime.provenance import sha256, source_stamp
 from tpjb_ident.runtime.tables import write_atomic
 

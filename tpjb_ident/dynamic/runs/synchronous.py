@@ -15,7 +15,7 @@ import numpy as np
 from tpjb_ident.arrays import ComplexArray, IntArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.line_means import complex_median
-from tpjb_ident.dynamic.records.shaft_phase import shaft_order
+from tpjb_ident.dynamic.records.shaft import shaft_order
 from tpjb_ident.dynamic.runs.point_data import PointData
 
 FITTED = "shaft lines fitted"

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.dynamic.spectral_lines.lines import LineSet
+from tpjb_ident.dynamic.records.lines import LineSet
 from tpjb_ident.errors import TpjbError
 
 

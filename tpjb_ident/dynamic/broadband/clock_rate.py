@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
-from tpjb_ident.dynamic.broadband.spectra.disturbing_lines import Disturbance, bins_taken
-from tpjb_ident.dynamic.broadband.spectra.samples import Samples, interpolated
+from tpjb_ident.dynamic.broadband.disturbing_lines import Disturbance, bins_taken
+from tpjb_ident.dynamic.broadband.samples import Samples, interpolated
 
 #: Pieces of a record,
 PIECES = 8

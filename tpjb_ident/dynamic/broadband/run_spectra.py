@@ -10,8 +10,8 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.broadband.spectra.clock_rate import ClockRate, clock_rates, with_one_clock
-from tpjb_ident.dynamic.broadband.spectra.disturbing_lines import (
+from tpjb_ident.dynamic.broadband.clock_rate import ClockRate, clock_rates, with_one_clock
+from tpjb_ident.dynamic.broadband.disturbing_lines import (
     LEFT_OUT,
     LEFT_OUT_OF_PERIOD,
     Disturbance,
@@ -19,14 +19,14 @@ from tpjb_ident.dynamic.broadband.spectra.disturbing_lines import (
     find_disturbances,
     without_disturbances,
 )
-from tpjb_ident.dynamic.broadband.spectra.period import Period, find_period, resampled
-from tpjb_ident.dynamic.broadband.spectra.samples import Samples, read_samples
+from tpjb_ident.dynamic.broadband.period import Period, find_period, resampled
+from tpjb_ident.dynamic.broadband.samples import Samples, read_samples
 from tpjb_ident.dynamic.instruments.findings import START
 from tpjb_ident.dynamic.records.compensation import compensated, look_at_readings
+from tpjb_ident.dynamic.records.lines import Line, LineSet
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import RunPhasors, oil_force
 from tpjb_ident.dynamic.runs.point_data import mean_temperatures
-from tpjb_ident.dynamic.spectral_lines.lines import Line, LineSet
 
 #: Kinds that may repeat themselves; those that never do are not asked.
 MAY_REPEAT = ("multisine", "random", "sweep")

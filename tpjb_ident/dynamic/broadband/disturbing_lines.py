@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tpjb_ident.arrays import BoolArray, FloatArray
-from tpjb_ident.dynamic.broadband.spectra.samples import Samples
+from tpjb_ident.dynamic.broadband.samples import Samples
 
 #: Highest harmonics of shaft and mains that are looked for.
 SHAFT_HARMONICS, MAINS_HARMONICS = 8, 5

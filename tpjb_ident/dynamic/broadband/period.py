@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
-from tpjb_ident.dynamic.broadband.spectra.samples import Samples, interpolated
+from tpjb_ident.dynamic.broadband.samples import Samples, interpolated
 
 #: Periods that a record must hold.
 MIN_PERIODS = 3

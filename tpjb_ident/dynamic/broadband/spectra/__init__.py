@@ -1,1 +1,0 @@
-"""A broadband run as phasors: its samples, its period, lines that disturb it, its clocks."""
