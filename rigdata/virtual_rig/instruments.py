@@ -372,27 +372,6 @@ class Instruments:
             housing_mass_error=self.housing_mass_error + mass_error,
         )
 
-    def with_drawn_errors(self, seed: int, angle: float = 0.0) -> Instruments:
-        """Draw every gain from its stated uncertainty, and the probes' and cells' angles from `angle` [rad].
-
-        A campaign without any hidden effect still has these: leaving them out flatters the false alarms.
-
-        Parameters
-        ----------
-        seed : int
-            Of the random numbers.
-        angle : float, optional
-            Standard deviation of the angles [rad].
-        """
-        rng = np.random.default_rng([seed, 1])
-        gains, turns = rng.standard_normal((2, len(self.sensors)))
-
-        def drawn(sensor: Sensor, gain: float, turn: float) -> Sensor:
-            turned = sensor.error.angle + (angle * turn if sensor.axis is not None else 0.0)
-            return sensor.with_error(gain=sensor.error.gain * (1 + sensor.uncertainty * gain), angle=turned)
-
-        return replace(self, sensors=tuple(drawn(s, float(g), float(t)) for s, g, t in zip(self.sensors, gains, turns)))
-
 
 def _unit(sensor: Sensor, turn: float) -> np.ndarray:
     if sensor.axis is None:

@@ -325,8 +325,11 @@ def test_what_runs_show_of_their_gains_is_told_from_what_h_takes():
 @pytest.mark.slow
 def test_the_command_writes_h_over_the_band_whole(tmp_path):
     path = campaign(tmp_path, BandRig(kind="multisine", seconds=6.0))
-    result = tpjb("identify", path, "--out", tmp_path / "out")
+    result = tpjb("identify", path, "--plain", "--keep-r", "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
+    plain = pd.read_csv(tmp_path / "out" / "plain.csv")
+    assert len(plain) == 0  # Eq. (15) line by line is for sines
+    assert "kxx_N_per_m" in plain
     written = {p.name for p in (tmp_path / "out").iterdir()}
     assert {"frf.csv", "frf.parquet", "frf_estimators.csv", "frf_models.csv", "run.json"} <= written
     assert "models over the band" in result.output

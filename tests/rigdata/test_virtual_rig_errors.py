@@ -109,19 +109,6 @@ def test_cell_gain_shows_in_the_mean_force_and_probe_gain_in_the_position():
     assert along == pytest.approx(1.05 * (x + y) / math.sqrt(2), rel=1e-9)
 
 
-def test_drawn_errors_follow_the_stated_uncertainty():
-    gains = {"displacement": [], "force": [], "speed": []}
-    for seed in range(300):
-        drawn = Instruments.like_paper().with_drawn_errors(seed, angle=0.01)
-        for quantity, found in gains.items():
-            found += [s.error.gain - 1 for s in drawn.of(quantity)]
-    assert np.std(gains["displacement"]) == pytest.approx(0.005, rel=0.12)
-    assert np.std(gains["force"]) == pytest.approx(0.002, rel=0.12)
-    assert np.ptp(gains["speed"]) == 0.0
-    assert drawn == Instruments.like_paper().with_drawn_errors(299, angle=0.01)
-    assert drawn.named("K1").error.angle == 0.0
-
-
 def test_truth_holds_the_apparent_coefficients_and_the_gap_voltages():
     instruments = Instruments.like_paper(seed=5).with_errors(probe_gain=1.1)
     plan = RigPlan(dynamic=operating_points([(5000.0, 40.0)]))

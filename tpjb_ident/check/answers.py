@@ -10,6 +10,7 @@ import numpy as np
 
 from rigdata.calibration import Channel
 from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.check.gain_evidence import stiffness_of
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.set_points import excited, oil_force, to_plane
 
@@ -66,16 +67,7 @@ def solve_stiffness(answers: Sequence[Answer]) -> ComplexArray | None:
     ----------
     answers : sequence of Answer
     """
-    displacement = np.stack([a.displacement for a in answers], axis=1)
-    force = np.stack([a.force for a in answers], axis=1)
-    scale = np.linalg.norm(displacement, axis=0)
-    if np.any(scale == 0) or not np.all(np.isfinite(displacement)):
-        return None
-    sizes = np.linalg.svd(displacement / scale, compute_uv=False)
-    if sizes[-1] < 0.2 * sizes[0]:
-        return None
-    weights = 1.0 / scale
-    return np.linalg.lstsq((displacement * weights).T, (force * weights).T, rcond=None)[0].T
+    return stiffness_of(np.stack([a.displacement for a in answers]), np.stack([a.force for a in answers]))
 
 
 def misfit_of(answer: Answer, stiffness: ComplexArray, repair: FloatArray | None = None) -> float:

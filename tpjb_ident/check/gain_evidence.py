@@ -247,7 +247,7 @@ def _noise_error(readings: PointReadings, runs: Sequence[int], stiffness: Comple
 
 
 def common_stiffness(readings: PointReadings, runs: Sequence[int]) -> ComplexArray | None:
-    """H (2, 2) of F = H D over some runs, weighted by one over their displacements; None where not determined.
+    """H (2, 2) of F = H D over some runs; None where not determined.
 
     Parameters
     ----------
@@ -255,7 +255,17 @@ def common_stiffness(readings: PointReadings, runs: Sequence[int]) -> ComplexArr
     runs : sequence of int
         Places.
     """
-    displacement, force = readings.displacement[list(runs)], readings.force[list(runs)]
+    return stiffness_of(readings.displacement[list(runs)], readings.force[list(runs)])
+
+
+def stiffness_of(displacement: ComplexArray, force: ComplexArray) -> ComplexArray | None:
+    """H (2, 2) of F = H D, every run weighted by one over its displacement; None where they move along one line.
+
+    Parameters
+    ----------
+    displacement, force : (n, 2) complex ndarray
+        Of the runs [m], [N].
+    """
     sizes = np.linalg.norm(displacement, axis=1)
     if len(sizes) < 2 or not np.all(sizes > 0) or not np.all(np.isfinite(sizes)):
         return None

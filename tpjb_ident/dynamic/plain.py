@@ -147,7 +147,8 @@ def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.Dat
             row[name], row[f"{name}_se"] = value, error
         figures = (settings.norm, settings.window, len(p.data.runs), len(p.f) // 2, "; ".join(p.status) or "ok")
         rows.append(row | dict(zip(FIGURES, figures)))
-    return pd.DataFrame(rows)
+    columns = [c for name in COEFFICIENT_COLUMNS for c in (name, f"{name}_se")]
+    return pd.DataFrame(rows, columns=[*POINT_COLUMNS, *columns, *FIGURES])
 
 
 def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:

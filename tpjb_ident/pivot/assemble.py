@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,8 +51,8 @@ class Choice:
     records: tuple[DryRecord, ...]
     good: tuple[BoolArray, ...]
     directions: tuple[tuple[PadDirection, PadDirection], ...]
-    fits: tuple[LawFit, ...]
-    weights: FloatArray
+    fits: tuple[LawFit, ...] = ()
+    weights: FloatArray = field(default_factory=lambda: np.empty(0))
     structure: str = ""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,23 +33,6 @@ UNKNOWN_ZERO = 2.0e-5  # [m], spread of the reading at zero load from run to run
 LAWS: dict[str, Law] = {
     law.name: law for law in (HertzLine(), HertzPoint(), Power(), Linear(), PointInSeries(), Bilinear(), SplineLaw())
 }
-
-
-@dataclass(frozen=True)
-class _Pad:
-    """All records of one pad, their used blocks and fitted directions."""
-
-    records: tuple[DryRecord, ...]
-    good: tuple[BoolArray, ...]
-    directions: tuple[tuple[PadDirection, PadDirection], ...]
-
-
-@dataclass(frozen=True)
-class _Said:
-    """What is to be said of every curve: runs left out, and a structure that bends the displacements."""
-
-    refused: tuple[str, ...]
-    structure: str
 
 
 def fit_pivots(
@@ -99,7 +82,7 @@ def fit_pivots(
     if problems and (chosen.on_refusal == "raise" or not pads or (chosen.on_refusal == "few" and many)):
         raise RigDataError(problems)
     left_out = tuple(f"{run} ({reasons[run]})" for run in sorted(reasons))
-    return _curves(pads, noise, chosen, _Said(left_out, str(structure or "")))
+    return _curves(pads, noise, chosen, str(structure or ""), left_out)
 
 
 def _read(campaign: Campaign, angles: FloatArray, settings: PivotSettings) -> tuple[list[DryRecord], list[Problem]]:
@@ -124,7 +107,8 @@ def _curves(
     pads: dict[int, list[tuple[DryRecord, tuple[PadDirection, PadDirection]]]],
     first_noise: NoiseModel,
     settings: PivotSettings,
-    said: _Said,
+    structure: str,
+    refused: tuple[str, ...],
 ) -> tuple[PivotCurve, ...]:
     """Drop bad holds, learn the noise about the curves, fit every law, weigh the laws over the pads."""
     numbers = sorted(pads)
@@ -132,7 +116,7 @@ def _curves(
     for number in numbers:
         records = tuple(record for record, _ in pads[number])
         good = tuple(~bad_blocks(record, first_noise, LAWS, _fit_data, settings) for record in records)
-        members.append(_Pad(records, good, tuple(d for _, d in pads[number])))
+        members.append(Choice(records, good, tuple(d for _, d in pads[number]), structure=structure))
     noise = noise_about_curve(
         [r for m in members for r in m.records], [g for m in members for g in m.good], settings.drift_rate
     )
@@ -143,8 +127,7 @@ def _curves(
     curves = []
     for member, candidates, shares in zip(members, fits, weights, strict=True):
         likely, kept = keep_likely(candidates, shares)
-        choice = Choice(member.records, member.good, member.directions, likely, kept, said.structure)
-        curves.append(assemble_curve(choice, noise, settings, said.refused))
+        curves.append(assemble_curve(replace(member, fits=likely, weights=kept), noise, settings, refused))
     return tuple(curves)
 
 

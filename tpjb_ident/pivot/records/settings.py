@@ -43,8 +43,6 @@ class PivotSettings:
         standard deviation) for the drift that the records themselves show.
     bad_hold_limit : float
         A hold is left out when it misses the curve by more than this many standard errors.
-    extrapolate_to : float
-        Tables reach this many times the largest measured load.
     on_refusal : {"raise", "few", "skip"}
         Whether one refused record stops everything, is left out as long as fewer than half of the records are refused
         (more are no accident of single records), or is left out in any case.
@@ -62,7 +60,6 @@ class PivotSettings:
     contact_tolerance: float = 0.05
     drift_rate: float = 1.0e-8
     bad_hold_limit: float = 5.0
-    extrapolate_to: float = 2.0
     on_refusal: Literal["raise", "few", "skip"] = "raise"
 
     def __post_init__(self) -> None:
