@@ -27,7 +27,7 @@ from tpjb_ident.diagnose.search.selection import Progress
 from tpjb_ident.diagnose.search.settings import DiagnoseSettings
 from tpjb_ident.diagnose.verdict.decide import decide
 from tpjb_ident.diagnose.verdict.verdict import Verdict
-from tpjb_ident.dynamic.results.identification_tables import coefficient_columns, point_columns
+from tpjb_ident.dynamic.results.identification import coefficient_columns, point_columns
 from tpjb_ident.schema import DAMPING, ENTRIES, STIFFNESS, coefficient_column
 
 if TYPE_CHECKING:
