@@ -178,10 +178,6 @@ def compare_campaign(
     ahead : callable, optional
         Gives what `model_side.model_beside` has found meanwhile.
 
-    Returns
-    -------
-    Comparison
-
     Raises
     ------
     ComparisonError

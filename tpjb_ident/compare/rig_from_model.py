@@ -52,10 +52,6 @@ def rig_truth(bearing: Bearing, settings: ModelSettings, bearing_text: str = "")
     bearing_text : str
         Text of the bearing file, for the campaign.
 
-    Returns
-    -------
-    RigTruth
-
     Raises
     ------
     ModelConvergenceError
@@ -76,10 +72,6 @@ def truth_of(setup: Setup, bearing_text: str = "") -> RigTruth:
         What the bearing is really like.
     bearing_text : str
         Text of the bearing file, for the campaign.
-
-    Returns
-    -------
-    RigTruth
     """
     world = _World(setup)
     return RigTruth(

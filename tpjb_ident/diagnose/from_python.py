@@ -106,10 +106,6 @@ def plan(
     temperatures : bool
         A temperature sensor in every pad.
 
-    Returns
-    -------
-    CampaignPlan
-
     Raises
     ------
     ArgumentError

@@ -97,10 +97,6 @@ def static_points(frame: pd.DataFrame, force: bool = False) -> Chosen:
     force : bool
         Also take the points that are not to be trusted, marked.
 
-    Returns
-    -------
-    Chosen
-
     Raises
     ------
     ExportError

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from model.bearing import Bearing
+    from model.options import Options
     from rigdata.operating_point import OperatingPoint
     from tpjb_ident.compare.predictions import ModelSettings
 
@@ -67,7 +68,7 @@ FEW = 20
 THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 
 
-def parse_physics(names: str | None, housing: str | None) -> Any:
+def parse_physics(names: str | None, housing: str | None) -> Options:
     """Read `--physics` and `--housing-temperature`.
 
     Parameters
@@ -76,10 +77,6 @@ def parse_physics(names: str | None, housing: str | None) -> Any:
         Option --physics.
     housing : str, optional
         Option --housing-temperature.
-
-    Returns
-    -------
-    Options
 
     Raises
     ------

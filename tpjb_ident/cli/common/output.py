@@ -104,11 +104,6 @@ def output_of(command: str, as_json: bool, quiet: bool) -> Iterator[CommandOutpu
         Its name.
     as_json, quiet : bool
         As asked for.
-
-
-    Yields
-    ------
-    CommandOutput
     """
     import typer
 

@@ -147,10 +147,6 @@ def progress(what: str) -> Iterator[Progress]:
     ----------
     what : str
         What is being done, for people.
-
-    Yields
-    ------
-    Progress
     """
     console = _console(stderr=True)
     if command_output().silent or not console.is_terminal:

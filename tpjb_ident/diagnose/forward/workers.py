@@ -79,10 +79,6 @@ def workers(forward: ForwardModel, problem: Any, count: int | None = None) -> It
     problem : object
     count : int, optional
         Processes; 1 runs everything here. Default: the cores this process may use.
-
-    Yields
-    ------
-    Map
     """
     number = next(_numbers)
     _shared[number] = (forward, problem)

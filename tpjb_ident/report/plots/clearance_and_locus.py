@@ -52,10 +52,6 @@ def clearance_and_locus(
         Pad angles [rad] and assembled clearances [m] of the drawing.
     title : str, optional
 
-    Returns
-    -------
-    Figure
-
     Raises
     ------
     ValueError

@@ -39,10 +39,6 @@ def coefficient(
         The longest series over it is drawn.
     title : str, optional
 
-    Returns
-    -------
-    Figure
-
     Raises
     ------
     ValueError

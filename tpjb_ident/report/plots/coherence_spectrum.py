@@ -38,10 +38,6 @@ def coherence_spectrum(
         Length of the averaged pieces [s]; default: as many pieces as give 16 averages at half overlap.
     title : str, optional
 
-    Returns
-    -------
-    Figure
-
     Raises
     ------
     ValueError

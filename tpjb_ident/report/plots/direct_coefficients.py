@@ -50,10 +50,6 @@ def direct_coefficients(
         Out of ``"xx"``, ``"xy"``, ``"yx"``, ``"yy"``.
     title : str, optional
 
-    Returns
-    -------
-    Figure
-
     Raises
     ------
     ValueError

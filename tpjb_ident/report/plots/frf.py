@@ -53,10 +53,6 @@ def frf(
         Of ``"xx"``, ``"xy"``, ``"yx"``, ``"yy"``.
     title : str, optional
 
-    Returns
-    -------
-    Figure
-
     Raises
     ------
     ValueError

@@ -34,10 +34,6 @@ def gap(
     logarithmic : bool, optional
         Default: when the gaps span more than a factor of thirty.
     title : str, optional
-
-    Returns
-    -------
-    Figure
     """
     gaps = _gaps(source)
     if not gaps:

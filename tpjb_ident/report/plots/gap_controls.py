@@ -36,10 +36,6 @@ def gap_controls(
     noise_floor : float, optional
         What measurement noise alone would leave.
     title : str, optional
-
-    Returns
-    -------
-    Figure
     """
     rows: list[tuple[str, float, tuple[float, float] | None, str]] = [
         ("before: baseline", float(before), None, "before"), ("after: effects found", float(after), None, "after"),

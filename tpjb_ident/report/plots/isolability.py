@@ -38,10 +38,6 @@ def isolability(
     names : sequence of str, optional
         Of the k effects; default: the plan's own.
     title : str, optional
-
-    Returns
-    -------
-    Figure
     """
     matrix = np.asarray(getattr(plan, "separation", plan), dtype=float)
     names = names or [c.label for c in getattr(plan, "candidates", ())]

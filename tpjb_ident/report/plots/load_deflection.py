@@ -40,10 +40,6 @@ def load_deflection(
     level : float
         Coverage of the bands: of what the probes should read at given load, about the points' own zero.
     title : str, optional
-
-    Returns
-    -------
-    Figure
     """
     chosen = list(curves) if isinstance(curves, Sequence) else [curves]
     if not chosen:

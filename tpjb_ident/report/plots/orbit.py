@@ -26,10 +26,6 @@ def orbit(run: Run, *, title: str | None = None) -> Figure:
         With two displacement channels.
     title : str, optional
 
-    Returns
-    -------
-    Figure
-
     Raises
     ------
     ValueError

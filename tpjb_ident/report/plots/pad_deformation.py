@@ -32,10 +32,6 @@ def pad_deformation(
         Of the pads' surface at the same angles [degC]; adds a second panel.
     title : str, optional
 
-    Returns
-    -------
-    Figure
-
     Raises
     ------
     ValueError

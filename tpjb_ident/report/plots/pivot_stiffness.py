@@ -51,10 +51,6 @@ def pivot_stiffness(
     level : float
         Coverage of the bands.
     title : str, optional
-
-    Returns
-    -------
-    Figure
     """
     if not curves:
         raise ValueError("curves must hold at least one PivotCurve")

@@ -45,10 +45,6 @@ def pivots_of_bearings(
     level : float
         Coverage of the bands.
     title : str, optional
-
-    Returns
-    -------
-    Figure
     """
     if not curves:
         raise ValueError("curves must hold at least one PivotCurve")

@@ -104,10 +104,6 @@ def residual_map(source: Diagnosis | Comparison | pd.DataFrame, *, title: str | 
     source : Diagnosis, Comparison or DataFrame
         See `residual_frame`.
     title : str, optional
-
-    Returns
-    -------
-    Figure
     """
     frame = residual_frame(source)
     models = list(dict.fromkeys(frame["model"]))

@@ -43,10 +43,6 @@ def residual_series(
         Coefficients, four at most; default: the three that disagree most with the first model.
     title : str, optional
 
-    Returns
-    -------
-    Figure
-
     Raises
     ------
     ValueError

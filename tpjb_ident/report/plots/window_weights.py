@@ -26,10 +26,6 @@ def window_weights(result: PointResult | DynamicStiffness, *, title: str | None 
     result : PointResult or DynamicStiffness
         From a `PointResult` the rejected windows carry run, time and reason.
     title : str, optional
-
-    Returns
-    -------
-    Figure
     """
     estimate = result.stiffness if hasattr(result, "stiffness") else result
     weights = np.asarray(estimate.weights, dtype=float)
