@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import subprocess
 import sys
 from pathlib import Path
@@ -259,3 +260,15 @@ def test_colours_are_told_apart_by_the_colour_blind():
     seen = np.clip(linear @ matrix.T, 0.0, 1.0) ** (1 / 2.4)
     apart = np.linalg.norm(seen[:, None] - seen[None], axis=2)[np.triu_indices(5, 1)]
     assert apart.min() > 0.1
+
+
+@pytest.mark.parametrize("name", plots.__all__)
+def test_a_picture_s_name_means_its_function_whoever_imported_the_file(name):
+    module = importlib.import_module(f"tpjb_ident.report.plots.{name}")
+    assert getattr(plots, name) is getattr(module, name)
+    assert callable(getattr(plots, name))
+
+
+def test_an_unknown_picture_gets_the_nearest():
+    with pytest.raises(AttributeError, match="did you mean 'orbit'"):
+        plots.orbitt  # noqa: B018
