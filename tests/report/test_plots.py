@@ -267,8 +267,3 @@ def test_a_picture_s_name_means_its_function_whoever_imported_the_file(name):
     module = importlib.import_module(f"tpjb_ident.report.plots.{name}")
     assert getattr(plots, name) is getattr(module, name)
     assert callable(getattr(plots, name))
-
-
-def test_an_unknown_picture_gets_the_nearest():
-    with pytest.raises(AttributeError, match="did you mean 'orbit'"):
-        plots.orbitt  # noqa: B018
