@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from rigdata.campaign import Campaign
+    from tpjb_ident.compare.coefficient_table import TableSource
     from tpjb_ident.diagnose.campaign import CampaignDiagnosis
     from tpjb_ident.diagnose.diagnose import Diagnosis
     from tpjb_ident.diagnose.verdict.verdict import Assumption, Verdict
@@ -44,7 +45,7 @@ OVER: tuple[tuple[Literal["load", "frequency"], str, str], ...] = (
 
 def write_diagnosis_report(
     folder: Path,
-    campaign: Campaign,
+    campaign: Campaign | TableSource,
     result: CampaignDiagnosis,
     settings: Mapping[str, Any],
     inputs: Mapping[str, str],
@@ -56,8 +57,8 @@ def write_diagnosis_report(
     ----------
     folder : Path
         Exists already; what stands in it under the same names is replaced.
-    campaign : Campaign
-        The campaign that was diagnosed.
+    campaign : Campaign or TableSource
+        What was diagnosed.
     result : CampaignDiagnosis
         Diagnosis with identification and setup.
     settings : mapping

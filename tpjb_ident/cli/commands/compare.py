@@ -11,7 +11,7 @@ import typer
 from tpjb_ident.cli.commands.identify import identify_settings, refuse_untrusted, write_identification
 from tpjb_ident.cli.commands.predict import model_settings
 from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import open_bearing, open_campaign, refuse_impossible, table_inputs
+from tpjb_ident.cli.common.inputs import Data, open_data, refuse_impossible
 from tpjb_ident.cli.common.options import (
     BearingOption,
     Coefficients,
@@ -66,61 +66,46 @@ def compare(
     from tpjb_ident.compare.measured_pivots import counts_from_measured
 
     settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
-    files = {effects.name: sha256(effects)} if effects else {}
+    data = open_data("compare", campaign, coefficients, bearing, reading_error)
+    refuse_impossible(settings.effects, effects, data.bearing)
+    options["bearing"] = data.bearing_name
+    inputs = data.inputs | ({effects.name: sha256(effects)} if effects else {})
     target = out_folder(out, "compare")
-    if (campaign is None) == (coefficients is None):
-        raise BadInputError("compare: give a campaign, or --coefficients TABLE.csv with --bearing FILE; one of them.")
-    if coefficients is not None:
-        _from_table(coefficients, bearing, settings, options, files, target)
-    elif campaign is not None:
-        _from_campaign(campaign, bearing, settings, options, files, target)
+    with output_folder(target, "compare", (data.path,)) as folder:
+        result, then = _compared(data, settings, options, inputs, folder)
+        write_record(folder, target, "compare", options, inputs)
+    show_comparison(result, then)
+    print_line(f"Report: {target / 'report.html'}")
+    refuse_comparison(result)
 
 
-def _from_campaign(
-    campaign: Path, bearing: Path | None, settings: CompareSettings, options: dict[str, Any], files: dict[str, str],
-    target: Path,
-) -> None:  # fmt: skip
+def _compared(
+    data: Data, settings: CompareSettings, options: dict[str, Any], inputs: dict[str, str], folder: Path
+) -> tuple[Comparison, str]:
+    """Compare, and write everything into the folder; also the command that comes next."""
+    from tpjb_ident.compare.coefficient_table import TableSource
+
+    source = data.source
+    if isinstance(source, TableSource):
+        from tpjb_ident.compare.from_table import compare_table
+        from tpjb_ident.compare.tables import comparison_frame
+        from tpjb_ident.report.comparison_page import write_report
+
+        with progress("comparing") as show:
+            result = compare_table(data.path, data.bearing, settings, data.reading_error, show)
+        write_table(folder, "comparison", comparison_frame(result))
+        then = next_command(result, data.typed, data.given)
+        write_report(folder, result, options, inputs, then)
+        return result, then
     from tpjb_ident.compare.comparison import compare_campaign
     from tpjb_ident.compare.model_side import model_beside
 
-    source = open_campaign(campaign)
     settings = replace(settings, identify=identify_settings(source, options["method"], options["norm"]))
-    drawn, given = open_bearing(source, bearing)
-    refuse_impossible(settings.effects, options["effects"], drawn)
-    options = {**options, "bearing": bearing or source.bearing_name}
-    inputs = source.fingerprint() | given | files
-    with output_folder(target, "compare", (campaign,)) as folder:
-        with model_beside(source, drawn, settings.asked()) as ahead, progress("comparing") as show:
-            result = compare_campaign(source, drawn, settings, show, ahead)
-            then = next_command(result, str(campaign), bearing)
-            write_comparison(folder, result, options, inputs, show, then)
-        write_record(folder, target, "compare", options, inputs)
-    show_comparison(result, then)
-    print_line(f"Report: {target / 'report.html'}")
-    refuse_comparison(result)
-
-
-def _from_table(
-    path: Path, bearing: Path | None, settings: CompareSettings, options: dict[str, Any], files: dict[str, str],
-    target: Path,
-) -> None:  # fmt: skip
-    from tpjb_ident.compare.from_table import compare_table
-    from tpjb_ident.compare.tables import comparison_frame
-    from tpjb_ident.report.comparison_page import write_report
-
-    drawn, error, inputs = table_inputs("compare", path, bearing, options["reading_error"])
-    inputs |= files
-    refuse_impossible(settings.effects, options["effects"], drawn)
-    with output_folder(target, "compare", (path,)) as folder:
-        with progress("comparing") as show:
-            result = compare_table(path, drawn, settings, error, show)
-        write_table(folder, "comparison", comparison_frame(result))
-        then = next_command(result, f"--coefficients {path}", bearing)
-        write_report(folder, result, options, inputs, then)
-        write_record(folder, target, "compare", options, inputs)
-    show_comparison(result, then)
-    print_line(f"Report: {target / 'report.html'}")
-    refuse_comparison(result)
+    with model_beside(source, data.bearing, settings.asked()) as ahead, progress("comparing") as show:
+        result = compare_campaign(source, data.bearing, settings, show, ahead)
+        then = next_command(result, data.typed, data.given)
+        write_comparison(folder, result, options, inputs, show, then)
+    return result, then
 
 
 def _variants(text: str) -> tuple[str, ...]:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tpjb_ident.cli.commands.identify import refuse_untrusted, write_identification
 from tpjb_ident.cli.commands.predict import model_settings, pivot_choice
 from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import open_bearing, open_campaign, refuse_impossible, table_inputs
+from tpjb_ident.cli.common.inputs import Data, open_data, refuse_impossible
 from tpjb_ident.cli.common.options import (
     BearingOption,
     Coefficients,
@@ -25,7 +24,7 @@ from tpjb_ident.cli.common.options import (
     out_folder,
 )
 from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import command_line, print_line, progress, table
+from tpjb_ident.cli.common.terminal import Progress, command_line, print_line, progress, table
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
@@ -34,7 +33,7 @@ from tpjb_ident.runtime.tables import write_text
 if TYPE_CHECKING:
     from tpjb_ident.diagnose.campaign import Baseline, CampaignDiagnosis
     from tpjb_ident.diagnose.search.settings import DiagnoseSettings
-    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.diagnose.verdict.verdict import Verdict
 
 Pivots = Annotated[str, typer.Option("--pivots", help="Where to start from: kirk, rigid, measured or a pivots.toml.")]
 ModelTolerance = Annotated[
@@ -71,8 +70,6 @@ def diagnose(
     `tpjb predict --effects` and `tpjb compare --effects`), report.html, and the identified coefficients.
     """
     options = as_given(locals())
-    if (campaign is None) == (coefficients is None):
-        raise BadInputError("diagnose: give a campaign, or --coefficients TABLE.csv with --bearing FILE; one of them.")
     if model_tolerance is not None and not 1e-4 <= model_tolerance <= 0.5:
         raise BadInputError(f"--model-tolerance {model_tolerance:g}: must lie between 0.0001 and 0.5 (0.015 is 1.5 %).")
     if library is not None:
@@ -88,22 +85,26 @@ def diagnose(
 
     refuse_counted_twice(start, model.effects, effects)
     baseline = Baseline(start, thermal, model.effects)
+    data = open_data("diagnose", campaign, coefficients, bearing, reading_error)
+    refuse_impossible(model.effects, effects, data.bearing)
+    inputs = data.inputs | files
     target = out_folder(out, "diagnose")
-    if coefficients is not None:
-        _from_table(_Asked(baseline, settings, options, files, target), coefficients, bearing, reading_error)
-    elif campaign is not None:
-        _from_campaign(_Asked(baseline, settings, options, files, target), campaign, bearing)
+    with output_folder(target, "diagnose", (data.path,)) as folder:
+        with progress("diagnosing") as show:
+            result = _diagnosed(data, baseline, settings, show)
+            if result.identification is not None:
+                write_identification(folder, result.identification)
+            _write_verdict(folder, baseline, result.diagnosis.verdict)
+            then = _next(data, result, target)
+            from tpjb_ident.report.diagnosis_page import write_diagnosis_report
 
-
-@dataclass(frozen=True)
-class _Asked:
-    """What the options ask for, whatever the data come from."""
-
-    baseline: Baseline
-    settings: DiagnoseSettings
-    options: dict[str, Any]
-    files: dict[str, str]
-    target: Path
+            named = {name: getattr(value, "name", value) for name, value in options.items()}
+            write_diagnosis_report(folder, data.source, result, named, inputs, then)
+        write_record(folder, target, "diagnose", options | {"bearing": data.bearing_name}, inputs)
+    _show_verdict(data.source.id, result, then)
+    print_line(f"Report: {target / 'report.html'}")
+    if result.identification is not None:
+        refuse_untrusted(result.identification)
 
 
 def _settings(model_tolerance: float | None, stated: list[str], workers: int | None) -> DiagnoseSettings:
@@ -121,71 +122,27 @@ def _settings(model_tolerance: float | None, stated: list[str], workers: int | N
     return DiagnoseSettings(tolerances=Tolerances().states(typed, "command line"), workers=workers)
 
 
-def _from_campaign(asked: _Asked, campaign: Path, bearing: Path | None) -> None:
-    from tpjb_ident.diagnose.campaign import diagnose_campaign
-
-    source = open_campaign(campaign)
-    drawn, given = open_bearing(source, bearing)
-    refuse_impossible(asked.baseline.effects, asked.options["effects"], drawn)
-    inputs = source.fingerprint() | given | asked.files
-    options = {**asked.options, "bearing": bearing or source.bearing_name}
-    with output_folder(asked.target, "diagnose", (campaign,)) as folder:
-        with progress("diagnosing") as show:
-            result = diagnose_campaign(source, drawn, asked.baseline, asked.settings, show)
-            write_identification(folder, found := _identified(result))
-            then = _next(asked, result, str(campaign), bearing)
-            _write(folder, asked, source, result, inputs, then)
-        write_record(folder, asked.target, "diagnose", options, inputs)
-    _show(source.id, asked, result, then)
-    refuse_untrusted(found)
-
-
-def _identified(result: CampaignDiagnosis) -> Identification:
-    assert result.identification is not None  # a campaign was identified
-    return result.identification
-
-
-def _from_table(asked: _Asked, path: Path, bearing: Path | None, reading_error: str | None) -> None:
+def _diagnosed(data: Data, baseline: Baseline, settings: DiagnoseSettings, show: Progress) -> CampaignDiagnosis:
     from tpjb_ident.compare.coefficient_table import TableSource
-    from tpjb_ident.diagnose.campaign import diagnose_table
+    from tpjb_ident.diagnose.campaign import diagnose_campaign, diagnose_table
 
-    drawn, error, inputs = table_inputs("diagnose", path, bearing, reading_error)
-    inputs |= asked.files
-    refuse_impossible(asked.baseline.effects, asked.options["effects"], drawn)
-    source = TableSource(path.stem)
-    with output_folder(asked.target, "diagnose", (path,)) as folder:
-        with progress("diagnosing") as show:
-            result = diagnose_table(path, drawn, asked.baseline, asked.settings, error, show)
-            then = _next(asked, result, f"--coefficients {path}", bearing)
-            _write(folder, asked, source, result, inputs, then)
-        write_record(folder, asked.target, "diagnose", asked.options, inputs)
-    _show(source.id, asked, result, then)
+    if isinstance(data.source, TableSource):
+        return diagnose_table(data.path, data.bearing, baseline, settings, data.reading_error, show)
+    return diagnose_campaign(data.source, data.bearing, baseline, settings, show)
 
 
-def _write(  # type: ignore[no-untyped-def]
-    folder: Path, asked: _Asked, source, result: CampaignDiagnosis, inputs: dict[str, str], then: str
-) -> None:
-    from tpjb_ident.report.diagnosis_page import write_diagnosis_report
+def _next(data: Data, result: CampaignDiagnosis, target: Path) -> str:
+    from tpjb_ident.report.diagnosis_words import next_command
 
-    verdict = result.diagnosis.verdict
+    return next_command(data.typed, str(data.given or ""), result.diagnosis.verdict, str(target))
+
+
+def _write_verdict(folder: Path, baseline: Baseline, verdict: Verdict) -> None:
     write_text(folder / "diagnosis.json", verdict.to_json())
-    before, measured = asked.baseline.effects, asked.baseline.from_measured
+    before, measured = baseline.effects, baseline.from_measured
     write_text(folder / "updated.effects.toml", verdict.effects_toml(before, measured))
     if verdict.behaves_like:
         write_text(folder / "with-terms.effects.toml", verdict.terms_toml(before, measured))
-    named = {name: getattr(value, "name", value) for name, value in asked.options.items()}
-    write_diagnosis_report(folder, source, result, named, inputs, then)
-
-
-def _next(asked: _Asked, result: CampaignDiagnosis, source: str, bearing: Path | None) -> str:
-    from tpjb_ident.report.diagnosis_words import next_command
-
-    return next_command(source, str(bearing or ""), result.diagnosis.verdict, str(asked.target))
-
-
-def _show(name: str, asked: _Asked, result: CampaignDiagnosis, then: str) -> None:
-    _show_verdict(name, result, then)
-    print_line(f"Report: {asked.target / 'report.html'}")
 
 
 def _show_verdict(name: str, result: CampaignDiagnosis, then: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from model.bearing import Bearing
     from model.effects import Effect
     from rigdata.campaign import Campaign
+    from tpjb_ident.compare.coefficient_table import TableSource
 
 HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
 
@@ -121,16 +123,51 @@ def refuse_impossible(effects: Sequence[Effect], path: Path | None, bearing: Bea
         raise BadInputError(f"--effects {path.name}: {error}") from error
 
 
-def table_inputs(
-    command: str, path: Path, bearing: Path | None, reading_error: str | None
-) -> tuple[Bearing, float | None, dict[str, str]]:
-    """What stands beside a table of coefficients: its bearing, how far its values hold, and what both were made of.
+@dataclass(frozen=True)
+class Data:
+    """What stands beside the model: a campaign, or a table of coefficients in its place.
+
+    Attributes
+    ----------
+    source : Campaign or TableSource
+    bearing : Bearing
+    inputs : dict of str to str
+        SHA-256 of what it was made of.
+    path : Path
+        As the user gave it.
+    typed : str
+        The same, as it stands in a command.
+    given : Path or None
+        Option --bearing.
+    reading_error : float or None
+        How far values of a table hold, as a share.
+    """
+
+    source: Campaign | TableSource
+    bearing: Bearing
+    inputs: dict[str, str]
+    path: Path
+    typed: str
+    given: Path | None
+    reading_error: float | None = None
+
+    @property
+    def bearing_name(self) -> Path | str | None:
+        """The bearing file that is used: the one given, or the one that the campaign names."""
+        return self.given or getattr(self.source, "bearing_name", None)
+
+
+def open_data(
+    command: str, campaign: Path | None, table: Path | None, bearing: Path | None, reading_error: str | None
+) -> Data:
+    """Open a campaign with its bearing, or a table of coefficients with the one given.
 
     Parameters
     ----------
     command : str
         Its name, for messages.
-    path : Path
+    campaign : Path, optional
+    table : Path, optional
         Option --coefficients.
     bearing : Path, optional
         Option --bearing.
@@ -140,15 +177,27 @@ def table_inputs(
     Raises
     ------
     BadInputError
-        No bearing, or a share that is none.
+        Both or neither, no bearing, or a share that is none.
     """
+    if table is None and campaign is not None:
+        source = open_campaign(campaign)
+        drawn, given = open_bearing(source, bearing)
+        return Data(source, drawn, source.fingerprint() | given, campaign, str(campaign), bearing)
+    if table is None or campaign is not None:
+        raise BadInputError(
+            f"{command}: give a campaign, or --coefficients TABLE.csv with --bearing FILE; one of them."
+        )
     from model.bearing_file import load_bearing
     from model.units import parse_quantity
+    from tpjb_ident.compare.coefficient_table import TableSource
 
-    refuse_special(path, bearing)
-    if not path.is_file():
-        raise BadInputError(f"{path}: no such file. Give the table of coefficients as CSV.")
+    refuse_special(table, bearing)
+    if not table.is_file():
+        raise BadInputError(f"{table}: no such file. Give the table of coefficients as CSV.")
     if bearing is None:
         raise BadInputError(f"{command} --coefficients: a table names no bearing. Add --bearing FILE.")
     error = None if reading_error is None else float(parse_quantity(reading_error, "ratio", "--reading-error"))
-    return load_bearing(bearing), error, {path.name: sha256(path), bearing.name: sha256(bearing)}
+    inputs = {table.name: sha256(table), bearing.name: sha256(bearing)}
+    return Data(
+        TableSource(table.stem), load_bearing(bearing), inputs, table, f"--coefficients {table}", bearing, error
+    )
