@@ -11,14 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.identification_display import (
-    refused_bands,
-    show_bands,
-    show_coefficients,
-    show_frequency_fits,
-    show_remarks,
-    show_summary,
-)
+from tpjb_ident.cli.common.identification_display import refused_bands, show_identification
 from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
 from tpjb_ident.cli.common.options import (
     CampaignPath,
@@ -106,12 +99,7 @@ def identify(
         if plain or keep_r:
             _write_plain(folder, source, _plain_settings(window, norm), keep_r)
         write_record(folder, target, "identify", options, source.fingerprint(), result.remarks())
-    if result.points or not result.bands:
-        show_summary(result)
-        show_coefficients(result)
-        show_frequency_fits(result)
-    show_bands(result)
-    show_remarks(result)
+    show_identification(result)
     if result.points:
         command_line(f"tpjb {'compare' if source.bearing_text else 'export --to ross'} {campaign}")
     print_line(f"Results: {target}")

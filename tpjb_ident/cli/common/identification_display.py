@@ -20,13 +20,23 @@ CROSS_MATTERS = 0.1
 SHOWN = 5
 
 
-def show_summary(result: Identification) -> None:
-    """Print how many points have an answer, and how many of those are to be trusted.
+def show_identification(result: Identification) -> None:
+    """Print what was identified: a summary, coefficients and models over frequency, bands, remarks.
 
     Parameters
     ----------
     result : Identification
     """
+    if result.points or not result.bands:
+        _show_summary(result)
+        _show_coefficients(result)
+        _show_frequency_fits(result)
+    _show_bands(result)
+    _show_remarks(result)
+
+
+def _show_summary(result: Identification) -> None:
+    """Print how many points have an answer, and how many of those are to be trusted."""
     bad = sum(bool(untrusted(p.quality)) or not math.isfinite(float(p.stiffness.k[0, 0])) for p in result.points)
     flagged = sum(bool(p.quality) for p in result.points) - bad
     trusted = "all to be trusted" if not bad else f"{bad} NOT to be trusted"
@@ -34,13 +44,8 @@ def show_summary(result: Identification) -> None:
     print_line(f"{result.campaign}: {len(result.points)} operating points, {trusted}{more}.")
 
 
-def show_coefficients(result: Identification) -> None:
-    """Print K and C of every point with half the width of their intervals; what is flagged stands below in full.
-
-    Parameters
-    ----------
-    result : Identification
-    """
+def _show_coefficients(result: Identification) -> None:
+    """Print K and C of every point with half the width of their intervals; what is flagged stands below in full."""
     import numpy as np
 
     letters = _flag_letters(result)
@@ -72,13 +77,8 @@ def _flag_letters(result: Identification) -> dict[str, str]:
     return dict(zip(names, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ", strict=False))
 
 
-def show_remarks(result: Identification) -> None:
-    """Print every condition once, under the letter by which the table marks its points.
-
-    Parameters
-    ----------
-    result : Identification
-    """
+def _show_remarks(result: Identification) -> None:
+    """Print every condition once, under the letter by which the table marks its points."""
     letters = _flag_letters(result)
     for remark in result.remarks():
         name = next((n for n in letters if remark.startswith(f"{n} at ")), "")
@@ -119,13 +119,8 @@ def cross_coupling_matters(values: FloatArray, halves: FloatArray) -> bool:
     return False
 
 
-def show_frequency_fits(result: Identification) -> None:
-    """Print which model over frequency the data of every load support.
-
-    Parameters
-    ----------
-    result : Identification
-    """
+def _show_frequency_fits(result: Identification) -> None:
+    """Print which model over frequency the data of every load support."""
     rows = []
     for group in result.frequency_fits():
         point = group.points[0].point
@@ -146,13 +141,8 @@ def show_frequency_fits(result: Identification) -> None:
         )
 
 
-def show_bands(result: Identification) -> None:
-    """Print K, C and M of every point that was excited over a band, and h at some of its lines.
-
-    Parameters
-    ----------
-    result : Identification
-    """
+def _show_bands(result: Identification) -> None:
+    """Print K, C and M of every point that was excited over a band, and h at some of its lines."""
     if not result.bands:
         return
     bad = sum(bool(untrusted(band.quality)) for band in result.bands)
