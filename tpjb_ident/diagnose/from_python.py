@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +30,6 @@ from tpjb_ident.errors import ArgumentError
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
 
-Progress = Callable[[str, int, int], None]
 #: Set points of a plan and what they must be.
 _POINT = {"load": "force", "load_direction": "angle", "speed": "angular speed", "excitation": "angular speed"}
 
