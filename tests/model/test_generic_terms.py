@@ -46,7 +46,8 @@ KIND = EffectKind("{name}", "bearing", (Parameter("share", "1", "ratio", 0.0, 0.
 """
 
 
-def test_effects_of_ones_own_are_registered_from_a_file(tmp_path):
+def test_effects_of_ones_own_are_registered_from_a_file(tmp_path, monkeypatch):
+    monkeypatch.setattr("model.effects.registry._registered", {})  # other tests know the bundled ones only
     path = tmp_path / "own.py"
     path.write_text(OWN.format(name="of_ones_own"))
     assert [k.name for k in load_library(path)] == ["of_ones_own"]
