@@ -10,11 +10,9 @@ from model.bearing import Bearing
 from model.effects import Effect
 from rigdata.campaign import Campaign
 from tpjb_ident.compare.coefficient_table import TableSource
-from tpjb_ident.compare.measured_pivots import beside_measured, counted_twice
+from tpjb_ident.compare.measured_pivots import counted_twice
 from tpjb_ident.compare.model_side import Asked, ModelSide, model_side
 from tpjb_ident.compare.predictions import PointPrediction, Progress
-from tpjb_ident.dynamic.identify import identify
-from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.presentation import Presented, changed, shown_by
 
@@ -24,7 +22,11 @@ if TYPE_CHECKING:
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.dynamic.settings import IdentifySettings
     from tpjb_ident.pivot import PivotCurve
+
+    #: Somebody who worked out the model's side while the campaign was identified.
+    Ahead = Callable[["CompareSettings", Identification], ModelSide | None]
 
 #: Pivot models that are compared, in the order of the tables.
 VARIANTS = ("rigid", "kirk", "kirk-secant", "measured")
@@ -48,31 +50,22 @@ class CompareSettings:
         Switched on with every pivot model; with measured pivots, those that these hold already are left out.
     from_measured : bool
         The effects are sizes beside measured pivots: none of them is left out.
-    identify : IdentifySettings
+    identify : IdentifySettings, optional
+        Default: what `identify` takes.
     """
 
     variants: tuple[str, ...] = DEFAULT_VARIANTS
     thermal: str = "adiabatic"
     effects: tuple[Effect, ...] = ()
-    identify: IdentifySettings = field(default_factory=IdentifySettings)
+    identify: IdentifySettings | None = None
     from_measured: bool = False
 
     def __repr__(self) -> str:
         return changed(self)
 
-    def effects_with(self, pivots: str) -> tuple[Effect, ...]:
-        """Effects that are switched on with a pivot model.
-
-        Parameters
-        ----------
-        pivots : str
-            Out of `VARIANTS`.
-        """
-        return self.effects if pivots != "measured" or self.from_measured else beside_measured(self.effects)
-
     def asked(self) -> Asked:
         """What the model is asked for."""
-        return Asked({name: self.effects_with(name) for name in self.variants}, self.thermal)
+        return Asked.of(self.variants, self.thermal, self.effects, self.from_measured)
 
 
 @dataclass(frozen=True)
@@ -163,7 +156,7 @@ def compare_campaign(
     bearing: Bearing,
     settings: CompareSettings | None = None,
     progress: Progress | None = None,
-    ahead: Callable[[], ModelSide | None] | None = None,
+    ahead: Ahead | None = None,
 ) -> Comparison:
     """Identify a campaign, measure its pivots, locus and clearance, and predict the same with every pivot model.
 
@@ -176,7 +169,7 @@ def compare_campaign(
     progress : callable, optional
         Called as progress(text, done, total).
     ahead : callable, optional
-        Gives what `model_side.model_beside` has found meanwhile.
+        Is told the settings and what was identified, and gives what was found meanwhile; None: nothing was.
 
     Raises
     ------
@@ -185,21 +178,43 @@ def compare_campaign(
     rigdata.problem.RigDataError
         Records that are not what they claim to be.
     """
+    from tpjb_ident.dynamic.identify import identify  # late: another process may be at work meanwhile
+    from tpjb_ident.dynamic.settings import IdentifySettings
+
     settings = settings or CompareSettings()
     _check(campaign, settings)
     tell = progress or (lambda text, done, total: None)
     least = min(pad.assembled_clearance for pad in bearing.pads)
-    chosen = replace(settings.identify, clearance=settings.identify.clearance or least)
+    chosen = settings.identify or IdentifySettings()
+    chosen = replace(chosen, clearance=chosen.clearance or least)
     identification = identify(campaign, chosen, _labelled(tell, "identifying"))
     points = tuple(p.point for p in identification.points)
     tell("waiting for the model", 0, 1)
-    side = ahead() if ahead is not None else None
+    side = ahead(settings, identification) if ahead is not None else None
     if side is None or not all(set(points) <= found.keys() for found in side.predicted.values()):
         side = model_side(campaign, bearing, settings.asked(), points, tell)
+    return joined(campaign, bearing, settings, identification, side)
+
+
+def joined(
+    campaign: Campaign, bearing: Bearing, settings: CompareSettings, identification: Identification, side: ModelSide
+) -> Comparison:
+    """Set what was identified beside the model's side.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    bearing : Bearing
+    settings : CompareSettings
+    identification : Identification
+    side : ModelSide
+        With every point that was identified.
+    """
     static, names = side.static, list(side.predicted)
     clearance, locus = static.clearance, static.locus
     remarks = [*side.remarks, *(condition.sentence() for condition in static.left_out)]
     remarks += _left_out(settings, names) + _not_run(clearance, locus)
+    points = tuple(p.point for p in identification.points)
     stations = () if locus is None else tuple(p.point for p in locus.points)
     variants = tuple(
         Variant(name, tuple(found[p] for p in points), tuple(found[p] for p in stations))

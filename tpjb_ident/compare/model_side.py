@@ -1,27 +1,23 @@
-"""What a comparison asks of the static tests and of the model, here or in another process while this one identifies.
+"""What a comparison asks of the static tests and of the model.
 
-Nothing of it depends on what is identified, but for the operating points, which the manifest names. On a fresh machine
-the other process compiles the film solver as well, which takes half a minute.
+Nothing of it depends on what is identified, but for the operating points, which the manifest names: another process may
+work it out meanwhile (`tpjb_ident.report.comparison_beside`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.compare.measured_pivots import measured_laws
+from tpjb_ident.compare.measured_pivots import beside_measured, measured_laws
 from tpjb_ident.compare.predictions import ModelSettings, PointPrediction, Progress, predict_points
-from tpjb_ident.compare.static_tests import StaticTests, measure_static
-from tpjb_ident.runtime.beside import beside
-from tpjb_ident.runtime.executors import cores
 
 if TYPE_CHECKING:
     from model.bearing import Bearing
     from model.effects import Effect
+    from tpjb_ident.compare.static_tests import StaticTests
     from tpjb_ident.pivot import PivotCurve
 
 
@@ -38,6 +34,22 @@ class Asked:
 
     effects: dict[str, tuple[Effect, ...]]
     thermal: str
+
+    @classmethod
+    def of(cls, variants: tuple[str, ...], thermal: str, effects: tuple[Effect, ...], from_measured: bool) -> Asked:
+        """With measured pivots, effects that these hold already are left out, unless they are sizes beside them.
+
+        Parameters
+        ----------
+        variants : tuple of str
+            Pivot models.
+        thermal : str
+        effects : tuple of Effect
+        from_measured : bool
+            The effects are sizes beside measured pivots.
+        """
+        held = effects if from_measured else beside_measured(effects)
+        return cls({name: held if name == "measured" else effects for name in variants}, thermal)
 
 
 @dataclass(frozen=True)
@@ -76,6 +88,8 @@ def model_side(
     progress : callable, optional
         Called as progress(text, done, total).
     """
+    from tpjb_ident.compare.static_tests import measure_static  # late: a process that asks another one needs none of it
+
     tell = progress or (lambda text, done, total: None)
     tell("fitting pivot curves, clearance and locus", 0, 1)
     static = measure_static(campaign, bearing, "measured" in asked.effects)
@@ -92,30 +106,6 @@ def model_side(
 
         predicted[name] = {p.point: p for p in predict_points(bearing, wanted, model, show)}
     return ModelSide(static, tuple(remarks), predicted)
-
-
-@contextmanager
-def model_beside(campaign: Campaign, bearing: Bearing, asked: Asked) -> Iterator[Callable[[], ModelSide | None] | None]:
-    """Let another process work out the model's side for the points that the manifest names, while the block runs.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    bearing : Bearing
-    asked : Asked
-
-    Yields
-    ------
-    callable or None
-        Waits for the answer; None where there is none: whatever went wrong is found, and said, by whoever works it out
-        again. None instead of a callable where there is but one core.
-    """
-    if cores() < 2:
-        yield None
-        return
-    points = tuple(sorted({run.point for run in campaign.of_kind("dynamic")}))
-    with beside(model_side, campaign, bearing, asked, points) as answer:
-        yield answer
 
 
 def possible_variants(

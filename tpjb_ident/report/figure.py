@@ -19,6 +19,7 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.picture import new_picture
 from tpjb_ident.report.hover import mark_lines, with_titles
 from tpjb_ident.runtime.executors import cores, in_order, local_workers
 from tpjb_ident.runtime.tables import write_atomic, write_text
@@ -151,6 +152,13 @@ def prefixed_ids(svg: str, prefix: str) -> str:
     return _ID.sub(rf"\g<1>{prefix}-\g<2>", svg)
 
 
+def make_ready() -> None:
+    """Draw a picture for nobody: fonts and both ways to write are loaded, also for processes forked from this one."""
+    figure, _ = new_picture("x", "y")
+    svg_text(figure, "x")
+    _save_png(figure, io.BytesIO())
+
+
 def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:
     """Write every panel as SVG and PNG, on white ground; return the SVG texts, without ground, by name.
 
@@ -189,5 +197,5 @@ def _on_white(svg: str) -> str:
     return f'{svg[:start]}<rect width="100%" height="100%" fill="white"/>{svg[start:]}'
 
 
-def _save_png(figure: Figure, path: Path) -> None:
+def _save_png(figure: Figure, path: Path | io.BytesIO) -> None:
     figure.savefig(path, format="png", dpi=PNG_DPI, facecolor="white", pil_kwargs={"compress_level": 4})

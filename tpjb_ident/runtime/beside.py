@@ -1,57 +1,151 @@
-"""One job in another process while this one goes on with something else."""
+"""A task in another process while this one goes on with something else, and what the two tell each other."""
 
 from __future__ import annotations
 
 import functools
 import multiprocessing
+import os
+import signal
+import sys
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 from tpjb_ident.runtime.executors import Job, Outcome, Task, attempt, begin_worker, forks, one_thread_each
 
 
+class Talk:
+    """One end of the line between two processes.
+
+    Parameters
+    ----------
+    connection : Connection
+    """
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._sending: threading.Thread | None = None
+
+    def tell(self, value: Any) -> None:
+        """Send a value; this process goes on, whether or not the other one listens yet.
+
+        Parameters
+        ----------
+        value : object
+        """
+        self.settle()
+        packed = ForkingPickler.dumps(value)
+        self._sending = threading.Thread(target=self._send, args=(packed,), daemon=True)
+        self._sending.start()
+
+    def hear(self) -> Any:
+        """Wait for the next value.
+
+        Raises
+        ------
+        EOFError, ConnectionError
+            The other process is gone.
+        """
+        return self._connection.recv()
+
+    def settle(self) -> None:
+        """Wait until all that was told has been heard."""
+        if self._sending is not None:
+            self._sending.join()
+
+    def _send(self, packed: Any) -> None:
+        with suppress(OSError):  # nobody listens any more
+            self._connection.send_bytes(packed)
+
+
+class Companion(Talk):
+    """The other process, as the one that began it sees it."""
+
+    def hear(self) -> Any | None:
+        """Wait for the next value, in the end for the task's own.
+
+        None if the task had an error or its process was lost: whoever needs the value works it out again, and finds
+        what was wrong.
+        """
+        try:
+            outcome = super().hear()
+        except (EOFError, ConnectionError):
+            return None
+        if not isinstance(outcome, Outcome):
+            return outcome
+        return outcome.get() if outcome.error is None else None
+
+
 @contextmanager
-def beside(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
-    """Run one job in a process of its own while the block goes on; the process is ended with the block.
+def companion(task: Task, *job: Any) -> Iterator[Companion]:
+    """Run a task in a process of its own while the block goes on; the process is ended with the block.
 
     Parameters
     ----------
     task : callable
-        Of a module, so that another process finds it.
+        Of a module, so that another process finds it. Called as ``task(talk, *job)`` with its own end of the line.
+    *job : object
+        Its other arguments.
+
+    Yields
+    ------
+    Companion
+    """
+    context: Any = multiprocessing.get_context("fork" if forks() else "spawn")  # a copy need not import anything again
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_run, args=(theirs, task, job))
+    with one_thread_each():
+        process.start()
+    theirs.close()
+    try:
+        yield Companion(ours)
+    finally:
+        _end(process)
+        ours.close()
+
+
+@contextmanager
+def beside(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
+    """Run one job in a process of its own while the block goes on; see `companion`.
+
+    Parameters
+    ----------
+    task : callable
+        Of a module.
     *job : object
         Its arguments.
 
     Yields
     ------
     callable
-        Waits for the value; None if the job had an error or its process was lost: whoever needs the value works it out
-        again, and finds what was wrong. Called a second time, it gives the same.
+        Waits for the value; None as of `Companion.hear`. Called a second time, it gives the same.
     """
-    context: Any = multiprocessing.get_context("fork" if forks() else "spawn")  # a copy need not import anything again
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_send_outcome, args=(sender, task, job), daemon=True)
-    with one_thread_each():
-        process.start()
-    sender.close()
-
-    @functools.cache
-    def value() -> Any | None:
-        try:
-            outcome: Outcome = receiver.recv()
-        except EOFError:
-            return None
-        return outcome.get() if outcome.error is None else None
-
-    try:
-        yield value
-    finally:
-        receiver.close()
-        process.kill()
-        process.join()
+    with companion(_silent, task, job) as other:
+        yield functools.cache(other.hear)
 
 
-def _send_outcome(sender: Connection, task: Task, job: Job) -> None:
+def _silent(_: Talk, task: Task, job: Job) -> Any:
+    return task(*job)
+
+
+def _run(connection: Connection, task: Task, job: Job) -> None:
+    with suppress(AttributeError, OSError):  # a group with its own workers: they end with it. Not on Windows
+        os.setpgid(0, 0)
     begin_worker()
-    sender.send(attempt(task, None, job))
+    talk = Talk(connection)
+    outcome = attempt(task, None, (talk, *job))
+    talk.settle()
+    with suppress(ConnectionError):
+        connection.send(outcome)
+
+
+def _end(process: Any) -> None:
+    """Kill a process and its workers, at whatever they are: what they write into is cleared next."""
+    if sys.platform != "win32":
+        with suppress(OSError):
+            os.killpg(process.pid, signal.SIGKILL)
+    process.kill()
+    process.join()

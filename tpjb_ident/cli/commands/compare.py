@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -35,6 +37,7 @@ from tpjb_ident.runtime.tables import write_table
 
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import CompareSettings, Comparison
+    from tpjb_ident.report.comparison_beside import OtherHalf, ReportOrder
 
 Pivots = Annotated[
     str, typer.Option("--pivots", help='Pivot models to compare: some of "rigid, kirk, kirk-secant, measured".')
@@ -98,14 +101,15 @@ def _compared(
         write_report(folder, result, options, inputs, then)
         return result, then
     from tpjb_ident.compare.comparison import compare_campaign
-    from tpjb_ident.compare.model_side import model_beside
+    from tpjb_ident.report.comparison_beside import ReportOrder, comparison_beside
 
-    settings = replace(settings, identify=identify_settings(source, options["method"], options["norm"]))
-    with model_beside(source, data.bearing, settings.asked()) as ahead, progress("comparing") as show:
-        result = compare_campaign(source, data.bearing, settings, show, ahead)
-        then = next_command(result, data.typed, data.given)
-        write_comparison(folder, result, options, inputs, show, then)
-    return result, then
+    then = functools.partial(next_command, source=data.typed, bearing=data.given)
+    order = ReportOrder(folder, named(options), inputs, then)
+    with comparison_beside(source, data.bearing, settings.asked(), order) as other, progress("comparing") as show:
+        settings = replace(settings, identify=identify_settings(source, options["method"], options["norm"]))
+        result = compare_campaign(source, data.bearing, settings, show, other.side)
+        write_comparison(order, result, other, show)
+    return result, then(result)
 
 
 def _variants(text: str) -> tuple[str, ...]:
@@ -119,31 +123,35 @@ def _variants(text: str) -> tuple[str, ...]:
     return names
 
 
-def write_comparison(
-    folder: Path, result: Comparison, options: dict[str, Any], inputs: dict[str, str], show: Progress, then: str = ""
-) -> None:
-    """Write every table, pivots.toml, the figures and report.html.
+def named(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options as a report shows them: files by their names.
 
     Parameters
     ----------
-    folder : Path
-        Existing.
-    result : Comparison
     options : mapping of str to object
-        As they are to be shown.
-    inputs : mapping of str to str
-        SHA-256 by file name.
+        As given.
+    """
+    return {name: getattr(value, "name", value) for name, value in options.items()}
+
+
+def write_comparison(order: ReportOrder, result: Comparison, other: OtherHalf, show: Progress) -> None:
+    """Write every table and pivots.toml, and the report unless the other process has written it.
+
+    Parameters
+    ----------
+    order : ReportOrder
+        With the folder.
+    result : Comparison
+    other : OtherHalf
     show : Progress
         Called with what is being done, how much is done, of how much.
-    then : str
-        The command that comes next.
     """
     from tpjb_ident.compare.pivot_formula import printed_formula
     from tpjb_ident.compare.positions import locus_frame
     from tpjb_ident.compare.tables import comparison_frame
     from tpjb_ident.pivot import pivot_table, write_pivots
-    from tpjb_ident.report.comparison_page import write_report
 
+    folder = order.folder
     show("writing tables", 0, 2)
     write_identification(folder, result.identification)
     write_table(folder, "comparison", comparison_frame(result))
@@ -157,8 +165,8 @@ def write_comparison(
         write_table(folder, "locus", result.locus.to_frame())
         write_table(folder, "locus_comparison", locus_frame(result))
     show("drawing figures", 1, 2)
-    named = {name: getattr(value, "name", value) for name, value in options.items()}
-    write_report(folder, result, named, inputs, then)
+    if not other.reported():
+        order.carry_out(result)
 
 
 def show_comparison(result: Comparison, then: str = "") -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.commands.check import check_summary
-from tpjb_ident.cli.commands.compare import refuse_comparison, show_comparison, write_comparison
+from tpjb_ident.cli.commands.compare import named, refuse_comparison, show_comparison, write_comparison
 from tpjb_ident.cli.common.errors import guarded
 from tpjb_ident.cli.common.options import Out, out_folder
 from tpjb_ident.cli.common.run_record import write_record
@@ -31,10 +31,9 @@ def demo(out: Out = None) -> None:
     """
     from model.bearing_file import parse_bearing
     from rigdata import load_campaign
-    from tpjb_ident.check.campaign import check_campaign
     from tpjb_ident.compare.comparison import CompareSettings, compare_campaign
-    from tpjb_ident.compare.model_side import model_beside
     from tpjb_ident.compare.predictions import prediction_frame
+    from tpjb_ident.report.comparison_beside import ReportOrder, comparison_beside
 
     path = sample("demo.h5")
     target = out_folder(out, "demo")
@@ -42,16 +41,18 @@ def demo(out: Out = None) -> None:
     with output_folder(target, "demo") as folder:
         campaign = load_campaign(path)
         bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
+        order = ReportOrder(folder, named(options), campaign.fingerprint())
         asked = CompareSettings().asked()
-        with model_beside(campaign, bearing, asked) as ahead, progress("demo") as show:
+        with comparison_beside(campaign, bearing, asked, order) as other, progress("demo") as show:
+            from tpjb_ident.check.campaign import check_campaign  # late: the other process is at work meanwhile
+
             show("reading and checking every record", 0, 1)
             summary = check_summary(path, check_campaign(path), campaign)
             write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")
-            result = compare_campaign(campaign, bearing, progress=show, ahead=ahead)
+            result = compare_campaign(campaign, bearing, progress=show, ahead=other.side)
             write_table(folder, "prediction", prediction_frame(result.variant("measured").points))
-            inputs = summary["files_sha256"]
-            write_comparison(folder, result, options, inputs, show)
-        write_record(folder, target, "demo", options, inputs)
+            write_comparison(order, result, other, show)
+        write_record(folder, target, "demo", options, summary["files_sha256"])
     counts = summary["counts"]
     print_line(
         f"Read {len(campaign.runs)} records of {path.name}: {counted(counts['error'], 'error')}, "
