@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy  # noqa: F401  (has to be loaded)
 import pytest
 
-from tpjb_ident.runtime.beside import beside
+from tpjb_ident.runtime.beside import beside, companion
 from tpjb_ident.runtime.executors import (
     InProcessWorkers,
     LostJobsError,
@@ -171,3 +171,41 @@ def test_a_job_beside_ends_with_its_block():
     with beside(time.sleep, 600.0):
         began = time.monotonic()
     assert time.monotonic() - began < 60.0
+
+
+def answers(talk, folder):
+    """Tell more than a line holds before the other end listens, hear as much, and leave a worker at work."""
+    talk.tell(bytes(10**7))
+    heard = talk.hear()
+    with local_workers(2, start="fork") as workers:
+        for _ in in_order(workers, writes_for_ever, [(folder,)] * (2 if heard == b"go on" else 0)):
+            pass
+    return len(heard)
+
+
+def writes_for_ever(folder):
+    while True:
+        (Path(folder) / "mark").write_text("x")
+
+
+@pytest.mark.slow
+def test_two_processes_tell_each_other_much_and_neither_waits_for_the_other_to_listen():
+    with companion(answers, "") as other:
+        other.tell(bytes(2 * 10**7))
+        assert len(other.hear()) == 10**7
+        assert other.hear() == 2 * 10**7
+        assert other.hear() is None  # it has said all
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no groups of processes here")
+def test_the_workers_of_another_process_end_with_the_block(tmp_path):
+    mark = tmp_path / "mark"
+    with companion(answers, str(tmp_path)) as other:
+        other.tell(b"go on")
+        assert len(other.hear()) == 10**7
+        while not mark.exists():
+            time.sleep(0.01)
+    mark.unlink(missing_ok=True)
+    time.sleep(0.3)
+    assert not mark.exists()

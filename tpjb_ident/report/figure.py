@@ -17,6 +17,7 @@ from pathlib import Path
 
 import matplotlib
 from matplotlib.figure import Figure
+from PIL import Image
 
 from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.drawing.picture import new_picture
@@ -198,4 +199,8 @@ def _on_white(svg: str) -> str:
 
 
 def _save_png(figure: Figure, path: Path | io.BytesIO) -> None:
-    figure.savefig(path, format="png", dpi=PNG_DPI, facecolor="white", pil_kwargs={"compress_level": 4})
+    pixels = io.BytesIO()
+    figure.savefig(pixels, format="rgba", dpi=PNG_DPI, facecolor="white")
+    width, height = (int(inches * PNG_DPI) for inches in figure.get_size_inches())
+    opaque = Image.frombytes("RGBA", (width, height), pixels.getvalue()).convert("RGB")  # a third of the file
+    opaque.save(path, format="PNG", dpi=(PNG_DPI, PNG_DPI), compress_level=4)
