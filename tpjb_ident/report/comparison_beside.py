@@ -17,7 +17,6 @@ from tpjb_ident.runtime.beside import Companion, Talk, companion
 from tpjb_ident.runtime.executors import cores
 
 if TYPE_CHECKING:
-    from model.bearing import Bearing
     from rigdata.campaign import Campaign
     from tpjb_ident.compare.comparison import CompareSettings, Comparison
     from tpjb_ident.dynamic.results.identification import Identification
@@ -91,7 +90,7 @@ class OtherHalf:
 
 
 @contextmanager
-def comparison_beside(campaign: Campaign, bearing: Bearing, asked: Asked, order: ReportOrder) -> Iterator[OtherHalf]:
+def comparison_beside(campaign: Campaign, bearing: Any, asked: Asked, order: ReportOrder) -> Iterator[OtherHalf]:
     """Let another process work out the model's side for the points that the manifest names, then draw the report.
 
     Parameters
@@ -113,7 +112,7 @@ def comparison_beside(campaign: Campaign, bearing: Bearing, asked: Asked, order:
         yield OtherHalf(process)
 
 
-def _model_then_report(talk: Talk, campaign: Campaign, bearing: Bearing, asked: Asked, order: ReportOrder) -> bool:
+def _model_then_report(talk: Talk, campaign: Campaign, bearing: Any, asked: Asked, order: ReportOrder) -> bool:
     points = tuple(sorted({run.point for run in campaign.of_kind("dynamic")}))
     side = model_side(campaign, bearing, asked, points)
     talk.tell(side)
