@@ -103,13 +103,13 @@ def _compared(
     from tpjb_ident.compare.comparison import compare_campaign
     from tpjb_ident.report.comparison_beside import ReportOrder, comparison_beside
 
-    then = functools.partial(next_command, source=data.typed, bearing=data.given)
-    order = ReportOrder(folder, named(options), inputs, then)
+    next_one = functools.partial(next_command, source=data.typed, bearing=data.given)
+    order = ReportOrder(folder, named(options), inputs, next_one)
     with comparison_beside(source, data.bearing, settings.asked(), order) as other, progress("comparing") as show:
         settings = replace(settings, identify=identify_settings(source, options["method"], options["norm"]))
         result = compare_campaign(source, data.bearing, settings, show, other.side)
         write_comparison(order, result, other, show)
-    return result, then(result)
+    return result, next_one(result)
 
 
 def _variants(text: str) -> tuple[str, ...]:
