@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -108,39 +108,44 @@ def _with_given(guess: ChannelGuess, known: ChannelGuess | None) -> ChannelGuess
 
 def _one_direction(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
     """Directions that lie within a few degrees of each other become one: -89 and -91 deg are a load on one pad."""
-    known = sorted({r.direction for r in runs if math.isfinite(r.direction)})
-    groups: list[list[float]] = []
-    for angle in known:
-        if groups and angle - groups[-1][-1] <= _ALIKE and angle - groups[-1][0] <= 2 * _ALIKE:
-            groups[-1].append(angle)
-        else:
-            groups.append([angle])
-    common: dict[float, float] = {}
-    for group in groups:
-        every = sorted(r.direction for r in runs if r.direction in group)
-        middle = every[len(every) // 2]
+
+    def alike(group: list[float], angle: float) -> bool:
+        return angle - group[-1] <= _ALIKE and angle - group[0] <= 2 * _ALIKE
+
+    def meant(middle: float) -> float:
         round_one = 45.0 * round(middle / 45.0)  # an axis, or between two; pads may stand anywhere
-        common |= dict.fromkeys(group, round_one if abs(round_one - middle) <= _ALIKE / 2 else middle)
+        return round_one if abs(round_one - middle) <= _ALIKE / 2 else middle
+
+    common = _common([r.direction for r in runs], alike, meant)
     return tuple(replace(r, direction=common.get(r.direction, r.direction)) for r in runs)
 
 
 def _common_speeds(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
     """Speeds within a per cent or so of each other are one set point: a tachometer shows what came of it."""
-    known = sorted({r.speed for r in runs if math.isfinite(r.speed)})
+
+    def meant(middle: float) -> float:
+        round_one = float(f"{middle:.2g}")  # 21.99 Hz was meant to be 22 Hz
+        return round_one if abs(round_one - middle) <= _ROUND * middle else float(f"{middle:.4g}")
+
+    common = _common([r.speed for r in runs], lambda group, speed: speed <= _ONE_SPEED * group[0], meant)
+    return tuple(replace(r, speed=common.get(r.speed, r.speed)) for r in runs)
+
+
+def _common(
+    values: Sequence[float], alike: Callable[[list[float], float], bool], meant: Callable[[float], float]
+) -> dict[float, float]:
+    """What every finite value was meant to be: the middle of its group of values that are alike, rounded."""
     groups: list[list[float]] = []
-    for speed in known:
-        if groups and speed <= _ONE_SPEED * groups[-1][0]:
-            groups[-1].append(speed)
+    for value in sorted({v for v in values if math.isfinite(v)}):
+        if groups and alike(groups[-1], value):
+            groups[-1].append(value)
         else:
-            groups.append([speed])
+            groups.append([value])
     common: dict[float, float] = {}
     for group in groups:
-        every = sorted(r.speed for r in runs if r.speed in group)
-        middle = every[len(every) // 2]
-        round_one = float(f"{middle:.2g}")  # 21.99 Hz was meant to be 22 Hz
-        near = abs(round_one - middle) <= _ROUND * middle
-        common |= dict.fromkeys(group, round_one if near else float(f"{middle:.4g}"))
-    return tuple(replace(r, speed=common.get(r.speed, r.speed)) for r in runs)
+        every = sorted(v for v in values if v in group)
+        common |= dict.fromkeys(group, meant(every[len(every) // 2]))
+    return common
 
 
 def _tachometers(

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tpjb_ident.clearance.polygon import corners, find_centre, normals
+from rigdata.vector import directions
+from tpjb_ident.clearance.polygon import corners, find_centre
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 SMALL = np.eye(5) * (1e-8) ** 2
@@ -19,7 +20,7 @@ MICRO = st.floats(-50e-6, 50e-6)
 def test_one_pad_off_is_found_exactly(x, y, offset, pad, sign):
     clearance = np.full(5, 80e-6)
     clearance[pad] += sign * offset
-    found = find_centre(ANGLES, clearance + normals(ANGLES) @ [x, y], SMALL)
+    found = find_centre(ANGLES, clearance + directions(ANGLES) @ [x, y], SMALL)
     # square within the measurement error: a few hundredths of a micrometre remain
     assert found.position == pytest.approx([x, y], abs=8e-8)
     assert found.clearance == pytest.approx(80e-6, abs=8e-8)
@@ -29,7 +30,7 @@ def test_least_squares_spreads_one_pad_over_all():
     clearance = np.full(5, 80e-6)
     clearance[0] += 10e-6
     found = find_centre(ANGLES, clearance, SMALL, rule="least-squares")
-    seen = clearance - normals(ANGLES) @ found.position - 80e-6
+    seen = clearance - directions(ANGLES) @ found.position - 80e-6
     assert seen == pytest.approx(np.array([6.0, -1.236, 3.236, 3.236, -1.236]) * 1e-6, abs=2e-9)
 
 

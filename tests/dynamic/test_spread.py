@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import chi2
 
 from tests.dynamic.phasor_cases import H, complex_normal
-from tpjb_ident.dynamic.estimators.errors_in_variables import LOCKED, Repeats, aligned, eiv_fit, repeats
+from tpjb_ident.dynamic.estimators.errors_in_variables import LOCKED, Repeats, aligned, eiv_fit, readmitted, repeats
 from tpjb_ident.dynamic.estimators.least_trimmed import (
     Regression,
     distance2,
@@ -30,7 +30,6 @@ from tpjb_ident.dynamic.estimators.uncertainty import (
     spread_of,
     with_repeats,
 )
-from tpjb_ident.dynamic.estimators.whole_directions import readmitted
 
 
 def hermitian(rng, n):

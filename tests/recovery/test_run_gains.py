@@ -78,7 +78,7 @@ def test_identify_says_nothing_of_gains_where_channels_are_not_in_pairs(tmp_path
     path = written(tmp_path / "c.h5", stiff_rig(4, Fault("scaled", RUN, "X1A", value=1.05), plan=SHORT))
     campaign = rigdata.load_campaign(path)
     channels = {n: replace(c, axis=0.1) if n == "L1H" else c for n, c in campaign.channels.items()}
-    from tpjb_ident.dynamic.results.run_gains import channel_pairs
+    from tpjb_ident.dynamic.results.gains import channel_pairs
 
     assert channel_pairs(campaign) is not None
     assert channel_pairs(replace(campaign, channels={n: c for n, c in channels.items() if n != "X1A"})) is None

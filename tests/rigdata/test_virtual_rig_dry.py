@@ -19,8 +19,7 @@ from rigdata.virtual_rig import (
     VirtualRig,
     VirtualRigError,
 )
-from rigdata.virtual_rig.dry import held_back, load_history
-from rigdata.virtual_rig.polygon import corners, swept_position
+from rigdata.virtual_rig.at_rest import corners, held_back, load_history, swept_position
 
 HERTZ = 1.4e-8
 

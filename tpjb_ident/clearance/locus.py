@@ -11,12 +11,12 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
-from rigdata.vector import zero_uncertainty
+from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.presentation import Presented, shown_by
-from tpjb_ident.slow_records.bad_samples import good_samples, refuse_flat_channels
+from tpjb_ident.slow_records.bad_samples import slow_samples
 from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
 
 if TYPE_CHECKING:
@@ -201,16 +201,13 @@ def _from_down(direction: float) -> float:
 
 
 def _read(run: Run) -> _Read:
-    refuse_flat_channels(run)
-    force, displacement = run.vector("force"), run.vector("displacement")
-    n = min(len(force), len(displacement))
-    good = good_samples(np.hstack([force.values[:n], displacement.values[:n]]))
+    time, force, place, good = slow_samples(run)
     if good.sum() < 50 or good.mean() < 0.5:
-        what = f"locus run {run.id} has only {int(good.sum())} usable samples of {n}"
+        what = f"locus run {run.id} has only {int(good.sum())} usable samples of {len(good)}"
         raise RigDataError(Problem("error", run.file, "record", what, "Repeat this direction", run=run.id))
-    time, place = displacement.time[:n][good], displacement.values[:n][good]
+    time, place = time[good], place[good]
     design = _turning(time, run.point.shaft_speed)
-    mean = np.linalg.lstsq(design, np.hstack([place, force.values[:n][good]]), rcond=None)[0]
+    mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
     # what turns with the shaft (runout, unbalance) averages out only over whole turns: take it off
     still = place - design[:, 1:] @ mean[1:, :2]
     label = np.floor((time - time[0]) / BLOCK).astype(int)
@@ -315,5 +312,4 @@ def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, drift: F
 
 def _behind(point: LocusPoint, polygon: ClearancePolygon) -> bool:
     """True where the shaft lies behind a pad's unloaded face by more than any pivot gives."""
-    n = np.column_stack([np.cos(polygon.angles), np.sin(polygon.angles)])
-    return bool(np.nanmax(n @ point.position - 1.5 * polygon.clearance) > 0.0)
+    return bool(np.nanmax(directions(polygon.angles) @ point.position - 1.5 * polygon.clearance) > 0.0)

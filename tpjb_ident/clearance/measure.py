@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigdata.problem import Problem, RigDataError
+from rigdata.vector import directions
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.clearance.polygon import Centre, CentreRule, corners, find_centre, gain_ratio, normals
+from tpjb_ident.clearance.polygon import Centre, CentreRule, corners, find_centre, gain_ratio
 from tpjb_ident.clearance.side_fit import SideFit, fit_sides
 from tpjb_ident.clearance.sweep import Touch, read_sweep
 from tpjb_ident.conditions import Condition, sentences
@@ -207,7 +208,7 @@ def _polygon(
     run: Run, touch: Touch, angles: FloatArray, fit: SideFit, centre: Centre, rule: CentreRule
 ) -> ClearancePolygon:
     """Clearances about the centre, with the errors of both."""
-    n = normals(angles)
+    n = directions(angles)
     pads = np.flatnonzero(np.isfinite(fit.distance))
     clearance = fit.distance - n @ centre.position
     # clearance = (I - n G) distance on the reached pads: the centre's error is the same sides' error

@@ -21,6 +21,7 @@ from typing import Literal
 
 import numpy as np
 
+from rigdata.vector import directions
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.errors import ArgumentError
 
@@ -66,17 +67,6 @@ class Centre:
     gain: FloatArray
 
 
-def normals(angles: FloatArray) -> FloatArray:
-    """Unit vectors (n, 2) toward the pads at `angles` (n,) [rad].
-
-    Parameters
-    ----------
-    angles : (n,) ndarray
-        [rad]
-    """
-    return np.column_stack([np.cos(angles), np.sin(angles)])
-
-
 def find_centre(
     angles: FloatArray, distances: FloatArray, covariance: FloatArray, rule: CentreRule = "least-absolute"
 ) -> Centre:
@@ -102,7 +92,7 @@ def find_centre(
     ArgumentError
         When fewer than three pads are given or they do not surround the shaft.
     """
-    design = np.column_stack([normals(angles), np.ones(len(angles))])
+    design = np.column_stack([directions(angles), np.ones(len(angles))])
     if len(angles) < 3 or np.linalg.cond(design) > 1e3:
         raise ArgumentError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
     error = EQUAL_WITHIN * np.sqrt(np.maximum(np.diag(covariance), 1e-20))
@@ -134,7 +124,7 @@ def corners(angles: FloatArray, clearances: FloatArray) -> FloatArray:
     (n, 2) ndarray
         Corner k lies between side k and side k + 1 [m], from the centre.
     """
-    n = normals(angles)
+    n = directions(angles)
     following = np.roll(n, -1, axis=0)
     systems = np.stack([n, following], axis=1)
     sides = np.stack([clearances, np.roll(clearances, -1)], axis=1)
@@ -171,7 +161,7 @@ def gain_ratio(angles: FloatArray, tilt: FloatArray, tilt_se: FloatArray, axes: 
     rows = np.array([[np.cos(a), np.sin(a)] for a in axes])
     if known.sum() < 4 or abs(np.linalg.det(rows)) < 0.05:
         return GainRatio(np.nan, np.nan, np.nan)
-    n = np.column_stack([np.cos(angles), np.sin(angles)])[known]
+    n = directions(angles)[known]
     own, dual = rows[0], np.linalg.inv(rows)[:, 0]
     shear = -(n @ dual) * (n[:, 0] * own[1] - n[:, 1] * own[0])
     design = np.column_stack([np.ones(len(n)), shear]) / tilt_se[known, None]

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigdata.vector import directions
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.measure import SAME_WARMTH, ClearancePolygon
-from tpjb_ident.clearance.polygon import normals
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.schema import TANGENT
 
@@ -112,7 +112,7 @@ def clearance_change(before: ClearancePolygon, after: ClearancePolygon) -> Clear
     se = np.hypot(before.clearance_se, after.clearance_se)
     known = np.isfinite(per_pad)
     # pads that do not surround the shaft evenly: a shift of the centre must not pass for growth
-    design = np.column_stack([np.ones(known.sum()), normals(before.angles[known])])
+    design = np.column_stack([np.ones(known.sum()), directions(before.angles[known])])
     mean = np.linalg.lstsq(design, per_pad[known], rcond=None)[0][0]
     mean_se = float(np.sqrt(np.linalg.inv(design.T @ design)[0, 0] * np.mean(se[known] ** 2)))
     return ClearanceChange(per_pad, se, float(mean), mean_se, shift)

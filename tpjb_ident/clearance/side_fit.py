@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rigdata.vector import directions
 from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
-from tpjb_ident.clearance.polygon import normals
 from tpjb_ident.clearance.sweep import Touch
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
@@ -136,7 +136,7 @@ def _place_along_side(touch: Touch, angles: FloatArray, reached: BoolArray) -> F
     """Place (m,) on each side, from the foot of the polygon's centre."""
     pads = np.flatnonzero(reached)
     far = np.array([np.quantile(touch.along[touch.pad == k], 0.9) for k in pads])
-    design = np.column_stack([normals(angles[pads]), np.ones(len(pads))])
+    design = np.column_stack([directions(angles[pads]), np.ones(len(pads))])
     centre = np.linalg.lstsq(design, far, rcond=None)[0][:2]
     tangents = np.column_stack([-np.sin(angles), np.cos(angles)])
     return np.asarray(touch.across - (tangents @ centre)[touch.pad])
@@ -185,7 +185,7 @@ def _whitener(touch: Touch, angles: FloatArray, noise: NoiseModel, unsure: Float
 
     `unsure` (m,) is a standard deviation of each average by itself [m].
     """
-    n = normals(angles)[touch.pad]
+    n = directions(angles)[touch.pad]
     centred = touch.time - touch.time.mean()
     same = touch.time[:, None] == touch.time[None, :]
     covariance = (n @ n.T) * (

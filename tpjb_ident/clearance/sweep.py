@@ -7,15 +7,15 @@ So the force vector says how much each pad carries, and the position says which 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigdata.problem import Problem, RigDataError
+from rigdata.vector import directions
 from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
-from tpjb_ident.clearance.polygon import normals
-from tpjb_ident.slow_records.bad_samples import good_samples, refuse_flat_channels
+from tpjb_ident.slow_records.bad_samples import piece_means, slow_samples
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run
@@ -65,19 +65,11 @@ class Touch:
         ----------
         keep : (m,) ndarray of bool
         """
-        return Touch(
-            self.time[keep],
-            self.duration[keep],
-            self.pad[keep],
-            self.along[keep],
-            self.across[keep],
-            self.load[keep],
-            self.push,
-            self.alone[keep],
-        )
+        of_piece = ("time", "duration", "pad", "along", "across", "load", "alone")
+        return replace(self, **{name: getattr(self, name)[keep] for name in of_piece})
 
 
-def read_sweep(run: Run, angles: FloatArray, give: FloatArray | None = None, longest_glitch: int = 60) -> Touch:
+def read_sweep(run: Run, angles: FloatArray) -> Touch:
     """Read a run of kind ``clearance``.
 
     Parameters
@@ -86,10 +78,6 @@ def read_sweep(run: Run, angles: FloatArray, give: FloatArray | None = None, lon
         The sweep.
     angles : (n,) ndarray
         Pad directions [rad].
-    give : (n,) ndarray, optional
-        Deflection of each pivot under the push load [m], where known.
-    longest_glitch : int
-        [samples]
 
     Returns
     -------
@@ -100,17 +88,13 @@ def read_sweep(run: Run, angles: FloatArray, give: FloatArray | None = None, lon
     RigDataError
         When the load does not go all around or the shaft does not follow it.
     """
-    refuse_flat_channels(run)
-    force, displacement = run.vector("force"), run.vector("displacement")
-    n = min(len(force), len(displacement))
-    good = good_samples(np.hstack([force.values[:n], displacement.values[:n]]), longest_glitch)
+    time, load, position, good = slow_samples(run)
     if good.sum() < 200:
         raise _refused(run, f"has only {int(good.sum())} usable samples", "Repeat the sweep")
-    load, position, time = force.values[:n][good], displacement.values[:n][good], displacement.time[:n][good]
+    load, position, time = load[good], position[good], time[good]
     _check_turn(run, load, position, time)
     push = float(np.median(np.hypot(*load.T)))
-    depth = CONTACT_DEPTH + (np.full(len(angles), LARGEST_GIVE) if give is None else 1.3 * give)
-    touched = _touched(position, angles, depth)
+    touched = _touched(position, angles, np.full(len(angles), CONTACT_DEPTH + LARGEST_GIVE))
     carried = _carried(load, angles, touched)
     swept = _Swept(time, position, touched, carried, push)
     return _blocks(swept, angles, _piece_length(run.point.shaft_speed))
@@ -148,14 +132,14 @@ def _check_turn(run: Run, load: FloatArray, position: FloatArray, time: FloatArr
 
 def _touched(position: FloatArray, angles: FloatArray, depth: FloatArray) -> BoolArray:
     """Which pads (n_samples, n) the shaft touches: it lies within `depth` of where it was farthest out."""
-    out = position @ normals(angles).T
+    out = position @ directions(angles).T
     farthest = np.quantile(out, 0.995, axis=0)
     return np.asarray(out > farthest - depth)
 
 
 def _carried(load: FloatArray, angles: FloatArray, touched: BoolArray) -> FloatArray:
     """Load on every touched pad (n_samples, n) [N]; NaN where the touched pads cannot balance the force."""
-    n = normals(angles)
+    n = directions(angles)
     carried = np.full(touched.shape, np.nan)
     count = touched.sum(axis=1)
     single = np.flatnonzero(count == 1)
@@ -193,16 +177,11 @@ def _blocks(swept: _Swept, angles: FloatArray, length: float) -> Touch:
     long = (stops - starts) >= SHORTEST
     starts, stops = starts[long], stops[long]
     count = (stops - starts).astype(float)
-
-    def means(values: FloatArray) -> FloatArray:
-        total = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(values - values[0], axis=0)])
-        return np.asarray((total[stops] - total[starts]) / count[:, None] + values[0])
-
     period = float(time[-1] - time[0]) / (len(time) - 1)
-    moment = means(time[:, None])[:, 0]
-    place = means(swept.position)
-    load = means(np.nan_to_num(swept.carried))
-    lost = means(np.isnan(swept.carried).astype(float)) > 0.0
+    moment = piece_means(time[:, None], starts, stops)[:, 0]
+    place = piece_means(swept.position, starts, stops)
+    load = piece_means(np.nan_to_num(swept.carried), starts, stops)
+    lost = piece_means(np.isnan(swept.carried).astype(float), starts, stops) > 0.0
     usable = touched[starts] & ~lost & _at_rest(moment, place, touched[starts])[:, None]
     row, pad = np.nonzero(usable)
     tangent = np.column_stack([-np.sin(angles), np.cos(angles)])
@@ -210,7 +189,7 @@ def _blocks(swept: _Swept, angles: FloatArray, length: float) -> Touch:
         time=moment[row],
         duration=count[row] * period,
         pad=pad,
-        along=np.sum(place[row] * normals(angles)[pad], axis=1),
+        along=np.sum(place[row] * directions(angles)[pad], axis=1),
         across=np.sum(place[row] * tangent[pad], axis=1),
         load=load[row, pad],
         push=swept.push,

@@ -32,10 +32,9 @@ from tpjb_ident.dynamic.instruments.amplitude import ZeroAmplitude, zero_amplitu
 from tpjb_ident.dynamic.instruments.findings import InstrumentFindings, film_change_at, look_at_instruments
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions, change_spread
 from tpjb_ident.dynamic.records.mains_frequency import mains_frequency
+from tpjb_ident.dynamic.results.gains import Pairs, channel_pairs, gain_doubts, swept_probes, with_probe_doubts
 from tpjb_ident.dynamic.results.identification import Identification, with_systematic
 from tpjb_ident.dynamic.results.point_result import PointResult, lost_points, named_at_points
-from tpjb_ident.dynamic.results.probes import swept_probes, with_probe_doubts
-from tpjb_ident.dynamic.results.run_gains import Pairs, channel_pairs, gain_doubts
 from tpjb_ident.dynamic.runs.baseline import measured_baseline
 from tpjb_ident.dynamic.runs.checked_runs import check_conditions, check_finished
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns

@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
-from tpjb_ident.arrays import BoolArray, FloatArray
+from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run
@@ -27,6 +27,48 @@ THRESHOLD = 7.0  # noise standard deviations beyond both medians
 SHORTEST = 50  # samples
 TIMES_EXPECTED = 10.0
 NOISE_FREE = 0.5  # share of repeated readings, apart from the longest stretch: a computed record, or a coarse converter
+
+
+def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Both vectors of a slow record on one time base, and which samples are good.
+
+    Parameters
+    ----------
+    run : rigdata.run.Run
+    longest : int, optional
+        Of a glitch [samples].
+
+    Returns
+    -------
+    time : (n,) ndarray
+        [s]
+    force, displacement : (n, 2) ndarray
+        [N], [m]
+    good : (n,) ndarray of bool
+        Neither missing nor part of a glitch.
+
+    Raises
+    ------
+    RigDataError
+        A channel stands still for a while.
+    """
+    refuse_flat_channels(run)
+    force, displacement = run.vector("force"), run.vector("displacement")
+    n = min(len(force), len(displacement))
+    load, place = force.values[:n], displacement.values[:n]
+    return np.asarray(displacement.time[:n]), load, place, good_samples(np.hstack([load, place]), longest)
+
+
+def piece_means(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
+    """Means of the rows of `values` (n, k) over pieces first..last-1 (m,), (m, k).
+
+    Parameters
+    ----------
+    values : (n, k) ndarray
+    first, last : (m,) ndarray of int
+    """
+    total = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(values - values[0], axis=0)])
+    return np.asarray((total[last] - total[first]) / (last - first)[:, None] + values[0])
 
 
 def good_samples(values: FloatArray, longest: int = 60) -> BoolArray:

@@ -11,14 +11,13 @@ import numpy as np
 from rigdata.near_names import unknown_name
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, repeats
+from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, readmitted, repeats
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
 from tpjb_ident.dynamic.estimators.mm import mm_fit
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, displacement_condition, ols_fit, phasor_table
 from tpjb_ident.dynamic.estimators.rlm import NORMS, RlmSettings, rlm_fit
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.estimators.uncertainty import homoscedastic, with_repeats
-from tpjb_ident.dynamic.estimators.whole_directions import readmitted
 from tpjb_ident.errors import ArgumentError
 
 #: Condition number of the displacement directions beyond which entries cannot be told apart.

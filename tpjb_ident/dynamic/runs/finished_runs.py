@@ -96,13 +96,8 @@ def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:
     )
 
 
-def slim(phasors: RunPhasors) -> RunPhasors:
-    """The run without the phasors of nuisance lines: estimates need those of the excitation alone.
-
-    Parameters
-    ----------
-    phasors : RunPhasors
-    """
+def _slim(phasors: RunPhasors) -> RunPhasors:
+    """The run without the phasors of nuisance lines: estimates need those of the excitation alone."""
     n = len(phasors.lines.excitation)
     return phasors.changed(lambda _, every: every[:, :n].copy())
 
@@ -234,7 +229,7 @@ class FinishedRuns:
         if result is None:  # cleared by another command since
             result, mark = self._again(run), ""
         self._digests[index] = digest(result, run.sample_rate)
-        phasors = slim(result.phasors)
+        phasors = _slim(result.phasors)
         size = _bytes(phasors)
         if size <= self._room:
             self._room -= size
@@ -257,7 +252,7 @@ class FinishedRuns:
         run, mark = self._runs[index], self._marks.get(index, "")
         store = self._store if mark and self._store is not None else self._own()
         found = store.load(run, mark or _OWN, self._mass)
-        return slim((found or self._again(run)).phasors)
+        return _slim((found or self._again(run)).phasors)
 
     def _own(self) -> RunStore:
         if self._folder is None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.pivot.records.steps import Hold
+from tpjb_ident.slow_records.bad_samples import piece_means
 
 TURN = 0.02  # of the load range: a smaller way back is noise
 MOST_BLOCKS = 220  # the covariance is a full matrix: keep it small
@@ -111,19 +112,14 @@ def cut_blocks(samples: Samples, holds: tuple[Hold, ...], length: float) -> Bloc
     period = span / max(len(samples.time) - 1, 1)
     whole = count >= np.maximum(3, 0.5 * (edges[:, 1] - edges[:, 0]) / period)
     first, last, count, number = first[whole], last[whole], count[whole], number[whole]
-
-    def means(values: FloatArray) -> FloatArray:
-        total = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(values - values[0], axis=0)])
-        return np.asarray((total[last] - total[first]) / count[:, None] + values[0])
-
-    time = means(samples.time[:, None])[:, 0]
-    along = means(samples.along[:, None])[:, 0]
+    time = piece_means(samples.time[:, None], first, last)[:, 0]
+    along = piece_means(samples.along[:, None], first, last)[:, 0]
     rate = np.where(number >= 0, 0.0, np.gradient(along, time) if len(time) > 1 else 0.0)
     return Blocks(
         time=time,
         duration=np.asarray(count * period),
-        load=means(samples.load),
-        displacement=means(samples.displacement),
+        load=piece_means(samples.load, first, last),
+        displacement=piece_means(samples.displacement, first, last),
         load_spread=_sample_noise(samples.along) / np.sqrt(count),
         rate=np.asarray(rate),
         hold=number,

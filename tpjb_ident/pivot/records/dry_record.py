@@ -16,7 +16,7 @@ from tpjb_ident.pivot.records.pickup import PickupSignature, measure_pickup
 from tpjb_ident.pivot.records.projection import Projection, pad_axes, project
 from tpjb_ident.pivot.records.settings import PivotSettings
 from tpjb_ident.pivot.records.steps import Hold, find_holds
-from tpjb_ident.slow_records.bad_samples import good_samples, refuse_flat_channels
+from tpjb_ident.slow_records.bad_samples import slow_samples
 from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
 
 if TYPE_CHECKING:
@@ -92,7 +92,6 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
             run, "pad", f"names pad {run.pad}, the bearing has pads 1 to {len(pad_angles)}", "Correct the manifest"
         )
     angle = float(pad_angles[run.pad - 1])
-    refuse_flat_channels(run)
     samples, pickup = _samples(run, angle, settings)
     load_range = float(np.ptp(samples.along))
     if load_range <= 0.0 or np.ptp(samples.displacement, axis=0).max() <= 0.0:
@@ -109,10 +108,9 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
 
 def _samples(run: Run, angle: float, settings: PivotSettings) -> tuple[Samples, PickupSignature | None]:
     """Both vectors on one time base, glitches left out; the mains line of the channels behind them."""
-    force, displacement = run.vector("force"), run.vector("displacement")
-    n = min(len(force), len(displacement))
-    load, position, time = force.values[:n], displacement.values[:n], np.asarray(displacement.time[:n])
-    good = good_samples(np.hstack([load, position]), settings.longest_glitch) & np.isfinite(time)
+    time, load, position, good = slow_samples(run, settings.longest_glitch)
+    good &= np.isfinite(time)
+    n = len(good)
     lost = 1.0 - float(np.mean(good)) if n else 1.0
     if n < FEWEST_SAMPLES or lost > MOST_LOST:
         what = f"has {n} samples, of which {100 * lost:.0f} % are missing or glitches"
