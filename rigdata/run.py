@@ -19,23 +19,6 @@ from rigdata.vector import COLLINEAR_SINE, solve_vector
 
 
 @dataclass(frozen=True)
-class Temperature:
-    """Where a temperature channel sits.
-
-    Attributes
-    ----------
-    channel : str
-    pad : int or None
-    position : float or None
-        Fraction of the pad's arc from its leading edge.
-    """
-
-    channel: str
-    pad: int | None
-    position: float | None
-
-
-@dataclass(frozen=True)
 class Run:
     """One test run; its samples are read when they are asked for.
 
@@ -212,11 +195,11 @@ class Run:
         opener = getattr(self.reader, "kept_open", None)
         return nullcontext() if opener is None else opener()
 
-    def temperatures(self) -> tuple[Temperature, ...]:
-        """Where the temperature channels of this run sit, by pad and position."""
+    def temperatures(self) -> tuple[Channel, ...]:
+        """Temperature channels of this run, by pad and position."""
         found = [c for c in self.channels.values() if c.quantity == "temperature"]
         found.sort(key=lambda c: (c.pad or 0, c.position or 0.0, c.name))
-        return tuple(Temperature(c.name, c.pad, c.position) for c in found)
+        return tuple(found)
 
     def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
         """Read the shaft speed [rad/s], from pulses if need be; None where no channel measures it.

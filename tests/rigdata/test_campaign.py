@@ -136,7 +136,7 @@ def test_probes_at_any_two_angles_become_x_and_y(tmp_path):
 def test_speed_and_temperatures(tmp_path):
     run = rigdata.load_campaign(write(tmp_path)).run("l-1")
     assert run.speed().values[0] == pytest.approx(2 * np.pi * 22)
-    assert [(t.channel, t.pad, t.position) for t in run.temperatures()] == [("T1", 1, 0.75), ("T2", 2, 0.75)]
+    assert [(t.name, t.pad, t.position) for t in run.temperatures()] == [("T1", 1, 0.75), ("T2", 2, 0.75)]
     assert run.record("T1").values[0] == pytest.approx(313.15)
 
 

@@ -1,4 +1,4 @@
-"""Runs of one operating point against each other: a run whose gains, signs or channels are others' stands apart.
+"""Runs of one point against each other: what each answers to the force, and which one stands apart from the rest.
 
 All runs of a point share one matrix H. Each run is held against the matrix of the others, in units of what these
 scatter about it themselves, so that a quiet rig shows a gain that is some per cent off and a noisy one does not cry.
@@ -7,17 +7,18 @@ scatter about it themselves, so that a quiet rig shows a gain that is some per c
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
+from rigdata.calibration import Channel
 from rigdata.problem import Severity
-from tpjb_ident.arrays import ComplexArray
-from tpjb_ident.check.answers import Answer, misfit_of, solve_stiffness
-from tpjb_ident.check.gain_evidence import PointReadings, leverage
+from tpjb_ident.arrays import ComplexArray, FloatArray
+from tpjb_ident.check.gain_evidence import PointReadings, leverage, stiffness_of
+from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.one_gain import gain_of_run
-from tpjb_ident.check.run_gains import channel_names
-from tpjb_ident.check.set_points import to_plane
+from tpjb_ident.check.set_points import excited, oil_force, to_plane
 from tpjb_ident.check.wiring import repairs
 
 #: A run that differs by this share stands apart in any case, where the others agree to the second share.
@@ -28,6 +29,100 @@ _LEAST = 0.03
 _CHANCE = 1e-4
 #: Runs needed before one can be told apart from the others, and share of them that can be.
 _MIN_RUNS, _MOST = 4, 1 / 3
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One dynamic run: force and displacement phasors.
+
+    Attributes
+    ----------
+    seen : Observation
+    force : (2,) complex ndarray
+        X, Y [N].
+    readings : (2,) complex ndarray
+        Of the two displacement channels, SI.
+    channels : tuple of Channel
+        These two.
+    """
+
+    seen: Observation
+    force: ComplexArray
+    readings: ComplexArray
+    channels: tuple[Channel, ...]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the probes and cells."""
+        return [c.name for c in (*self.channels, *(self.seen.channels[i] for i in self.seen.pick("force")))]
+
+    @property
+    def displacement(self) -> ComplexArray:
+        """X, Y [m]."""
+        return to_plane(self.channels, self.readings)
+
+
+def answer_of(seen: Observation, mass: float) -> Answer | None:
+    """Take the phasors of a run; None where it does not show them, or its force is in doubt already.
+
+    Parameters
+    ----------
+    seen : Observation
+    mass : float
+        Of the housing [kg]; NaN where not stated.
+    """
+    where = seen.pick("displacement")
+    force = oil_force(seen, mass)
+    if len(where) != 2 or force is None or seen.lines is None or "force" in seen.report.doubts or not excited(seen):
+        return None
+    readings = seen.lines.phasor[where]
+    if not np.all(np.isfinite(readings)) or not np.any(np.abs(readings) > 8 * seen.lines.floor[where]):
+        return None
+    return Answer(seen, force, readings, tuple(seen.channels[i] for i in where))
+
+
+def _solve_stiffness(answers: Sequence[Answer]) -> ComplexArray | None:
+    """H of ``F = H D``, least squares; None where the runs excite one direction only."""
+    return stiffness_of(np.stack([a.displacement for a in answers]), np.stack([a.force for a in answers]))
+
+
+def misfit_of(answer: Answer, stiffness: ComplexArray, repair: FloatArray | None = None) -> float:
+    """Share of the force that H does not explain, after a repair (2, 2) of the displacement readings.
+
+    Parameters
+    ----------
+    answer : Answer
+    stiffness : (2, 2) complex ndarray
+        H [N/m].
+    repair : (2, 2) ndarray, optional
+        On the readings of the two channels.
+    """
+    readings = answer.readings if repair is None else repair @ answer.readings
+    predicted = stiffness @ to_plane(answer.channels, readings)
+    return float(np.linalg.norm(answer.force - predicted) / np.linalg.norm(answer.force))
+
+
+def robust_stiffness(group: Sequence[Answer]) -> ComplexArray | None:
+    """H with the least median misfit among all pairs of runs, so that a faulty run cannot pull it.
+
+    Parameters
+    ----------
+    group : sequence of Answer
+        Runs of one operating point.
+    """
+    best: tuple[float, ComplexArray] | None = None
+    for pair in combinations(group[:24], 2):
+        stiffness = _solve_stiffness(pair)
+        if stiffness is None:
+            continue
+        misfit = float(np.median([misfit_of(a, stiffness) for a in group]))
+        if best is None or misfit < best[0]:
+            best = (misfit, stiffness)
+    if best is None:
+        return None
+    close = [a for a in group if misfit_of(a, best[1]) <= max(3 * best[0], 1e-9)]
+    refined = _solve_stiffness(close)
+    return best[1] if refined is None else refined
 
 
 def check_agreement(
@@ -53,12 +148,10 @@ def check_agreement(
         outliers = {i for i, misfit in enumerate(misfits) if misfit > allowed}
     outliers |= _apart(group, outliers)
     others = [i for i in range(len(group)) if i not in outliers]
-    common = solve_stiffness([group[i] for i in others]) if outliers and len(others) > 1 else None
+    common = _solve_stiffness([group[i] for i in others]) if outliers and len(others) > 1 else None
     for i in sorted(outliers):
         gain = None if readings is None else gain_of_run(readings, i, others)
-        hint = (
-            "" if gain is None or gain.chance > _CHANCE else _as_if(channel_names(group)[gain.channels[0]], gain.gain)
-        )
+        hint = "" if gain is None or gain.chance > _CHANCE else _as_if(group[0].names[gain.channels[0]], gain.gain)
         _tell(group[i], stiffness if common is None else common, hint)
     return outliers
 
@@ -84,7 +177,7 @@ def _distance(one: Answer, others: Sequence[Answer]) -> tuple[float, float]:
     With s^2 the others' variance per equation and d the run's displacement, its residual r has the variance
     s^2 (1 + d* (sum of d d*)^-1 d); |r|^2 over it follows an F distribution.
     """
-    stiffness = solve_stiffness(others)
+    stiffness = _solve_stiffness(others)
     spare = 2 * (2 * len(others) - 4)
     if stiffness is None or spare < 4:
         return 0.0, 0.0

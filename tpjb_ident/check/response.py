@@ -14,8 +14,7 @@ import numpy as np
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
 from tpjb_ident.arrays import AnyArray, ComplexArray, FloatArray
-from tpjb_ident.check.agreement import check_agreement
-from tpjb_ident.check.answers import Answer, answer_of, misfit_of, robust_stiffness
+from tpjb_ident.check.agreement import Answer, answer_of, check_agreement, misfit_of, robust_stiffness
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.run_gains import check_gains, point_readings, probe_centres
 from tpjb_ident.check.set_points import excited, plane_of, to_plane

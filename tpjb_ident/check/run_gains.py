@@ -9,7 +9,7 @@ import numpy as np
 
 from rigdata.calibration import Channel
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.check.answers import Answer
+from tpjb_ident.check.agreement import Answer
 from tpjb_ident.check.gain_evidence import PointReadings
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.one_gain import WrongGain, wrong_gains
@@ -34,19 +34,7 @@ def check_gains(group: Sequence[Answer], known_outliers: Collection[int], readin
         Of the same runs.
     """
     for found in wrong_gains(readings, known_outliers):
-        _tell(group[found.run], found, [channel_names(group)[i] for i in found.channels])
-
-
-def channel_names(group: Sequence[Answer]) -> list[str]:
-    """Names of the two probes and two cells.
-
-    Parameters
-    ----------
-    group : sequence of Answer
-        Runs of one operating point.
-    """
-    first = group[0]
-    return [c.name for c in (*first.channels, *_cells(first.seen))]
+        _tell(group[found.run], found, [group[0].names[i] for i in found.channels])
 
 
 def point_readings(group: Sequence[Answer], centres: dict[str, float]) -> PointReadings | None:

@@ -105,8 +105,7 @@ def plain_points(
 
 
 def _solved(data: PointData, settings: PlainSettings) -> PlainPoint:
-    good = np.isfinite(data.D).all(axis=1) & np.isfinite(data.F).all(axis=1)
-    D, F = data.D[good], data.F[good]
+    D, F = data.D[data.whole], data.F[data.whole]
     R, f = r_matrix(D, F)
     if np.linalg.matrix_rank(D) < 2:
         none = np.full((2, 2), np.nan + 0j)
@@ -173,6 +172,5 @@ def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:
             group.attrs["shaft_speed_Hz"] = point.shaft_speed_hz
             group.attrs["excitation_Hz"] = point.excitation_hz
             group.attrs["runs"] = [run.run for run in p.data.runs]
-            good = np.isfinite(p.data.D).all(axis=1) & np.isfinite(p.data.F).all(axis=1)
-            for name, values in (("R", p.R), ("f", p.f), ("run_index", p.data.run_index[good])):
+            for name, values in (("R", p.R), ("f", p.f), ("run_index", p.data.run_index[p.data.whole])):
                 group.create_dataset(name, data=values, track_times=False)

@@ -195,8 +195,7 @@ def _beside_repeats(data: PointData) -> FloatArray:
     """Windows (n,) that are like the others of their run: 1, else 0. Runs of other amplitude are no outliers here."""
     good = np.zeros(len(data.D))
     for i in range(len(data.runs)):
-        mine = np.flatnonzero(data.run_index == i)
-        mine = mine[np.isfinite(data.D[mine]).all(axis=1) & np.isfinite(data.F[mine]).all(axis=1)]
+        mine = np.flatnonzero((data.run_index == i) & data.whole)
         if len(mine):
             turned = _one_phase(data.D[mine], data.F[mine])
             off = np.max([np.abs(z - complex_median(z)).max(axis=1) / np.abs(z).max() for z in turned], axis=0)
@@ -215,8 +214,7 @@ def _run_means(data: PointData, weights: FloatArray) -> tuple[ComplexArray, Comp
     """Means (n_runs, 2) of the runs' good windows, and the standard errors of the forces' components."""
     D, F, noise = [], [], []
     for i in range(len(data.runs)):
-        good = (data.run_index == i) & (weights > 0)
-        good &= np.isfinite(data.D).all(axis=1) & np.isfinite(data.F).all(axis=1)
+        good = (data.run_index == i) & (weights > 0) & data.whole
         if good.sum() < 2:
             return None
         d, f = _one_phase(data.D[good], data.F[good])

@@ -111,8 +111,7 @@ def balance_runs(data: PointData) -> list[BalanceRun]:
     found = []
     mass = data.runs[0].housing_mass
     for i, (run, line) in enumerate(zip(data.runs, data.lines)):
-        whole = np.isfinite(data.F).all(axis=1) & np.isfinite(data.A).all(axis=1) & np.isfinite(data.D).all(axis=1)
-        mine = (data.run_index == i) & whole
+        mine = (data.run_index == i) & data.whole & np.isfinite(data.A).all(axis=1)
         if not mine.any():
             continue
         both = _one_phase(np.concatenate([data.F[mine], data.A[mine]], axis=1), data.D[mine])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
+from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
@@ -133,14 +133,9 @@ def _inertia_left(mass: float, omega: float) -> Condition:
     return Condition("inertia-not-corrected" if share > HARMLESS else "inertia-negligible", told)
 
 
-def _complete(data: PointData) -> BoolArray:
-    """Windows that have phasors."""
-    return np.asarray(np.isfinite(data.D).all(axis=1) & np.isfinite(data.F).all(axis=1))
-
-
 def _missing(data: PointData) -> list[Condition]:
     """Windows without phasors, pointed out when they are many or a whole run's."""
-    whole = _complete(data)
+    whole = data.whole
     empty = [run.run for i, run in enumerate(data.runs) if not whole[data.run_index == i].any()]
     if empty:
         return [Condition("run-without-data", f"no usable window in {', '.join(empty)}")]
@@ -183,7 +178,7 @@ def directional_pattern(data: PointData, weights: FloatArray) -> Condition | Non
     """
     from scipy.special import bdtrc
 
-    whole = _complete(data)
+    whole = data.whole
     bad = (weights < REJECTED_WEIGHT) & whole
     total = int(bad.sum())
     named = []
@@ -213,7 +208,7 @@ def disagreeing_runs(data: PointData, h: ComplexArray, weights: FloatArray, know
     """
     if len(data.runs) < 3 or not np.isfinite(h).all():
         return None
-    good = _complete(data) & (weights > 0)
+    good = data.whole & (weights > 0)
     shares, sizes = [], []
     for i in range(len(data.runs)):
         mine = good & (data.run_index == i)

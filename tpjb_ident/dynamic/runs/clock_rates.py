@@ -64,10 +64,9 @@ class ClockRates:
         omega = 2 * np.pi * np.array([r.lines.excitation[i].frequency for r, i in zip(data.runs, data.lines)])
         time = np.concatenate([run.start + 0.5 * run.length for run in data.runs])
         phase = omega[data.run_index] * time
-        mass = data.runs[0].housing_mass if data.runs[0].acceleration is not None else 0.0
-        cells = (data.F - mass * data.A) * np.exp(-1j * self.force * phase)[:, None]
+        cells = (data.F - data.mass * data.A) * np.exp(-1j * self.force * phase)[:, None]
         A = data.A * np.exp(-1j * self.acceleration * phase)[:, None]
-        return replace(data, F=cells + mass * A, A=A)
+        return replace(data, F=cells + data.mass * A, A=A)
 
     def doubt(self, data: PointData) -> float:
         """Standard deviation of the cells' lag [s] that the error of the rate leaves, in the middle of the windows.
@@ -101,8 +100,7 @@ def rate_samples(data: PointData) -> RateSamples:
     ----------
     data : PointData
     """
-    mass = data.runs[0].housing_mass if data.runs[0].acceleration is not None else 0.0
-    cells = data.F - mass * data.A
+    cells = data.F - data.mass * data.A
     found: dict[str, list[FloatArray]] = {"force": [], "acceleration": []}
     for i, (run, line) in enumerate(zip(data.runs, data.lines)):
         mine = data.run_index == i

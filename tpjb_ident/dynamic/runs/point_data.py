@@ -9,7 +9,7 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from rigdata.run import Run
-from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.records.run_phasors import RunPhasors
 
 #: Samples from which a run's temperatures are taken.
@@ -50,6 +50,16 @@ class PointData:
     def omega(self) -> float:
         """Excitation frequency as found in the runs, else as set [rad/s]."""
         return self.found or self.point.excitation
+
+    @property
+    def whole(self) -> BoolArray:
+        """Windows that have phasors of displacement and force, (n,)."""
+        return np.asarray(np.isfinite(self.D).all(axis=1) & np.isfinite(self.F).all(axis=1))
+
+    @property
+    def mass(self) -> float:
+        """Housing mass whose inertia is in F [kg]: zero where no accelerometer measures it."""
+        return self.runs[0].housing_mass if self.runs[0].acceleration is not None else 0.0
 
     @property
     def mean_loads(self) -> FloatArray:
@@ -161,7 +171,7 @@ def mean_temperatures(run: Run) -> dict[int, float]:
     for sensor in run.temperatures():
         if sensor.pad is None:
             continue
-        values = run.record(sensor.channel, 0, TEMPERATURE_SAMPLES).values
+        values = run.record(sensor.name, 0, TEMPERATURE_SAMPLES).values
         known = values[np.isfinite(values)]
         if len(known):
             found.setdefault(sensor.pad, []).append(float(known.mean()))

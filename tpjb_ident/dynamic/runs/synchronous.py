@@ -119,8 +119,7 @@ def _saying(data: PointData, name: str, condition: Condition) -> PointData:
 
 
 def _whole(data: PointData, i: int) -> IntArray:
-    good = np.isfinite(data.D).all(axis=1) & np.isfinite(data.F).all(axis=1) & np.isfinite(data.A).all(axis=1)
-    return np.flatnonzero(good & (data.run_index == i))
+    return np.flatnonzero(data.whole & np.isfinite(data.A).all(axis=1) & (data.run_index == i))
 
 
 def _mean(data: PointData, i: int) -> ComplexArray:
