@@ -201,7 +201,7 @@ class Table:
             return None
         return value
 
-    def integer(self, key: str, low: int, high: int = 10_000_000, required: bool = False) -> int | None:
+    def integer(self, key: str, low: int, high: int = 10_000_000) -> int | None:
         """Give a whole number between `low` and `high`.
 
         Parameters
@@ -212,10 +212,8 @@ class Table:
             Least value allowed.
         high : int, optional
             Greatest value allowed.
-        required : bool, optional
-            Whether its absence is an error.
         """
-        value = self._get(key, required, f"Add {key} = {low}")
+        value = self.data.get(key)
         if value is None:
             return None
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:

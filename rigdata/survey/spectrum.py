@@ -11,6 +11,8 @@ from rigdata.arrays import FloatArray
 #: A line must stand this far out of the median of its neighbourhood to be named.
 _STANDS_OUT = 8.0
 _NEIGHBOURS = 25
+#: Lines that a first look names.
+_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class Look:
         return not self.high > self.low
 
 
-def look_at(values: FloatArray, rate: float, most: int = 3) -> Look:
+def look_at(values: FloatArray, rate: float) -> Look:
     """Take a first look at a channel.
 
     Parameters
@@ -63,8 +65,6 @@ def look_at(values: FloatArray, rate: float, most: int = 3) -> Look:
         NaN where missing.
     rate : float
         Sample rate [Hz]; NaN if unknown.
-    most : int
-        Lines to name.
     """
     good = np.isfinite(values)
     kept = values[good]
@@ -82,7 +82,7 @@ def look_at(values: FloatArray, rate: float, most: int = 3) -> Look:
         high=float(kept.max()),
         frequency=frequency,
         amplitude=amplitude,
-        lines=strongest(frequency, amplitude, most),
+        lines=strongest(frequency, amplitude, _NAMED),
     )
 
 

@@ -82,8 +82,8 @@ class Sensor:
     error: SensorError = SensorError()
 
     @classmethod
-    def probe(cls, name: str, axis: float, gap_voltage: float = 8.0, mv_per_um: float = 7.78) -> Sensor:
-        """Eddy-current probe: the reading falls as the shaft comes nearer.
+    def probe(cls, name: str, axis: float, gap_voltage: float = 8.0) -> Sensor:
+        """Eddy-current probe of 7.78 mV/um: the reading falls as the shaft comes nearer.
 
         Parameters
         ----------
@@ -92,110 +92,50 @@ class Sensor:
             Direction [rad].
         gap_voltage : float, optional
             Reading at the centre [V].
-        mv_per_um : float, optional
-            Sensitivity [mV/um].
         """
+        stated = (("sensitivity", "7.78 mV/um"),)
         return cls(
-            name,
-            "displacement",
-            "V",
-            mv_per_um * 1e3,
-            axis,
-            polarity=-1,
-            zero=gap_voltage,
-            stated=(("sensitivity", f"{mv_per_um:g} mV/um"),),
-            uncertainty=0.005,
+            name, "displacement", "V", 7.78e3, axis, polarity=-1, zero=gap_voltage, stated=stated, uncertainty=0.005
         )
 
     @classmethod
-    def load_cell(
-        cls,
-        name: str,
-        axis: float,
-        full_scale: float = 20e3,
-        mv_per_v: float = 2.0,
-        excitation: float = 5.0,
-    ) -> Sensor:
-        """Strain-gauge cell in a bridge; `full_scale` [N], `excitation` [V].
+    def load_cell(cls, name: str, axis: float) -> Sensor:
+        """Strain-gauge cell of 20 kN in a bridge: 2 mV/V at full scale, supplied with 5 V.
 
         Parameters
         ----------
         name : str
         axis : float
             Direction [rad].
-        full_scale : float, optional
-            [N]
-        mv_per_v : float, optional
-            At full scale [mV/V].
-        excitation : float, optional
-            Supply [V].
         """
-        span = mv_per_v * excitation
-        return cls(
-            name,
-            "force",
-            "mV",
-            span / full_scale,
-            axis,
-            span=span,
-            stated=(
-                ("sensitivity", f"{mv_per_v:.1f} mV/V"),
-                ("full_scale", f"{full_scale / 1e3:g} kN"),
-                ("excitation", f"{excitation:g} V"),
-            ),
-            uncertainty=0.002,
-        )
+        stated = (("sensitivity", "2.0 mV/V"), ("full_scale", "20 kN"), ("excitation", "5 V"))
+        return cls(name, "force", "mV", 10.0 / 20e3, axis, span=10.0, stated=stated, uncertainty=0.002)
 
     @classmethod
-    def accelerometer(cls, name: str, axis: float, mv_per_g: float = 10.0, span: float = 0.05) -> Sensor:
-        """Accelerometer; `span` of its converter in V.
+    def accelerometer(cls, name: str, axis: float) -> Sensor:
+        """Accelerometer of 10 mV/g on a converter of 0.05 V.
 
         Parameters
         ----------
         name : str
         axis : float
             Direction [rad].
-        mv_per_g : float, optional
-            Sensitivity [mV/g].
-        span : float, optional
-            Of the converter [V].
         """
-        return cls(
-            name,
-            "acceleration",
-            "V",
-            mv_per_g * 1e-3 / STANDARD_GRAVITY,
-            axis,
-            span=span,
-            stated=(("sensitivity", f"{mv_per_g:g} mV/g"),),
-        )
+        stated = (("sensitivity", "10 mV/g"),)
+        return cls(name, "acceleration", "V", 10.0 * 1e-3 / STANDARD_GRAVITY, axis, span=0.05, stated=stated)
 
     @classmethod
-    def thermometer(cls, name: str, pad: int, kelvin_per_volt: float = 15.0, position: float = 0.75) -> Sensor:
-        """Pt100 with its amplifier, in `pad` (1 for pad #1) at a fraction of the arc.
+    def thermometer(cls, name: str, pad: int) -> Sensor:
+        """Pt100 with its amplifier, at three quarters of a pad's arc.
 
         Parameters
         ----------
         name : str
         pad : int
             From 1.
-        kelvin_per_volt : float, optional
-            [K/V]
-        position : float, optional
-            Fraction of the pad's arc from its leading edge.
         """
-        return cls(
-            name,
-            "temperature",
-            "V",
-            1 / kelvin_per_volt,
-            stated=(
-                ("position", f"{position:g}"),
-                ("sensitivity", f"{kelvin_per_volt:g} K/V"),
-                ("zero", "0 degC"),
-            ),
-            pad=pad,
-        )
+        stated = (("position", "0.75"), ("sensitivity", "15 K/V"), ("zero", "0 degC"))
+        return cls(name, "temperature", "V", 1 / 15.0, stated=stated, pad=pad)
 
     @classmethod
     def tachometer(cls, name: str, mv_per_hz: float = 100.0) -> Sensor:

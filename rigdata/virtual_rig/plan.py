@@ -300,10 +300,8 @@ def operating_points(
     return tuple(OperatingPoint(load, direction, speed, hz(frequency)) for load, frequency in pairs)
 
 
-def locus_points(
-    count: int, load: float = 5000.0, first: float = DOWNWARD, speed: float = hz(22.0)
-) -> tuple[OperatingPoint, ...]:
-    """Give `count` directions of one load [N], evenly all around, counter-clockwise from `first` [rad].
+def locus_points(count: int, load: float = 5000.0) -> tuple[OperatingPoint, ...]:
+    """Give `count` directions of one load [N], evenly all around, counter-clockwise from straight down, at 22 Hz.
 
     Parameters
     ----------
@@ -311,12 +309,8 @@ def locus_points(
         Directions.
     load : float, optional
         [N]
-    first : float, optional
-        First direction [rad].
-    speed : float, optional
-        [rad/s]
     """
-    return tuple(OperatingPoint(load, first + 2 * pi * i / count, speed) for i in range(count))
+    return tuple(OperatingPoint(load, DOWNWARD + 2 * pi * i / count, hz(22.0)) for i in range(count))
 
 
 def _unexcited(point: OperatingPoint) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ force where there are accelerometers, as Eq. (13) wants the film's force.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -76,17 +76,13 @@ class PlainPoint:
     status: tuple[str, ...]
 
 
-def plain_points(
-    campaign: Campaign, settings: PlainSettings, tell: Callable[[str, int, int], None] | None = None
-) -> list[PlainPoint]:
+def plain_points(campaign: Campaign, settings: PlainSettings) -> list[PlainPoint]:
     """Solve every operating point of a campaign as the paper prints it.
 
     Parameters
     ----------
     campaign : Campaign
     settings : PlainSettings
-    tell : callable, optional
-        Called as tell(text, done, total).
 
     Raises
     ------
@@ -95,12 +91,9 @@ def plain_points(
     """
     phasors = PhasorSettings(windows=WindowSettings(length=settings.window, max_inflation=np.inf, min_cycles=1.0))
     runs = []
-    every = [run for run in campaign.of_kind("dynamic") if not is_broadband(run)]
-    for count, run in enumerate(every):
+    for run in (run for run in campaign.of_kind("dynamic") if not is_broadband(run)):
         lines = LineSet((Line("excitation", run.point.excitation_hz),), (), (), run.point.shaft_speed_hz)
         runs.append(extract(run, campaign.housing_mass, phasors, lines))
-        if tell is not None:
-            tell(run.id, count + 1, len(every))
     return [_solved(data, settings) for data in gather(runs)]
 
 

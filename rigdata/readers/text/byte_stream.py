@@ -11,6 +11,8 @@ from typing import BinaryIO
 
 #: How much of a file is looked at to find its dialect; the names must stand in it [bytes].
 HEAD = 2**18
+#: Longer lines come in pieces [bytes].
+_PIECE = 2**20
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -179,8 +181,8 @@ def head_lines(path: Path, encoding: str) -> list[tuple[bytes, int]]:
     return lines
 
 
-def all_lines(path: Path, encoding: str, limit: int = 2**20) -> Iterator[bytes]:
-    """Every line of a file, without its end; lines beyond `limit` bytes come in pieces.
+def all_lines(path: Path, encoding: str) -> Iterator[bytes]:
+    """Every line of a file, without its end; lines beyond a megabyte come in pieces.
 
     Parameters
     ----------
@@ -188,8 +190,6 @@ def all_lines(path: Path, encoding: str, limit: int = 2**20) -> Iterator[bytes]:
         Of the file.
     encoding : str
         Python codec.
-    limit : int
-        Bytes at most.
     """
     with open_ascii(path, encoding) as stream:
         text = b""
@@ -202,9 +202,9 @@ def all_lines(path: Path, encoding: str, limit: int = 2**20) -> Iterator[bytes]:
                 parts[-1] += b"\r"
             text = parts.pop()
             yield from parts
-            while len(text) > limit:
-                yield text[:limit]
-                text = text[limit:]
+            while len(text) > _PIECE:
+                yield text[:_PIECE]
+                text = text[_PIECE:]
         if text:
             yield text.rstrip(b"\r")
 

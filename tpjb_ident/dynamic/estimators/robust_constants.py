@@ -15,6 +15,9 @@ from scipy.special import chdtr, gammaincinv, gammaln, xlogy
 
 from tpjb_ident.arrays import FloatArray
 
+#: Probabilities beyond which a window begins to lose weight, and beyond which none is left.
+_BEGIN, _END = 0.99, 0.9999
+
 
 def bisquare_weight(u: FloatArray, c: float) -> FloatArray:
     """Tukey's weight psi(u) / u.
@@ -70,17 +73,13 @@ def efficiency_constant(dimension: int, efficiency: float = 0.95) -> float:
 
 
 @functools.cache
-def trimming_limits(dimension: int, begin: float = 0.99, end: float = 0.9999) -> tuple[float, float, float]:
+def trimming_limits(dimension: int) -> tuple[float, float, float]:
     """Squared distances where a window starts to lose weight and where it has none.
 
     Parameters
     ----------
     dimension : int
         Real dimensions.
-    begin : float, optional
-        Probability beyond which weight is lost.
-    end : float, optional
-        Probability beyond which none is left.
 
     Returns
     -------
@@ -89,7 +88,7 @@ def trimming_limits(dimension: int, begin: float = 0.99, end: float = 0.9999) ->
     shrinkage : float
         E[w u^2] / (dimension E[w]): what a weighted covariance comes out too small by.
     """
-    lower, upper = _quantile(begin, dimension), _quantile(end, dimension)
+    lower, upper = _quantile(_BEGIN, dimension), _quantile(_END, dimension)
 
     nodes, width = np.polynomial.legendre.leggauss(40)
     x = lower + 0.5 * (upper - lower) * (nodes + 1)

@@ -89,16 +89,15 @@ def window_speeds(speed: FloatArray | None, count: int, nominal: float) -> Float
     return np.where(believable, speeds, np.nan)
 
 
-def shaft_order(frequency: float, speed: float, settings: LineSettings | None = None) -> int:
+def shaft_order(frequency: float, speed: float) -> int:
     """Harmonic of the shaft that an excitation stands on; 0 where it stands on none.
 
     Parameters
     ----------
     frequency, speed : float
         Of the excitation and of the shaft [Hz].
-    settings : LineSettings, optional
     """
-    settings = settings or LineSettings()
+    settings = LineSettings()
     n = round(frequency / speed) if speed > 0 else 0
     near = 0 < n <= settings.named_harmonics and abs(frequency - n * speed) <= n * settings.speed_wander
     return n if near else 0
