@@ -76,11 +76,11 @@ def write_campaign(
     with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as spare:
         if isinstance(chosen, Hdf5Layout):
             made = Path(spare) / "campaign.h5"
-            write_hdf5(made, rig, manifest, records, chosen)
+            _write_hdf5(made, rig, manifest, records, chosen)
         else:
             made = Path(spare) / "campaign"
             made.mkdir()
-            write_csv(made, rig, manifest, records, chosen)
+            _write_csv(made, rig, manifest, records, chosen)
         truth = campaign_truth(rig, facts)
         _put_in_place(made, target, Path(spare))
     return truth
@@ -144,19 +144,12 @@ def _put_in_place(made: Path, target: Path, spare: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: Iterable[SimulatedRun], layout: Hdf5Layout) -> None:
+def _write_hdf5(
+    path: Path, rig: VirtualRig, manifest: str, records: Iterable[SimulatedRun], layout: Hdf5Layout
+) -> None:
     """Write all records to a new file; runs that share a record share its group.
 
     No time stamps are stored: the same rig gives the same bytes.
-
-    Parameters
-    ----------
-    path : Path
-    rig : VirtualRig
-    manifest : str
-        Text of the manifest.
-    records : iterable of SimulatedRun
-    layout : Hdf5Layout
     """
     import h5py
 
@@ -210,18 +203,10 @@ def _share(groups: Any, run: PlannedRun) -> None:
     groups[run.id] = groups[run.record]
 
 
-def write_csv(folder: Path, rig: VirtualRig, manifest: str, records: Iterable[SimulatedRun], layout: CsvLayout) -> None:
-    """Write manifest, bearing and all records into an existing, empty folder.
-
-    Parameters
-    ----------
-    folder : Path
-    rig : VirtualRig
-    manifest : str
-        Text of the manifest.
-    records : iterable of SimulatedRun
-    layout : CsvLayout
-    """
+def _write_csv(
+    folder: Path, rig: VirtualRig, manifest: str, records: Iterable[SimulatedRun], layout: CsvLayout
+) -> None:
+    """Write manifest, bearing and all records into an existing, empty folder."""
     (folder / "campaign.toml").write_bytes(manifest.encode())
     (folder / rig.truth.bearing_name).write_bytes(rig.truth.bearing_text.encode())
     (folder / "runs").mkdir()
@@ -239,7 +224,7 @@ def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout, fault
     names = [s.name for s in (*sensors, *twice)]
     units = [s.unit for s in (*sensors, *twice)]
     columns = [record.readings.columns[name] for name in names]
-    forms = [f"%.{decimals(s, rig.noise.bits)}f" for s in (*sensors, *twice)]
+    forms = [f"%.{_decimals(s, rig.noise.bits)}f" for s in (*sensors, *twice)]
     if layout.time_name is not None:
         names, units = [layout.time_name, *names], ["s", *units]
         columns = [record.readings.time, *columns]
@@ -269,15 +254,8 @@ def _rows(table: np.ndarray, forms: list[str], layout: CsvLayout, tail: str) -> 
     return [line + tail for line in text.split("\n")] if text else []
 
 
-def decimals(sensor: Sensor, bits: int | None) -> int:
-    """Decimals that keep a hundredth of a converter step.
-
-    Parameters
-    ----------
-    sensor : Sensor
-    bits : int or None
-        Of the converter; None for none.
-    """
+def _decimals(sensor: Sensor, bits: int | None) -> int:
+    """Decimals that keep a hundredth of a converter step."""
     return max(0, ceil(-log10(converter_step(sensor, bits or UNQUANTISED_BITS))) + 2)
 
 

@@ -33,7 +33,7 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
     if run.point is None:
         raise VirtualRigError(f"run {run.id} needs a set point")
     rng = stream(seed, run.record, "physics")
-    actual = missed(run.point, noise, rng)
+    actual = _missed(run.point, noise, rng)
     stiffness_point = actual if noise.set_point.stiffness_follows else run.point
     position_point = actual if noise.set_point.position_follows else run.point
     shaft_angle = rng.uniform(0, 2 * np.pi)
@@ -58,15 +58,8 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
     return RunPhysics(time, motion, _facts(actual, motion))
 
 
-def missed(point: OperatingPoint, noise: Noise, rng: np.random.Generator) -> OperatingPoint:
-    """Draw the point that is really run when the set point is `point`.
-
-    Parameters
-    ----------
-    point : OperatingPoint
-    noise : Noise
-    rng : numpy.random.Generator
-    """
+def _missed(point: OperatingPoint, noise: Noise, rng: np.random.Generator) -> OperatingPoint:
+    """Draw the point that is really run when the set point is `point`."""
     miss = noise.set_point
     load, direction, speed = rng.standard_normal(3)
     return replace(

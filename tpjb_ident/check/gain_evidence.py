@@ -212,13 +212,13 @@ def dynamic_difference(
     variance += (_LEAST_PHASOR * float(np.linalg.norm(force[one]))) ** 2
     changes = _bearing_changes(stiffness, own)
     honest = changes @ np.diag(HONEST**2 + _bearing_wander(readings, others, stiffness)) @ changes.T
-    return Difference(stacked(force[one] - stiffness @ own), variance * np.eye(4), honest, spare)
+    return Difference(_stacked(force[one] - stiffness @ own), variance * np.eye(4), honest, spare)
 
 
 def _bearing_changes(stiffness: ComplexArray, displacement: ComplexArray) -> FloatArray:
-    """Force by stiffness and by damping alone, (4, 2) as `stacked` [N]: what a stiffer, a more damped bearing adds."""
+    """Force by stiffness and by damping alone, (4, 2) as `_stacked` [N]: what a stiffer, a more damped bearing adds."""
     return np.stack(
-        [stacked(stiffness.real @ displacement), stacked(1j * stiffness.imag @ displacement)],
+        [_stacked(stiffness.real @ displacement), _stacked(1j * stiffness.imag @ displacement)],
         axis=1,
     )
 
@@ -227,7 +227,7 @@ def _bearing_wander(readings: PointReadings, runs: Sequence[int], stiffness: Com
     """Variances by which some runs' stiffness and damping, as shares, differ about the matrix fitted to them, (2,)."""
     shares = []
     for displacement, force in zip(readings.displacement[list(runs)], readings.force[list(runs)], strict=True):
-        rest = stacked(force - stiffness @ displacement)
+        rest = _stacked(force - stiffness @ displacement)
         shares.append(np.linalg.lstsq(_bearing_changes(stiffness, displacement), rest, rcond=None)[0])
     # the matrix took 8 of the 4 n equations along
     return np.asarray(np.mean(np.square(shares), axis=0) * len(runs) / (len(runs) - 2))
@@ -334,7 +334,7 @@ def static_difference(
 
 
 def dynamic_pattern(readings: PointReadings, one: int, channel: int, stiffness: ComplexArray) -> FloatArray:
-    """What a channel (probes 0 and 1, cells 2 and 3) contributes to force minus H times displacement, as `stacked`.
+    """What a channel (probes 0 and 1, cells 2 and 3) contributes to force minus H times displacement, as `_stacked`.
 
     Parameters
     ----------
@@ -347,8 +347,8 @@ def dynamic_pattern(readings: PointReadings, one: int, channel: int, stiffness: 
         H [N/m].
     """
     if channel < 2:
-        return stacked(-stiffness @ readings.probe_plane[:, channel] * readings.probes[one, channel])
-    return stacked(readings.cell_plane[:, channel - 2] * readings.cells[one, channel - 2])
+        return _stacked(-stiffness @ readings.probe_plane[:, channel] * readings.probes[one, channel])
+    return _stacked(readings.cell_plane[:, channel - 2] * readings.cells[one, channel - 2])
 
 
 def lever_slack(lever: float, part: float) -> float:
@@ -364,11 +364,6 @@ def lever_slack(lever: float, part: float) -> float:
     return abs(_LEVER_KNOWN * lever * part)
 
 
-def stacked(vector: ComplexArray) -> FloatArray:
-    """Real parts, then imaginary ones.
-
-    Parameters
-    ----------
-    vector : (m,) complex ndarray
-    """
+def _stacked(vector: ComplexArray) -> FloatArray:
+    """Real parts, then imaginary ones."""
     return np.concatenate([vector.real, vector.imag])

@@ -241,7 +241,7 @@ def _polygon(
         pivot_scale=fit.scale,
         pivot_scale_se=fit.scale_se,
         noise=fit.noise,
-        temperature=mean_temperature(run),
+        temperature=_mean_temperature(run),
         centre_rule=rule,
         status=_status(fit, clearance, se, len(pads)),
     )
@@ -274,13 +274,8 @@ def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[Con
     return (Condition("give-extrapolated", detail),)
 
 
-def mean_temperature(run: Run) -> float:
-    """Mean over time and over all temperature channels of a run [K]; NaN without any.
-
-    Parameters
-    ----------
-    run : Run
-    """
+def _mean_temperature(run: Run) -> float:
+    """Mean over time and over all temperature channels of a run [K]; NaN without any."""
     names = [name for name, channel in run.channels.items() if channel.quantity == "temperature"]
     records = [np.asarray(run.record(name).values) for name in names]
     means = [float(np.mean(v[np.isfinite(v)])) for v in records if np.isfinite(v).any()]
@@ -298,7 +293,7 @@ def coldest_run(runs: Sequence[Run]) -> Run:
     if len(runs) == 1:
         return runs[0]
     slowest = min(run.point.shaft_speed for run in runs)
-    slow = [(run, mean_temperature(run)) for run in runs if run.point.shaft_speed == slowest]
+    slow = [(run, _mean_temperature(run)) for run in runs if run.point.shaft_speed == slowest]
     cold = float(np.nanmin([t for _, t in slow])) if np.isfinite([t for _, t in slow]).any() else np.nan
     # a temperature that nobody measured does not rule a sweep out
     fit = [run for run, t in slow if not t > cold + SAME_WARMTH]

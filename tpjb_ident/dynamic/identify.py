@@ -156,7 +156,7 @@ def assemble(
     workers = workers or InProcessWorkers()
     checked = check_finished(campaign, finished)
     digests = finished.digests
-    findings, sources = look_at_instruments(point_sources(finished), delays_stated(campaign))
+    findings, sources = look_at_instruments(point_sources(finished), _delays_stated(campaign))
     baseline = measured_baseline(campaign, settings.phasors, own_method(settings.method))
     sources = [replace(source, baseline=baseline) for source in sources]
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
@@ -257,13 +257,8 @@ def _amplitude_part(
     return ({"amplitude": change_spread(film.share, est)} if film.share else {}), film.share
 
 
-def delays_stated(campaign: Campaign) -> bool:
-    """Whether the manifest says how late channels are, or how well that is known.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    """
+def _delays_stated(campaign: Campaign) -> bool:
+    """Whether the manifest says how late channels are, or how well that is known."""
     return any(
         getattr(c, "delay_uncertainty", 0.0) > 0 or getattr(getattr(c, "response", None), "delay", 0.0) != 0.0
         for c in campaign.channels.values()

@@ -86,22 +86,13 @@ def clock_rates(samples: Samples, band: tuple[float, float], lines: tuple[Distur
         Those that are in the record.
     """
     present = [q for q in ("force", "acceleration") if q in samples.values]
-    return {q: clock_rate(samples, q, band, lines) for q in present}
+    return {q: _clock_rate(samples, q, band, lines) for q in present}
 
 
-def clock_rate(samples: Samples, quantity: str, band: tuple[float, float], lines: tuple[Disturbance, ...]) -> ClockRate:
-    """Rate of a quantity's clock against the probes'.
-
-    Parameters
-    ----------
-    samples : Samples
-    quantity : str
-        ``"force"`` or ``"acceleration"``.
-    band : (float, float)
-        [Hz]
-    lines : tuple of Disturbance
-        Those that are in the record.
-    """
+def _clock_rate(
+    samples: Samples, quantity: str, band: tuple[float, float], lines: tuple[Disturbance, ...]
+) -> ClockRate:
+    """Rate of a quantity's clock against the probes'."""
     length = samples.length // PIECES
     frequency = np.asarray(np.fft.rfftfreq(length, 1 / samples.rate), dtype=float)
     seconds = length / samples.rate

@@ -20,20 +20,6 @@ from tpjb_ident.dynamic.broadband.line_rows import LineRows
 H_ORDER = 2
 #: and of what the ends of the record leak into them: for K, C and M it is of the first already.
 ENDS_ORDER = 2
-#: Equations beyond the unknowns that a line needs, per run.
-SPARE_ROWS = 4
-
-
-def unknowns(n_runs: int, ends: bool) -> int:
-    """Complex unknowns per force axis of a line.
-
-    Parameters
-    ----------
-    n_runs : int
-    ends : bool
-        Whether the records' ends are fitted along.
-    """
-    return 2 * (H_ORDER + 1) + (n_runs * (ENDS_ORDER + 1) if ends else 0)
 
 
 def local_fit(rows: LineRows, instrument: ComplexArray | None = None, order: int = H_ORDER) -> LineFit:

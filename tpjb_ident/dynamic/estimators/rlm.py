@@ -1,6 +1,6 @@
 """statsmodels' robust linear model on the stacked real rows of Eq. (15): the paper's choice.
 
-Huber's and Tukey's norms with the MAD scale are `irls.robust_fit`, equal to statsmodels to the last bit; for all
+Huber's and Tukey's norms with the MAD scale are `robust_fit`, equal to statsmodels to the last bit; for all
 others, and where its own numbers are promised (`plain`), statsmodels itself is run.
 
 Kept as a reference with its traps guarded: complex input is refused (statsmodels takes it and returns false standard
