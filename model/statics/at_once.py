@@ -184,5 +184,5 @@ def _take_over(search: Search, state: PadState) -> None:
             f.bent = state.bent[m]
         if solved:
             f.forces = FilmForces(state.force[m], state.stiffness[m], state.damping[m], least, steps)
-            f.corrected = f.forces._replace(force=state.corrected[m])
+            f.corrected = FilmForces(state.corrected[m], *f.forces[1:])
         f.branch = Branch(*state.branch[m, :, :rows]) if rows else None
