@@ -79,8 +79,8 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
         stiffness=moments.T @ film.forces.stiffness @ frame,
         damping=moments.T @ film.forces.damping @ frame,
         pad_mass=np.array([[pad.moment_of_inertia, coupling], [coupling, pad.mass]]),
-        pad_damping=np.diag([0.0, setup.pivot_damping]),
-        pad_stiffness=np.diag([hold.stiffness + friction[0], law.vibration_stiffness(load)]),
+        pad_damping=np.array([[0.0, 0.0], [0.0, setup.pivot_damping]]),
+        pad_stiffness=np.array([[hold.stiffness + friction[0], 0.0], [0.0, law.vibration_stiffness(load)]]),
         friction=friction,
     )
 
