@@ -13,6 +13,7 @@ with open_workers(count=4) as workers:   # of runtime.workers; or open_workers(s
 from __future__ import annotations
 
 import collections
+import gc
 import multiprocessing
 import os
 import pickle
@@ -366,11 +367,22 @@ def local_workers(count: int, start: str | None = None, preload: Sequence[str] =
     if context.get_start_method() == "forkserver":
         context.set_forkserver_preload(["tpjb_ident.runtime.executors", *preload])
     pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=begin_worker), count)
-    with one_thread_each():
+    with one_thread_each(), _shared_memory(context.get_start_method() == "fork"):
         try:
             yield pool
         finally:
             pool.close()
+
+
+@contextmanager
+def _shared_memory(forked: bool) -> Iterator[None]:
+    """Copies of this process share its memory with it as long as nobody's garbage collector walks through all of it."""
+    if forked:
+        gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 @contextmanager
