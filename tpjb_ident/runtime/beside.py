@@ -14,7 +14,8 @@ from multiprocessing.connection import Connection
 from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
-from tpjb_ident.runtime.executors import Job, Outcome, Task, attempt, begin_worker, forks, one_thread_each
+from tpjb_ident.runtime.executors import Job, Outcome, Task, attempt, begin_worker, forks
+from tpjb_ident.runtime.threads import one_thread_each
 
 
 class Talk:

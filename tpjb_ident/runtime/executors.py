@@ -24,13 +24,13 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import wait as wait_for_end
 from typing import Any, Protocol
 
 from tpjb_ident.errors import TpjbError
-from tpjb_ident.runtime.threads import THREAD_VARIABLES, limit_threads, limited_threads
+from tpjb_ident.runtime.threads import limit_threads, one_thread_each
 
 Task = Callable[..., Any]
 Job = tuple[Any, ...]
@@ -383,19 +383,3 @@ def _shared_memory(forked: bool) -> Iterator[None]:
         yield
     finally:
         gc.unfreeze()
-
-
-@contextmanager
-def one_thread_each() -> Iterator[None]:
-    """Processes share the cores already: linear algebra with threads of its own would only be in the way, here too."""
-    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
-    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
-    try:
-        with limited_threads():
-            yield
-    finally:
-        for name, value in before.items():
-            with suppress(KeyError):
-                del os.environ[name]
-            if value is not None:
-                os.environ[name] = value

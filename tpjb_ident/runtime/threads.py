@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -63,3 +64,19 @@ def limited_threads(count: int = 1) -> Iterator[None]:
     finally:
         for (_, limit), number in zip(_loaded(), before, strict=True):
             limit(number)
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Processes share the cores already: linear algebra with threads of its own would only be in the way, here too."""
+    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    try:
+        with limited_threads():
+            yield
+    finally:
+        for name, value in before.items():
+            with suppress(KeyError):
+                del os.environ[name]
+            if value is not None:
+                os.environ[name] = value
