@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
+    from tpjb_ident.compare.static_tests import StaticTests
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.pivot import PivotCurve
 
@@ -126,6 +127,7 @@ def diagnose_campaign(
     baseline: Baseline | None = None,
     settings: DiagnoseSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
+    ahead: Callable[[], StaticTests | None] | None = None,
 ) -> CampaignDiagnosis:
     """Identify a campaign and find what its model lacks.
 
@@ -138,6 +140,8 @@ def diagnose_campaign(
         Tolerances that the bearing file and the campaign's manifest state take the place of defaults.
     progress : callable, optional
         ``progress(text, done, total)``.
+    ahead : callable, optional
+        Gives what `measure_static` has found meanwhile; None: nothing was.
 
     Raises
     ------
@@ -145,7 +149,7 @@ def diagnose_campaign(
         The campaign has no dynamic runs.
     """
     settings = settings or DiagnoseSettings()
-    measured = measure_campaign(campaign, bearing, settings.tolerances, progress)
+    measured = measure_campaign(campaign, bearing, settings.tolerances, progress, ahead)
     return _diagnose_measured(measured, bearing, baseline, settings, progress)
 
 
@@ -154,12 +158,13 @@ def measure_campaign(
     bearing: Bearing,
     known: Tolerances | None = None,
     progress: Callable[[str, int, int], None] | None = None,
+    ahead: Callable[[], StaticTests | None] | None = None,
 ) -> Measured:
     """Identify a campaign and measure its static tests.
 
     Parameters
     ----------
-    campaign, bearing, progress
+    campaign, bearing, progress, ahead
         As of `diagnose_campaign`.
     known : Tolerances, optional
         What counts where bearing file and manifest are silent; what the command line states counts in any case.
@@ -176,7 +181,7 @@ def measure_campaign(
     chosen = IdentifySettings(clearance=least)
     found = identify(campaign, chosen, lambda text, done, total: tell(f"identifying, {text}", 20 * done, 100 * total))
     tell("pivot curves, clearance and locus", 20, 100)
-    static = measure_static(campaign, bearing)
+    static = (ahead() if ahead is not None else None) or measure_static(campaign, bearing)
     curves, polygon, locus = static.curves, static.clearance, static.locus
     found = replace(found, conditions=found.conditions + static.left_out)
     housing = with_housing(Setup(bearing, pivot_laws("rigid", bearing)), campaign).instruments

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -31,9 +33,12 @@ from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
+    from tpjb_ident.compare.static_tests import StaticTests
     from tpjb_ident.diagnose.campaign import Baseline, CampaignDiagnosis
     from tpjb_ident.diagnose.search.settings import DiagnoseSettings
     from tpjb_ident.diagnose.verdict.verdict import Verdict
+
+    Ahead = Callable[[], StaticTests | None] | None
 
 Pivots = Annotated[str, typer.Option("--pivots", help="Where to start from: kirk, rigid, measured or a pivots.toml.")]
 ModelTolerance = Annotated[
@@ -90,8 +95,8 @@ def diagnose(
     inputs = data.inputs | files
     target = out_folder(out, "diagnose")
     with output_folder(target, "diagnose", (data.path,)) as folder:
-        with progress("diagnosing") as show:
-            result = _diagnosed(data, baseline, settings, show)
+        with _static_tests_beside(data, workers) as ahead, progress("diagnosing") as show:
+            result = _diagnosed(data, baseline, settings, show, ahead)
             if result.identification is not None:
                 write_identification(folder, result.identification)
             _write_verdict(folder, baseline, result.diagnosis.verdict)
@@ -122,13 +127,30 @@ def _settings(model_tolerance: float | None, stated: list[str], workers: int | N
     return DiagnoseSettings(tolerances=Tolerances().states(typed, "command line"), workers=workers)
 
 
-def _diagnosed(data: Data, baseline: Baseline, settings: DiagnoseSettings, show: Progress) -> CampaignDiagnosis:
+@contextmanager
+def _static_tests_beside(data: Data, workers: int | None) -> Iterator[Ahead]:
+    """Measure the static tests in a copy of this process while it identifies; None where there is no second core."""
+    from tpjb_ident.compare.coefficient_table import TableSource
+    from tpjb_ident.compare.static_tests import measure_static
+    from tpjb_ident.runtime.beside import beside
+    from tpjb_ident.runtime.executors import cores, forks
+
+    if isinstance(data.source, TableSource) or workers == 1 or cores() < 2 or not forks():
+        yield None
+        return
+    with beside(measure_static, data.source, data.bearing) as ahead:
+        yield ahead
+
+
+def _diagnosed(
+    data: Data, baseline: Baseline, settings: DiagnoseSettings, show: Progress, ahead: Ahead
+) -> CampaignDiagnosis:
     from tpjb_ident.compare.coefficient_table import TableSource
     from tpjb_ident.diagnose.campaign import diagnose_campaign, diagnose_table
 
     if isinstance(data.source, TableSource):
         return diagnose_table(data.path, data.bearing, baseline, settings, data.reading_error, show)
-    return diagnose_campaign(data.source, data.bearing, baseline, settings, show)
+    return diagnose_campaign(data.source, data.bearing, baseline, settings, show, ahead)
 
 
 def _next(data: Data, result: CampaignDiagnosis, target: Path) -> str:
