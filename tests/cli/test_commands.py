@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 
 from tests.command_line import tpjb
+from tpjb_ident.report import comparison_beside
 
 COMMANDS = ("check", "identify", "pivot", "locus", "predict", "compare", "diagnose", "plan", "verify",
             "simulate", "demo", "export")  # fmt: skip
@@ -201,6 +202,24 @@ def test_compare_writes_a_report(small_campaign, tmp_path):
     assert (out / "report.html").exists()
     assert (out / "figures" / "kxx-over-load.svg").exists()
     assert (out / "figures" / "kxx-over-load.png").stat().st_size > 5000
+
+
+@pytest.mark.slow
+def test_compare_writes_the_same_where_there_is_no_other_process_or_it_is_lost(small_campaign, tmp_path, monkeypatch):
+    def written(name):
+        result = tpjb("compare", small_campaign, "--thermal", "isothermal", "--out", tmp_path / name)
+        assert result.exit_code == 0, result.output
+        files = sorted(
+            f for f in (tmp_path / name).rglob("*") if f.is_file() and f.name not in ("run.json", "report.html")
+        )
+        return {f.relative_to(tmp_path / name): f.read_bytes() for f in files}
+
+    both = written("both")
+    monkeypatch.setattr(comparison_beside, "cores", lambda: 1)
+    assert written("alone") == both
+    monkeypatch.undo()
+    monkeypatch.setattr(comparison_beside.Companion, "hear", lambda self: None)
+    assert written("lost") == both
 
 
 @pytest.mark.parametrize("form", ["ross", "csv", "mat"])
