@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import time
@@ -209,3 +210,18 @@ def test_the_workers_of_another_process_end_with_the_block(tmp_path):
     mark.unlink(missing_ok=True)
     time.sleep(0.3)
     assert not mark.exists()
+
+
+@pytest.mark.slow
+def test_what_somebody_else_froze_for_the_garbage_collector_stays_frozen():
+    gc.unfreeze()  # these tests are frozen themselves
+    try:
+        with local_workers(2, start="fork"):
+            assert gc.get_freeze_count() > 0
+        assert gc.get_freeze_count() == 0
+        gc.freeze()
+        with local_workers(2, start="fork"):
+            pass
+        assert gc.get_freeze_count() > 0
+    finally:
+        gc.freeze()

@@ -377,9 +377,11 @@ def local_workers(count: int, start: str | None = None, preload: Sequence[str] =
 @contextmanager
 def _shared_memory(forked: bool) -> Iterator[None]:
     """Copies of this process share its memory with it as long as nobody's garbage collector walks through all of it."""
-    if forked:
+    ours = forked and not gc.get_freeze_count()  # what somebody else froze stays frozen
+    if ours:
         gc.freeze()
     try:
         yield
     finally:
-        gc.unfreeze()
+        if ours:
+            gc.unfreeze()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -25,6 +24,7 @@ from tpjb_ident.cli.common.options import (
     ReadingError,
     Thermal,
     as_given,
+    named,
     out_folder,
     refuse_unknown,
 )
@@ -123,17 +123,6 @@ def _variants(text: str) -> tuple[str, ...]:
     return names
 
 
-def named(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options as a report shows them: files by their names.
-
-    Parameters
-    ----------
-    options : mapping of str to object
-        As given.
-    """
-    return {name: getattr(value, "name", value) for name, value in options.items()}
-
-
 def write_comparison(order: ReportOrder, result: Comparison, other: OtherHalf, show: Progress) -> None:
     """Write every table and pivots.toml, and the report unless the other process has written it.
 
@@ -179,10 +168,12 @@ def show_comparison(result: Comparison, then: str = "") -> None:
         A command to type.
     """
     from tpjb_ident.compare.summary import deviations, summary_sentences
+    from tpjb_ident.compare.tables import comparison_frame
     from tpjb_ident.rounding import percent
 
-    found = deviations(result)
-    first, *more = summary_sentences(result)
+    frame = comparison_frame(result)
+    found = deviations(result, frame)
+    first, *more = summary_sentences(result, frame)
     print_line(first)
     if then:
         command_line(then)

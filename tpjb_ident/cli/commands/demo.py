@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.commands.check import check_summary
-from tpjb_ident.cli.commands.compare import named, refuse_comparison, show_comparison, write_comparison
+from tpjb_ident.cli.commands.compare import refuse_comparison, show_comparison, write_comparison
 from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.options import Out, out_folder
+from tpjb_ident.cli.common.options import Out, named, out_folder
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress
 from tpjb_ident.rounding import counted

@@ -23,6 +23,7 @@ from tpjb_ident.cli.common.options import (
     Thermal,
     WorkerCount,
     as_given,
+    named,
     out_folder,
 )
 from tpjb_ident.cli.common.run_record import write_record
@@ -103,8 +104,7 @@ def diagnose(
             then = _next(data, result, target)
             from tpjb_ident.report.diagnosis_page import write_diagnosis_report
 
-            named = {name: getattr(value, "name", value) for name, value in options.items()}
-            write_diagnosis_report(folder, data.source, result, named, inputs, then)
+            write_diagnosis_report(folder, data.source, result, named(options), inputs, then)
         write_record(folder, target, "diagnose", options | {"bearing": data.bearing_name}, inputs)
     _show_verdict(data.source.id, result, then)
     print_line(f"Report: {target / 'report.html'}")

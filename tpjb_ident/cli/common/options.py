@@ -108,6 +108,17 @@ def as_given(arguments: Mapping[str, Any], *without: str) -> dict[str, Any]:
     return {k: v for k, v in arguments.items() if k not in {"out", "workers", "scheduler", *without}}
 
 
+def named(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options as a report shows them: files by their names.
+
+    Parameters
+    ----------
+    options : mapping of str to object
+        As given.
+    """
+    return {name: getattr(value, "name", value) for name, value in options.items()}
+
+
 def refuse_unknown(value: str, known: Iterable[str], option: str, several: bool = False) -> None:
     """Let a known name pass; answer another with the nearest.
 
