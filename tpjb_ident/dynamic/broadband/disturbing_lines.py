@@ -23,8 +23,6 @@ SHAFT_WANDER, MAINS_WANDER = 0.08, 0.15
 LEFT_OUT = 4.0
 #: The same of a period, in its own bins: lines between its bins are told from it by all its repeats.
 LEFT_OUT_OF_PERIOD = 0.6
-#: Samples per pass over the record.
-CHUNK = 2**15
 
 
 @dataclass(frozen=True)
