@@ -15,18 +15,7 @@ class BearingError(ModelError):
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic pad material (paper, Table 1).
-
-    Attributes
-    ----------
-    youngs_modulus : float
-        [Pa]
-    poissons_ratio : float
-    thermal_expansion : float
-        [1/K]
-    conductivity : float
-        [W/m/K]
-    """
+    """Isotropic pad material (paper, Table 1)."""
 
     youngs_modulus: float
     poissons_ratio: float
@@ -168,21 +157,7 @@ class Pad:
 
 @dataclass(frozen=True)
 class Pivot:
-    """Contact geometry of the pivots (paper, Table 3), for the printed formulas.
-
-    Attributes
-    ----------
-    kind : {"rocker", "spherical", "rigid"}
-    youngs_modulus : float
-        [Pa]
-    poissons_ratio : float
-    contact_length : float
-        L of Eq. (16) [m] (rocker).
-    housing_diameter, pivot_diameter : float
-        D_H, D_P of Eq. (16) [m] (rocker).
-    sphere_diameter : float
-        D_s of Eq. (17) [m] (spherical).
-    """
+    """Contact geometry of the pivots (paper, Table 3), for the printed formulas."""
 
     kind: str = "rigid"
     youngs_modulus: float = 206e9

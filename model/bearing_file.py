@@ -104,23 +104,7 @@ def load_bearing(source: str | Path) -> Bearing:
 
 
 def parse_bearing(text: str, name: str) -> Bearing:
-    """Build a `Bearing` from TOML text; `name` is what error messages call the file.
-
-    Parameters
-    ----------
-    text : str
-    name : str
-        What error messages call the file.
-
-    Returns
-    -------
-    Bearing
-
-    Raises
-    ------
-    BearingError
-        Says section, key, what is wrong and what to do.
-    """
+    """Build a `Bearing` from TOML text; `name` is what error messages call the file."""
     try:
         data = parse_toml(text)
     except ValueError as error:

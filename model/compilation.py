@@ -171,33 +171,12 @@ def inner(function: Function) -> Function:
     """Leave a loop to the compiled functions that call it: it becomes part of each, and has no machine code of its own.
 
     Such a one costs nothing where a process starts, and neither a way in from Python nor a file is made for it.
-
-    Parameters
-    ----------
-    function : callable
-        A loop that numba understands; called from Python it runs as Python, correctly and slowly.
     """
     _untold.append(function)
     return function
 
 
 def compiled(function: Function) -> Function:
-    """Compile with numba, cached on disk under the stamp of all kernels: a way in from Python.
-
-    Parameters
-    ----------
-    function : callable
-        A loop that numba understands, called from Python; otherwise take `inner`.
-
-    Returns
-    -------
-    callable
-        The same, compiled at its first call.
-
-    Warns
-    -----
-    RuntimeWarning
-        At that call: neither the sources' folder nor the user's own can be written; every process compiles anew.
-    """
+    """Compile with numba, cached on disk under the stamp of all kernels: a way in from Python."""
     kept: Any = Kernel(function)
     return kept  # type: ignore[no-any-return]

@@ -10,18 +10,7 @@ Severity = Literal["error", "warning", "note"]
 
 
 class Condition(str):
-    """A short name that compares and prints like a string, and knows how much it matters.
-
-    Parameters
-    ----------
-    name : str
-        By which scripts test for it: ``"not converged" in prediction.status``.
-    severity : {"error", "warning", "note"}
-    detail : str
-        A sentence that explains it.
-    pads : tuple of int
-        The pads it is about, numbers from 1; empty if it is about the bearing.
-    """
+    """A short name that compares and prints like a string, and knows how much it matters."""
 
     __slots__ = ("detail", "pads", "severity")
     severity: Severity
@@ -43,14 +32,5 @@ class Condition(str):
 
 
 def has_answer(conditions: Iterable[Condition]) -> bool:
-    """Whether a result with these conditions has numbers: none of them is an error.
-
-    Parameters
-    ----------
-    conditions : iterable of Condition
-
-    Returns
-    -------
-    bool
-    """
+    """Whether a result with these conditions has numbers: none of them is an error."""
     return all(condition.severity != "error" for condition in conditions)

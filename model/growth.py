@@ -16,20 +16,7 @@ from model.errors import OptionError
 
 @dataclass(frozen=True)
 class Growth:
-    """Temperatures that set the running clearances.
-
-    Attributes
-    ----------
-    reference : float
-        At which the clearances of the bearing file hold [degC].
-    housing : float, optional
-        Mean temperature of the housing [degC]; default: the oil's supply temperature. The paper measured 48 degC
-        with oil at 40 degC.
-    journal : float, optional
-        [degC]; default: as computed, the isothermal journal's or the mean of the films that carry.
-    expansion : tuple of float
-        Of journal and housing [1/K]; carbon steel. The pads have their own.
-    """
+    """Temperatures that set the running clearances."""
 
     reference: float = 20.0
     housing: float | None = None
@@ -44,37 +31,12 @@ class Growth:
             raise OptionError(f"expansion must be two numbers from 0 to 1e-4 1/K, got {self.expansion!r}")
 
     def closing(self, bearing: Bearing) -> float:
-        """What a kelvin of the journal's takes from every clearance [m/K].
-
-        Parameters
-        ----------
-        bearing : Bearing
-        """
+        """What a kelvin of the journal's takes from every clearance [m/K]."""
         return self.expansion[0] * bearing.journal_radius
 
 
 def grown(bearing: Bearing, growth: Growth, supply: float, journal: float) -> Bearing:
-    """Bearing with its clearances as they run.
-
-    Parameters
-    ----------
-    bearing : Bearing
-        As drawn.
-    growth : Growth
-    supply : float
-        Temperature of the oil supply and of the pads' backs [degC].
-    journal : float
-        [degC]
-
-    Returns
-    -------
-    Bearing
-
-    Raises
-    ------
-    BearingError
-        Nothing is left of a clearance.
-    """
+    """Bearing with its clearances as they run."""
     by_housing = growth.expansion[1]
     warm = supply - growth.reference
     outward = supply if growth.housing is None else growth.housing

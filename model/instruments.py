@@ -19,19 +19,7 @@ SensorMap = Callable[[float], ComplexArray | FloatArray]
 
 @dataclass(frozen=True)
 class Instruments:
-    """Linear maps of displacement and force readings.
-
-    Attributes
-    ----------
-    displacement : tuple of SensorMap
-        Each turns true (X, Y) into read (X, Y); applied in order.
-    force : tuple of SensorMap
-        The same for the oil force as computed from cells and accelerometers.
-    housing_mass : float
-        Stated mass of the housing [kg], for effects that need the force split; default: the virtual rig's.
-    cell_stiffness : tuple of float
-        Stiffness between housing and frame in X and Y [N/m], seen in a dry shake; default: the virtual rig's.
-    """
+    """Linear maps of displacement and force readings."""
 
     displacement: tuple[SensorMap, ...] = ()
     force: tuple[SensorMap, ...] = ()
@@ -39,95 +27,30 @@ class Instruments:
     cell_stiffness: tuple[float, float] = (4.0e8, 6.0e8)
 
     def displacement_map(self, omega: float) -> ComplexArray:
-        """S(omega): read displacement = S @ true displacement.
-
-        Parameters
-        ----------
-        omega : float
-            [rad/s]
-
-        Returns
-        -------
-        (2, 2) complex ndarray
-        """
+        """S(omega): read displacement = S @ true displacement."""
         return _product(self.displacement, omega)
 
     def force_map(self, omega: float) -> ComplexArray:
-        """G(omega): read force = G @ true force.
-
-        Parameters
-        ----------
-        omega : float
-            [rad/s]
-
-        Returns
-        -------
-        (2, 2) complex ndarray
-        """
+        """G(omega): read force = G @ true force."""
         return _product(self.force, omega)
 
     def shown_stiffness(self, h: ComplexArray, lines: FloatArray) -> ComplexArray:
-        """G h S^-1 (n, 2, 2) [N/m]: what the records make of the bearing's `h` (n, 2, 2) at `lines` (n,) [rad/s].
-
-        Parameters
-        ----------
-        h : (n, 2, 2) complex ndarray
-            Of the bearing [N/m].
-        lines : (n,) ndarray
-            [rad/s]
-
-        Returns
-        -------
-        (n, 2, 2) complex ndarray
-            [N/m]
-        """
+        """G h S^-1 (n, 2, 2) [N/m]: what the records make of the bearing's `h` (n, 2, 2) at `lines` (n,) [rad/s]."""
         if not (self.force or self.displacement):
             return np.asarray(h)
         at = zip(lines, h, strict=True)
         return np.array([self.force_map(w) @ one @ np.linalg.inv(self.displacement_map(w)) for w, one in at])
 
     def shown_position(self, position: FloatArray) -> FloatArray:
-        """S(0) position (2,) [m]: where static readings place a shaft that the housing's probes see at `position`.
-
-        Parameters
-        ----------
-        position : (2,) ndarray
-            Shaft as the housing's probes see it [m].
-
-        Returns
-        -------
-        (2,) ndarray
-            [m]
-        """
+        """S(0) position (2,) [m]: where static readings place a shaft that the housing's probes see at `position`."""
         return np.asarray((self.displacement_map(0.0) @ position).real)
 
     def shown_load(self, force: FloatArray) -> FloatArray:
-        """G(0) force (2,) [N]: the static load that the cells tell.
-
-        Parameters
-        ----------
-        force : (2,) ndarray
-            Static load [N].
-
-        Returns
-        -------
-        (2,) ndarray
-            [N]
-        """
+        """G(0) force (2,) [N]: the static load that the cells tell."""
         return np.asarray((self.force_map(0.0) @ force).real)
 
     def read_displacement(self, one: SensorMap) -> Instruments:
-        """Return a copy whose displacement readings pass through one more map.
-
-        Parameters
-        ----------
-        one : SensorMap
-            True (X, Y) to read (X, Y).
-
-        Returns
-        -------
-        Instruments
-        """
+        """Return a copy whose displacement readings pass through one more map."""
         return replace(self, displacement=(*self.displacement, one))
 
     def read_cells(self, gain: FloatArray) -> Instruments:
@@ -135,15 +58,6 @@ class Instruments:
 
         Only the cells' part of F_oil = F_cell + m a passes through the gain; with the housing on springs K,
         F_cell = F_oil / (1 - m omega^2 / K).
-
-        Parameters
-        ----------
-        gain : (2, 2) ndarray
-            Reading per truth.
-
-        Returns
-        -------
-        Instruments
         """
 
         def one(omega: float) -> ComplexArray:
@@ -158,15 +72,6 @@ class Instruments:
 
         The force computed with the stated mass lacks mass_error times the housing's acceleration,
         a = -omega^2 F_cell / K.
-
-        Parameters
-        ----------
-        mass_error : float
-            [kg]
-
-        Returns
-        -------
-        Instruments
         """
 
         def one(omega: float) -> ComplexArray:

@@ -13,24 +13,7 @@ MOST_STEPS = 200
 
 
 def monotone_cubics(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Cubics through points that rise or fall where the points do, with a continuous tangent.
-
-    Parameters
-    ----------
-    x : (n,) ndarray
-        Rising; n is two or more.
-    y : (n,) or (n, m) ndarray
-        Values, a column per curve.
-
-    Returns
-    -------
-    (4, n - 1) or (4, n - 1, m) ndarray
-        Coefficients by powers of x - x[i], the highest first.
-
-    Notes
-    -----
-    F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300; ends by three points, held to the same shape.
-    """
+    """Cubics through points that rise or fall where the points do, with a continuous tangent."""
     h = np.diff(x).reshape(-1, *([1] * (y.ndim - 1)))
     rise = np.diff(y, axis=0) / h
     slope = np.empty_like(y, dtype=float)
@@ -56,20 +39,7 @@ def _end(h0: FloatArray, h1: FloatArray, rise0: FloatArray, rise1: FloatArray) -
 
 
 def evaluated(x: FloatArray, coefficients: FloatArray, at: FloatArray) -> FloatArray:
-    """Values of `monotone_cubics`.
-
-    Parameters
-    ----------
-    x : (n,) ndarray
-        The points.
-    coefficients : (4, n - 1) or (4, n - 1, m) ndarray
-    at : (k,) ndarray
-        Within the points.
-
-    Returns
-    -------
-    (k,) or (k, m) ndarray
-    """
+    """Values of `monotone_cubics`."""
     i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
     s = (at - x[i]).reshape(-1, *([1] * (coefficients.ndim - 2)))
     c = coefficients[:, i]
@@ -77,30 +47,7 @@ def evaluated(x: FloatArray, coefficients: FloatArray, at: FloatArray) -> FloatA
 
 
 def bracketed_root(function: Callable[[float], float], low: float, high: float, tolerance: float) -> float:
-    """Root of a function that changes its sign between two places.
-
-    Parameters
-    ----------
-    function : callable
-        May be infinite at an end.
-    low, high : float
-        The places.
-    tolerance : float
-        Of the root.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        The function has the same sign at both.
-
-    Notes
-    -----
-    C. J. F. Ridders, IEEE Trans. Circuits Syst. 26 (1979) 979, and halving where a value is infinite.
-    """
+    """Root of a function that changes its sign between two places."""
     at_low, at_high = function(low), function(high)
     if at_low == 0.0 or at_high == 0.0:
         return low if at_low == 0.0 else high

@@ -25,16 +25,6 @@ class MeasuredPivot:
     """A measured monotone curve, interpolated with a continuous tangent (PCHIP in load).
 
     Beyond the last point the curve goes on with its last tangent; `extrapolated` says when that is so.
-
-    Attributes
-    ----------
-    load, deflection_points : (n,) ndarray
-        Strictly increasing, from (0, 0) [N], [m].
-    valid_from, valid_to : float
-        Loads between which the curve was measured [N].
-    name : str
-    includes_housing : bool
-        The curve holds the compliance of pivot AND housing up to the probes.
     """
 
     load: FloatArray
@@ -97,17 +87,7 @@ class MeasuredPivot:
     vibration_stiffness = stiffness
 
     def extrapolated(self, load: float) -> bool:
-        """Whether `load` lies beyond what was measured.
-
-        Parameters
-        ----------
-        load : float
-            Pad load [N], zero or positive.
-
-        Returns
-        -------
-        bool
-        """
+        """Whether `load` lies beyond what was measured."""
         return not self.valid_from <= load <= self.valid_to
 
     def without_housing(self, compliance: float) -> MeasuredPivot:
@@ -116,15 +96,6 @@ class MeasuredPivot:
         What is left keeps at least `LEAST_SHARE` of the measured give: a housing softer than the curve it is part of
         cannot be taken off it. A curve that holds no housing is returned as it is; of one that does, more than one
         part of the structure may be taken off.
-
-        Parameters
-        ----------
-        compliance : float
-            Of the housing [m/N].
-
-        Returns
-        -------
-        MeasuredPivot
         """
         if not self.includes_housing:
             return self

@@ -9,43 +9,14 @@ from model.errors import OptionError
 
 
 def hint(name: object, known: Iterable[str], all_of: str = "Known:") -> str:
-    """Say which known name may have been meant.
-
-    Parameters
-    ----------
-    name : object
-        What was given; what is not text has no nearest name.
-    known : iterable of str
-    all_of : str
-        What introduces the whole list where nothing is near.
-
-    Returns
-    -------
-    str
-        ``"Did you mean 'adiabatic'?"``, or ``"Known: adiabatic, tehd."``
-    """
+    """Say which known name may have been meant."""
     names = list(known)
     near = difflib.get_close_matches(name, names, n=1) if isinstance(name, str) else []
     return f"Did you mean {near[0]!r}?" if near else f"{all_of} {', '.join(names)}."
 
 
 def check_known(what: str, name: object, known: Iterable[str]) -> None:
-    """Refuse an option's value that there is not.
-
-    Parameters
-    ----------
-    what : str
-        The option, as the user calls it.
-    name : object
-        Its value.
-    known : iterable of str
-        The values there are.
-
-    Raises
-    ------
-    OptionError
-        Names the nearest one, or all.
-    """
+    """Refuse an option's value that there is not."""
     names = list(known)
     if name not in names:
         raise OptionError(f"{what} must be one of {', '.join(names)}, got {name!r}. {hint(name, names, 'Use one of')}")

@@ -16,32 +16,7 @@ TURBULENCE = ("none", "ng-pan")
 
 @dataclass(frozen=True)
 class Options:
-    """Physics that the baseline leaves out; `predict(..., options=Options(conduction=True))`.
-
-    Attributes
-    ----------
-    conduction : bool
-        The pads conduct the film's heat to their backs and edges; see `model.statics.heat_paths`.
-    isothermal_journal : bool
-        The journal passes heat from hot films to cold ones and keeps none.
-    growth : Growth, optional
-        Clearances change with the temperatures of journal, housing and pads; see `model.growth`.
-    cavitation : {"swift-stieber", "jfo"}
-        What happens where the film ruptures: p = 0 and dp/dn = 0 alone, or with the oil conserved (Jakobsson, Floberg
-        and Olsson), see `model.film.cavitation`.
-    turbulence : {"none", "ng-pan"}
-        Resistance and shear of the film: laminar at every Reynolds number, or Ng and Pan's linearised theory, see
-        `model.film.turbulence`. Films of idle pads stay laminar.
-    perturbed_heat : bool
-        In the dynamics the films' temperature and viscosity follow the motion (`adiabatic`, `tehd`) instead of staying
-        what they are at rest; see `model.film.following_heat`. What enters a pad keeps its temperature.
-    perturbed_bending : bool
-        In the dynamics pads that deform (`tehd`, `thd`) bend with the motion, instead of moving as rigid bodies; see
-        `model.dynamics.flexing_pads`.
-    axial_tilt : bool
-        Pads on spheres follow a shaft that leans (effect `misalignment`), as far as their pivots let them; see
-        `model.statics.axial_tilt`.
-    """
+    """Physics that the baseline leaves out; `predict(..., options=Options(conduction=True))`."""
 
     conduction: bool = False
     isothermal_journal: bool = False

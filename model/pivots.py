@@ -95,13 +95,7 @@ class RigidPivot:
 
 @dataclass(frozen=True)
 class ConstantPivot:
-    """A linear spring.
-
-    Attributes
-    ----------
-    value : float
-        [N/m]
-    """
+    """A linear spring."""
 
     value: float
     name: str = "constant"
@@ -123,15 +117,6 @@ class RockerPivot:
 
     K = pi E L / { 2 (1 - nu^2) [ 2/3 + ln( pi E L (D_H - D_P) / (4 W (1 - nu^2)) ) ] } is the secant; its tangent
     has 1/3 less than the logarithm: [ ln(...) - 1/3 ].
-
-    Attributes
-    ----------
-    line_modulus : float
-        pi E L / (2 (1 - nu^2)) [N/m].
-    load_scale : float
-        pi E L (D_H - D_P) / (4 (1 - nu^2)) [N]: the logarithm is ln(load_scale / W).
-    secant_vibrations : bool
-        Use the printed secant for vibrations.
     """
 
     line_modulus: float
@@ -165,13 +150,6 @@ class SphericalPivot:
     """Point contact, sphere on flat, Eq. (17) of the paper (= Hertz).
 
     K = W / cbrt(9 W^2 (1 - nu^2)^2 / (2 E^2 D_s)); the tangent is 1.5 K.
-
-    Attributes
-    ----------
-    compliance : float
-        delta = compliance * W^(2/3) [m / N^(2/3)].
-    secant_vibrations : bool
-        Use the printed secant for vibrations.
     """
 
     compliance: float
@@ -197,14 +175,7 @@ class SphericalPivot:
 
 @dataclass(frozen=True)
 class ScaledPivot:
-    """Another law whose deflection is divided by a factor.
-
-    Attributes
-    ----------
-    law : PivotLaw
-    stiffness_factor : float
-        f: the pivot deflects delta(W) / f.
-    """
+    """Another law whose deflection is divided by a factor."""
 
     law: PivotLaw
     stiffness_factor: float
@@ -228,19 +199,7 @@ class ScaledPivot:
 
 
 def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> PivotLaw:
-    """The printed formula for a contact geometry, Eq. (16) or (17).
-
-    Parameters
-    ----------
-    pivot : Pivot
-    secant_vibrations : bool
-        Use the printed secant for vibrations, as the paper does.
-
-    Returns
-    -------
-    PivotLaw
-        `RigidPivot` for a rigid one.
-    """
+    """The printed formula for a contact geometry, Eq. (16) or (17)."""
     modulus = pivot.youngs_modulus / (1.0 - pivot.poissons_ratio**2)
     name = "kirk-secant" if secant_vibrations else "kirk"
     if pivot.kind == "rocker":
@@ -259,20 +218,7 @@ NAMED_LAWS = ("rigid", "kirk", "kirk-secant")
 
 
 def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
-    """One law per pad from what a user may say.
-
-    Parameters
-    ----------
-    choice : str, float, Path, PivotLaw or sequence of PivotLaw
-        ``"rigid"``, ``"kirk"``, ``"kirk-secant"``, the path of a ``pivots.toml``, a constant stiffness [N/m],
-        one law for all pads, or one per pad.
-    bearing : Bearing
-
-    Raises
-    ------
-    BearingError
-        Unknown name, wrong number of laws, or a stiffness that is not positive.
-    """
+    """One law per pad from what a user may say."""
     n = len(bearing.pads)
     if isinstance(choice, str) and choice in NAMED_LAWS:
         law = RigidPivot() if choice == "rigid" else formula_pivot(bearing.pivot, choice == "kirk-secant")
@@ -338,25 +284,7 @@ def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ..
 def measured_pivots(
     tables: Sequence[Any], source: str, pads: int | None = None, includes_housing: bool = True
 ) -> tuple[PivotLaw, ...]:
-    """Make pivot laws of the pads' tables, pad #1 first.
-
-    Parameters
-    ----------
-    tables : sequence of mapping
-        As the ``[[pads]]`` of a ``pivots.toml``: ``pad``, ``force_N`` and ``deflection_m`` (n,), and where they are
-        known ``valid_from_N``, ``valid_to_N`` and ``law``.
-    source : str
-        What is named in messages.
-    pads : int, optional
-        Pads of the bearing; default: as many as the tables name.
-    includes_housing : bool
-        The curves hold the compliance of pivot AND housing.
-
-    Raises
-    ------
-    BearingError
-        A pad left out, or a curve that does not rise.
-    """
+    """Make pivot laws of the pads' tables, pad #1 first."""
     laws = dict(_read_pad(table, source, includes_housing) for table in tables)
     wanted = pads or max(laws)
     missing = sorted(set(range(1, wanted + 1)) - set(laws))

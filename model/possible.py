@@ -58,17 +58,7 @@ _MAY_BE_ABSENT = {"contact_length", "housing_diameter", "pivot_diameter", "spher
 
 
 def check_possible(bearing: Bearing) -> None:
-    """Refuse a bearing with a number that no bearing has.
-
-    Parameters
-    ----------
-    bearing : Bearing
-
-    Raises
-    ------
-    BearingError
-        Names the part, the number and its bounds.
-    """
+    """Refuse a bearing with a number that no bearing has."""
     _check(bearing, bearing.name)
     _check(bearing.oil, "oil")
     _check(bearing.pivot, "pivot")

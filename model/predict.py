@@ -117,31 +117,7 @@ def _number(value: Any, dimension: str, name: str) -> float:
 def predict_setup(
     setup: Setup, load: float, load_direction: float, speed: float, excitation: Any, start: Equilibrium | None = None
 ) -> Prediction:
-    """Predict for a `Setup` (effects applied); SI floats only, see `predict`.
-
-    Parameters
-    ----------
-    setup : Setup
-    load : float
-        [N]
-    load_direction : float
-        [rad, counter-clockwise from +X]
-    speed : float
-        [rad/s]
-    excitation : float or (n,) array_like
-        [rad/s]
-    start : Equilibrium, optional
-        A neighbouring solution on the same mesh.
-
-    Returns
-    -------
-    Prediction
-
-    Raises
-    ------
-    OperatingPointError
-        A load, direction, speed or excitation that no bearing can have.
-    """
+    """Predict for a `Setup` (effects applied); SI floats only, see `predict`."""
     try:
         omega = np.asarray(excitation, float)
     except TypeError as error:
@@ -188,24 +164,7 @@ def _impedance(setup: Setup, equilibrium: Equilibrium, lines: FloatArray) -> tup
 def solve_as_it_runs(
     setup: Setup, force: FloatArray, speed: float, start: Equilibrium | None = None
 ) -> tuple[Setup, Equilibrium]:
-    """Find the equilibrium with the clearances that belong to its own temperatures.
-
-    Parameters
-    ----------
-    setup : Setup
-    force : (2,) ndarray
-        Static load on the shaft [N].
-    speed : float
-        [rad/s]
-    start : Equilibrium, optional
-        A neighbouring solution on the same mesh.
-
-    Returns
-    -------
-    setup : Setup
-        With these clearances.
-    equilibrium : Equilibrium
-    """
+    """Find the equilibrium with the clearances that belong to its own temperatures."""
     growth = setup.growth
     if growth is not None and growth.journal is not None:
         given = grown(setup.bearing, growth, setup.inlet_temperature, growth.journal)

@@ -22,17 +22,7 @@ from model.statics.warm_start import extrapolated_state
 
 @dataclass(frozen=True)
 class DryCurve:
-    """A dry load-deflection curve as probes and cells read it.
-
-    Attributes
-    ----------
-    pad : int
-        From 1.
-    load : (n,) ndarray
-        Component of the read force on the pad's direction [N].
-    deflection : (n,) ndarray
-        Component of the read displacement on the pad's direction, from zero load [m].
-    """
+    """A dry load-deflection curve as probes and cells read it."""
 
     pad: int
     load: FloatArray
@@ -40,16 +30,7 @@ class DryCurve:
 
 
 def dry_curve(setup: Setup, pad: int, load: FloatArray) -> DryCurve:
-    """Predict a dry test on one pad.
-
-    Parameters
-    ----------
-    setup : Setup
-    pad : int
-        From 1.
-    load : (n,) ndarray
-        True load towards the pad [N].
-    """
+    """Predict a dry test on one pad."""
     law, angle = setup.pivots[pad - 1], setup.bearing.pads[pad - 1].pivot_angle
     normal = np.array([math.cos(angle), math.sin(angle)])
     structure = float(normal @ setup.structure @ normal)
@@ -61,17 +42,7 @@ def dry_curve(setup: Setup, pad: int, load: FloatArray) -> DryCurve:
 
 @dataclass(frozen=True)
 class PolygonSides:
-    """The clearance polygon as the probes read it: per pad the distance of its side from the bearing centre.
-
-    Attributes
-    ----------
-    clearance : (n_pads,) ndarray
-        At zero push load [m].
-    pushed : (n_pads,) ndarray
-        With the pivots and the structure given way under the push load [m].
-    angle : (n_pads,) ndarray
-        Direction of each side's normal [rad].
-    """
+    """The clearance polygon as the probes read it: per pad the distance of its side from the bearing centre."""
 
     clearance: FloatArray
     pushed: FloatArray
@@ -79,18 +50,7 @@ class PolygonSides:
 
 
 def polygon_sides(setup: Setup, push_load: float) -> PolygonSides:
-    """Predict a cold clearance sweep with a push load [N].
-
-    Parameters
-    ----------
-    setup : Setup
-    push_load : float
-        [N]
-
-    Returns
-    -------
-    PolygonSides
-    """
+    """Predict a cold clearance sweep with a push load [N]."""
     inverse = np.linalg.inv(setup.instruments.displacement_map(0.0).real)
     rows = []
     for pad, law in zip(setup.bearing.pads, setup.pivots, strict=True):
@@ -112,20 +72,7 @@ def polygon_sides(setup: Setup, push_load: float) -> PolygonSides:
 def sweep(
     setup: Setup, points: Sequence[tuple[float, float, float, FloatArray]], start: Equilibrium | None = None
 ) -> list[Prediction]:
-    """Predict many operating points, each started from the one before.
-
-    Parameters
-    ----------
-    setup : Setup
-    points : sequence of (load [N], load_direction [rad], speed [rad/s], excitation (n,) [rad/s])
-    start : Equilibrium, optional
-        For the first point.
-
-    Returns
-    -------
-    list of Prediction
-        One per point. A point without equilibrium has its status and NaN, and the next one starts afresh.
-    """
+    """Predict many operating points, each started from the one before."""
     out: list[Prediction] = []
     behind: Equilibrium | None = None
     for at, (load, direction, speed, excitation) in enumerate(points):
@@ -148,22 +95,6 @@ def _step_share(*points: tuple[float, float, float, FloatArray]) -> float:
 
 
 def locus(setup: Setup, load: float, directions: FloatArray, speed: float) -> FloatArray:
-    """Journal positions over load directions, as read.
-
-    Parameters
-    ----------
-    setup : Setup
-    load : float
-        [N]
-    directions : (n,) ndarray
-        [rad]
-    speed : float
-        [rad/s]
-
-    Returns
-    -------
-    (n, 2) ndarray
-        NaN where no equilibrium was found [m].
-    """
+    """Journal positions over load directions, as read."""
     points = [(load, float(d), speed, np.array([speed])) for d in directions]
     return np.array([p.position if p.converged else (math.nan, math.nan) for p in sweep(setup, points)])

@@ -15,21 +15,7 @@ _STEP = re.compile(r"""(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*""")
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Parse TOML text.
-
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    ModelError, tomllib.TOMLDecodeError
-        Not TOML, nested too deeply, or a whole number of thousands of digits; says the line where it is known.
-    """
+    """Parse TOML text."""
     for number, line in enumerate(text.split("\n"), start=1):
         if line.count(".") > MAX_DEPTH and not line.lstrip().startswith("#") and _longest_key(line) > MAX_DEPTH:
             raise ModelError(f"line {number} nests far too deeply")

@@ -88,24 +88,7 @@ def _factor(unit: str, dimension: str) -> float:
 
 
 def pint_factor(unit: str, dimension: str) -> float:
-    """Multiplier from `unit` to the SI unit of `dimension`, by pint.
-
-    Parameters
-    ----------
-    unit : str
-        As pint reads it.
-    dimension : str
-        Key of `SI_UNITS`.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    UnitError
-        Not a unit, or one of another dimension.
-    """
+    """Multiplier from `unit` to the SI unit of `dimension`, by pint."""
     registry = _registry()
     target = SI_UNITS[dimension]
     try:
@@ -118,28 +101,7 @@ def pint_factor(unit: str, dimension: str) -> float:
 
 
 def parse_quantity(value: str | float | int, dimension: str, name: str = "value") -> float:
-    """Turn ``"0.080 mm"`` into 8e-5.
-
-    Parameters
-    ----------
-    value : str or number
-        A number followed by a unit; a bare number only where `dimension` is ``"ratio"``.
-    dimension : str
-        Key of `SI_UNITS`. ``"temperature"`` is returned in degC, ``"angular speed"`` takes Hz as
-        revolutions per second.
-    name : str
-        What to call it in an error message.
-
-    Returns
-    -------
-    float
-        SI value.
-
-    Raises
-    ------
-    UnitError
-        Not a quantity, wrong dimension, or not finite.
-    """
+    """Turn ``"0.080 mm"`` into 8e-5."""
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise UnitError(f"{name}: expected a number with a unit of {dimension}, got {value!r}")
     if isinstance(value, (int, float)):
@@ -188,21 +150,7 @@ def _finite(number: float, name: str) -> float:
 
 
 def to_si(value: Any, dimension: str, name: str) -> Any:
-    """Take SI floats or arrays as they are, pint quantities converted; refuse a wrong dimension.
-
-    Parameters
-    ----------
-    value : float, array or pint quantity
-    dimension : str
-        Key of `SI_UNITS`.
-    name : str
-        The argument's name, for the message.
-
-    Raises
-    ------
-    UnitError
-        A pint quantity of another dimension, or a string that does not parse.
-    """
+    """Take SI floats or arrays as they are, pint quantities converted; refuse a wrong dimension."""
     if isinstance(value, str):
         return parse_quantity(value, dimension, name)
     if hasattr(value, "to") and hasattr(value, "magnitude"):

@@ -126,25 +126,7 @@ class Channel:
 def reading_gain(
     quantity: str, unit: str, sensitivity: object, full_scale: object = None, excitation: object = None
 ) -> float:
-    """SI value per unit of reading.
-
-    Parameters
-    ----------
-    quantity : str
-        Key of `DIMENSIONS`.
-    unit : str
-        Unit of the reading. An engineering unit is already converted: `sensitivity` is then not used.
-    sensitivity : object
-        ``"7.78 mV/um"``, ``"15 K/V"``; for a bridge ``"2.0 mV/V"`` at full scale.
-    full_scale, excitation : object
-        Of a bridge: the quantity at full scale, and the supply voltage (not needed where the reading
-        itself is in mV/V). F = reading / (sensitivity * excitation) * full_scale.
-
-    Raises
-    ------
-    UnitError
-        A wrong unit, or a part that is missing.
-    """
+    """SI value per unit of reading."""
     dimension = DIMENSIONS[quantity]
     if not is_signal(unit):
         return unit_factor(unit, dimension)
@@ -173,16 +155,7 @@ def _bridge_gain(dimension: str, unit: str, sensitivity: str, full_scale: object
 
 
 def reading_zero(quantity: str, unit: str, zero: object) -> float:
-    """SI value at reading zero.
-
-    Parameters
-    ----------
-    quantity, unit : str
-        As in `reading_gain`.
-    zero : object
-        What the manifest says, or None: then reading zero is zero; of a temperature 0 degC, unless the
-        reading itself is in K or degF.
-    """
+    """SI value at reading zero."""
     if quantity != "temperature":
         return 0.0 if zero is None else parse_quantity(zero, DIMENSIONS[quantity])
     if zero is not None:

@@ -222,19 +222,7 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
 
 
 def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
-    """The same test in another file: a repeat, or a record that landed under another name.
-
-    Parameters
-    ----------
-    run : Run
-        Of a campaign in a folder.
-    path : Path
-        Where the record is.
-    file : str
-        Its display name.
-    run_id : str
-        Id of the run that it becomes.
-    """
+    """The same test in another file: a repeat, or a record that landed under another name."""
     from rigdata.readers.formats.foreign import ForeignReader, is_foreign
     from rigdata.readers.text.csv import CsvReader
 

@@ -21,18 +21,7 @@ _SAY = 'Write for instance "bessel 4 low 800 Hz": bessel or butterworth, order, 
 
 @dataclass(frozen=True)
 class AnalogFilter:
-    """An analogue filter by its data sheet.
-
-    Attributes
-    ----------
-    family : {"bessel", "butterworth"}
-        Of a Bessel filter the corner is where the amplitude has fallen by 3 dB, as data sheets state it.
-    order : int
-    side : {"low", "high"}
-        What it lets pass.
-    corner : float
-        [Hz]
-    """
+    """An analogue filter by its data sheet."""
 
     family: str
     order: int
@@ -52,23 +41,7 @@ class AnalogFilter:
 
 
 def parse_filter(text: str) -> AnalogFilter:
-    """Read ``"bessel 4 low 800 Hz"``.
-
-    Parameters
-    ----------
-    text : str
-        Family, order, side and corner with its unit.
-
-    Returns
-    -------
-    AnalogFilter
-        The filter.
-
-    Raises
-    ------
-    rigdata.units.UnitError
-        Not such a text; the message says what is expected.
-    """
+    """Read ``"bessel 4 low 800 Hz"``."""
     parts = text.split(None, 3)
     if len(parts) != 4 or parts[0].lower() not in FAMILIES or parts[2].lower() not in SIDES:
         raise UnitError(f"{text[:60]!r} is no filter. {_SAY}")
@@ -82,16 +55,7 @@ def parse_filter(text: str) -> AnalogFilter:
 
 @dataclass(frozen=True)
 class ResponseTable:
-    """A measured frequency response.
-
-    Attributes
-    ----------
-    frequency : tuple of float
-        Rising [Hz].
-    gain : tuple of float
-    phase : tuple of float
-        Unwrapped [rad].
-    """
+    """A measured frequency response."""
 
     frequency: tuple[float, ...]
     gain: tuple[float, ...]
@@ -106,23 +70,7 @@ class ResponseTable:
 
 
 def parse_response_table(text: str) -> ResponseTable:
-    """Read a table of frequency_Hz, gain, phase_deg, one line each, separated by commas or semicolons.
-
-    Parameters
-    ----------
-    text : str
-        The whole table.
-
-    Returns
-    -------
-    ResponseTable
-        Frequencies [Hz], gain, phase [rad].
-
-    Raises
-    ------
-    rigdata.units.UnitError
-        A line that holds no three numbers, frequencies that do not rise, a gain not above zero.
-    """
+    """Read a table of frequency_Hz, gain, phase_deg, one line each, separated by commas or semicolons."""
     rows: list[tuple[float, float, float]] = []
     for number, line in enumerate(text.splitlines(), start=1):
         cells = [c.strip() for c in line.replace(";", ",").split(",")]
@@ -146,14 +94,7 @@ def parse_response_table(text: str) -> ResponseTable:
 
 @dataclass(frozen=True)
 class ChannelResponse:
-    """Filter, measured response and delay of one channel.
-
-    Attributes
-    ----------
-    filters : tuple of AnalogFilter or ResponseTable
-    delay : float
-        Seconds by which the channel comes late.
-    """
+    """Filter, measured response and delay of one channel."""
 
     filters: tuple[AnalogFilter | ResponseTable, ...] = ()
     delay: float = 0.0
@@ -162,18 +103,7 @@ class ChannelResponse:
         return bool(self.filters) or self.delay != 0.0
 
     def at(self, frequency: FloatArray) -> ComplexArray:
-        """What a phasor at `frequency` (n,) [Hz] was multiplied by.
-
-        Parameters
-        ----------
-        frequency : array, shape (n,)
-            Frequencies [Hz].
-
-        Returns
-        -------
-        array, shape (n,)
-            Complex gain of delay and filters together.
-        """
+        """What a phasor at `frequency` (n,) [Hz] was multiplied by."""
         f = np.asarray(frequency, dtype=float)
         total = np.exp(-2j * math.pi * f * self.delay)
         for each in self.filters:

@@ -15,23 +15,7 @@ _LEVELS = 100
 
 @dataclass
 class ChannelStatistics:
-    """Counts over all samples seen so far; feed it with `add`.
-
-    Attributes
-    ----------
-    samples, missing : int
-        Seen, and of these without a value.
-    low, high : float
-        Extreme readings.
-    repeats : int
-        Samples equal to the one before.
-    longest_flat : int
-        Longest stretch of equal readings.
-    flat_start : int
-        Sample at which it begins.
-    blocks : list of ndarray
-        A thinned copy, for the distribution of readings near the extremes.
-    """
+    """Counts over all samples seen so far; feed it with `add`."""
 
     samples: int = 0
     missing: int = 0
@@ -45,13 +29,7 @@ class ChannelStatistics:
     _flat: int = 0
 
     def add(self, readings: FloatArray) -> None:
-        """Take the next block, (n,) readings as the file holds them.
-
-        Parameters
-        ----------
-        readings : (n,) ndarray
-            As the file holds them.
-        """
+        """Take the next block, (n,) readings as the file holds them."""
         if len(readings) == 0:
             return
         valid = np.isfinite(readings) & (np.abs(np.nan_to_num(readings)) < _OVERFLOW)

@@ -24,17 +24,7 @@ OVERFLOW = 1e30
 
 @dataclass(frozen=True)
 class Rows:
-    """Consecutive samples of a run.
-
-    Attributes
-    ----------
-    rows : dict of str to (2, n) ndarray
-        X and Y by quantity, SI; NaN where missing.
-    time : (n,) ndarray or None
-        Seconds; None where they are counted from the rate.
-    speed : (n,) ndarray or None
-        Shaft speed by the tachometer [rad/s].
-    """
+    """Consecutive samples of a run."""
 
     rows: dict[str, FloatArray]
     time: FloatArray | None
@@ -45,15 +35,7 @@ class RowReader(Protocol):
     """Gives the samples of some quantities, stretch by stretch."""
 
     def read(self, start: int, stop: int) -> Rows:
-        """Samples start..stop-1.
-
-        Parameters
-        ----------
-        start : int
-            First sample.
-        stop : int
-            Sample after the last.
-        """
+        """Samples start..stop-1."""
 
 
 class _HasVectors(Protocol):
@@ -73,15 +55,7 @@ class _FileRun(_HasVectors, Protocol):
 
 
 class VectorRows:
-    """Rows of what gives its vectors one by one: a run held in memory.
-
-    Parameters
-    ----------
-    run : object
-        With `vector` and `speed` like `rigdata.run.Run`.
-    quantities : sequence of str
-        With X and Y.
-    """
+    """Rows of what gives its vectors one by one: a run held in memory."""
 
     def __init__(self, run: _HasVectors, quantities: Sequence[str]) -> None:
         self._run, self._quantities = run, quantities
@@ -105,14 +79,7 @@ class _Plan:
 
 
 class FileRows:
-    """Rows of a run's file, all channels in one request; made by `Run.row_reader`.
-
-    Parameters
-    ----------
-    run : rigdata.run.Run
-    quantities : sequence of str
-        With X and Y.
-    """
+    """Rows of a run's file, all channels in one request; made by `Run.row_reader`."""
 
     def __init__(self, run: _FileRun, quantities: Sequence[str]) -> None:
         self._run, self._reader = run, run.reader

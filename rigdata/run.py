@@ -222,15 +222,7 @@ class Run:
 
 
 def pulse_times(readings: FloatArray, time: FloatArray) -> FloatArray:
-    """Times of the rising edges of once-per-revolution pulses [s], (m,).
-
-    Parameters
-    ----------
-    readings : (n,) ndarray
-        Of the pulse channel; its level is half way between its usual extremes.
-    time : (n,) ndarray
-        [s]
-    """
+    """Times of the rising edges of once-per-revolution pulses [s], (m,)."""
     known = readings[np.isfinite(readings)]
     if len(known) < 4:
         return np.empty(0)
@@ -251,15 +243,7 @@ def pulse_times(readings: FloatArray, time: FloatArray) -> FloatArray:
 
 
 def speed_from_pulses(readings: FloatArray, time: FloatArray) -> FloatArray:
-    """Shaft speed at every sample [rad/s]; NaN where fewer than two pulses tell it.
-
-    Parameters
-    ----------
-    readings : (n,) ndarray
-        Of the pulse channel.
-    time : (n,) ndarray
-        [s]
-    """
+    """Shaft speed at every sample [rad/s]; NaN where fewer than two pulses tell it."""
     pulses = pulse_times(readings, time)
     if len(pulses) < 2:
         return np.full(len(readings), np.nan)

@@ -12,28 +12,7 @@ _MAX_NAME = 1000
 
 
 def inside(folder: Path, name: str, file: str, place: str, run: str | None = None) -> Path:
-    r"""Resolve `name` below `folder`.
-
-    Parameters
-    ----------
-    folder : Path
-        Campaign folder.
-    name : str
-        Relative path as the manifest gives it; ``\`` counts as ``/``.
-    file, place, run : str
-        Where it stands, for the message.
-
-    Returns
-    -------
-    Path
-        Absolute, all symlinks followed; it need not exist.
-
-    Raises
-    ------
-    RigDataError
-        The name is empty, absolute, has a drive letter or a share, or leaves the folder by ``..`` or
-        by a symlink.
-    """
+    r"""Resolve `name` below `folder`."""
 
     def refuse(why: str) -> RigDataError:
         cure = "Give a path relative to the campaign folder, inside it"

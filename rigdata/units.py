@@ -65,15 +65,7 @@ class UnitError(RigError):
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit as a multiple of SI base units.
-
-    Attributes
-    ----------
-    factor : float
-        Multiplier to SI base units.
-    powers : tuple of (str, int)
-        Base unit and power, sorted; the radian counts, so that an angle is not a ratio.
-    """
+    """A unit as a multiple of SI base units."""
 
     factor: float
     powers: tuple[tuple[str, int], ...] = ()
@@ -88,12 +80,7 @@ class Unit:
         return Unit(self.factor**power, tuple((n, p * power) for n, p in self.powers))
 
     def same_dimension(self, other: Unit) -> bool:
-        """Whether both measure the same thing.
-
-        Parameters
-        ----------
-        other : Unit
-        """
+        """Whether both measure the same thing."""
         return self.powers == other.powers
 
 
@@ -111,17 +98,7 @@ def _base(name: str) -> Unit:
 
 
 def from_pint(name: str) -> Unit:
-    """One unit name as pint knows it.
-
-    Parameters
-    ----------
-    name : str
-
-    Raises
-    ------
-    UnitError
-        Pint does not know it.
-    """
+    """One unit name as pint knows it."""
     registry = _registry()
     try:
         magnitude, units = registry.get_base_units(name)
@@ -138,21 +115,7 @@ def _dialect(dimension: str) -> dict[str, str]:
 
 @functools.lru_cache(maxsize=1024)
 def parse_unit(text: str, dimension: str = "") -> Unit:
-    """Read a unit such as ``"mV/um"``, ``"m/s^2"`` or ``"V/(rad/s)"``.
-
-    Parameters
-    ----------
-    text : str
-        Unit names with powers -6..6, ``*``, a space or ``/`` between them, parentheses.
-    dimension : str
-        What is measured; key of `SI_UNITS`. In ``"acceleration"`` ``g`` is standard gravity, in
-        ``"speed"`` ``Hz`` is one revolution (2 pi rad) per second.
-
-    Raises
-    ------
-    UnitError
-        Not such a unit.
-    """
+    """Read a unit such as ``"mV/um"``, ``"m/s^2"`` or ``"V/(rad/s)"``."""
     if len(text) > _MAX_UNIT:
         raise UnitError(f"unit {text[:_MAX_UNIT]!r}... is too long to be one")
     plain = text.strip().translate(_SPELLINGS).replace("°C", "degC").replace("°F", "degF").replace("°", "deg")
@@ -211,20 +174,7 @@ def _named(name: str, dimension: str) -> Unit:
 
 
 def unit_factor(unit: str, dimension: str) -> float:
-    """SI value of one `unit`, a multiple without offset (``degC`` counts as a kelvin step).
-
-    Parameters
-    ----------
-    unit : str
-        As written by the logger or in the manifest.
-    dimension : str
-        Key of `rigdata.units.DIMENSIONS`.
-
-    Raises
-    ------
-    UnitError
-        `unit` is not one of `dimension`.
-    """
+    """SI value of one `unit`, a multiple without offset (``degC`` counts as a kelvin step)."""
     parsed = parse_unit(unit, dimension)
     # The radian of a speed is asked for: "22 1/s" is caught above as revolutions.
     if not parsed.same_dimension(parse_unit(SI_UNITS[dimension])):
@@ -237,20 +187,7 @@ def _example(dimension: str) -> str:
 
 
 def split_quantity(value: object, dimension: str) -> tuple[float, str]:
-    """Split ``"7.78 mV/um"`` into 7.78 and ``"mV/um"``.
-
-    Parameters
-    ----------
-    value : object
-        Text of a number and a unit, or a plain number in SI.
-    dimension : str
-        Key of `rigdata.units.DIMENSIONS`.
-
-    Raises
-    ------
-    UnitError
-        Not a number followed by a unit, not finite, or no unit where `dimension` needs one.
-    """
+    """Split ``"7.78 mV/um"`` into 7.78 and ``"mV/um"``."""
     example = _example(dimension)
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise UnitError(f'expected a number with a unit in quotes, like "1 {example}", got {_short(value)}')
@@ -289,25 +226,7 @@ def _finite(number: float) -> float:
 
 
 def parse_quantity(value: object, dimension: str) -> float:
-    """Turn ``"22 Hz"`` into SI.
-
-    Parameters
-    ----------
-    value : object
-        What TOML gave: a string, or a bare number where `dimension` is ``"ratio"``.
-    dimension : str
-        Key of `SI_UNITS`; a ``"temperature"`` is absolute, in K.
-
-    Returns
-    -------
-    float
-        SI value, finite.
-
-    Raises
-    ------
-    UnitError
-        Not a quantity, or one of another dimension.
-    """
+    """Turn ``"22 Hz"`` into SI."""
     number, unit = split_quantity(value, dimension)
     if dimension == "temperature":
         return _finite(number * unit_factor(unit, dimension) + temperature_offset(unit))
@@ -317,13 +236,7 @@ def parse_quantity(value: object, dimension: str) -> float:
 
 
 def temperature_offset(unit: str) -> float:
-    """Kelvin at 0 of the temperature `unit`.
-
-    Parameters
-    ----------
-    unit : str
-        As written by the logger or in the manifest.
-    """
+    """Kelvin at 0 of the temperature `unit`."""
     plain = unit.strip().replace("°", "deg")
     if plain in {"degC", "C", "celsius"}:
         return _ZERO_CELSIUS
@@ -331,13 +244,7 @@ def temperature_offset(unit: str) -> float:
 
 
 def is_signal(unit: str) -> bool:
-    """Whether `unit` is what a data logger sees (V, mA, mV/V), not an engineering unit.
-
-    Parameters
-    ----------
-    unit : str
-        As written by the logger or in the manifest.
-    """
+    """Whether `unit` is what a data logger sees (V, mA, mV/V), not an engineering unit."""
     parsed = parse_unit(unit)
     if is_bridge_ratio(unit):
         return True
@@ -345,13 +252,7 @@ def is_signal(unit: str) -> bool:
 
 
 def is_bridge_ratio(unit: str) -> bool:
-    """Whether `unit` is volts per volt, as a strain-gauge bridge gives.
-
-    Parameters
-    ----------
-    unit : str
-        As written by the logger or in the manifest.
-    """
+    """Whether `unit` is volts per volt, as a strain-gauge bridge gives."""
     numerator, slash, denominator = unit.partition("/")
     if not slash:
         return False
@@ -363,22 +264,7 @@ def is_bridge_ratio(unit: str) -> bool:
 
 
 def sensitivity_gain(value: object, signal_unit: str, dimension: str) -> float:
-    """SI value of the quantity per one `signal_unit` of reading.
-
-    Parameters
-    ----------
-    value : object
-        ``"7.78 mV/um"`` (reading per quantity) or ``"15 K/V"`` (quantity per reading).
-    signal_unit : str
-        Unit of the reading, e.g. ``"V"``.
-    dimension : str
-        Dimension of the quantity.
-
-    Raises
-    ------
-    UnitError
-        Not positive, or of a dimension that joins neither way.
-    """
+    """SI value of the quantity per one `signal_unit` of reading."""
     number, unit = split_quantity(value, dimension)
     parsed, signal = parse_unit(unit, dimension), parse_unit(signal_unit)
     target = parse_unit(SI_UNITS[dimension])

@@ -18,29 +18,13 @@ _LEAST_SINGULAR = math.sqrt(1.0 - math.sqrt(1.0 - COLLINEAR_SINE**2))
 
 
 def directions(axes: Sequence[float] | FloatArray) -> FloatArray:
-    """Unit vectors along `axes`: what turns X and Y into components.
-
-    Parameters
-    ----------
-    axes : (..., m) array_like
-        Directions [rad].
-
-    Returns
-    -------
-    (..., m, 2) ndarray
-    """
+    """Unit vectors along `axes`: what turns X and Y into components."""
     return np.stack([np.cos(axes), np.sin(axes)], axis=-1)
 
 
 @functools.lru_cache(maxsize=256)
 def inverse_directions(axes: tuple[float, ...]) -> FloatArray:
-    """(2, m) matrix from components along `axes` [rad] to X and Y; NaN where they span no plane.
-
-    Parameters
-    ----------
-    axes : tuple of float
-        Directions [rad].
-    """
+    """(2, m) matrix from components along `axes` [rad] to X and Y; NaN where they span no plane."""
     along = directions(axes)
     if len(axes) < 2 or np.linalg.svd(along, compute_uv=False)[-1] <= _LEAST_SINGULAR:
         return np.full((2, len(axes)), np.nan)
@@ -50,21 +34,7 @@ def inverse_directions(axes: tuple[float, ...]) -> FloatArray:
 
 
 def solve_vector(axes: FloatArray, values: FloatArray) -> FloatArray:
-    """Solve ``[cos a_i, sin a_i] . (X, Y) = value_i`` sample by sample.
-
-    Parameters
-    ----------
-    axes : (m,) ndarray
-        Directions [rad], not all along one line; they need not be orthogonal.
-    values : (n, m) ndarray
-        Components along `axes`; NaN where missing.
-
-    Returns
-    -------
-    (n, 2) ndarray
-        Exact for two directions, least squares over those with a value for more; NaN where the
-        directions with a value do not span the plane.
-    """
+    """Solve ``[cos a_i, sin a_i] . (X, Y) = value_i`` sample by sample."""
     present = np.isfinite(values)
     if present.all():
         return values @ inverse_directions(tuple(axes)).T
@@ -77,13 +47,9 @@ def solve_vector(axes: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def zero_uncertainty(channels: Iterable[Channel], quantity: str) -> FloatArray:
-    """Standard uncertainty of a quantity's zero along X and Y (2,), from what the manifest states of its channels [SI].
+    """Standard uncertainty of a quantity's zero along X and Y (2,).
 
-    Parameters
-    ----------
-    channels : iterable of Channel
-    quantity : str
-        ``"displacement"`` or another that has a direction.
+    From what the manifest states of its channels [SI].
     """
     chosen = [c for c in channels if c.quantity == quantity and c.axis is not None]
     if len(chosen) < 2:

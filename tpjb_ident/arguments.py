@@ -17,22 +17,7 @@ if TYPE_CHECKING:
 
 
 def as_campaign(given: Any, name: str) -> Campaign:
-    """Return the campaign given, or open it.
-
-    Parameters
-    ----------
-    given : Campaign, str or Path
-        An object with ``runs`` counts as a campaign.
-    name : str
-        Of the argument, for the message.
-
-    Raises
-    ------
-    ArgumentError
-        Neither.
-    RigDataError
-        The path leads to no campaign that can be used.
-    """
+    """Return the campaign given, or open it."""
     if isinstance(given, (str, Path)):
         from rigdata import load_campaign
 
@@ -79,16 +64,7 @@ _CHECKS: dict[str, Callable[[Any, str], Any]] = {
 
 
 def checked(function: Callable[..., Any], called: str, names: str) -> Callable[..., Any]:
-    """Let a function take paths for a campaign or a bearing, and refuse in our own words what it cannot take.
-
-    Parameters
-    ----------
-    function : callable
-    called : str
-        Its public name.
-    names : str
-        Of the parameters that are checked, keys of `_CHECKS`.
-    """
+    """Let a function take paths for a campaign or a bearing, and refuse in our own words what it cannot take."""
     signature = inspect.signature(function)
 
     @functools.wraps(function)

@@ -33,15 +33,7 @@ class CallablePackage(ModuleType):
 
 
 def make_callable(package: str, function: str) -> None:
-    """Let a package be called.
-
-    Parameters
-    ----------
-    package : str
-        Its own ``__name__``.
-    function : str
-        ``"module:name"`` of what its call does.
-    """
+    """Let a package be called."""
     module = sys.modules[package]
     module.__class__ = CallablePackage
     module._called = function  # type: ignore[attr-defined]

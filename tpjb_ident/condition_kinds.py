@@ -17,18 +17,7 @@ class UnknownConditionError(LookupError):
 
 @dataclass(frozen=True)
 class ConditionKind:
-    """What is known of a condition by its name alone.
-
-    Attributes
-    ----------
-    name : str
-        As it is printed and as scripts test for it.
-    severity : {"error", "warning", "note"}
-        With an error the number is not to be trusted, and the command ends with exit code 3; a warning needs a look;
-        a note is for information.
-    meaning : str
-        What it means to the reader, and what to do.
-    """
+    """What is known of a condition by its name alone."""
 
     name: str
     severity: Severity
@@ -192,18 +181,7 @@ KINDS = {
 
 
 def condition_kind(name: str) -> ConditionKind:
-    """Look a condition up.
-
-    Parameters
-    ----------
-    name : str
-        As it is printed.
-
-    Raises
-    ------
-    UnknownConditionError
-        It is not in the registry; the message names the nearest one.
-    """
+    """Look a condition up."""
     kind = KINDS.get(str(name))
     if kind is None:
         near = nearest_name(name, KINDS)

@@ -9,20 +9,7 @@ from tpjb_ident.condition_kinds import condition_kind
 
 
 class Condition(str):
-    """A name of the registry that compares like a string, with a sentence on what was found.
-
-    Parameters
-    ----------
-    name : str
-        One of `tpjb_ident.condition_kinds.KINDS`; scripts test for it, e.g. ``"iteration-limit" in est.status``.
-    detail : str
-        What was found, with its figure and the limit.
-
-    Raises
-    ------
-    UnknownConditionError
-        The registry does not know the name; the message says the nearest one.
-    """
+    """A name of the registry that compares like a string, with a sentence on what was found."""
 
     __slots__ = ("detail",)
     detail: str
@@ -61,21 +48,10 @@ def merged(*groups: tuple[Condition, ...]) -> tuple[Condition, ...]:
 
 
 def untrusted(conditions: Iterable[Condition]) -> tuple[Condition, ...]:
-    """Those that forbid trust in the number that they belong to: a command that has one ends with exit code 3.
-
-    Parameters
-    ----------
-    conditions : iterable of Condition
-        Of a point, a curve, a polygon, a locus or a campaign.
-    """
+    """Those that forbid trust in the number that they belong to: a command that has one ends with exit code 3."""
     return tuple(condition for condition in conditions if condition.severity == "error")
 
 
 def sentences(conditions: Iterable[Condition]) -> tuple[str, ...]:
-    """Every condition as one line, name and detail.
-
-    Parameters
-    ----------
-    conditions : iterable of Condition
-    """
+    """Every condition as one line, name and detail."""
     return tuple(condition.sentence() for condition in conditions)

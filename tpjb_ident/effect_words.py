@@ -39,27 +39,13 @@ UNITS = {
 
 
 def label_in_words(name: str) -> str:
-    """Name of an effect, a parameter or an observable as people write it.
-
-    Parameters
-    ----------
-    name : str
-        Such as ``"soft_pivot pad 2"`` or ``"misalignment direction 0.785398"`` [rad].
-    """
+    """Name of an effect, a parameter or an observable as people write it."""
     text = re.sub(r"\bpad (\d)", r"pad #\1", name.replace("_", " "))
     return re.sub(r"(?<!load )\bdirection (-?\d+\.?\d*)", lambda m: f"at {plain(math.degrees(float(m[1])), 0)}°", text)
 
 
 def amount(found: Found, size: bool = False) -> str:
-    """A parameter with half its interval in the units that people read.
-
-    Parameters
-    ----------
-    found : Found
-        A ratio is given in per cent.
-    size : bool
-        Without its sign, where the words say the direction.
-    """
+    """A parameter with half its interval in the units that people read."""
     unit, scale = UNITS.get(found.unit, (found.unit, 1.0))
     value, low, high = found.value, found.lo, found.hi
     if size and value < 0:
@@ -80,19 +66,7 @@ def _away(found: Found, more: str, less: str) -> str:
 
 @dataclass(frozen=True)
 class EffectWords:
-    """What to say of an effect.
-
-    Attributes
-    ----------
-    finding : callable
-        Parameters to one clause: what was found, with its size.
-    physics : str
-        What happens, in two sentences.
-    on_the_rig : str
-        How it looks there.
-    check : str
-        What to check first.
-    """
+    """What to say of an effect."""
 
     finding: Callable[[Parameters], str]
     physics: str
@@ -340,15 +314,7 @@ WORDS: dict[str, EffectWords] = {
 
 
 def finding(name: str, parameters: Parameters) -> str:
-    """Say what was found, in one clause with its size; an effect of one's own by its name.
-
-    Parameters
-    ----------
-    name : str
-        Of the effect.
-    parameters : mapping of str to Found
-        By name, SI.
-    """
+    """Say what was found, in one clause with its size; an effect of one's own by its name."""
     words = WORDS.get(name)
     if words is not None:
         return words.finding(parameters)

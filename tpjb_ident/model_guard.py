@@ -6,13 +6,7 @@ import importlib
 
 
 def check_model() -> None:
-    """Do nothing if `import model` gives the bundled bearing model.
-
-    Raises
-    ------
-    ImportError
-        Another package or file of that name comes first on the path; says which, and what to do.
-    """
+    """Do nothing if `import model` gives the bundled bearing model."""
     package = importlib.import_module("model")
     if getattr(package, "DISTRIBUTION", None) != "tpjb-ident":
         place = getattr(package, "__file__", None) or getattr(package, "__path__", "an unknown place")

@@ -43,17 +43,7 @@ class Presented:
         return str(self)
 
     def plot(self, **options: Any) -> Any:
-        """The picture that shows it best; further ones are in `tpjb_ident.report.plots`.
-
-        Parameters
-        ----------
-        **options
-            Of the function in `tpjb_ident.report.plots`.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """The picture that shows it best; further ones are in `tpjb_ident.report.plots`."""
         raise NotImplementedError
 
     def __repr__(self) -> str:
@@ -82,13 +72,7 @@ def _in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def json_data(value: Any) -> Any:
-    """A result as JSON can hold it: numbers that it cannot hold become null, what it does not know a text.
-
-    Parameters
-    ----------
-    value : object
-        Mappings, sequences, numbers (numpy's too), texts.
-    """
+    """A result as JSON can hold it: numbers that it cannot hold become null, what it does not know a text."""
     if isinstance(value, Mapping):
         return {str(k): json_data(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
@@ -100,13 +84,7 @@ def json_data(value: Any) -> Any:
 
 
 def changed(settings: Any) -> str:
-    """Settings as a call with what differs from the defaults: ``IdentifySettings(method='ols')``.
-
-    Parameters
-    ----------
-    settings : dataclass
-        All of whose fields have defaults.
-    """
+    """Settings as a call with what differs from the defaults: ``IdentifySettings(method='ols')``."""
     default = type(settings)()
     named = {f.name: getattr(settings, f.name) for f in fields(settings)}
     other = [f"{name}={value!r}" for name, value in named.items() if value != getattr(default, name)]
@@ -114,13 +92,5 @@ def changed(settings: Any) -> str:
 
 
 def shown_by(module: str, function: str) -> Any:
-    """A function of a room above the result's own, looked up when it is asked for: no file imports upwards.
-
-    Parameters
-    ----------
-    module : str
-        Below `tpjb_ident`, e.g. ``"report.plots"``.
-    function : str
-        Of that module.
-    """
+    """A function of a room above the result's own, looked up when it is asked for: no file imports upwards."""
     return getattr(importlib.import_module(f"tpjb_ident.{module}"), function)

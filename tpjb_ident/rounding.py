@@ -12,12 +12,6 @@ ASKEW = 1.5
 def counted(number: int, thing: str) -> str:
     """A number of things, in the plural unless it is one.
 
-    Parameters
-    ----------
-    number : int
-    thing : str
-        In the singular.
-
     >>> counted(1, "error"), counted(0, "error")
     ('1 error', '0 errors')
     """
@@ -26,13 +20,6 @@ def counted(number: int, thing: str) -> str:
 
 def plain(value: float, digits: int) -> str:
     """A number with `digits` decimals; never a negative zero.
-
-    Parameters
-    ----------
-    value : float
-        In the unit that is shown.
-    digits : int
-        Decimals.
 
     >>> plain(-0.004, 1)
     '0.0'
@@ -43,17 +30,6 @@ def plain(value: float, digits: int) -> str:
 
 def with_interval(value: float, low: float, high: float, scale: float = 1.0) -> str:
     """Value and half the width of its interval, or its ends where it is askew, to the digit that it allows.
-
-    Parameters
-    ----------
-    value : float
-        SI.
-    low : float
-        Lower end of the interval.
-    high : float
-        Upper end.
-    scale : float, optional
-        Size in SI of the unit that is shown.
 
     >>> with_interval(163.2841e6, 162.0e6, 164.6e6, 1e6)
     '163.3 ± 1.3'
@@ -73,28 +49,12 @@ def with_interval(value: float, low: float, high: float, scale: float = 1.0) -> 
 
 
 def percent(share: float, digits: int = 1) -> str:
-    """A share as a signed percentage; a dash if there is none.
-
-    Parameters
-    ----------
-    share : float
-        1 is 100 %.
-    digits : int, optional
-        Decimals.
-    """
+    """A share as a signed percentage; a dash if there is none."""
     return f"{signed(100 * share, digits)}\N{NO-BREAK SPACE}%" if math.isfinite(share) else "–"
 
 
 def signed(value: float, digits: int = 1) -> str:
-    """A number with its sign, none if it rounds to zero; a dash if there is none.
-
-    Parameters
-    ----------
-    value : float
-        In the unit that is shown.
-    digits : int, optional
-        Decimals.
-    """
+    """A number with its sign, none if it rounds to zero; a dash if there is none."""
     if not math.isfinite(value):
         return "–"
     text = plain(value, digits)
@@ -102,13 +62,5 @@ def signed(value: float, digits: int = 1) -> str:
 
 
 def fixed(value: float, digits: int = 1) -> str:
-    """A plain number; a dash if there is none.
-
-    Parameters
-    ----------
-    value : float
-        In the unit that is shown.
-    digits : int, optional
-        Decimals.
-    """
+    """A plain number; a dash if there is none."""
     return plain(value, digits) if math.isfinite(value) else "–"

@@ -14,18 +14,7 @@ ENTRIES = ("xx", "xy", "yx", "yy")
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A kind of coefficient: stiffness, damping or mass.
-
-    Attributes
-    ----------
-    symbol, quantity : str
-        ``"k"``, ``"stiffness"``.
-    suffix, unit : str
-        Of the columns, and how the unit is written.
-    display_unit, display_scale : str, float
-        What people read, and its size in SI.
-    meaning : str
-    """
+    """A kind of coefficient: stiffness, damping or mass."""
 
     symbol: str
     quantity: str
@@ -36,13 +25,7 @@ class Coefficient:
     meaning: str
 
     def column(self, entry: str) -> str:
-        """Name of the column of one entry, ``"xx"`` to ``"yy"``.
-
-        Parameters
-        ----------
-        entry : str
-            ``"xx"``, ``"xy"``, ``"yx"`` or ``"yy"``.
-        """
+        """Name of the column of one entry, ``"xx"`` to ``"yy"``."""
         return f"{self.symbol}{entry}_{self.suffix}"
 
     @property
@@ -65,35 +48,13 @@ TANGENT, SECANT = f"stiffness_{STIFFNESS.suffix}", f"secant_{STIFFNESS.suffix}"
 
 
 def coefficient_column(name: str) -> str:
-    """Column of a coefficient.
-
-    Parameters
-    ----------
-    name : str
-        ``"kxx"`` .. ``"myy"``.
-
-    Raises
-    ------
-    KeyError
-        No such coefficient.
-    """
+    """Column of a coefficient."""
     return KINDS[name[0]].column(name[1:])
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a table.
-
-    Attributes
-    ----------
-    name : str
-        As in the file; ``N`` stands for a pad's number, ``{e}`` for an entry ``xx`` .. ``yy``.
-    quantity, unit : str
-        ``"length"``, ``"m"``; no unit for text, counts, shares and truth values.
-    meaning : str
-    endings : tuple of str
-        What also exists behind this name: ``"_lo"``, ``"_hi"``, ``"_se"``, ..
-    """
+    """One column of a table."""
 
     name: str
     quantity: str
@@ -365,13 +326,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
 
 
 def markdown(table: str) -> str:
-    """Rows of the documentation's table of one file: name, unit, meaning.
-
-    Parameters
-    ----------
-    table : str
-        A key of `TABLES`.
-    """
+    """Rows of the documentation's table of one file: name, unit, meaning."""
     rows = ["| column | unit | meaning |", "|---|---|---|"]
     for column in TABLES[table]:
         names = ", ".join(f"`{name}`" for name in (column.name.replace("{e}", "xx"), *column.endings))

@@ -29,30 +29,7 @@ MOST_TURNS, SETTLED = 40, 1e-7
 def flexing_impedance(
     film: PadFilm, position: FloatArray, omega: FloatArray, factor: float, axial: tuple[AxialTilt, float] | None = None
 ) -> ComplexArray:
-    """What bending and axial tilting with the motion add to a film's impedance.
-
-    Parameters
-    ----------
-    film : PadFilm
-        Of a solved equilibrium.
-    position : (2,) ndarray
-        Journal [m].
-    omega : (n,) ndarray
-        [rad/s]
-    factor : float
-        On the pad's computed compliance; 0: it moves as a rigid body.
-    axial : tuple, optional
-        Of a pad that is free to: its axial tilt, and its moment of inertia [kg m^2].
-
-    Returns
-    -------
-    (n, 2, 2) complex ndarray
-        By (a, b) [N/m].
-
-    Notes
-    -----
-    J. W. Lund, L. B. Pedersen, ASME J. Tribology 109 (1987) 65, of pads that flex in tilting-pad bearings.
-    """
+    """What bending and axial tilting with the motion add to a film's impedance."""
     work, weights = film.work, force_weights(film.grid)
     conductance = conductances(film.grid, work, film.pad.pad_clearance, *film.approach(position))
     still, moving = work.slopes[:, :2], work.slopes[:, 2:4]

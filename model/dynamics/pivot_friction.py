@@ -24,22 +24,7 @@ HALVINGS = 60
 
 
 def describing(amplitude: FloatArray, stick: float, slip: float) -> ComplexArray:
-    """N(A) [N m/rad] of a pivot with contact stiffness `stick` [N m/rad] and friction moment `slip` [N m].
-
-    Parameters
-    ----------
-    amplitude : ndarray
-        Tilt [rad].
-    stick : float
-        Contact stiffness [N m/rad].
-    slip : float
-        Friction moment [N m].
-
-    Returns
-    -------
-    complex ndarray
-        [N m/rad]
-    """
+    """N(A) [N m/rad] of a pivot with contact stiffness `stick` [N m/rad] and friction moment `slip` [N m]."""
     share = slip / (stick * np.maximum(amplitude, slip / stick))
     phi = np.arccos(np.clip(1.0 - 2.0 * share, -1.0, 1.0))
     turning = phi - 0.5 * np.sin(2.0 * phi)
@@ -47,22 +32,7 @@ def describing(amplitude: FloatArray, stick: float, slip: float) -> ComplexArray
 
 
 def friction_impedance(own: ComplexArray, drive: FloatArray, stick: float, slip: float) -> ComplexArray:
-    """Rotational impedance of a pivot's friction.
-
-    Parameters
-    ----------
-    own : (n, 2) complex ndarray
-        Rotational impedance of the pad without it [N m/rad].
-    drive : (n, 2) ndarray
-        Amplitude of the moment that the vibration sets against the pad [N m].
-    stick, slip : float
-        See `describing`.
-
-    Returns
-    -------
-    (n, 2) complex ndarray
-        `stick` where the vibration does not break the pivot loose [N m/rad].
-    """
+    """Rotational impedance of a pivot's friction."""
     if not slip > 0.0:
         return np.zeros_like(own)
     low = np.full(own.shape, slip / stick)

@@ -27,20 +27,7 @@ from model.statics.tilt_hold import friction_limits, tilt_hold
 
 @dataclass(frozen=True)
 class PadMatrices:
-    """Full matrices of one pad in (x, y, theta, eta), Eq. (11) and (12).
-
-    Attributes
-    ----------
-    number : int
-        Pad, from 1.
-    stiffness, damping : (4, 4) ndarray
-        Film [N/m, N/rad, N m/rad; times s].
-    pad_mass, pad_damping, pad_stiffness : (2, 2) ndarray
-        Eq. (12), in (theta, eta). A rigid pivot has infinite k_eta.
-    friction : tuple of float
-        Of a sphere in its seat: rotational stiffness while it sticks [N m/rad], in `pad_stiffness` too, and the moment
-        at which it slides [N m].
-    """
+    """Full matrices of one pad in (x, y, theta, eta), Eq. (11) and (12)."""
 
     number: int
     stiffness: FloatArray
@@ -52,18 +39,7 @@ class PadMatrices:
 
 
 def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
-    """Assemble the full matrices of one pad; None if it idles.
-
-    Parameters
-    ----------
-    setup : Setup
-    film : PadFilm
-        Solved.
-
-    Returns
-    -------
-    PadMatrices or None
-    """
+    """Assemble the full matrices of one pad; None if it idles."""
     if film.forces is None:
         return None
     pad, law = film.pad, setup.pivots[film.number - 1]
@@ -86,14 +62,7 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
 
 
 def pad_frames(film: PadFilm, arm: float) -> tuple[FloatArray, FloatArray]:
-    """J = d(a, b)/d(x, y, theta, eta), (2, 4), and what the film's forces do in these directions.
-
-    Parameters
-    ----------
-    film : PadFilm
-    arm : float
-        Where the contact rolls away from the pivot line, the arm with which the pad's load has a moment [m].
-    """
+    """J = d(a, b)/d(x, y, theta, eta), (2, 4), and what the film's forces do in these directions."""
     frame = np.array(
         [
             [film.normal[0], film.normal[1], 0.0, -1.0],
@@ -106,17 +75,7 @@ def pad_frames(film: PadFilm, arm: float) -> tuple[FloatArray, FloatArray]:
 
 
 def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
-    """b_G, the mass centre's distance from the pivot line [m], positive with rotation; zero for a central pivot.
-
-    Parameters
-    ----------
-    setup : Setup
-    film : PadFilm
-
-    Returns
-    -------
-    float
-    """
+    """b_G, the mass centre's distance from the pivot line [m], positive with rotation; zero for a central pivot."""
     pad = film.pad
     middle = (0.5 - pad.pivot_offset) * pad.arc
     inner = setup.bearing.journal_radius + pad.pad_clearance
@@ -129,23 +88,7 @@ def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
 def reduce_pads(
     pads: list[PadMatrices], omega: FloatArray, vibration: float = 0.0, beside: list[ComplexArray] | None = None
 ) -> ComplexArray:
-    """Eq. (10): the bearing's 2 x 2 impedance at every excitation frequency.
-
-    Parameters
-    ----------
-    pads : list of PadMatrices
-    omega : (n,) ndarray
-        [rad/s]
-    vibration : float
-        Amplitude of the journal [m], for pivots with friction.
-    beside : list of (n, 4, 4) complex ndarray, optional
-        What the films' impedances hold besides stiffness and damping, see `model.film.following_heat`.
-
-    Returns
-    -------
-    (n, 2, 2) complex ndarray
-        h = k + i omega c [N/m].
-    """
+    """Eq. (10): the bearing's 2 x 2 impedance at every excitation frequency."""
     total = np.zeros((len(omega), 2, 2), dtype=complex)
     for rigid in (False, True):  # a rigid pivot: eta takes no part
         alike = [k for k, pad in enumerate(pads) if math.isinf(pad.pad_stiffness[1, 1]) == rigid]
@@ -192,23 +135,7 @@ def _reduce_with_friction(pad: PadMatrices, z: ComplexArray, film: ComplexArray,
 
 
 def broken_loose(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
-    """Rotational impedance (n, 2) of a pivot's friction [N m/rad] for the journal vibrating along X, along Y.
-
-    Parameters
-    ----------
-    pad : PadMatrices
-    z : (n, 4, 4) complex ndarray
-        Film impedance.
-    film : (n, m, m) complex ndarray
-        Of tilt and deflection, pad and pivot included.
-    vibration : float
-        Amplitude of the journal [m].
-
-    Returns
-    -------
-    (n, 2) complex ndarray
-        [N m/rad]
-    """
+    """Rotational impedance (n, 2) of a pivot's friction [N m/rad] for the journal vibrating along X, along Y."""
     stick, slip = pad.friction
     own, drive = film[:, 0, 0] - stick, z[:, 2, :2]
     if film.shape[1] == 2:  # the pivot gives way as well
@@ -218,17 +145,7 @@ def broken_loose(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibratio
 
 
 def axial_inertia(setup: Setup, film: PadFilm) -> float:
-    """Moment of inertia of a pad about the axis across it through its pivot [kg m^2], of a sector of a ring.
-
-    Parameters
-    ----------
-    setup : Setup
-    film : PadFilm
-
-    Returns
-    -------
-    float
-    """
+    """Moment of inertia of a pad about the axis across it through its pivot [kg m^2], of a sector of a ring."""
     pad = film.pad
     inner = setup.bearing.journal_radius + pad.pad_clearance
     outer = inner + pad.thickness
@@ -241,20 +158,7 @@ def axial_inertia(setup: Setup, film: PadFilm) -> float:
 
 
 def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> ComplexArray:
-    """h(omega) of the bearing inside the measured displacement, effects of the structure included.
-
-    Parameters
-    ----------
-    setup : Setup
-    equilibrium : Equilibrium
-    omega : (n,) ndarray
-        [rad/s]
-
-    Returns
-    -------
-    (n, 2, 2) complex ndarray
-        With added mass and series compliance, before any instrument.
-    """
+    """h(omega) of the bearing inside the measured displacement, effects of the structure included."""
     pads = [m for film in equilibrium.films if (m := pad_matrices(setup, film)) is not None]
     beside = None
     if setup.options.perturbed_heat and setup.thermal != "isothermal":
@@ -293,20 +197,7 @@ def _heat_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: F
 
 
 def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexArray:
-    """What the structure around a bearing makes of its impedance.
-
-    Parameters
-    ----------
-    setup : Setup
-    h : (n, 2, 2) complex ndarray
-        Of the bearing alone [N/m].
-    omega : (n,) ndarray
-        [rad/s]
-
-    Returns
-    -------
-    (n, 2, 2) complex ndarray
-    """
+    """What the structure around a bearing makes of its impedance."""
     if setup.added_mass:
         h = h - (omega**2)[:, None, None] * setup.added_mass * np.eye(2)
     if any(setup.series_compliance):
@@ -319,19 +210,7 @@ def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexA
 
 
 def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> tuple[Condition, ...]:
-    """Named regimes of pivots with friction: which ones it holds, and which ones the vibration breaks loose.
-
-    Parameters
-    ----------
-    setup : Setup
-    equilibrium : Equilibrium
-    omega : (n,) ndarray
-        [rad/s]
-
-    Returns
-    -------
-    tuple of Condition
-    """
+    """Named regimes of pivots with friction: which ones it holds, and which ones the vibration breaks loose."""
     held: list[int] = []
     loose: list[int] = []
     for film in equilibrium.films:

@@ -52,25 +52,7 @@ def _rebuild(name: str, parameters: dict[str, float]) -> Effect:
 
 
 def apply_effects(setup: Setup, effects: Iterable[Effect]) -> Setup:
-    """Apply effects one after the other.
-
-    Parameters
-    ----------
-    setup : Setup
-        Bearing, oil, pivots and instruments as they are without the effects.
-    effects : iterable of Effect
-        In the order in which they are applied.
-
-    Returns
-    -------
-    Setup
-        A new one; `setup` is not changed.
-
-    Raises
-    ------
-    EffectError
-        A pad number beyond the bearing's pads, not one number per pad, or a bearing that cannot have the effect.
-    """
+    """Apply effects one after the other."""
     pads = len(setup.bearing.pads)
     for effect in effects:
         kind = kind_of(effect.name)

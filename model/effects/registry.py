@@ -29,18 +29,7 @@ def known_effects() -> dict[str, EffectKind]:
 
 
 def kind_of(name: str) -> EffectKind:
-    """Look an effect up.
-
-    Parameters
-    ----------
-    name : str
-        Canonical name of the effect.
-
-    Raises
-    ------
-    EffectError
-        Not known; names the nearest known one.
-    """
+    """Look an effect up."""
     kinds = known_effects()
     if name not in kinds:
         raise EffectError(f"effect {name!r} is not known. {hint(name, sorted(kinds), 'Known effects:')}")

@@ -15,18 +15,6 @@ def add_compliance(setup: Setup, xx: float, xy: float, yy: float) -> Setup:
 
     A pivot curve that was measured against the same structure already holds it once; it is taken off there, as far as
     it gives way towards that pad.
-
-    Parameters
-    ----------
-    setup : Setup
-        Setup without it.
-    xx, xy, yy : float
-        Entries of the symmetric compliance, rig axes [m/N].
-
-    Returns
-    -------
-    Setup
-        With the compliance, pivot curves corrected.
     """
     before = setup.series_compliance
     pivots = []

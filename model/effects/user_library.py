@@ -10,17 +10,7 @@ from model.effects.registry import known_effects, register
 
 
 def load_library(path: str | Path) -> tuple[EffectKind, ...]:
-    """Run a Python file and register every `EffectKind` that it defines.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Raises
-    ------
-    EffectError
-        No such file, code that fails, no effect in it, or a name that is bundled.
-    """
+    """Run a Python file and register every `EffectKind` that it defines."""
     path = Path(path)
     spec = importlib.util.spec_from_file_location(f"effects_of_{path.stem}", path) if path.is_file() else None
     if spec is None or spec.loader is None:

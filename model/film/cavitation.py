@@ -52,27 +52,7 @@ def solve_film_jfo(
     sharp: bool,
     filling: float,
 ) -> FilmForces:
-    """Pressure of one film and its derivatives, mass conserved where it is ruptured.
-
-    Parameters
-    ----------
-    grid, work, wedge, speed, sharp
-        As `model.film.reynolds.solve_film` takes them; ``work.ruptured[0]`` is set where the leading edge is not
-        full behind itself.
-    filling : float
-        Share of the gap that is full where the film enters.
-
-    Returns
-    -------
-    FilmForces
-
-    Notes
-    -----
-    Stiffness is the derivative of the steady solution, the fronts and the filling moving along. Damping is exact to
-    first order in the frequency: the mass that is stored is that of rho h theta, with the change of theta that goes
-    with the stiffness, so that what the fronts sweep is counted. Where the film is ruptured `work.flow_x` is that of
-    the full film: heat and flow shrink alike there.
-    """
+    """Pressure of one film and its derivatives, mass conserved where it is ruptured."""
     forces = solve_film(grid, work, wedge, speed, sharp)
     if forces.steps < 0:
         return forces
@@ -85,23 +65,7 @@ def solve_film_jfo(
 def solve_flooded_film(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool
 ) -> FilmForces:
-    """`solve_film_jfo` for a film that the supply fills where it enters; parameters as those of `solve_film`.
-
-    Parameters
-    ----------
-    grid : FilmGrid
-    work : FilmWork
-    wedge : tuple of float
-        Cp, a, b [m].
-    speed : float
-        Surface speed of the journal [m/s].
-    sharp : bool
-        See `model.film.reynolds.solve_film`.
-
-    Returns
-    -------
-    FilmForces
-    """
+    """`solve_film_jfo` for a film that the supply fills where it enters; parameters as those of `solve_film`."""
     return solve_film_jfo(grid, work, wedge, speed, sharp, 1.0)
 
 

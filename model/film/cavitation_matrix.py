@@ -19,19 +19,7 @@ from model.film.reynolds import conductances
 
 
 class FaceFlows(NamedTuple):
-    """What the faces of the control volumes conduct and carry.
-
-    Attributes
-    ----------
-    along, across : (nt, nz + 1), (nt + 1, nz) ndarray
-        Conductance rho h^3 / (12 mu) times length over distance [kg/s/Pa].
-    couette : (nt, nz + 1) ndarray
-        What the journal drags through a face along the arc that is full [kg/s].
-    height : (nt, nz + 1) ndarray
-        Film thickness at those faces [m].
-    supply : (nz + 1,) ndarray
-        What the journal drags over the leading edge at most [kg/s]: a gap that opens there is not filled.
-    """
+    """What the faces of the control volumes conduct and carry."""
 
     along: FloatArray
     across: FloatArray
@@ -44,23 +32,7 @@ class FaceFlows(NamedTuple):
 def face_flows(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, filling: float
 ) -> FaceFlows:
-    """Conductances and drag of a film that is full everywhere but for its supply: `filling` of the gap there.
-
-    Parameters
-    ----------
-    grid : FilmGrid
-    work : FilmWork
-    wedge : tuple of float
-        Cp, a, b [m].
-    speed : float
-        Surface speed of the journal [m/s].
-    filling : float
-        Share of the gap that is full where the film enters.
-
-    Returns
-    -------
-    FaceFlows
-    """
+    """Conductances and drag of a film that is full everywhere but for its supply: `filling` of the gap there."""
     along, across = conductances(grid, work, wedge[0], wedge[1], wedge[2])
     couette, height = np.empty_like(along), np.empty_like(along)
     for i in range(along.shape[0]):
@@ -77,17 +49,7 @@ def face_flows(
 
 @inner
 def assemble_columns(band: FloatArray, faces: FaceFlows, ruptured: BoolArray, first: int) -> None:
-    """Fill the band: entry (row, column) stands at ``band[row, width + column - row]``.
-
-    Parameters
-    ----------
-    band : (n, 2 width + 1) ndarray
-        Overwritten.
-    faces : FaceFlows
-    ruptured : (nt + 1, nz + 1) ndarray of bool
-    first : int
-        First unknown axial node, see `FilmGrid`.
-    """
+    """Fill the band: entry (row, column) stands at ``band[row, width + column - row]``."""
     gx, gz, couette = faces.along, faces.across, faces.couette
     nt, nz = gx.shape[0], gz.shape[1]
     width = nz - first
@@ -117,13 +79,7 @@ def assemble_columns(band: FloatArray, faces: FaceFlows, ruptured: BoolArray, fi
 
 @inner
 def factorise_columns(band: FloatArray) -> None:
-    """L U in place, without pivoting.
-
-    Parameters
-    ----------
-    band : (n, 2 width + 1) ndarray
-        The matrix; overwritten with its factors.
-    """
+    """L U in place, without pivoting."""
     n, width = band.shape[0], band.shape[1] // 2
     for k in range(n):
         pivot = 1.0 / band[k, width]
@@ -137,15 +93,7 @@ def factorise_columns(band: FloatArray) -> None:
 
 @inner
 def substitute_columns(band: FloatArray, x: FloatArray) -> None:
-    """Solve for the right-hand sides (n, m) in place.
-
-    Parameters
-    ----------
-    band : (n, 2 width + 1) ndarray
-        The factors.
-    x : (n, m) ndarray
-        Right-hand sides, overwritten with the solutions.
-    """
+    """Solve for the right-hand sides (n, m) in place."""
     n, width, count = band.shape[0], band.shape[1] // 2, x.shape[1]
     for k in range(n):
         for r in range(1, min(width, n - 1 - k) + 1):

@@ -15,24 +15,7 @@ from model.film.slopes import net_inflow
 def jfo_slopes(
     grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, sharp: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Solve for the derivatives by a, b, da/dt, db/dt; then the mass flows.
-
-    Parameters
-    ----------
-    grid, work, faces
-        Solved: `work.pressure` and `work.ruptured` are read, the flows written.
-    x : (unknowns, 1) ndarray
-        Pressure where wet, theta - 1 where ruptured.
-    sharp : bool
-        As in `model.film.reynolds.solve_film`.
-
-    Returns
-    -------
-    weight : (nt + 1, nz + 1) ndarray
-        Area that a node's perturbed pressure stands for [m^2].
-    slopes : (unknowns, 4) ndarray
-        Of the pressure where wet, of theta where ruptured.
-    """
+    """Solve for the derivatives by a, b, da/dt, db/dt; then the mass flows."""
     nz = work.pressure.shape[1] - 1
     width = nz - grid.first
     band = np.empty((x.shape[0], 2 * width + 1))

@@ -41,28 +41,7 @@ def cross_operator(
     heat: tuple[float, float, float, float, float],
     operator: CrossOperator,
 ) -> float:
-    """Set up and factorise the heat balances of a film.
-
-    Parameters
-    ----------
-    grid, work
-        Mesh and the pressure solution.
-    cross : CrossFilm
-        Its fluidity and integrals are those that the pressure was solved with.
-    speed : float
-        Surface speed of the journal [m/s].
-    heat : tuple of float
-        Specific heat [J/kg/K] and conductivity [W/m/K] of the oil, share of the dissipation that stays in it, 1 for
-        a journal that takes part, 0 for an insulated one, and the exponent of the viscosity [1/K].
-    operator : CrossOperator
-        Set.
-
-    Returns
-    -------
-    float
-        How far the net flow over the leading edge is below `LEAST_NET_FLOW`, as a share of it, or what runs back there
-        above `MOST_BACK`; zero: neither.
-    """
+    """Set up and factorise the heat balances of a film."""
     nt, lines, cells = work.flow_x.shape[0], work.flow_x.shape[1], len(cross.edges) - 1
     n = lines * cells
     factor, before, journal, made, carried, flows = operator

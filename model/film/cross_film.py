@@ -30,23 +30,7 @@ GRADING = 0.5
 
 
 class CrossFilm(NamedTuple):
-    """What one film holds across its thickness; n cells, from the pad to the journal.
-
-    Attributes
-    ----------
-    edges : (n + 1,) ndarray
-        Of the cells, eta = y / h from 0 at the pad to 1 at the journal.
-    temperature : (nt + 1, nz + 1, n) ndarray
-        [degC]
-    face : (nt + 1, nz + 1) ndarray
-        Of the pad's face [degC].
-    fluidity : (nt + 1, nz + 1, n) ndarray
-        1 / mu, as the pressure was solved with [1/(Pa s)].
-    shear : (nt + 1, nz + 1) ndarray
-        1 / f0, the viscosity that shears [Pa s].
-    centre : (nt + 1, nz + 1) ndarray
-        e.
-    """
+    """What one film holds across its thickness; n cells, from the pad to the journal."""
 
     edges: FloatArray
     temperature: FloatArray
@@ -57,23 +41,7 @@ class CrossFilm(NamedTuple):
 
 
 class CrossOperator(NamedTuple):
-    """The heat balances of one film, factorised; n = (nz + 1) * cells unknowns per station, cells fastest.
-
-    Attributes
-    ----------
-    factor : (nt, n, 2 cells + 1) ndarray
-        L and U of the balances at the later station, with 1 / U on the diagonal [W/K].
-    before : (nt, n, 5) ndarray
-        What the earlier station adds: by the cell itself, the cells below and above, the lines before and after.
-    journal : (nt, nz + 1, 2) ndarray
-        Exchange with the journal at the earlier and the later station [W/K].
-    made : (nt, n) ndarray
-        Dissipation [W], and what the balances take from it per kelvin, at the present temperature.
-    carried : (nz + 1, cells) ndarray
-        Heat carried over the trailing edge per kelvin [W/K].
-    flows : (nt, nz + 1, cells) ndarray
-        Mass flow of the cells from station to station [kg/s].
-    """
+    """The heat balances of one film, factorised; n = (nz + 1) * cells unknowns per station, cells fastest."""
 
     factor: FloatArray
     before: FloatArray
@@ -84,17 +52,7 @@ class CrossOperator(NamedTuple):
 
     @classmethod
     def place(cls, rows: int, lines: int, cells: int) -> CrossOperator:
-        """Room for the balances of a film.
-
-        Parameters
-        ----------
-        rows, lines, cells : int
-            nt + 1, nz + 1, cells across.
-
-        Returns
-        -------
-        CrossOperator
-        """
+        """Room for the balances of a film."""
         nt, n = rows - 1, lines * cells
         return cls(
             np.zeros((nt, n, 2 * cells + 1)),
@@ -107,20 +65,7 @@ class CrossOperator(NamedTuple):
 
 
 def cross_film(work: FilmWork, temperature: float, cells: int = CELLS) -> CrossFilm:
-    """Lay out a film of one temperature.
-
-    Parameters
-    ----------
-    work : FilmWork
-        Its mesh is taken over.
-    temperature : float
-        [degC]
-    cells : int
-
-    Returns
-    -------
-    CrossFilm
-    """
+    """Lay out a film of one temperature."""
     shape = work.temperature.shape
     uniform = np.arange(cells + 1) / cells
     edges = GRADING * 0.5 * (1.0 - np.cos(np.pi * uniform)) + (1.0 - GRADING) * uniform
@@ -136,17 +81,7 @@ def cross_film(work: FilmWork, temperature: float, cells: int = CELLS) -> CrossF
 
 @compiled
 def set_cross_viscosity(cross: CrossFilm, work: FilmWork, oil: tuple[float, float, float, float]) -> None:
-    """Viscosities of the cells, and what the pressure solution needs of them.
-
-    Parameters
-    ----------
-    cross : CrossFilm
-        Its fluidity, shear and centre are set.
-    work : FilmWork
-        Its temperature and density (of the mean across), viscosity 1 / (12 f2) and drag 2 (1 - e) are set.
-    oil : tuple of float
-        See `model.statics.pad_film.oil_constants`.
-    """
+    """Viscosities of the cells, and what the pressure solution needs of them."""
     rows, columns, _ = cross.temperature.shape
     for i in range(rows):
         for j in range(columns):
@@ -190,19 +125,9 @@ def cross_pressure_change(
     oil: tuple[float, float, float, float],
     change: FloatArray,
 ) -> FloatArray:
-    """Change of the pressure that new temperatures across the film will make; as `model.film.slopes.pressure_change`.
+    """Change of the pressure that new temperatures across the film will make.
 
-    Parameters
-    ----------
-    grid, work, speed, oil, change
-        As there.
-    cross : CrossFilm
-        With the new temperatures; its fluidity is set to theirs.
-
-    Returns
-    -------
-    (2,) ndarray
-        Change of the radial and tangential force [N].
+    As `model.film.slopes.pressure_change`.
     """
     shape = work.temperature.shape
     old, new, denser = np.empty(shape), np.empty(shape), np.empty(shape)

@@ -22,19 +22,6 @@ def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray
     """March three temperature fields: of fresh oil at zero with sources, per kelvin of the inlet, and of the journal.
 
     The equation is linear. Three numbers that do not wait for one another cost what one does.
-
-    Parameters
-    ----------
-    operator : CrossOperator
-    fields : (nt + 1, n, 3) ndarray
-        Station 0 holds the inlets; the rest is overwritten [degC].
-    sources : (nt, n) ndarray
-        Heat between two stations, for the first field [W].
-
-    Returns
-    -------
-    (3,) ndarray
-        Heat that the journal takes up [W]; it is of 0, 0 and 1 degC.
     """
     n, cells = fields.shape[1], operator.carried.shape[1]
     taken = np.zeros(3)
@@ -79,20 +66,9 @@ def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray
 
 @inner
 def march_one(operator: CrossOperator, field: FloatArray, sources: FloatArray) -> float:
-    """`march_cross` for one field of fresh oil at zero beside a journal at zero, with sources in the lowest cells only.
+    """`march_cross` for one field of fresh oil at zero beside a journal at zero.
 
-    Parameters
-    ----------
-    operator : CrossOperator
-    field : (nt + 1, n) ndarray
-        Station 0 is zero; the rest is overwritten [K].
-    sources : (nt, nz + 1) ndarray
-        Heat between two stations [W].
-
-    Returns
-    -------
-    float
-        Heat that the journal takes up [W].
+    With sources in the lowest cells only.
     """
     n, cells = field.shape[1], operator.carried.shape[1]
     taken = 0.0
@@ -130,21 +106,7 @@ def march_one(operator: CrossOperator, field: FloatArray, sources: FloatArray) -
 def face_temperature(
     work: FilmWork, edges: FloatArray, conductivity: float, field: FloatArray, taken: FloatArray, face: FloatArray
 ) -> None:
-    """Temperature of the pad's face, from the two cells next to it and the heat flux into the pad.
-
-    Parameters
-    ----------
-    work : FilmWork
-    edges : (cells + 1,) ndarray
-    conductivity : float
-        Of the oil [W/m/K].
-    field : (nt + 1, (nz + 1) cells) ndarray
-        Temperature of the cells [degC].
-    taken : (nt + 1, nz + 1) ndarray
-        Heat flux density into the pad [W/m^2].
-    face : (nt + 1, nz + 1) ndarray
-        Overwritten [degC].
-    """
+    """Temperature of the pad's face, from the two cells next to it and the heat flux into the pad."""
     cells = len(edges) - 1
     one, two = 0.5 * (edges[0] + edges[1]), 0.5 * (edges[1] + edges[2])
     for i in range(face.shape[0]):
@@ -157,19 +119,7 @@ def face_temperature(
 
 @inner
 def station_heat(grid: FilmGrid, flux: FloatArray) -> FloatArray:
-    """What a heat flux density into the pad takes between two stations.
-
-    Parameters
-    ----------
-    grid : FilmGrid
-    flux : (nt + 1, nz + 1) ndarray
-        [W/m^2]
-
-    Returns
-    -------
-    (nt, nz + 1) ndarray
-        [W]
-    """
+    """What a heat flux density into the pad takes between two stations."""
     return 0.5 * grid.dx * (flux[1:] + flux[:-1]) * grid.height
 
 
@@ -185,26 +135,6 @@ def conduct(
     """Change temperatures so that the pad takes what it conducts at its face's new temperature, not at its old one.
 
     By how much the pad's coarser nodes change is found by GMRES: Y. Saad, SIAM J. Sci. Comput. 14 (1993) 461.
-
-    Parameters
-    ----------
-    film : tuple
-        Mesh, pressure solution, edges of the cells, and the oil's conductivity [W/m/K].
-    operator : CrossOperator
-    pad : tuple
-        `flux` and `to_coarse` of `model.pad.bending.PadDeformation`, and about what the coarser nodes change by where
-        the film would bring them by something, (c, c).
-    missing : (nt + 1, nz + 1) ndarray
-        The face's temperature with what the pad took at its old one, less that [K].
-    tolerance : float
-        Share of it that may be left.
-    answer : tuple
-        (nt + 1, n) temperatures of the cells and (nt + 1, nz + 1) of the face, changed [degC].
-
-    Returns
-    -------
-    float
-        What the journal takes up besides [W]; NaN, and nothing is changed, if the answer has no bounds.
     """
     flux, to_coarse, guess = pad
     right = np.dot(to_coarse, missing.copy().ravel())

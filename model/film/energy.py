@@ -28,31 +28,7 @@ LEAST_THINNING = 1e-6
 
 @compiled
 def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running, temperature: FloatArray) -> float:
-    """March the film temperature from the leading edge.
-
-    Parameters
-    ----------
-    grid, work
-        Mesh and the pressure solution (pressure, thickness, viscosity, density, flows).
-    inlet : float
-        Temperature at the leading edge [degC].
-    running : Running
-        Heat is made at the new temperature, to first order about `work.temperature`; of an oil that does not thin
-        (kappa 0), at that one.
-    temperature : (nt + 1, nz + 1) ndarray
-        Overwritten with the new temperature [degC].
-
-    Returns
-    -------
-    float
-        Largest share of a line's flow that had to be limited (0: no flow back at the leading edge).
-
-    Notes
-    -----
-    Integrated over the film thickness, Eq. (3) reads
-    rho c h (u T_x + w T_z) = k h T_zz + mu U^2 / h + h^3 / (12 mu) (p_x^2 + p_z^2) - exchange T + gained;
-    the last two are what pad and journal take and give (`model.statics.heat_paths`), zero in the adiabatic baseline.
-    """
+    """March the film temperature from the leading edge."""
     rows, columns = temperature.shape
     fields = temperature.reshape((1, rows, columns))
     loss, sources = np.empty((rows, columns)), np.empty((1, rows, columns))
@@ -71,24 +47,7 @@ def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running,
 def march(
     grid: FilmGrid, work: FilmWork, running: Running, loss: FloatArray, fields: FloatArray, sources: FloatArray
 ) -> float:
-    """March any number of temperature fields that differ in their inlet and sources: the equation is linear.
-
-    Parameters
-    ----------
-    grid, work, running
-        As for `solve_energy`; of the oil its heat only.
-    loss : (nt + 1, nz + 1) ndarray
-        What every kelvin loses per station of length dx and control-volume height [W/K].
-    fields : (m, nt + 1, nz + 1) ndarray
-        Row 0 holds the temperature at the leading edge; the rest is overwritten [degC].
-    sources : (m, nt + 1, nz + 1) ndarray
-        Heat per station [W].
-
-    Returns
-    -------
-    float
-        Largest share of a line's flow that had to be limited.
-    """
+    """March any number of temperature fields that differ in their inlet and sources: the equation is linear."""
     nz, count = work.flow_z.shape[1], fields.shape[0]
     conduct = np.empty(nz)
     for j in range(nz):
@@ -154,23 +113,7 @@ def _march_lines(
 def heat_step(
     grid: FilmGrid, work: FilmWork, running: Running, thermal: tuple[float, float, float], shift: FloatArray
 ) -> tuple[float, float, float, float]:
-    """Temperature for the pressure at hand, and what it will do to that pressure: one call for one film.
-
-    Parameters
-    ----------
-    grid, work, running
-        As for `solve_energy`; `work.temperature` is moved towards the new one.
-    thermal : tuple of float
-        Inlet temperature [degC]; relaxation of the temperature; largest step [K].
-    shift : (unknowns,) ndarray
-        Overwritten with the change of pressure; see `model.film.slopes.pressure_change`.
-
-    Returns
-    -------
-    tuple of float
-        Largest change of temperature that the pressure asks for [K]; limited share of a flow, see `march`; change of
-        the radial and of the tangential force [N].
-    """
+    """Temperature for the pressure at hand, and what it will do to that pressure: one call for one film."""
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     new = np.empty((nt + 1, nz + 1))
     limited = solve_energy(grid, work, thermal[0], running, new)
@@ -194,17 +137,6 @@ def heat_by_drag(
 
     With m = rho U h / 2 along and mu(T) = mu_in exp(-kappa (T - T_in)), m c T_x = mu U^2 / h is
     kappa (T - T_in) = ln(1 + kappa (2 mu_in U / (rho c)) int dx / h^2).
-
-    Parameters
-    ----------
-    grid : FilmGrid
-    work : FilmWork
-        Its temperature is overwritten.
-    wedge : tuple of float
-        Cp, a, b [m].
-    running : Running
-    inlet : float
-        [degC]
     """
     speed, oil, heat = running.speed, running.oil, running.heat[0]
     fluid = oil[0] * np.exp(oil[1] * (40.0 - inlet)) / (oil[2] * (1.0 + oil[3] * (40.0 - inlet)))
@@ -219,17 +151,7 @@ def heat_by_drag(
 
 @compiled
 def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
-    """Heat made per station of length dx and control-volume height [W], full film; shape (nt + 1, nz + 1).
-
-    Parameters
-    ----------
-    grid : FilmGrid
-        Mesh of the film.
-    work : FilmWork
-        Solved pressure, thickness and viscosity.
-    speed : float
-        Surface speed of the journal [m/s].
-    """
+    """Heat made per station of length dx and control-volume height [W], full film; shape (nt + 1, nz + 1)."""
     out, less = np.empty(work.pressure.shape), np.empty(work.pressure.shape)
     _made(grid, work, speed, out, less)
     return out

@@ -40,23 +40,7 @@ class _Change(NamedTuple):
 def heat_impedance(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], running: Running, omega: float
 ) -> ComplexArray:
-    """What the temperature that follows adds to a film's impedance.
-
-    Parameters
-    ----------
-    grid, work
-        As `model.film.reynolds.solve_film` left them, with a temperature that belongs to the pressure.
-    wedge : tuple of float
-        Cp, a, b [m].
-    running : Running
-    omega : float
-        [rad/s]
-
-    Returns
-    -------
-    (2, 2) complex ndarray
-        By (a, b) [N/m]; NaN if pressure and heat do not settle.
-    """
+    """What the temperature that follows adds to a film's impedance."""
     conductance = conductances(grid, work, wedge[0], wedge[1], wedge[2])
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     out = np.zeros((2, 2), dtype=np.complex128)

@@ -30,13 +30,6 @@ class Branch:
     """Loaded attitudes of one pad on its pivot, against the approach of the journal to a rigid pivot.
 
     The rigid approach is Cp - Cb + n . (x, y): what `a` would be on a rigid pivot. It rises along the branch.
-
-    Attributes
-    ----------
-    rigid_approach, approach, wedge : (n,) ndarray
-        Rigid approach, a and b [m]; below the first rigid approach the pad has no loaded attitude.
-    load : (n,) ndarray
-        [N]
     """
 
     rigid_approach: FloatArray
@@ -45,52 +38,21 @@ class Branch:
     load: FloatArray
 
     def at(self, rigid_approach: float) -> tuple[float, float]:
-        """Guess (a, b) at a rigid approach, all [m].
-
-        Parameters
-        ----------
-        rigid_approach : float
-            [m]
-
-        Returns
-        -------
-        tuple of float
-            a, b [m].
-        """
+        """Guess (a, b) at a rigid approach, all [m]."""
         a = float(np.interp(rigid_approach, self.rigid_approach, self.approach))
         return a, float(np.interp(rigid_approach, self.rigid_approach, self.wedge))
 
 
 @dataclass(frozen=True, eq=False)
 class LoadedAttitude:
-    """Attitudes that tilt freely, and their load, along the wedge.
-
-    Attributes
-    ----------
-    curvature : (n,) ndarray
-        A(B).
-    wedge : (n,) ndarray
-        B, rising from 0.
-    load : (n,) ndarray
-        Radial force over mu U R^2 L / (Cp - a)^2.
-    """
+    """Attitudes that tilt freely, and their load, along the wedge."""
 
     curvature: FloatArray
     wedge: FloatArray
     load: FloatArray
 
     def branch(self, clearance: float, scale: float, deflection: Callable[[float], float]) -> Branch:
-        """The loaded attitudes of a pad; from an infinite approach on if it has none.
-
-        Parameters
-        ----------
-        clearance : float
-            Cp [m].
-        scale : float
-            mu U R^2 L [N m^2].
-        deflection : callable
-            Of the pivot [m] by load [N].
-        """
+        """The loaded attitudes of a pad; from an infinite approach on if it has none."""
         if len(self.curvature) < 2:
             return Branch(np.array([math.inf, math.inf]), *np.zeros((3, 2)))
         room = clearance / (1.0 + self.curvature)
@@ -115,22 +77,6 @@ def loaded_attitude(start: float, end: float, radius: float, length: float) -> L
 
     The film is solved at unit clearance scale; only ratios enter, so one table serves every clearance, speed and
     viscosity.
-
-    Parameters
-    ----------
-    start : float
-        Leading edge from the pivot [rad].
-    end : float
-        Trailing edge from the pivot [rad].
-    radius : float
-        Of the journal [m].
-    length : float
-        Of the pad [m].
-
-    Returns
-    -------
-    LoadedAttitude
-        The same object for the same arguments.
     """
     grid = film_grid(start, end, radius, length, _TABLE_MESH, True)
     work = film_work(grid, 40.0)

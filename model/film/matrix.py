@@ -10,20 +10,7 @@ from model.compilation import inner
 
 @inner
 def assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArray, first: int) -> None:
-    """Lower band of the matrix: row k holds its diagonal and the entries below it; ruptured nodes stand alone.
-
-    Parameters
-    ----------
-    band : (n, width + 1) ndarray
-        Lower band, overwritten.
-    gx : (nt, nz + 1) ndarray
-        Conductance of the faces along the arc [kg/s/Pa].
-    gz : (nt + 1, nz) ndarray
-        Conductance of the faces across [kg/s/Pa].
-    ruptured : (nt + 1, nz + 1) ndarray of bool
-    first : int
-        First unknown axial node, see `FilmGrid`.
-    """
+    """Lower band of the matrix: row k holds its diagonal and the entries below it; ruptured nodes stand alone."""
     nt, nz = gx.shape[0], gz.shape[1]
     width = nz - first
     for k in range(band.shape[0]):
@@ -133,13 +120,7 @@ _factorise_4, _substitute_4, _substitute_four_4 = _factoriser(4), _substitution(
 
 @inner
 def factorise(band: FloatArray) -> None:
-    """L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k].
-
-    Parameters
-    ----------
-    band : (n, width + 1) ndarray
-        The matrix; overwritten with its factor.
-    """
+    """L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k]."""
     n, width = band.shape[0], band.shape[1] - 1
     if width == 6 and n > width:
         _factorise_6(band)
@@ -160,15 +141,7 @@ def factorise(band: FloatArray) -> None:
 
 @inner
 def substitute(band: FloatArray, x: FloatArray) -> None:
-    """Solve for one right-hand side in place, with the factor from `factorise`.
-
-    Parameters
-    ----------
-    band : (n, width + 1) ndarray
-        The factor.
-    x : (n,) ndarray
-        Right-hand side, overwritten with the solution.
-    """
+    """Solve for one right-hand side in place, with the factor from `factorise`."""
     n, width = band.shape[0], band.shape[1] - 1
     if width == 6 and n > width:
         _substitute_6(band, x)
@@ -188,15 +161,7 @@ def substitute(band: FloatArray, x: FloatArray) -> None:
 
 @inner
 def substitute_four(band: FloatArray, x: FloatArray) -> None:
-    """`substitute` for the four derivatives side by side (n, 4): the inner loop fills a vector register.
-
-    Parameters
-    ----------
-    band : (n, width + 1) ndarray
-        The factor.
-    x : (n, 4) ndarray
-        Right-hand sides, overwritten with the solutions.
-    """
+    """`substitute` for the four derivatives side by side (n, 4): the inner loop fills a vector register."""
     n, width = band.shape[0], band.shape[1] - 1
     if width == 6 and n > width:
         _substitute_four_6(band, x)
@@ -221,17 +186,7 @@ def substitute_four(band: FloatArray, x: FloatArray) -> None:
 
 @inner
 def add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
-    """Add to the diagonal, mesh shape (nt + 1, nz + 1), before factorising.
-
-    Parameters
-    ----------
-    band : (n, width + 1) ndarray
-        Lower band, overwritten.
-    diagonal : (nt + 1, nz + 1) ndarray
-        [kg/s/Pa]
-    first : int
-        First unknown axial node, see `FilmGrid`.
-    """
+    """Add to the diagonal, mesh shape (nt + 1, nz + 1), before factorising."""
     nt, nz = diagonal.shape[0] - 1, diagonal.shape[1] - 1
     for i in range(1, nt):
         for j in range(first, nz):
@@ -240,15 +195,7 @@ def add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
 
 @inner
 def substitute_many(band: FloatArray, x: FloatArray) -> None:
-    """`substitute` for any number of right-hand sides, (n, m).
-
-    Parameters
-    ----------
-    band : (n, width + 1) ndarray
-        The factor.
-    x : (n, m) ndarray
-        Right-hand sides, overwritten with the solutions.
-    """
+    """`substitute` for any number of right-hand sides, (n, m)."""
     n, width, columns = band.shape[0], band.shape[1] - 1, x.shape[1]
     for k in range(n):
         for r in range(1, min(width, n - 1 - k) + 1):

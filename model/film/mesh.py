@@ -12,29 +12,7 @@ from model.errors import OptionError
 
 
 class FilmGrid(NamedTuple):
-    """Mesh of one film; `nt` intervals along the arc, `nz` across (half width if symmetric).
-
-    Attributes
-    ----------
-    angle : (nt + 1,) ndarray
-        alpha, from the pivot, positive with rotation [rad].
-    z : (nz + 1,) ndarray
-        Axial coordinate from mid-length [m].
-    cos, sin : (nt + 1,) ndarray
-        At the nodes.
-    cos_face, sin_face : (nt,) ndarray
-        At the faces between nodes.
-    dx : float
-        Spacing along the arc [m].
-    dz : (nz,) ndarray
-        Spacing across [m]; finer towards the edges, where the pressure bends most.
-    height : (nz + 1,) ndarray
-        Axial size of each control volume [m].
-    area : (nt + 1, nz + 1) ndarray
-        Quadrature weights [m^2]; the mirrored half is counted.
-    first : int
-        First unknown axial node: 0 at a symmetry plane, 1 where z = -L/2 is an edge.
-    """
+    """Mesh of one film; `nt` intervals along the arc, `nz` across (half width if symmetric)."""
 
     angle: FloatArray
     z: FloatArray
@@ -50,41 +28,7 @@ class FilmGrid(NamedTuple):
 
 
 class FilmWork(NamedTuple):
-    """Arrays that one film solution fills (mesh shape (nt + 1, nz + 1) unless said otherwise).
-
-    Attributes
-    ----------
-    pressure : ndarray
-        [Pa]
-    ruptured : ndarray of bool
-        True where the film is ruptured.
-    temperature : ndarray
-        [degC]
-    viscosity, density : ndarray
-        [Pa s], [kg/m^3], frozen for the pressure solution.
-    drag : ndarray
-        What the journal drags along over half the gap's flow U h / 2: 1, unless the viscosity changes across the film,
-        see `model.film.cross_film`.
-    exchange : ndarray
-        What a kelvin of film temperature loses to pad and journal, per station of length dx and control-volume
-        height [W/K]; zero in the adiabatic baseline.
-    gained : ndarray
-        What the film gains from them besides [W].
-    thickness : ndarray
-        h [m].
-    extra : ndarray
-        What is added to h: pad deformation, misalignment [m].
-    flow_x : (nt, nz + 1) ndarray
-        Mass flow through the faces along the arc [kg/s].
-    flow_z : (nt + 1, nz) ndarray
-        Mass flow through the faces across [kg/s].
-    band : ((nt - 1) * unknowns, unknowns + 1) ndarray
-        Factor of the matrix.
-    unknown : ((nt - 1) * unknowns,) ndarray
-        Pressure at the unknowns.
-    slopes : ((nt - 1) * unknowns, 4) ndarray
-        Its derivatives by a, b, da/dt, db/dt.
-    """
+    """Arrays that one film solution fills (mesh shape (nt + 1, nz + 1) unless said otherwise)."""
 
     pressure: FloatArray
     ruptured: BoolArray
@@ -107,24 +51,7 @@ class FilmWork(NamedTuple):
 def film_grid(
     start: float, end: float, radius: float, length: float, shape: tuple[int, int], symmetric: bool
 ) -> FilmGrid:
-    """Lay a mesh over a film.
-
-    Parameters
-    ----------
-    start, end : float
-        Leading and trailing edge, angle from the pivot [rad].
-    radius, length : float
-        Journal radius and pad length [m].
-    shape : tuple of int
-        Intervals along the arc and across (half width if `symmetric`); both even.
-    symmetric : bool
-        The film is mirrored about mid-length.
-
-    Returns
-    -------
-    FilmGrid
-        The same object for the same arguments; nobody writes to it.
-    """
+    """Lay a mesh over a film."""
     nt, nz = shape
     if nt < 4 or nz < 2 or nt % 2 or nz % 2:
         raise OptionError(f"mesh must have even numbers of intervals, at least 4 x 2, got {nt} x {nz}")
@@ -181,18 +108,7 @@ def _parabolic_weights(z: FloatArray) -> FloatArray:
 
 
 def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:
-    """Allocate the arrays of one film, at rest at the inlet temperature.
-
-    Parameters
-    ----------
-    grid : FilmGrid
-    inlet_temperature : float
-        [degC]
-
-    Returns
-    -------
-    FilmWork
-    """
+    """Allocate the arrays of one film, at rest at the inlet temperature."""
     nt, nz = len(grid.angle) - 1, len(grid.z) - 1
     shape = (nt + 1, nz + 1)
     unknowns = nz - grid.first

@@ -12,17 +12,7 @@ from model.film.mesh import FilmGrid, FilmWork
 
 
 class Running(NamedTuple):
-    """What a film runs with.
-
-    Attributes
-    ----------
-    speed : float
-        Surface speed of the journal [m/s].
-    oil : tuple of float
-        See `model.statics.pad_film.oil_constants`.
-    heat : tuple of float
-        Specific heat [J/kg/K] and conductivity [W/m/K] of the oil, both over the share of the heat that stays in it.
-    """
+    """What a film runs with."""
 
     speed: float
     oil: tuple[float, float, float, float]
@@ -31,15 +21,7 @@ class Running(NamedTuple):
 
 @compiled
 def set_viscosity(work: FilmWork, oil: tuple[float, float, float, float]) -> None:
-    """Eq. (4) and (5) at every node.
-
-    Parameters
-    ----------
-    work : FilmWork
-        Its viscosity [Pa s] and density [kg/m^3] are set.
-    oil : tuple of float
-        See `model.statics.pad_film.oil_constants`.
-    """
+    """Eq. (4) and (5) at every node."""
     t = work.temperature
     for i in range(t.shape[0]):
         for j in range(t.shape[1]):
@@ -49,23 +31,7 @@ def set_viscosity(work: FilmWork, oil: tuple[float, float, float, float]) -> Non
 
 @compiled
 def least_share(grid: FilmGrid, work: FilmWork, da: float, db: float, extra: FloatArray) -> float:
-    """Most negative relative change of the film thickness for a change of (a, b) and of its shape (may be empty).
-
-    Parameters
-    ----------
-    grid : FilmGrid
-    work : FilmWork
-    da : float
-        Change of a [m].
-    db : float
-        Change of b [m].
-    extra : (nt + 1, nz + 1) ndarray
-        Change of the shape [m]; may be empty.
-
-    Returns
-    -------
-    float
-    """
+    """Most negative relative change of the film thickness for a change of (a, b) and of its shape (may be empty)."""
     worst = 0.0
     for i in range(work.thickness.shape[0]):
         change = -(da * grid.cos[i] + db * grid.sin[i])

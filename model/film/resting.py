@@ -21,19 +21,7 @@ from model.film.mesh import FilmGrid
 
 
 class RestingFilm(NamedTuple):
-    """What an idle pad's film does.
-
-    Attributes
-    ----------
-    power : float
-        Shear [W].
-    flow : float
-        What enters and leaves [kg/s].
-    outlet : float
-        Temperature at the trailing edge [degC].
-    reynolds : float
-        Largest local rho U h / mu.
-    """
+    """What an idle pad's film does."""
 
     power: float
     flow: float
@@ -44,26 +32,7 @@ class RestingFilm(NamedTuple):
 def resting_film(
     grid: FilmGrid, wedge: tuple[float, float], surface_speed: float, oil: Oil, inlet: float, kept: float
 ) -> RestingFilm:
-    """Film of an idle pad.
-
-    Parameters
-    ----------
-    grid : FilmGrid
-    wedge : tuple of float
-        Cp and the journal's approach a [m].
-    surface_speed : float
-        [m/s]
-    oil : Oil
-    inlet : float
-        Temperature at the leading edge [degC].
-    kept : float
-        Share of the heat that stays in the film.
-
-    Returns
-    -------
-    RestingFilm
-        NaN where pad and journal would touch.
-    """
+    """Film of an idle pad."""
     thickness = wedge[0] - wedge[1] * grid.cos
     if not thickness.min() > 0.0:
         return RestingFilm(math.nan, math.nan, math.nan, math.nan)
@@ -83,14 +52,5 @@ def resting_film(
 
 
 def film_length(grid: FilmGrid) -> float:
-    """Axial length of a film [m]; its grid may hold one half of it.
-
-    Parameters
-    ----------
-    grid : FilmGrid
-
-    Returns
-    -------
-    float
-    """
+    """Axial length of a film [m]; its grid may hold one half of it."""
     return float(grid.z[-1] - grid.z[0]) * (2.0 if grid.first == 0 else 1.0)

@@ -116,24 +116,7 @@ def _thickness(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: fl
 
 @compiled
 def conductances(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float) -> tuple[FloatArray, FloatArray]:
-    """Rho h^3 / (12 mu) times face length over distance, at the faces along and across.
-
-    Parameters
-    ----------
-    grid : FilmGrid
-    work : FilmWork
-    clearance : float
-        Cp [m].
-    a : float
-        Approach [m].
-    b : float
-        Wedge [m].
-
-    Returns
-    -------
-    gx, gz : (nt, nz + 1), (nt + 1, nz) ndarray
-        [kg/s/Pa]
-    """
+    """Rho h^3 / (12 mu) times face length over distance, at the faces along and across."""
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     gx = np.empty((nt, nz + 1))
     gz = np.empty((nt + 1, nz))

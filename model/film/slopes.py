@@ -16,19 +16,7 @@ from model.film.mesh import FilmGrid, FilmWork
 
 @inner
 def net_inflow(along: FloatArray, across: FloatArray, first: int, inflow: FloatArray) -> None:
-    """What flows into every control volume less what flows out.
-
-    Parameters
-    ----------
-    along : (nt, nz + 1, m) ndarray
-        Flow through the faces along the arc, positive with it, for m perturbations.
-    across : (nt + 1, nz, m) ndarray
-        The same through the faces across.
-    first : int
-        First unknown axial node, see `FilmGrid`.
-    inflow : (unknowns, >= m) ndarray
-        Its first m columns are overwritten.
-    """
+    """What flows into every control volume less what flows out."""
     nt, nz = along.shape[0], across.shape[1]
     for i in range(1, nt):
         for j in range(first, nz):
@@ -42,16 +30,7 @@ def net_inflow(along: FloatArray, across: FloatArray, first: int, inflow: FloatA
 
 @inner
 def keep_ruptured(work: FilmWork, first: int, inflow: FloatArray) -> None:
-    """Ruptured nodes keep their pressure: their rows have no right-hand side.
-
-    Parameters
-    ----------
-    work : FilmWork
-    first : int
-        First unknown axial node, see `FilmGrid`.
-    inflow : (unknowns, m) ndarray
-        Set to zero there.
-    """
+    """Ruptured nodes keep their pressure: their rows have no right-hand side."""
     nt, nz = work.pressure.shape[0] - 1, work.pressure.shape[1] - 1
     for i in range(1, nt):
         for j in range(first, nz):
@@ -70,24 +49,6 @@ def rupture_line(
     A dry node is reached by the share `wet` of the flow that would wet it; the pressure rises as the square of
     the distance from the rupture line, so that the line lies (0.5 + wet) steps from the last wet node. A linear
     profile that vanishes there has (wet - 0.5) / (wet + 0.5) of the wet node's value at the dry node.
-
-    Parameters
-    ----------
-    grid : FilmGrid
-    work : FilmWork
-    gx : (nt, nz + 1) ndarray
-        Conductance of the faces along the arc [kg/s/Pa].
-    gz : (nt + 1, nz) ndarray
-        Conductance of the faces across [kg/s/Pa].
-    source : (nt + 1, nz + 1) ndarray
-        Couette inflow less outflow [kg/s].
-
-    Returns
-    -------
-    diagonal : (nt + 1, nz + 1) ndarray
-        To be added to the matrix [kg/s/Pa].
-    area : (nt + 1, nz + 1) ndarray
-        That a node's perturbed pressure stands for [m^2].
     """
     nt, nz = gx.shape[0], gz.shape[1]
     p, ruptured = work.pressure, work.ruptured
@@ -120,17 +81,7 @@ def derivatives(
     wedge: tuple[float, float, float],
     conductance: tuple[FloatArray, FloatArray],
 ) -> None:
-    """Derivatives of the pressure by a, b, da/dt, db/dt, into `work.slopes`; then the mass flows.
-
-    Parameters
-    ----------
-    grid, work
-        Solved for pressure and factorised; `work.flow_x` holds the Couette flow.
-    wedge : tuple of float
-        Cp, a, b [m].
-    conductance : tuple of ndarray
-        Of the faces along and across [kg/s/Pa].
-    """
+    """Derivatives of the pressure by a, b, da/dt, db/dt, into `work.slopes`; then the mass flows."""
     p, rhs, h = work.pressure, work.slopes, work.thickness
     gx, gz = conductance
     nt, nz = gx.shape[0], gz.shape[1]
@@ -164,22 +115,7 @@ def derivatives(
 def shape_slopes(
     grid: FilmGrid, work: FilmWork, conductance: tuple[FloatArray, FloatArray], shapes: FloatArray
 ) -> FloatArray:
-    """Derivatives of the pressure by the amplitudes of shapes that are added to the film thickness.
-
-    Parameters
-    ----------
-    grid, work
-        As `model.film.reynolds.solve_film` left them: the factor of the matrix is read.
-    conductance : tuple of ndarray
-        Of the faces along and across, at the present thickness [kg/s/Pa].
-    shapes : (nt + 1, nz + 1, m) ndarray
-        What a unit amplitude adds to h [m].
-
-    Returns
-    -------
-    (unknowns, m) ndarray
-        [Pa per unit]; zero where the film is ruptured.
-    """
+    """Derivatives of the pressure by the amplitudes of shapes that are added to the film thickness."""
     p, h = work.pressure, work.thickness
     gx, gz = conductance
     nt, nz, count = gx.shape[0], gz.shape[1], shapes.shape[2]
@@ -205,18 +141,7 @@ def shape_slopes(
 
 @compiled
 def squeeze_slopes(grid: FilmGrid, work: FilmWork, shapes: FloatArray) -> FloatArray:
-    """Derivatives of the pressure by the rates of shapes that are added to the film thickness; as `shape_slopes`.
-
-    Parameters
-    ----------
-    grid, work, shapes
-        As there.
-
-    Returns
-    -------
-    (unknowns, m) ndarray
-        [Pa s per unit]; zero where the film is ruptured.
-    """
+    """Derivatives of the pressure by the rates of shapes that are added to the film thickness; as `shape_slopes`."""
     nt, nz, count = work.flow_x.shape[0], work.flow_z.shape[1], shapes.shape[2]
     rhs = np.empty((work.unknown.shape[0], count))
     for i in range(1, nt):
@@ -234,25 +159,7 @@ def squeeze_slopes(grid: FilmGrid, work: FilmWork, shapes: FloatArray) -> FloatA
 def pressure_change(
     grid: FilmGrid, work: FilmWork, speed: float, oil: tuple[float, float, float, float], change: FloatArray
 ) -> FloatArray:
-    """Change of the pressure that the film's new temperature will make, to first order.
-
-    Parameters
-    ----------
-    grid, work
-        As `model.film.reynolds.solve_film` left them, with the new `work.temperature`; viscosity and density are
-        those that the pressure was solved with.
-    speed : float
-        Surface speed of the journal [m/s].
-    oil : tuple of float
-        See `model.statics.pad_film.oil_constants`.
-    change : (unknowns,) ndarray
-        Overwritten with the change [Pa].
-
-    Returns
-    -------
-    (2,) ndarray
-        Change of the radial and tangential force [N].
-    """
+    """Change of the pressure that the film's new temperature will make, to first order."""
     return change_by_oil(grid, work, speed, _fluidity(work, oil), change)
 
 
@@ -264,20 +171,7 @@ def change_by_oil(
     fluidity: tuple[FloatArray, FloatArray, FloatArray],
     change: FloatArray,
 ) -> FloatArray:
-    """`pressure_change` for given properties of the oil.
-
-    Parameters
-    ----------
-    grid, work, speed, change
-        As there.
-    fluidity : tuple of (nt + 1, nz + 1) ndarray
-        Density over viscosity, old and new; change of density times drag.
-
-    Returns
-    -------
-    (2,) ndarray
-        [N]
-    """
+    """`pressure_change` for given properties of the oil."""
     h = work.thickness
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     old, new, denser = fluidity

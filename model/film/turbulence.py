@@ -34,20 +34,7 @@ TRANSITION = (500.0, 1000.0)
 
 @compiled
 def excess(reynolds: float, factor: float, exponent: float) -> tuple[float, float]:
-    """What turbulence adds to a laminar coefficient, factor Re^exponent where it is whole, and d / d ln Re of it.
-
-    Parameters
-    ----------
-    reynolds : float
-        Local Reynolds number rho U h / mu.
-    factor, exponent : float
-        Of Ng and Pan's coefficient.
-
-    Returns
-    -------
-    tuple of float
-        Addition to the coefficient and its derivative with respect to ln Re.
-    """
+    """What turbulence adds to a laminar coefficient, factor Re^exponent where it is whole, and d / d ln Re of it."""
     if not reynolds > TRANSITION[0]:
         return 0.0, 0.0
     share = min(1.0, (reynolds - TRANSITION[0]) / (TRANSITION[1] - TRANSITION[0]))
@@ -64,24 +51,6 @@ def solve_turbulent_film(
     """Pressure of one film and its derivatives; as `model.film.reynolds.solve_film`.
 
     `work.gained` is set to the heat that is made beyond that of a laminar film in the same state [W].
-
-    Parameters
-    ----------
-    grid : FilmGrid
-        Mesh of the film.
-    work : FilmWork
-        Arrays of the film: viscosity and density in, pressure and thickness out.
-    wedge : tuple of float
-        Clearance, and the amplitudes of cosine and sine of the thickness [m].
-    speed : float
-        Surface speed of the journal [m/s].
-    sharp : bool
-        Whether the rupture line is to be found to the node.
-
-    Returns
-    -------
-    FilmForces
-        Force, stiffness, damping and least thickness.
     """
     clearance, a, b = wedge
     min_film = _thickness(grid, work, clearance, a, b)
@@ -205,14 +174,6 @@ def _heat_beyond(grid: FilmGrid, work: FilmWork, speed: float) -> None:
 
 
 def shear_factor(work: FilmWork, speed: float) -> FloatArray:
-    """C of the shear on the journal, (nt + 1, nz + 1).
-
-    Parameters
-    ----------
-    work : FilmWork
-        Density, viscosity and thickness of the film.
-    speed : float
-        Surface speed of the journal [m/s].
-    """
+    """C of the shear on the journal, (nt + 1, nz + 1)."""
     reynolds = work.density * speed * work.thickness / work.viscosity
     return np.asarray(1.0 + np.vectorize(lambda re: excess(re, *SHEAR)[0])(reynolds))

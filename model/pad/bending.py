@@ -30,27 +30,7 @@ SHAPES = 12
 
 @dataclass(frozen=True, eq=False)
 class PadDeformation:
-    """How a pad's face moves outward under its film; n = (nt + 1)(nz + 1) film nodes, raveled.
-
-    Attributes
-    ----------
-    compliance : (n, n) ndarray
-        Deformation by pressure [m/Pa].
-    to_coarse : (c, n) ndarray
-        Temperatures of the pad's coarser nodes by those of the film.
-    expansion : (n, c) ndarray
-        Deformation by them [m/K].
-    flux : (n, c) ndarray
-        Heat flux density into the pad by them [W/m^2/K].
-    shapes : (nt + 1, nz + 1, m) ndarray
-        In which the pad gives way most.
-    amplitudes : (m, n) ndarray
-        Amplitudes of the shapes in a deformation.
-    response : (m, unknowns) ndarray
-        Amplitudes by the pressure at the film's unknown nodes.
-    weights : (2, unknowns) ndarray
-        Radial and tangential force by that pressure [m^2].
-    """
+    """How a pad's face moves outward under its film; n = (nt + 1)(nz + 1) film nodes, raveled."""
 
     compliance: FloatArray
     to_coarse: FloatArray
@@ -63,17 +43,7 @@ class PadDeformation:
 
 
 class SolvedFilm(NamedTuple):
-    """A film whose pressure is solved.
-
-    Attributes
-    ----------
-    grid, work
-        Mesh and arrays.
-    wedge : tuple of float
-        Cp, a, b [m].
-    forces : FilmForces
-        At the temperature found since.
-    """
+    """A film whose pressure is solved."""
 
     grid: FilmGrid
     work: FilmWork
@@ -82,19 +52,7 @@ class SolvedFilm(NamedTuple):
 
 
 class AxialTilt(NamedTuple):
-    """A pad that is free to tilt along the shaft, about the axis across it through its pivot.
-
-    Attributes
-    ----------
-    shape : (nt + 1, nz + 1) ndarray
-        What a unit of axial tilt adds to h [m/rad].
-    weights : (unknowns,) ndarray
-        Moment by the pressure at the film's unknown nodes, less what grows with the pad's load [m^3].
-    stiffness : float
-        Of what holds the pad back [N m/rad].
-    moment : float
-        Not balanced [N m].
-    """
+    """A pad that is free to tilt along the shaft, about the axis across it through its pivot."""
 
     shape: FloatArray
     weights: FloatArray
@@ -104,23 +62,7 @@ class AxialTilt(NamedTuple):
 
 @dataclass(frozen=True)
 class BendingStep:
-    """One pad's part of a Newton step.
-
-    Attributes
-    ----------
-    forces : FilmForces
-        Force and stiffness with the pad giving way: what the journal and the pivot feel.
-    mismatch : (nt + 1, nz + 1) ndarray
-        Wanted less present deformation, without the shapes [m].
-    amplitude : (m,) ndarray
-        Change of the shapes' amplitudes at rest ...
-    by_approach : (m, 2) ndarray
-        ... and per (a, b).
-    share : float
-        Largest mismatch, or axial tilt asked for at the pad's ends, over the least film thickness.
-    axial_tilt : (3,) ndarray
-        Its change at rest, and per (a, b) [rad, rad/m]; empty if it is not free.
-    """
+    """One pad's part of a Newton step."""
 
     forces: FilmForces
     mismatch: FloatArray
@@ -131,21 +73,7 @@ class BendingStep:
 
 
 def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid, cooled: bool = False) -> PadDeformation:
-    """Matrices of a pad for its film's mesh; the same object for pads of the same shape.
-
-    Parameters
-    ----------
-    pad : Pad
-    bearing : Bearing
-    grid : FilmGrid
-    cooled : bool
-        Whether the film loses heat through the pad to its free faces, so that their convection matters and may be
-        fitted.
-
-    Returns
-    -------
-    PadDeformation
-    """
+    """Matrices of a pad for its film's mesh; the same object for pads of the same shape."""
     geometry = PadGeometry.of(pad, bearing)
     return _pad_deformation(geometry, grid.angle.tobytes(), grid.z.tobytes(), grid.area.tobytes(), cooled)
 
@@ -198,16 +126,7 @@ def _softest_shapes(compliance: FloatArray, area: FloatArray) -> FloatArray:
 def wanted_shapes(
     bodies: list[PadDeformation], pressures: list[FloatArray], rises: list[FloatArray], factor: float
 ) -> list[FloatArray]:
-    """Deformation that every film asks of its pad, Eq. (6)-(8) [m]; pads of one shape are done in one product.
-
-    Parameters
-    ----------
-    bodies : list of PadDeformation
-    pressures, rises : list of (nt + 1, nz + 1) ndarray
-        Pressure [Pa] and temperature above supply [K].
-    factor : float
-        On the computed deformation.
-    """
+    """Deformation that every film asks of its pad, Eq. (6)-(8) [m]; pads of one shape are done in one product."""
     wanted: list[FloatArray] = [np.empty(0)] * len(bodies)
     for body in {id(b): b for b in bodies}.values():
         same = [k for k, b in enumerate(bodies) if b is body]
@@ -222,21 +141,7 @@ def wanted_shapes(
 def bending_step(
     body: PadDeformation | None, film: SolvedFilm, change: FloatArray, factor: float, axial: AxialTilt | None = None
 ) -> BendingStep:
-    """Close the loop of pressure, deformation and axial tilt for one pad.
-
-    Parameters
-    ----------
-    body : PadDeformation or None
-        None for a rigid pad that tilts along the shaft.
-    film : SolvedFilm
-        At the present deformation.
-    change : (nt + 1, nz + 1) ndarray
-        Deformation asked for less the present one [m].
-    factor : float
-        On the computed deformation.
-    axial : AxialTilt, optional
-        Of a pad that tilts along the shaft.
-    """
+    """Close the loop of pressure, deformation and axial tilt for one pad."""
     grid, work, wedge, forces = film
     least = forces.min_film
     if body is None:
@@ -275,34 +180,13 @@ _UNIT = np.eye(SHAPES)
 
 
 def force_weights(grid: FilmGrid) -> FloatArray:
-    """Radial and tangential force by the pressure at the unknown nodes, (2, unknowns) [m^2].
-
-    Parameters
-    ----------
-    grid : FilmGrid
-    """
+    """Radial and tangential force by the pressure at the unknown nodes, (2, unknowns) [m^2]."""
     inner = grid.area[1:-1, grid.first : -1]
     return np.stack([(c[1:-1, None] * inner).ravel() for c in (grid.cos, grid.sin)])
 
 
 def change_of_shape(body: PadDeformation | None, step: BendingStep, da: float, db: float) -> FloatArray:
-    """Change of the deformation that belongs to a move (da, db) of the film [m].
-
-    Parameters
-    ----------
-    body : PadDeformation or None
-        None for a rigid pad.
-    step : BendingStep
-    da : float
-        Change of a [m].
-    db : float
-        Change of b [m].
-
-    Returns
-    -------
-    (nt + 1, nz + 1) ndarray
-        [m]
-    """
+    """Change of the deformation that belongs to a move (da, db) of the film [m]."""
     if body is None:
         return step.mismatch
     return step.mismatch + body.shapes @ (step.amplitude + step.by_approach @ np.array([da, db]))

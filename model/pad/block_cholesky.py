@@ -20,23 +20,7 @@ BlockRow = dict[int, FloatArray]  # block row i of a lower triangle: column j <=
 
 
 def factor_rows(rows: Iterable[BlockRow]) -> Iterator[BlockRow]:
-    """Factor a positive definite matrix K = L L^T, row by row of blocks.
-
-    Parameters
-    ----------
-    rows : iterable of dict
-        Block rows of the lower triangle of K, from the first; each holds its diagonal block. Rows are used up.
-
-    Yields
-    ------
-    dict
-        The same block row of L.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        K is not positive definite: the body is not held.
-    """
+    """Factor a positive definite matrix K = L L^T, row by row of blocks."""
     known: dict[int, BlockRow] = {}
     for i, row in enumerate(rows):
         first = min(row)
@@ -58,21 +42,7 @@ def factor_rows(rows: Iterable[BlockRow]) -> Iterator[BlockRow]:
 
 
 def forward_rows(factor: Iterable[BlockRow], rhs: Iterable[FloatArray]) -> Iterator[FloatArray]:
-    """Solve L Y = B, row by row of blocks.
-
-    Parameters
-    ----------
-    factor : iterable of dict
-        Block rows of L, as from `factor_rows`.
-    rhs : iterable of (m, n_columns) ndarray
-        Block rows of B. The number of columns may grow from row to row: new columns are zero in the rows before.
-        Loads numbered slab by slab are such, and half of the work falls away.
-
-    Yields
-    ------
-    (m, n_columns) ndarray
-        Block rows of Y.
-    """
+    """Solve L Y = B, row by row of blocks."""
     known: dict[int, FloatArray] = {}
     for i, (row, given) in enumerate(zip(factor, rhs)):
         known = {j: known[j] for j in range(min(row), i)}
@@ -87,42 +57,17 @@ def forward_rows(factor: Iterable[BlockRow], rhs: Iterable[FloatArray]) -> Itera
 
 @dataclass(frozen=True, eq=False)
 class BlockCholesky:
-    """Factor kept whole, for full solutions.
-
-    Attributes
-    ----------
-    rows : tuple of dict
-        Block rows of L.
-    """
+    """Factor kept whole, for full solutions."""
 
     rows: tuple[BlockRow, ...]
 
     @classmethod
     def factor(cls, rows: Iterable[BlockRow]) -> BlockCholesky:
-        """Factor; arguments and errors as for `factor_rows`.
-
-        Parameters
-        ----------
-        rows : iterable of dict
-            See `factor_rows`.
-
-        Returns
-        -------
-        BlockCholesky
-        """
+        """Factor; arguments and errors as for `factor_rows`."""
         return cls(tuple(factor_rows(rows)))
 
     def solve(self, rhs: FloatArray) -> FloatArray:
-        """Solve K X = B.
-
-        Parameters
-        ----------
-        rhs : (n_blocks, m, n_columns) ndarray
-
-        Returns
-        -------
-        ndarray, shape (n_blocks, m, n_columns)
-        """
+        """Solve K X = B."""
         out = np.stack(list(forward_rows(self.rows, rhs)))
         for i in reversed(range(len(self.rows))):
             row = self.rows[i]

@@ -22,19 +22,7 @@ LARGEST = 1e4
 
 
 def pad_operators_between(geometry: PadGeometry, density: MeshDensity, even: bool) -> PadOperators:
-    """As `pad_operators`, interpolated between a few convections: the first time costs more, every other nothing.
-
-    Parameters
-    ----------
-    geometry : PadGeometry
-    density : MeshDensity
-    even : bool
-        Symmetry in z of loads and temperatures.
-
-    Returns
-    -------
-    PadOperators
-    """
+    """As `pad_operators`, interpolated between a few convections: the first time costs more, every other nothing."""
     if geometry.back_convection > LARGEST:
         return pad_operators(geometry, density, even)
     through = geometry.backing.conductivity / geometry.backing_thickness

@@ -55,12 +55,6 @@ class ElasticSector:
 
     Degrees of freedom are numbered slab by slab along the arc; inside a slab by component, r, z: an array of them has
     shape (n_theta, 3, n_r, n_z).
-
-    Attributes
-    ----------
-    mesh : SectorMesh
-    fixed : (n_theta, 3, n_r, n_z) ndarray of bool
-        Degrees of freedom whose displacement is zero.
     """
 
     mesh: SectorMesh
@@ -68,16 +62,7 @@ class ElasticSector:
 
     @classmethod
     def held_at(cls, mesh: SectorMesh, nodes: BoolArray, even: bool = True) -> ElasticSector:
-        """Hold some nodes, and make the mid-plane one of symmetry.
-
-        Parameters
-        ----------
-        mesh : SectorMesh
-        nodes : (n_theta, n_r, n_z) ndarray of bool
-            Nodes of no displacement at all.
-        even : bool
-            Whether loads are even in z (no axial displacement at z = 0) or odd (nothing but axial displacement there).
-        """
+        """Hold some nodes, and make the mid-plane one of symmetry."""
         fixed = np.repeat(nodes[:, None], 3, axis=1)
         for component in (_W,) if even else (_U, _V):
             fixed[:, component, :, 0] = True
@@ -134,17 +119,7 @@ class ElasticSector:
         return self.mesh.per_gauss_point(lame), self.mesh.per_gauss_point(shear)
 
     def thermal_loads(self, temperature: FloatArray) -> Iterator[FloatArray]:
-        """Forces of hindered thermal expansion, the right-hand side of Eq. (7) in weak form, slab by slab.
-
-        Parameters
-        ----------
-        temperature : (n_theta, n_r, n_z, n_columns) ndarray
-            Temperature rise at the nodes [K].
-
-        Yields
-        ------
-        (3 * n_r * n_z, n_columns) ndarray
-        """
+        """Forces of hindered thermal expansion, the right-hand side of Eq. (7) in weak form, slab by slab."""
         mesh = self.mesh
         n_theta, n_r, n_z, n_columns = temperature.shape
         lame, shear = self._lame()
@@ -167,23 +142,6 @@ class ElasticSector:
 
         With K = L L^T, E the unit radial forces on the film face and F the thermal loads, both results are products
         of L^-1 E and L^-1 F, summed slab by slab: the compliance is symmetric and positive semidefinite by build.
-
-        Parameters
-        ----------
-        temperature : (n_theta, n_r, n_z, n_columns) ndarray
-            Temperature rise fields [K].
-
-        Returns
-        -------
-        compliance : (n_surface, n_surface) ndarray
-            Outward displacement per outward nodal force [m/N].
-        expansion : (n_surface, n_columns) ndarray
-            Outward displacement of every field [m].
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            The body is not held against rigid motion.
         """
         n_fields, n_surface = temperature.shape[3], self.mesh.n_surface
         compliance = np.zeros((n_surface, n_surface))

@@ -19,55 +19,21 @@ from model.pad.line import Line, gauss_rule
 
 @dataclass(frozen=True, eq=False)
 class AxisMap:
-    """One axis of the map.
-
-    Attributes
-    ----------
-    gather : (n_face, n_film) ndarray
-        G: integrals of face functions times film functions.
-    project : (n_film, n_face) ndarray
-        M^-1 G^T: film values of a face function.
-    """
+    """One axis of the map."""
 
     gather: FloatArray
     project: FloatArray
 
 
 def plain_map(face: Line, film: Line) -> AxisMap:
-    """Map of two bases on the same interval.
-
-    Parameters
-    ----------
-    face : Line
-        Basis of the solid.
-    film : Line
-        Basis of the film.
-
-    Returns
-    -------
-    LineMap
-    """
+    """Map of two bases on the same interval."""
     points, weights = _points(face.breaks, film.breaks, face.degree)
     gather = face.tabulate(points).T @ (weights[:, None] * film.tabulate(points))
     return AxisMap(gather, _solve(film, gather.T))
 
 
 def mirror_map(face: Line, film: Line, even: bool) -> AxisMap:
-    """Map of a basis on 0 <= z <= L/2 and a film on -L/2 <= z <= L/2, for its even or its odd part.
-
-    Parameters
-    ----------
-    face : Line
-        Basis of the solid.
-    film : Line
-        Basis of the film.
-    even : bool
-        The even part, not the odd one.
-
-    Returns
-    -------
-    LineMap
-    """
+    """Map of a basis on 0 <= z <= L/2 and a film on -L/2 <= z <= L/2, for its even or its odd part."""
     points, weights = _points(face.breaks, np.unique(np.abs(film.breaks)), face.degree)
     sign = 1.0 if even else -1.0
     part = 0.5 * (film.tabulate(points) + sign * film.tabulate(-points))
@@ -77,15 +43,7 @@ def mirror_map(face: Line, film: Line, even: bool) -> AxisMap:
 
 @dataclass(frozen=True, eq=False)
 class FilmMap:
-    """Both axes, for the elements and for the bilinear temperatures.
-
-    Attributes
-    ----------
-    theta, z : AxisMap
-        For the face's own basis.
-    coarse_theta, coarse_z : (n_coarse, n_film) ndarray
-        Bilinear face values closest in the mean square to film values.
-    """
+    """Both axes, for the elements and for the bilinear temperatures."""
 
     theta: AxisMap
     z: AxisMap
@@ -94,21 +52,7 @@ class FilmMap:
 
     @classmethod
     def between(cls, face: tuple[Line, Line], film: tuple[Line, Line], even: bool | None) -> FilmMap:
-        """Build the maps; `even` is None for a film on the half length, else the part of a full one.
-
-        Parameters
-        ----------
-        face : tuple of Line
-            Along the arc and across, of the solid.
-        film : tuple of Line
-            The same, of the film.
-        even : bool or None
-            None: a film on the half length; else which part of a full one.
-
-        Returns
-        -------
-        FilmMap
-        """
+        """Build the maps; `even` is None for a film on the half length, else the part of a full one."""
         coarse = tuple(Line(line.breaks, 1) for line in face)
 
         def axial(line: Line) -> AxisMap:

@@ -19,37 +19,14 @@ from model.pad.mesh import SectorMesh
 
 @dataclass(frozen=True, eq=False)
 class HeatSolution:
-    """What temperatures of the film face do to the half pad.
-
-    Attributes
-    ----------
-    temperature : (n_theta, n_r, n_z, n_columns) ndarray
-        Temperature rise at the nodes [K], one field for every given one.
-    heat : (n_surface, n_columns) ndarray
-        Heat that enters the pad at the nodes of the film face, weighted by their basis functions [W].
-    """
+    """What temperatures of the film face do to the half pad."""
 
     temperature: FloatArray
     heat: FloatArray
 
 
 def conduct(mesh: SectorMesh, convection: float, face: FloatArray, even: bool = True) -> HeatSolution:
-    """Solve the conduction problem for many temperature fields of the film face at once.
-
-    Parameters
-    ----------
-    mesh : SectorMesh
-    convection : float
-        Film coefficient on the free faces [W/m^2/K]; zero makes them adiabatic.
-    face : (n_surface, n_columns) ndarray
-        Temperature rises at the nodes of the film face [K].
-    even : bool
-        Whether they are even in z, or odd (then they are taken as zero on the mid-plane).
-
-    Returns
-    -------
-    HeatSolution
-    """
+    """Solve the conduction problem for many temperature fields of the film face at once."""
     theta, n_r, n_z = mesh.theta, mesh.r.n_nodes, mesh.z.n_nodes
     given = np.arange(n_r * n_z) < n_z
     prescribed = face.reshape(theta.n_nodes, n_z, -1).copy()

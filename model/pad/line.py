@@ -14,20 +14,7 @@ from model.errors import ModelError
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Continuous Lagrange elements on an interval.
-
-    Attributes
-    ----------
-    breaks : (n_elements + 1,) ndarray
-        Element ends, strictly increasing [m or rad].
-    degree : int
-        Polynomial degree; 1 is what a film grid interpolates with, 2 the pad's default.
-
-    Raises
-    ------
-    ModelError
-        `breaks` is not a strictly increasing 1-D array of at least two values, or `degree` < 1.
-    """
+    """Continuous Lagrange elements on an interval."""
 
     breaks: FloatArray
     degree: int = 2
@@ -60,20 +47,7 @@ class Line:
         return np.append(inside.ravel(), self.breaks[-1])
 
     def tabulate(self, x: ArrayLike, derivative: int = 0) -> FloatArray:
-        """Basis functions at points.
-
-        Parameters
-        ----------
-        x : (n,) array_like
-            Points inside the interval (outside: the end element is continued).
-        derivative : {0, 1}
-            Order of the derivative with respect to x.
-
-        Returns
-        -------
-        ndarray, shape (n, n_nodes)
-            At an inner break the derivative is the one from the right.
-        """
+        """Basis functions at points."""
         points = np.asarray(x, dtype=float)
         element = np.clip(np.searchsorted(self.breaks, points, side="right") - 1, 0, self.n_elements - 1)
         size = np.diff(self.breaks)[element]
@@ -98,40 +72,14 @@ class Line:
         return gauss_rule(self.breaks, self.degree + 2)
 
     def matrix(self, rows: int, columns: int, weight: FloatArray | float = 1.0) -> FloatArray:
-        """Weighted product of basis functions or their derivatives.
-
-        Parameters
-        ----------
-        rows, columns : {0, 1}
-            Order of derivative of the row and of the column function.
-        weight : ndarray or float
-            Weight at the points of `gauss`.
-
-        Returns
-        -------
-        ndarray, shape (n_nodes, n_nodes)
-            Integral of weight * phi_i^(rows) * phi_j^(columns).
-        """
+        """Weighted product of basis functions or their derivatives."""
         points, factor = self.gauss
         left, right = (self.tabulate(points, order) for order in (rows, columns))
         return left.T @ ((factor * weight)[:, None] * right)
 
 
 def graded(start: float, stop: float, count: int, first: float, last: float) -> FloatArray:
-    """Break an interval into elements that grow geometrically from both ends, by one factor.
-
-    Parameters
-    ----------
-    start, stop : float
-    count : int
-        Number of elements.
-    first, last : float
-        Largest sizes wanted at the two ends; equal elements if they are not to be had with fewer than uniform ones.
-
-    Returns
-    -------
-    ndarray, shape (count + 1,)
-    """
+    """Break an interval into elements that grow geometrically from both ends, by one factor."""
     length, steps = stop - start, np.arange(count)
 
     def sizes(growth: float) -> FloatArray:
@@ -150,18 +98,7 @@ def graded(start: float, stop: float, count: int, first: float, last: float) -> 
 
 
 def gauss_rule(breaks: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """Gauss-Legendre points and weights, `count` in every interval of `breaks`.
-
-    Parameters
-    ----------
-    breaks : (n + 1,) ndarray
-    count : int
-        Points in each.
-
-    Returns
-    -------
-    points, weights : (n, count) ndarray
-    """
+    """Gauss-Legendre points and weights, `count` in every interval of `breaks`."""
     points, weights = np.polynomial.legendre.leggauss(count)
     size = np.diff(breaks)
     x = breaks[:-1, None] + 0.5 * size[:, None] * (points + 1.0)

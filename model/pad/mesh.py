@@ -18,13 +18,6 @@ class PivotFace:
     """The part of the pad's back that is held (paper, Sec. 2: "null displacement ... corresponding to the pivot part").
 
     A rectangle centred on the pivot. Its size is a choice that the paper does not print; see `pivot_face`.
-
-    Attributes
-    ----------
-    width : float
-        Circumferential extent on the back [m].
-    length : float
-        Axial extent, both sides of the mid-plane together [m].
     """
 
     width: float
@@ -53,15 +46,6 @@ def pivot_face(pad: Pad, bearing: Bearing) -> PivotFace:
     and adds to its mean (1.02 -> 1.27 um, 0.86 -> 1.21 um), which works like a softer pivot. A face twice as wide:
     1.22 um and 0.71 um, -0.08 um and 0.57 um. The thermal range (edges less pivot, 3.4 um and 2.9 um) goes to
     3.1 um and 2.5 um for half, 4.2 um and 3.6 um for twice the width.
-
-    Parameters
-    ----------
-    pad : Pad
-    bearing : Bearing
-
-    Returns
-    -------
-    PivotFace
     """
     thickness = pad.elastic_thickness
     back = bearing.journal_radius + pad.pad_clearance + thickness
@@ -77,21 +61,7 @@ def pivot_face(pad: Pad, bearing: Bearing) -> PivotFace:
 
 @dataclass(frozen=True)
 class PadGeometry:
-    """All that the finite elements of a pad depend on; equal geometries share one solution.
-
-    Attributes
-    ----------
-    inner_radius, backing_thickness, babbitt_thickness : float
-        [m]; the babbitt may be zero.
-    leading, trailing : float
-        Edge angles from the pivot [rad].
-    length : float
-        Axial length [m].
-    face : PivotFace
-    back_convection : float
-        [W/m^2/K]
-    backing, babbitt : Material
-    """
+    """All that the finite elements of a pad depend on; equal geometries share one solution."""
 
     inner_radius: float
     backing_thickness: float
@@ -121,22 +91,6 @@ class PadGeometry:
 
         The inner radius, journal radius + Cp, is rounded to 0.1 mm: a fit that moves Cp by microns would
         otherwise ask for a new FE solution every time, for less than 0.1 % of the deformation.
-
-        Parameters
-        ----------
-        pad : Pad
-        bearing : Bearing
-        face : PivotFace, optional
-            Default: as `pivot_face` says.
-
-        Returns
-        -------
-        PadGeometry
-
-        Raises
-        ------
-        BearingError
-            The pivot face does not fit on the pad.
         """
         return cls(
             inner_radius=round(bearing.journal_radius + pad.pad_clearance, 4),
@@ -164,15 +118,7 @@ class PadGeometry:
 
 @dataclass(frozen=True, eq=False)
 class SectorMesh:
-    """Tensor-product hexahedra of half a pad, 0 <= z <= length / 2.
-
-    Attributes
-    ----------
-    r, theta, z : Line
-        Elements across the thickness [m], along the arc [rad, from the pivot] and along the half length [m].
-    layers : tuple of Material
-        Material of every element of `r`, from the film outwards.
-    """
+    """Tensor-product hexahedra of half a pad, 0 <= z <= length / 2."""
 
     r: Line
     theta: Line
@@ -186,17 +132,7 @@ class SectorMesh:
             )
 
     def per_gauss_point(self, values: list[float]) -> FloatArray:
-        """Spread one value per radial element over the Gauss points of `r`; shape of ``r.gauss[0]``.
-
-        Parameters
-        ----------
-        values : list of float
-            One per radial element.
-
-        Returns
-        -------
-        ndarray
-        """
+        """Spread one value per radial element over the Gauss points of `r`; shape of ``r.gauss[0]``."""
         return np.repeat(np.asarray(values, dtype=float), self.r.degree + 2)
 
     @property
@@ -205,16 +141,7 @@ class SectorMesh:
         return self.theta.n_nodes * self.z.n_nodes
 
     def held(self, face: PivotFace) -> BoolArray:
-        """Nodes on the pivot face, shape (n_theta, n_r, n_z).
-
-        Parameters
-        ----------
-        face : PivotFace
-
-        Returns
-        -------
-        (n_theta, n_r, n_z) ndarray of bool
-        """
+        """Nodes on the pivot face, shape (n_theta, n_r, n_z)."""
         slack = 1e-9
         angle = 0.5 * face.width / self.r.breaks[-1]
         in_arc = np.abs(self.theta.nodes) <= angle * (1 + slack)
@@ -228,21 +155,6 @@ class MeshDensity:
     """How many elements, and how small at the places where the stress is singular.
 
     The default keeps the deformation within 1 % of the converged one (tests/literature/test_pad_analytic.py).
-
-    Attributes
-    ----------
-    arc : int
-        Along the arc, both sides of the pivot face together.
-    face : int
-        Along the arc, over the pivot face.
-    half_length : int
-        Along the half length.
-    backing, babbitt : int
-        Across the layers.
-    rim, edge : float
-        Element size at the rim of the pivot face and at the pad's edges, as parts of the bending thickness.
-    degree : int
-        Polynomial degree.
     """
 
     arc: int = 14
@@ -259,16 +171,7 @@ class MeshDensity:
             raise OptionError(f"A pad needs arc >= 2, half_length >= 3 and every other count >= 1, got {self}.")
 
     def refined(self, factor: int) -> MeshDensity:
-        """Return a density of `factor` times as many elements in every direction.
-
-        Parameters
-        ----------
-        factor : int
-
-        Returns
-        -------
-        MeshDensity
-        """
+        """Return a density of `factor` times as many elements in every direction."""
         return MeshDensity(
             arc=factor * self.arc,
             face=factor * self.face,
@@ -286,15 +189,6 @@ def sector_mesh(geometry: PadGeometry, density: MeshDensity) -> SectorMesh:
 
     The stress is singular along the rim of the held face, and steep near the free edges, where the babbitt's larger
     expansion ends: elements are small there and grow in between.
-
-    Parameters
-    ----------
-    geometry : PadGeometry
-    density : MeshDensity
-
-    Returns
-    -------
-    SectorMesh
     """
     outer, thickness = geometry.outer_radius, geometry.outer_radius - geometry.inner_radius
     rim, edge = density.rim * thickness, density.edge * thickness

@@ -21,17 +21,6 @@ class PadOperators:
 
     Two sets of basis functions live on the film face: the elements' own (`theta` x `z`, quadratic), for forces and
     displacements, and the bilinear ones on the same breaks, for temperatures, which are smoother.
-
-    Attributes
-    ----------
-    theta, z : Line
-        Elements of the face along the arc [rad] and along the half length [m].
-    compliance : (n_surface, n_surface) ndarray
-        Outward displacement per outward nodal force [m/N].
-    expansion : (n_surface, n_temperatures) ndarray
-        Outward displacement per temperature rise of the face's bilinear nodes [m/K].
-    flux : (n_surface, n_temperatures) ndarray
-        Heat flux density from film into pad per temperature rise [W/m^2/K].
     """
 
     theta: Line
@@ -48,38 +37,14 @@ class PadOperators:
 
 @lru_cache(maxsize=12)  # 4 MB each
 def pad_operators(geometry: PadGeometry, density: MeshDensity, even: bool) -> PadOperators:
-    """Operators of one pad geometry: from memory, from the cache folder, or by solving (a few seconds).
-
-    Parameters
-    ----------
-    geometry : PadGeometry
-    density : MeshDensity
-    even : bool
-        Symmetry in z of loads and temperatures.
-    """
+    """Operators of one pad geometry: from memory, from the cache folder, or by solving (a few seconds)."""
     return operators_at(geometry, density, even, (geometry.back_convection,))[0]
 
 
 def operators_at(
     geometry: PadGeometry, density: MeshDensity, even: bool, convections: tuple[float, ...]
 ) -> tuple[PadOperators, ...]:
-    """Operators of one pad geometry at several convections of its free faces, with one solution of its elasticity.
-
-    Parameters
-    ----------
-    geometry : PadGeometry
-        Its own `back_convection` counts for nothing.
-    density : MeshDensity
-    even : bool
-        Symmetry in z of loads and temperatures.
-    convections : tuple of float
-        [W/m^2/K]
-
-    Returns
-    -------
-    tuple of PadOperators
-        In that order; they share their `compliance`.
-    """
+    """Operators of one pad geometry at several convections of its free faces, with one solution of its elasticity."""
     mesh = sector_mesh(geometry, density)
     shapes = _shapes(mesh.theta, mesh.z, len(convections))
     key = storage_key((replace(geometry, back_convection=0.0), density, even, convections))

@@ -30,16 +30,6 @@ class PadSolid:
 
     Fields on the film grid have shape (n_theta, n_z); matrices act on their ``ravel()``. Temperatures are rises above
     the oil supply temperature [K].
-
-    Attributes
-    ----------
-    geometry : PadGeometry
-    density : MeshDensity
-    film_theta : (n_theta,) ndarray
-        Film nodes along the arc [rad from the pivot].
-    film_z : (n_z,) ndarray
-        Film nodes along the axis [m from the mid-plane]: 0 to L/2 for a symmetric film, whose mirror image is
-        included in every result, or -L/2 to L/2.
     """
 
     geometry: PadGeometry
@@ -80,29 +70,7 @@ def solid_of(
     density: MeshDensity | None = None,
     operators: Operators = pad_operators,
 ) -> PadSolid:
-    """Solid of a pad for a film grid.
-
-    Parameters
-    ----------
-    geometry : PadGeometry
-    film_theta : (n_theta,) array_like
-        Film nodes along the arc [rad from the pivot], from the leading to the trailing edge.
-    film_z : (n_z,) array_like
-        Film nodes along the axis [m from the mid-plane]: 0 to L/2 (symmetric film), or -L/2 to L/2.
-    density : MeshDensity, optional
-    operators : callable, optional
-        How the finite elements are solved: `pad_operators`, or `pad_operators_between` where the convection varies.
-
-    Returns
-    -------
-    PadSolid
-        The same object for the same arguments; pads of one geometry share their finite elements.
-
-    Raises
-    ------
-    ModelError
-        The film grid does not span the pad.
-    """
+    """Solid of a pad for a film grid."""
     theta, z = np.asarray(film_theta, dtype=float), np.asarray(film_z, dtype=float)
     _check_span(theta, (geometry.leading, geometry.trailing), "film_theta", "rad")
     if z.ndim == 1 and z.size and abs(z[0]) < 1e-6 * geometry.length:

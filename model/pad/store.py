@@ -22,13 +22,7 @@ _SOURCES = ("line", "mesh", "elasticity", "heat", "operators", "block_cholesky")
 
 
 def cache_folder() -> Path | None:
-    """Folder for pad solutions.
-
-    Returns
-    -------
-    Path or None
-        ``TPJB_CACHE`` if that variable is set (None if it is empty or ``off``), else the platform's cache folder.
-    """
+    """Folder for pad solutions."""
     chosen = os.environ.get("TPJB_CACHE")
     if chosen is not None:
         return None if chosen.strip().lower() in {"", "off"} else Path(chosen)
@@ -46,17 +40,7 @@ def cache_folder() -> Path | None:
 
 
 def storage_key(what: object) -> str:
-    """Hash of `what` (by its repr) and of the solver's source, so that neither can change unnoticed.
-
-    Parameters
-    ----------
-    what : object
-        Whose repr says all of it.
-
-    Returns
-    -------
-    str
-    """
+    """Hash of `what` (by its repr) and of the solver's source, so that neither can change unnoticed."""
     return hashlib.sha256(f"{_source_digest()}{what!r}".encode()).hexdigest()[:32]
 
 
@@ -69,18 +53,7 @@ def _source_digest() -> str:
 
 
 def load_arrays(key: str, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, FloatArray] | None:
-    """Arrays stored under `key`, or None if there are none, or none of these shapes and finite.
-
-    Parameters
-    ----------
-    key : str
-    shapes : mapping
-        Shape by name.
-
-    Returns
-    -------
-    dict of ndarray or None
-    """
+    """Arrays stored under `key`, or None if there are none, or none of these shapes and finite."""
     folder = cache_folder()
     if folder is None:
         return None
@@ -100,19 +73,7 @@ def load_arrays(key: str, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Fl
 
 
 def save_arrays(key: str, arrays: Mapping[str, FloatArray]) -> bool:
-    """Store arrays whole or not at all; a folder that cannot be written leaves the solution in memory only.
-
-    Parameters
-    ----------
-    key : str
-    arrays : mapping
-        Array by name.
-
-    Returns
-    -------
-    bool
-        Whether they were stored.
-    """
+    """Store arrays whole or not at all; a folder that cannot be written leaves the solution in memory only."""
     folder = cache_folder()
     if folder is None:
         return False

@@ -11,17 +11,7 @@ from model.arrays import FloatArray
 
 @dataclass
 class Anderson:
-    """Anderson mixing, type II.
-
-    Attributes
-    ----------
-    depth : int
-        How many differences are kept.
-
-    Notes
-    -----
-    D. G. Anderson, J. ACM 12 (1965) 547; H. F. Walker, P. Ni, SIAM J. Numer. Anal. 49 (2011) 1715.
-    """
+    """Anderson mixing, type II."""
 
     depth: int = 4
     _images: list[FloatArray] = field(default_factory=list)
@@ -33,17 +23,7 @@ class Anderson:
         self._residuals.clear()
 
     def next(self, state: FloatArray, image: FloatArray) -> FloatArray:
-        """Return the next state.
-
-        Parameters
-        ----------
-        state, image : (n,) ndarray
-            x and g(x), scaled so that all entries matter alike.
-
-        Returns
-        -------
-        (n,) ndarray
-        """
+        """Return the next state."""
         residual = image - state
         self._images.append(image)
         self._residuals.append(residual)

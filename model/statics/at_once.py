@@ -39,12 +39,7 @@ _PLAIN = Options()
 
 
 def able(setup: Setup) -> bool:
-    """Whether the compiled search knows all of a set-up's physics.
-
-    Parameters
-    ----------
-    setup : Setup
-    """
+    """Whether the compiled search knows all of a set-up's physics."""
     if setup.thermal == "thd" or _felt(setup) != _PLAIN:
         return False
     if any(getattr(setup, name) != value for name, value in _DEFAULTS.items()):
@@ -65,19 +60,7 @@ def _felt(setup: Setup) -> Options:
 
 
 def iterate_at_once(search: Search, cold: bool) -> Equilibrium:
-    """Iterate from where a search stands, or from a cold start, in one compiled call.
-
-    Parameters
-    ----------
-    search : Search
-        Of a set-up that is `able`; left where the iteration ends.
-    cold : bool
-
-    Returns
-    -------
-    Equilibrium
-        ``status`` names what is wrong, if anything is.
-    """
+    """Iterate from where a search stands, or from a cold start, in one compiled call."""
     setup, films = search.setup, search.films
     pads = _pads(search)
     state = _state(search, pads.attitudes.shape[2])

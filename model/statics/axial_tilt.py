@@ -30,46 +30,18 @@ from model.statics.tilt_hold import tilt_hold
 
 
 def axial_shape(grid: FilmGrid) -> FloatArray:
-    """What a unit of axial tilt adds to the film thickness, (nt + 1, nz + 1) [m/rad].
-
-    Parameters
-    ----------
-    grid : FilmGrid
-        Over the whole width.
-    """
+    """What a unit of axial tilt adds to the film thickness, (nt + 1, nz + 1) [m/rad]."""
     return np.outer(grid.cos, grid.z)
 
 
 def aligned_tilt(setup: Setup, pivot_angle: float) -> float:
-    """AxialTilt at which a pad lies along the shaft [rad].
-
-    Parameters
-    ----------
-    setup : Setup
-    pivot_angle : float
-        [rad]
-    """
+    """AxialTilt at which a pad lies along the shaft [rad]."""
     angle, toward = setup.misalignment
     return angle * math.cos(pivot_angle - toward)
 
 
 def axial_tilt_of(setup: Setup, film: PadFilm, pressure: FloatArray, forces: FilmForces) -> AxialTilt:
-    """A pad's freedom to tilt along the shaft, and the moment that is not balanced.
-
-    Parameters
-    ----------
-    setup : Setup
-    film : PadFilm
-        Solved.
-    pressure : (nt + 1, nz + 1) ndarray
-        [Pa]
-    forces : FilmForces
-        Of that pressure.
-
-    Returns
-    -------
-    AxialTilt
-    """
+    """A pad's freedom to tilt along the shaft, and the moment that is not balanced."""
     grid, shape = film.grid, axial_shape(film.grid)
     hold = tilt_hold(setup, film.axial_tilt, float(forces.force[0]))
     moment = float((grid.area * shape * pressure).sum()) - hold.moment
@@ -78,23 +50,7 @@ def axial_tilt_of(setup: Setup, film: PadFilm, pressure: FloatArray, forces: Fil
 
 
 def shape_change(setup: Setup, film: PadFilm, da: float, db: float) -> tuple[FloatArray, float]:
-    """Change of a film's shape that belongs to a move (da, db) of it, and that of the pad's axial tilt in it.
-
-    Parameters
-    ----------
-    setup : Setup
-    film : PadFilm
-        With its part of the Newton step.
-    da, db : float
-        Changes of a and b [m].
-
-    Returns
-    -------
-    change : (nt + 1, nz + 1) ndarray
-        Of the thickness, beside what (a, b) do [m].
-    axial : float
-        [rad]
-    """
+    """Change of a film's shape that belongs to a move (da, db) of it, and that of the pad's axial tilt in it."""
     assert film.step is not None
     change = change_of_shape(film.deformation if setup.flexible_pads else None, film.step, da, db)
     if not setup.pads_follow:

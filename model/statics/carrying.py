@@ -18,34 +18,14 @@ from model.statics.tilt_hold import tilt_hold
 
 
 def attitude_of(setup: Setup, film: PadFilm) -> LoadedAttitude:
-    """The pad shape's table.
-
-    Parameters
-    ----------
-    setup : Setup
-    film : PadFilm
-
-    Returns
-    -------
-    LoadedAttitude
-    """
+    """The pad shape's table."""
     angle, bearing = film.grid.angle, setup.bearing
     start, end = round(float(angle[0]), 12), round(float(angle[-1]), 12)
     return loaded_attitude(start, end, bearing.journal_radius, bearing.length)
 
 
 def find_branch(setup: Setup, film: PadFilm, surface_speed: float, hotter: float = 0.0) -> Branch:
-    """Loaded attitudes of a pad at its film's mean temperature, or `hotter` [K] than that.
-
-    Parameters
-    ----------
-    setup : Setup
-    film : PadFilm
-    surface_speed : float
-        [m/s]
-    hotter : float
-        [K]
-    """
+    """Loaded attitudes of a pad at its film's mean temperature, or `hotter` [K] than that."""
     bearing, clearance = setup.bearing, film.pad.pad_clearance
     viscosity = float(bearing.oil.viscosity(float(film.work.temperature.mean()) + hotter))
     scale = viscosity * surface_speed * bearing.journal_radius**2 * bearing.length
@@ -53,18 +33,7 @@ def find_branch(setup: Setup, film: PadFilm, surface_speed: float, hotter: float
 
 
 def margin(film: PadFilm, position: FloatArray) -> float:
-    """How far a pad is from where it stops carrying, as a share of its clearance; negative beyond.
-
-    Parameters
-    ----------
-    film : PadFilm
-    position : (2,) ndarray
-        Journal [m].
-
-    Returns
-    -------
-    float
-    """
+    """How far a pad is from where it stops carrying, as a share of its clearance; negative beyond."""
     assert film.branch is not None
     return float(_reach(film, position) - film.branch.rigid_approach[0]) / film.pad.pad_clearance
 
@@ -80,25 +49,13 @@ def _edge(film: PadFilm) -> float:
 
 
 def let_idle(film: PadFilm) -> None:
-    """Let a pad carry nothing.
-
-    Parameters
-    ----------
-    film : PadFilm
-    """
+    """Let a pad carry nothing."""
     film.idle = True
     film.deflection = film.tilt = 0.0
 
 
 def set_loaded(film: PadFilm, position: FloatArray) -> None:
-    """Put a pad on its loaded attitude for a journal position, or let it idle.
-
-    Parameters
-    ----------
-    film : PadFilm
-    position : (2,) ndarray
-        Journal [m].
-    """
+    """Put a pad on its loaded attitude for a journal position, or let it idle."""
     assert film.branch is not None
     let_idle(film)
     film.idle = margin(film, position) <= 0.0
@@ -111,17 +68,7 @@ def set_loaded(film: PadFilm, position: FloatArray) -> None:
 
 
 def update_carrying(setup: Setup, films: list[PadFilm], position: FloatArray, surface_speed: float) -> bool:
-    """Let pads take up or shed their load as the journal's position has it; True if any did.
-
-    Parameters
-    ----------
-    setup : Setup
-    films : list of PadFilm
-    position : (2,) ndarray
-        Journal [m].
-    surface_speed : float
-        [m/s]
-    """
+    """Let pads take up or shed their load as the journal's position has it; True if any did."""
     changed = False
     for film in films:
         if film.branch is None or abs(margin(film, position)) < NEAR_EDGE:
@@ -153,16 +100,6 @@ def is_stable(setup: Setup, film: PadFilm) -> bool:
 
     The determinant of the pad's own two equations is positive: kbb (1 + c kaa) > c kba kab, c the pivot's compliance,
     with what holds the tilt back added to the film's moment.
-
-    Parameters
-    ----------
-    setup : Setup
-    film : PadFilm
-        Solved.
-
-    Returns
-    -------
-    bool
     """
     assert film.forces is not None
     (kaa, kab), (kba, kbb) = film.forces.stiffness
@@ -175,19 +112,7 @@ def is_stable(setup: Setup, film: PadFilm) -> bool:
 
 
 def leave_unstable(setup: Setup, films: list[PadFilm], position: FloatArray) -> bool:
-    """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any.
-
-    Parameters
-    ----------
-    setup : Setup
-    films : list of PadFilm
-    position : (2,) ndarray
-        Journal [m].
-
-    Returns
-    -------
-    bool
-    """
+    """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any."""
     found = False
     for film in films:
         if film.forces is None or setup.rotational_stiffness > 0 or is_stable(setup, film):
@@ -203,19 +128,9 @@ def leave_unstable(setup: Setup, films: list[PadFilm], position: FloatArray) -> 
 
 
 def unloaded_pads(films: list[PadFilm], position: FloatArray) -> tuple[list[int], list[int]]:
-    """Pads that were left idle although they have a loaded attitude here: carrying, they would push the journal away.
+    """Pads that were left idle although they have a loaded attitude here.
 
-    Parameters
-    ----------
-    films : list of PadFilm
-    position : (2,) ndarray
-        Journal [m].
-
-    Returns
-    -------
-    staying, restarting : list of int
-        Numbers of pads that stay unloaded when left alone (a < 0: the film opens towards both edges), and of those
-        that would take up load again at once.
+    Carrying, they would push the journal away.
     """
     unloaded = [f for f in films if f.idle and f.branch is not None and margin(f, position) > _edge(f)]
     staying = [f.number for f in unloaded if _reach(f, position) <= 0.0]
@@ -223,17 +138,6 @@ def unloaded_pads(films: list[PadFilm], position: FloatArray) -> tuple[list[int]
 
 
 def longest_step(films: list[PadFilm], shift: FloatArray) -> float:
-    """Share of a step [m] that the journal may take.
-
-    Parameters
-    ----------
-    films : list of PadFilm
-    shift : (2,) ndarray
-        Move of the journal [m].
-
-    Returns
-    -------
-    float
-    """
+    """Share of a step [m] that the journal may take."""
     least = min(f.pad.pad_clearance for f in films)
     return LONGEST_STEP * least / max(math.hypot(shift[0], shift[1]), 1e-30)

@@ -43,46 +43,20 @@ FLOW_BACK = Condition(
 
 
 def runaway(share: float) -> Condition:
-    """No equilibrium with all of the heat; where it ended.
-
-    Parameters
-    ----------
-    share : float
-        Of the heat, with which the last one was found.
-    """
+    """No equilibrium with all of the heat; where it ended."""
     said = f"journal and films find rest with up to {100 * share:.0f} % of the heat they make, and not with more"
     return Condition("heat runs away", "error", said)
 
 
 def idle(pads: Sequence[int]) -> Condition:
-    """Pads without a loaded attitude, numbers from 1.
-
-    Parameters
-    ----------
-    pads : sequence of int
-        Numbers from 1.
-
-    Returns
-    -------
-    Condition
-    """
+    """Pads without a loaded attitude, numbers from 1."""
     return Condition(
         f"idle pads {_listed(pads)}", "note", "they carry nothing and take no part in the dynamics", tuple(pads)
     )
 
 
 def overloaded(pads: Sequence[int]) -> Condition:
-    """Pads whose film no bearing has, numbers from 1.
-
-    Parameters
-    ----------
-    pads : sequence of int
-        Numbers from 1.
-
-    Returns
-    -------
-    Condition
-    """
+    """Pads whose film no bearing has, numbers from 1."""
     limits = f"{1e6 * THINNEST_FILM:g} um, {HIGHEST_PRESSURE / 1e6:g} MPa, {HOTTEST_FILM:g} degC"
     return Condition(
         f"overloaded pads {_listed(pads)}", "warning", f"thinnest film, pressure or heat beyond {limits}", tuple(pads)
@@ -90,17 +64,7 @@ def overloaded(pads: Sequence[int]) -> Condition:
 
 
 def left_unloaded(pads: Sequence[int]) -> Condition:
-    """Pads that were left idle on the way, although they could carry, numbers from 1.
-
-    Parameters
-    ----------
-    pads : sequence of int
-        Numbers from 1.
-
-    Returns
-    -------
-    Condition
-    """
+    """Pads that were left idle on the way, although they could carry, numbers from 1."""
     return Condition(
         f"pads {_listed(pads)} cannot keep their load", "warning",
         "carrying, they would push the journal off, or friction holds them off", tuple(pads),
@@ -108,17 +72,7 @@ def left_unloaded(pads: Sequence[int]) -> Condition:
 
 
 def undecided(pads: Sequence[int]) -> Condition:
-    """Pads that find no state at all, numbers from 1.
-
-    Parameters
-    ----------
-    pads : sequence of int
-        Numbers from 1.
-
-    Returns
-    -------
-    Condition
-    """
+    """Pads that find no state at all, numbers from 1."""
     return Condition(
         f"pads {_listed(pads)} can neither carry nor idle", "error",
         "idle they take up load at once, carrying they push the journal off", tuple(pads),
@@ -126,34 +80,14 @@ def undecided(pads: Sequence[int]) -> Condition:
 
 
 def alternating(pads: Sequence[int]) -> Condition:
-    """Pads that went on taking up and shedding their load, numbers from 1.
-
-    Parameters
-    ----------
-    pads : sequence of int
-        Numbers from 1.
-
-    Returns
-    -------
-    Condition
-    """
+    """Pads that went on taking up and shedding their load, numbers from 1."""
     return Condition(
         f"pads {_listed(pads)} take up and shed their load", "error", "the iteration finds no rest", tuple(pads)
     )
 
 
 def stick_and_slip(pads: Sequence[int]) -> Condition:
-    """Pads that swing between sticking and sliding, numbers from 1.
-
-    Parameters
-    ----------
-    pads : sequence of int
-        Numbers from 1.
-
-    Returns
-    -------
-    Condition
-    """
+    """Pads that swing between sticking and sliding, numbers from 1."""
     return Condition(
         f"pads {_listed(pads)} neither stick nor slide at rest", "error",
         STICK_AND_SLIP, tuple(pads),
@@ -161,26 +95,12 @@ def stick_and_slip(pads: Sequence[int]) -> Condition:
 
 
 def held_off(status: Sequence[Condition]) -> tuple[int, ...]:
-    """Pads of `stick_and_slip` in a status.
-
-    Parameters
-    ----------
-    status : sequence of Condition
-    """
+    """Pads of `stick_and_slip` in a status."""
     return tuple(pad for c in status if c.detail == STICK_AND_SLIP for pad in c.pads)
 
 
 def never_at_rest(films: Sequence[PadFilm]) -> tuple[Condition, ...]:
-    """Names the pads that went on taking up and shedding their load, if any did.
-
-    Parameters
-    ----------
-    films : sequence of PadFilm
-
-    Returns
-    -------
-    tuple of Condition
-    """
+    """Names the pads that went on taking up and shedding their load, if any did."""
     pads = [f.number for f in films if f.load_changes >= MAX_LOAD_CHANGES]
     return (alternating(pads),) if pads else ()
 
@@ -190,14 +110,7 @@ def _listed(pads: Sequence[int]) -> str:
 
 
 def unsupported(setup: Setup, load: FloatArray) -> bool:
-    """Whether no pads can hold a load, wherever the journal goes: free pads push along their pivots only.
-
-    Parameters
-    ----------
-    setup : Setup
-    load : (2,) ndarray
-        [N]
-    """
+    """Whether no pads can hold a load, wherever the journal goes: free pads push along their pivots only."""
     size = float(np.hypot(load[0], load[1]))
     if size == 0.0 or setup.rotational_stiffness > 0.0:
         return False
@@ -209,16 +122,7 @@ def unsupported(setup: Setup, load: FloatArray) -> bool:
 
 
 def overloaded_pads(films: Sequence[PadFilm]) -> list[int]:
-    """Numbers of the pads whose film is too thin, whose pressure too high or whose oil too hot for a pad to live.
-
-    Parameters
-    ----------
-    films : sequence of PadFilm
-
-    Returns
-    -------
-    list of int
-    """
+    """Numbers of the pads whose film is too thin, whose pressure too high or whose oil too hot for a pad to live."""
     return [
         f.number
         for f in films
@@ -232,19 +136,7 @@ def overloaded_pads(films: Sequence[PadFilm]) -> list[int]:
 
 
 def regimes(setup: Setup, films: Sequence[PadFilm], surface_speed: float) -> list[Condition]:
-    """Named regimes beyond what the equations hold for: pads in each other's way, films not laminar, oil too hot.
-
-    Parameters
-    ----------
-    setup : Setup
-    films : sequence of PadFilm
-    surface_speed : float
-        Of the journal [m/s].
-
-    Returns
-    -------
-    list of Condition
-    """
+    """Named regimes beyond what the equations hold for: pads in each other's way, films not laminar, oil too hot."""
     names = misfits(setup)
     reynolds = largest_reynolds(films, surface_speed)
     if reynolds > LAMINAR and setup.options.turbulence == "none":
@@ -261,18 +153,7 @@ def regimes(setup: Setup, films: Sequence[PadFilm], surface_speed: float) -> lis
 
 
 def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:
-    """Largest local Reynolds number rho U h / mu of all films, the idle pads' too; NaN where there is none.
-
-    Parameters
-    ----------
-    films : sequence of PadFilm
-    surface_speed : float
-        Of the journal [m/s].
-
-    Returns
-    -------
-    float
-    """
+    """Largest local Reynolds number rho U h / mu of all films, the idle pads' too; NaN where there is none."""
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # a lost film may be as hot as numbers go
         numbers = [
             float((f.work.density * f.work.thickness / f.work.viscosity).max()) * surface_speed
@@ -284,16 +165,7 @@ def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:
 
 
 def misfits(setup: Setup) -> list[Condition]:
-    """Pads that stand in each other's way, or in the journal's, in a bearing built in code (a file is refused).
-
-    Parameters
-    ----------
-    setup : Setup
-
-    Returns
-    -------
-    list of Condition
-    """
+    """Pads that stand in each other's way, or in the journal's, in a bearing built in code (a file is refused)."""
     pads = setup.bearing.pads
     names = []
     inside = [k for k, p in enumerate(pads, 1) if not p.assembled_clearance + setup.clearance_change > 0.0]

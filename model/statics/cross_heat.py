@@ -39,17 +39,7 @@ FACE_SHARE = 0.1
 
 @dataclass
 class CrossAnswer:
-    """What one film's temperatures are made of: with all else at zero, per kelvin of its inlet, of the journal.
-
-    Attributes
-    ----------
-    fields : (nt + 1, n, 3) ndarray
-        Of the cells [degC].
-    faces : (3, nt + 1, nz + 1) ndarray
-        Of the pad's face [degC].
-    outer : FilmAnswer
-        Outlet temperature and the heat that the journal takes.
-    """
+    """What one film's temperatures are made of: with all else at zero, per kelvin of its inlet, of the journal."""
 
     fields: FloatArray
     faces: FloatArray
@@ -64,30 +54,9 @@ def settle_cross_temperatures(
     limits: tuple[float, float],
     operator: CrossOperator,
 ) -> tuple[float, float, float]:
-    """Temperatures of all films, pads and the journal for the present flows; as `settle_temperatures` of `heat_paths`.
+    """Temperatures of all films, pads and the journal for the present flows.
 
-    Parameters
-    ----------
-    setup : Setup
-    films : list of PadFilm
-        Solved for pressure.
-    surface_speed : float
-        [m/s]
-    journal : float
-        The journal's temperature so far [degC]; NaN for none.
-    limits : tuple of float
-        Relaxation, and the largest change of a temperature in one step [K].
-    operator : CrossOperator
-        Room for the balances of one film after the other.
-
-    Returns
-    -------
-    change : float
-        Largest change asked for [K].
-    back : float
-        Largest share of a film's oil that runs back at its leading edge.
-    journal : float
-        [degC]
+    As `settle_temperatures` of `heat_paths`.
     """
     order = sorted(films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
     start = journal if math.isfinite(journal) else setup.inlet_temperature
@@ -119,38 +88,17 @@ def settle_cross_temperatures(
 
 
 def limited_share(change: float, limits: tuple[float, float]) -> float:
-    """Share of a change of temperature that is made.
-
-    Parameters
-    ----------
-    change : float
-        [K]
-    limits : tuple of float
-        Relaxation, and the largest change in one step [K].
-    """
+    """Share of a change of temperature that is made."""
     return limits[0] * min(1.0, limits[1] / max(abs(change), 1e-30))
 
 
 def housing_oil(films: Sequence[PadFilm]) -> float:
-    """Temperature of the oil that the pads stand in [degC]: what the grooves hold, on the mean.
-
-    Parameters
-    ----------
-    films : sequence of PadFilm
-    """
+    """Temperature of the oil that the pads stand in [degC]: what the grooves hold, on the mean."""
     return sum(f.inlet for f in films) / len(films)
 
 
 def pad_heat(film: PadFilm, around: float) -> FloatArray:
-    """Heat flux density from the film into its pad, (nt + 1, nz + 1) [W/m^2].
-
-    Parameters
-    ----------
-    film : PadFilm
-        With temperatures across.
-    around : float
-        Temperature of the oil at the pad's free faces [degC].
-    """
+    """Heat flux density from the film into its pad, (nt + 1, nz + 1) [W/m^2]."""
     assert film.cross is not None
     return _into_pad(film, film.cross.face - around)
 

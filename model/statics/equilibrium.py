@@ -13,26 +13,7 @@ from model.statics.pad_film import PadFilm
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A static solution.
-
-    Attributes
-    ----------
-    position : (2,) ndarray
-        Journal centre from the bearing centre [m].
-    films : tuple of PadFilm
-        Pads with their films, as they stand.
-    iterations : int
-    force_residual : float
-        Share of the load (or of 1 N) that is not balanced.
-    temperature_residual : float
-        Largest change that one more step would make [K].
-    journal_temperature : float
-        [degC]; NaN where the journal takes no heat.
-    status : tuple of Condition
-        Named conditions; empty when all is well.
-    surface_speed : float
-        Of the journal [m/s].
-    """
+    """A static solution."""
 
     position: FloatArray
     films: tuple[PadFilm, ...]
@@ -57,12 +38,7 @@ class Equilibrium:
 
 
 def mean_temperature(films: Sequence[PadFilm]) -> float:
-    """Mean temperature of the films that carry, by area [degC]; the oil's where it enters if none does.
-
-    Parameters
-    ----------
-    films : sequence of PadFilm
-    """
+    """Mean temperature of the films that carry, by area [degC]; the oil's where it enters if none does."""
     carrying = [f for f in films if not f.idle]
     if not carrying:
         return films[0].inlet

@@ -17,17 +17,7 @@ from model.statics.search import Search
 
 
 def solve_films(search: Search) -> float:
-    """Solve every film that carries once, at the present positions of journal and pads.
-
-    Parameters
-    ----------
-    search : Search
-
-    Returns
-    -------
-    float
-        Largest temperature change asked for [K], or change of shape of the same weight; infinite if a film is lost.
-    """
+    """Solve every film that carries once, at the present positions of journal and pads."""
     search.limited = 0.0
     for film in search.films:
         if not film.idle:
@@ -49,12 +39,7 @@ def solve_films(search: Search) -> float:
 
 
 def refine_derivatives(search: Search) -> None:
-    """Find the derivatives once more, with the rupture line between the nodes; the pressure stays.
-
-    Parameters
-    ----------
-    search : Search
-    """
+    """Find the derivatives once more, with the rupture line between the nodes; the pressure stays."""
     for film in search.films:
         if film.forces is not None:
             wedge = (film.pad.pad_clearance, *film.approach(search.position))

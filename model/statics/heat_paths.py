@@ -42,13 +42,7 @@ LEAST_FRESH = 1e-3
 
 
 def couples_heat(setup: Setup) -> bool:
-    """Whether the films' temperatures depend on more than their own inlets.
-
-    Parameters
-    ----------
-    setup : Setup
-        Bearing with its options.
-    """
+    """Whether the films' temperatures depend on more than their own inlets."""
     return setup.thermal != "isothermal" and bool(
         setup.thermal == "thd" or setup.mixing or setup.options.conduction or setup.options.isothermal_journal
     )
@@ -57,29 +51,7 @@ def couples_heat(setup: Setup) -> bool:
 def settle_temperatures(
     setup: Setup, films: list[PadFilm], surface_speed: float, journal: float, limits: tuple[float, float]
 ) -> tuple[float, float, float]:
-    """Temperatures of all films for their present flows; writes them, and the inlets.
-
-    Parameters
-    ----------
-    setup : Setup
-    films : list of PadFilm
-        Solved for pressure.
-    surface_speed : float
-        [m/s]
-    journal : float
-        The journal's temperature so far [degC]; NaN for none.
-    limits : tuple of float
-        Relaxation, and the largest change of a temperature in one step [K].
-
-    Returns
-    -------
-    change : float
-        Largest change asked for [K].
-    limited : float
-        See `model.film.energy.solve_energy`.
-    journal : float
-        The journal's temperature [degC]; NaN if it takes no part.
-    """
+    """Temperatures of all films for their present flows; writes them, and the inlets."""
     order = sorted(films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
     heat = FilmHeat(setup, surface_speed, journal if math.isfinite(journal) else setup.inlet_temperature)
     parts = [heat.answers(film) for film in order]
@@ -101,18 +73,7 @@ def settle_temperatures(
 
 @dataclass
 class FilmHeat:
-    """The energy equation of one film after the other, with its pad and journal.
-
-    Attributes
-    ----------
-    setup : Setup
-    surface_speed : float
-        [m/s]
-    journal : float
-        The journal's temperature so far [degC].
-    limited : float
-        The largest share of a flow that had to be limited so far, see `model.film.energy.solve_energy`.
-    """
+    """The energy equation of one film after the other, with its pad and journal."""
 
     setup: Setup
     surface_speed: float
@@ -123,11 +84,6 @@ class FilmHeat:
         """Temperature of a film with all else at zero, per kelvin of its inlet, and per kelvin of the journal.
 
         Shape (3, nt + 1, nz + 1); None if the film carries nothing.
-
-        Parameters
-        ----------
-        film : PadFilm
-            A film with its flows solved.
         """
         if film.forces is None:
             return None
@@ -184,24 +140,6 @@ def minimal_residual(apply: Callable[[FloatArray], FloatArray], right: FloatArra
     """Solve apply(x) = right by GMRES, in at most `KRYLOV_STEPS` steps, to a share `tolerance` of the right-hand side.
 
     NaN where `apply` grows beyond `BOUNDLESS`.
-
-    Parameters
-    ----------
-    apply : callable
-        Linear map of (n,) to (n,).
-    right : array, shape (n,)
-        Right-hand side.
-    tolerance : float
-        Share of its norm that may be left.
-
-    Returns
-    -------
-    array, shape (n,)
-        The solution.
-
-    Notes
-    -----
-    Y. Saad, M. H. Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856.
     """
     size = float(np.linalg.norm(right))
     basis, images = [right / size], []
@@ -235,15 +173,7 @@ def _journal_exchange(setup: Setup, film: PadFilm) -> FloatArray:
 
 
 class FilmAnswer(NamedTuple):
-    """What a film passes on: with all else at zero, per kelvin of its inlet, per kelvin of the journal.
-
-    Attributes
-    ----------
-    outlet : (3,) sequence of float
-        Flow-weighted temperature at the trailing edge [degC].
-    taken : (3,) sequence of float
-        Heat that the journal takes up [W].
-    """
+    """What a film passes on: with all else at zero, per kelvin of its inlet, per kelvin of the journal."""
 
     outlet: Sequence[float] | FloatArray
     taken: Sequence[float] | FloatArray
@@ -260,23 +190,7 @@ def _film_answer(setup: Setup, film: PadFilm, part: FloatArray) -> FilmAnswer:
 
 
 def balance_heat(setup: Setup, order: list[PadFilm], parts: Sequence[FilmAnswer | None]) -> tuple[FloatArray, float]:
-    """Inlet temperature of every pad, and the journal's that keeps no heat.
-
-    Parameters
-    ----------
-    setup : Setup
-    order : list of PadFilm
-        In the order of rotation.
-    parts : sequence of FilmAnswer or None
-        None for a film that carries nothing.
-
-    Returns
-    -------
-    inlets : (n,) ndarray
-        [degC]
-    journal : float
-        [degC]
-    """
+    """Inlet temperature of every pad, and the journal's that keeps no heat."""
     n, supply = len(order), setup.inlet_temperature
     shares = mixing_shares(order, setup.mixing)
     matrix, right = np.eye(n + 1), np.full(n + 1, supply)
@@ -302,20 +216,7 @@ def balance_heat(setup: Setup, order: list[PadFilm], parts: Sequence[FilmAnswer 
 
 
 def mixing_shares(order: list[PadFilm], fraction: float) -> list[float]:
-    """Share s of what a pad drinks that comes from the pad before it, for the pads in the order of rotation.
-
-    Parameters
-    ----------
-    order : list of PadFilm
-        Pads in the order of rotation.
-    fraction : float
-        Share of a pad's outflow that reaches the next pad, 0 to 1.
-
-    Returns
-    -------
-    list of float
-        One share for each pad, 0 to 1.
-    """
+    """Share s of what a pad drinks that comes from the pad before it, for the pads in the order of rotation."""
     if fraction == 0.0:
         return [0.0] * len(order)
     flows = [through_flow(film) for film in order]

@@ -41,18 +41,7 @@ SWINGING = 0.3
 
 
 def iterate(search: Search) -> Equilibrium:
-    """Iterate from where a search stands.
-
-    Parameters
-    ----------
-    search : Search
-        Left where the iteration ends.
-
-    Returns
-    -------
-    Equilibrium
-        ``status`` names what is wrong, if anything is.
-    """
+    """Iterate from where a search stands."""
     best, residual, heat, stalled = math.inf, math.inf, math.inf, 0
     left = best_left = math.inf
     memory, setup = Anderson(), search.setup
@@ -144,12 +133,7 @@ def _settled(search: Search, iterations: int, residual: float, heat: float) -> E
 
 
 def settled_status(search: Search) -> tuple[Condition, ...]:
-    """What is to be said of pads that idle where an iteration has settled.
-
-    Parameters
-    ----------
-    search : Search
-    """
+    """What is to be said of pads that idle where an iteration has settled."""
     staying, restarting = unloaded_pads(search.films, search.position)
     if search.held:  # without friction they would carry
         staying = sorted(staying + [k for k in restarting if k in search.held])
@@ -164,16 +148,7 @@ def _failed(search: Search, iterations: int, heat: float, why: Condition) -> Equ
 
 
 def ended(search: Search, figures: tuple[int, float, float], status: tuple[Condition, ...]) -> Equilibrium:
-    """The state as an answer.
-
-    Parameters
-    ----------
-    search : Search
-    figures : tuple
-        Iterations, residual and change of temperature [K].
-    status : tuple of Condition
-        What is to be said besides.
-    """
+    """The state as an answer."""
     names = list(status)
     for film in search.films:
         film.rest(search.position, search.surface_speed, search.setup.bearing.oil)

@@ -12,25 +12,7 @@ from model.statics.tilt_hold import tilt_hold
 
 
 def newton_step(setup: Setup, load: FloatArray, films: list[PadFilm]) -> tuple[float, FloatArray, FloatArray]:
-    """Solve the linearised equilibrium once.
-
-    Parameters
-    ----------
-    setup : Setup
-    load : (2,) ndarray
-        [N]
-    films : list of PadFilm
-        Solved; those without forces take no part.
-
-    Returns
-    -------
-    residual : float
-        Unbalanced share of the load, see `eliminate`.
-    shift : (2,) ndarray
-        The journal's move [m].
-    moves : (n_pads, 2) ndarray
-        Changes of every pad's tilt [rad] and deflection [m].
-    """
+    """Solve the linearised equilibrium once."""
     carrying = [f for f in films if f.forces is not None]
     residual, shift, moves = eliminate(load, pad_equations(setup, carrying))
     if setup.friction:
@@ -48,18 +30,7 @@ def _stop_at_untilted(carrying: list[PadFilm], moves: FloatArray) -> None:
 
 
 def pad_equations(setup: Setup, carrying: list[PadFilm]) -> PadEquations:
-    """Gather the equations of the pads that carry.
-
-    Parameters
-    ----------
-    setup : Setup
-    carrying : list of PadFilm
-        Solved.
-
-    Returns
-    -------
-    PadEquations
-    """
+    """Gather the equations of the pads that carry."""
     n = len(carrying)
     rows = PadEquations(
         frame=np.empty((n, 2, 2)),

@@ -26,60 +26,7 @@ from model.statics.compiled.stack import film_works
 
 @dataclass
 class PadFilm:
-    """State of one pad while an equilibrium is sought.
-
-    Attributes
-    ----------
-    number : int
-        From 1.
-    pad : Pad
-    normal, tangent : (2,) ndarray
-        Unit vectors at the pivot.
-    preload_distance : float
-        Cp - Cb, how far the pad is moved in from a concentric one, plus running changes [m].
-    pivot_radius : float
-        R_P [m].
-    grid, work
-        Mesh and arrays.
-    inlet : float
-        Temperature of the oil that enters [degC].
-    tilt, deflection : float
-        t [rad], eta [m].
-    idle : bool
-        No loaded attitude: carries nothing.
-    forces : FilmForces or None
-        At the temperature that the pressure was solved with.
-    corrected : FilmForces or None
-        At the temperature found since, to first order: what a Newton step should go by.
-    pressure_change : (unknowns,) ndarray
-        The change of pressure from the one to the other [Pa].
-    bent : (nt + 1, nz + 1) ndarray
-        The pad's deformation, part of `work.extra` [m].
-    deformation : PadDeformation or None
-        How the pad deforms; None for a rigid one.
-    step : BendingStep or None
-        Its part of the present Newton step.
-    branch : Branch or None
-        Loaded attitudes, tabulated.
-    load_changes : int
-        How often the pad has taken up or shed its load.
-    temperature_change : float
-        What the last step asked for [K].
-    kept : float
-        Share of the dissipation that stays in the film.
-    rupture : str
-        Which solver finds the film's pressure: one of `model.film.models.FILM_MODELS`, or "turbulent".
-    resting : RestingFilm or None
-        What an idle pad's film does.
-    cross : CrossFilm or None
-        Temperatures across the film; None where there is one at each place.
-    outlet : float
-        Flow-weighted temperature at the trailing edge of a film with temperatures across [degC].
-    axial_tilt : float
-        How far the pad has turned about the axis across it, see `model.statics.axial_tilt` [rad].
-    closing : float
-        What the present step takes from the clearance, because the journal grows [m].
-    """
+    """State of one pad while an equilibrium is sought."""
 
     number: int
     pad: Pad
@@ -126,13 +73,7 @@ class PadFilm:
         return self.work.temperature if self.cross is None else self.cross.face
 
     def temperature_at(self, fraction: float) -> float:
-        """Of the pad's face at mid-length [degC].
-
-        Parameters
-        ----------
-        fraction : float
-            Of the arc, from the leading edge.
-        """
+        """Of the pad's face at mid-length [degC]."""
         angle = self.pad.leading_edge + fraction * self.pad.arc
         middle = 0 if self.grid.first == 0 else len(self.grid.z) // 2
         return float(np.interp(angle, self.grid.angle, self.face_temperature[:, middle]))
@@ -148,46 +89,17 @@ class PadFilm:
         return 0.0 if self.deformation is None else -float(np.interp(0.0, self.grid.angle, self.bent[:, 0]))
 
     def rigid_approach(self, position: FloatArray) -> float:
-        """Approach a of the film if the pivot were rigid [m].
-
-        Parameters
-        ----------
-        position : (2,) ndarray
-            Journal [m].
-
-        Returns
-        -------
-        float
-        """
+        """Approach a of the film if the pivot were rigid [m]."""
         return self.preload_distance + float(self.normal @ position)
 
     def approach(self, position: FloatArray) -> tuple[float, float]:
-        """(a, b) of the film for a journal position and the pad's present tilt and deflection [m].
-
-        Parameters
-        ----------
-        position : (2,) ndarray
-            Journal [m].
-
-        Returns
-        -------
-        tuple of float
-        """
+        """(a, b) of the film for a journal position and the pad's present tilt and deflection [m]."""
         a = self.rigid_approach(position) - self.deflection
         b = float(self.tangent @ position) + self.pivot_radius * self.tilt
         return a, b
 
     def solve(self, position: FloatArray, surface_speed: float, oil: Oil) -> None:
-        """Solve the film's pressure for a journal position, at its present temperature and shape.
-
-        Parameters
-        ----------
-        position : (2,) ndarray
-            Journal [m].
-        surface_speed : float
-            Of the journal [m/s].
-        oil : Oil
-        """
+        """Solve the film's pressure for a journal position, at its present temperature and shape."""
         a, b = self.approach(position)
         if self.cross is None:
             set_viscosity(self.work, oil_constants(oil))
@@ -197,47 +109,20 @@ class PadFilm:
         self.forces = self.corrected = self.solver(self.grid, self.work, wedge, surface_speed, False)
 
     def rest(self, position: FloatArray, surface_speed: float, oil: Oil) -> None:
-        """Say what the film of an idle pad does; nothing for one that carries.
-
-        Parameters
-        ----------
-        position : (2,) ndarray
-            Journal [m].
-        surface_speed : float
-            Of the journal [m/s].
-        oil : Oil
-        """
+        """Say what the film of an idle pad does; nothing for one that carries."""
         wedge = (self.pad.pad_clearance, self.rigid_approach(position))
         idle = self.idle or self.forces is None
         self.resting = resting_film(self.grid, wedge, surface_speed, oil, self.inlet, self.kept) if idle else None
 
     def running(self, surface_speed: float, oil: Oil) -> Running:
-        """What the film runs with; what a share of the heat does, all of it does to oil that takes up more per kelvin.
+        """What the film runs with.
 
-        Parameters
-        ----------
-        surface_speed : float
-            Of the journal [m/s].
-        oil : Oil
+        What a share of the heat does, all of it does to oil that takes up more per kelvin.
         """
         return Running(surface_speed, oil_constants(oil), (oil.specific_heat / self.kept, oil.conductivity / self.kept))
 
     def heat(self, surface_speed: float, oil: Oil, limits: tuple[float, float]) -> float:
-        """Move the temperature towards what the pressure makes it, by `limits`: relaxation, and largest step [K].
-
-        Parameters
-        ----------
-        surface_speed : float
-            Of the journal [m/s].
-        oil : Oil
-        limits : tuple of float
-            Relaxation, and largest step [K].
-
-        Returns
-        -------
-        float
-            See `model.film.energy.solve_energy`.
-        """
+        """Move the temperature towards what the pressure makes it, by `limits`: relaxation, and largest step [K]."""
         assert self.forces is not None
         running = self.running(surface_speed, oil)
         change, limited, radial, tangential = heat_step(
@@ -248,14 +133,7 @@ class PadFilm:
         return limited
 
     def correct(self, surface_speed: float, oil: Oil) -> None:
-        """Say what a temperature that was found otherwise will do to the pressure; see `corrected`.
-
-        Parameters
-        ----------
-        surface_speed : float
-            Of the journal [m/s].
-        oil : Oil
-        """
+        """Say what a temperature that was found otherwise will do to the pressure; see `corrected`."""
         assert self.forces is not None
         given = oil_constants(oil)
         if self.cross is None:
@@ -273,21 +151,7 @@ class PadFilm:
 
 
 def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FloatArray]:
-    """Lay out every pad's film.
-
-    Parameters
-    ----------
-    setup : Setup
-
-    Returns
-    -------
-    films : list of PadFilm
-        Pad #1 first.
-    works : FilmWork
-        Their arrays side by side, with a leading axis for the pad.
-    shifts : (n, unknowns) ndarray
-        Their `pressure_change`.
-    """
+    """Lay out every pad's film."""
     bearing = setup.bearing
     symmetric = setup.misalignment[0] == 0.0
     across = setup.thermal == "thd"
@@ -334,15 +198,5 @@ def _grid(setup: Setup, pad: Pad, symmetric: bool) -> FilmGrid:
 
 
 def oil_constants(oil: Oil) -> tuple[float, float, float, float]:
-    """What the compiled viscosity and density need: mu_40, kappa, rho_40, alpha_v.
-
-    Parameters
-    ----------
-    oil : Oil
-
-    Returns
-    -------
-    tuple of float
-        [Pa s], [1/K], [kg/m^3], [1/K]
-    """
+    """What the compiled viscosity and density need: mu_40, kappa, rho_40, alpha_v."""
     return oil.viscosity_40, oil.viscosity_exponent, oil.density_40, oil.thermal_expansion

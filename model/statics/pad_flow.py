@@ -14,15 +14,7 @@ from model.statics.pad_film import PadFilm
 
 
 class PadFlow(NamedTuple):
-    """One pad's oil.
-
-    Attributes
-    ----------
-    inflow, outflow, leakage : float
-        Through the leading edge, the trailing edge, and both sides [m^3/s].
-    inlet, outlet : float
-        Temperature at the leading edge, and flow-weighted at the trailing edge [degC].
-    """
+    """One pad's oil."""
 
     inflow: float
     outflow: float
@@ -32,20 +24,7 @@ class PadFlow(NamedTuple):
 
 
 def pad_flow(film: PadFilm, oil: Oil) -> PadFlow:
-    """Oil of a pad in a solved equilibrium; NaN where it has no film.
-
-    Parameters
-    ----------
-    film : PadFilm
-        Pad of a solved equilibrium.
-    oil : Oil
-        For the density at the temperatures of inlet, sides and outlet.
-
-    Returns
-    -------
-    PadFlow
-        Volume flows [m^3/s] and temperatures [degC].
-    """
+    """Oil of a pad in a solved equilibrium; NaN where it has no film."""
     entering, leaving = through_flow(film)
     outlet = outlet_temperature(film)
     sides = film.inlet if film.idle else _side_temperature(film)
@@ -63,11 +42,6 @@ def through_flow(film: PadFilm) -> tuple[float, float]:
 
     What enters and does not leave over the sides leaves at the trailing edge, in streaks where the film is ruptured:
     by balance, because the rupture line of a mesh moves by whole nodes and what is found behind it jumps.
-
-    Parameters
-    ----------
-    film : PadFilm
-        Pad of a solved equilibrium.
     """
     if film.resting is not None:
         return film.resting.flow, film.resting.flow
@@ -78,13 +52,7 @@ def through_flow(film: PadFilm) -> tuple[float, float]:
 
 
 def side_flow(film: PadFilm) -> float:
-    """What leaves over both sides [kg/s].
-
-    Parameters
-    ----------
-    film : PadFilm
-        Pad of a solved equilibrium.
-    """
+    """What leaves over both sides [kg/s]."""
     if film.forces is None:
         return 0.0 if film.resting is not None else math.nan
     entering, leaving, across = film.work.flow_x[0], film.work.flow_x[-1], film.work.flow_z
@@ -107,13 +75,7 @@ def _side_temperature(film: PadFilm) -> float:
 
 
 def outlet_temperature(film: PadFilm) -> float:
-    """Flow-weighted temperature at the trailing edge [degC]; an idle pad's film heats up by shear alone.
-
-    Parameters
-    ----------
-    film : PadFilm
-        Pad of a solved equilibrium.
-    """
+    """Flow-weighted temperature at the trailing edge [degC]; an idle pad's film heats up by shear alone."""
     if film.resting is not None:
         return film.resting.outlet
     if film.forces is None:
@@ -124,20 +86,7 @@ def outlet_temperature(film: PadFilm) -> float:
 
 
 def flow_weighted(film: PadFilm, fields: FloatArray) -> list[float]:
-    """Mean of every field at the trailing edge, weighted by the flow of a full film there.
-
-    Parameters
-    ----------
-    film : PadFilm
-        Pad of a solved equilibrium.
-    fields : array, shape (n, nt + 1, nz + 1)
-        Temperatures [degC], or their derivatives.
-
-    Returns
-    -------
-    list of float
-        One mean for each field.
-    """
+    """Mean of every field at the trailing edge, weighted by the flow of a full film there."""
     flow = film.work.flow_x[-1]
     values: list[float] = (fields[:, -1] @ flow / float(flow.sum())).tolist()
     return values
@@ -155,18 +104,7 @@ def _ruptured(work: FilmWork) -> BoolArray:
 
 
 def striation(work: FilmWork) -> FloatArray:
-    """Share of the gap that oil fills: 1, or h_rupture / h downstream of where a line's film ruptured.
-
-    Parameters
-    ----------
-    work : FilmWork
-        Solved pressure and thickness.
-
-    Returns
-    -------
-    array, shape (nt + 1, nz + 1)
-        Share of the gap, 0 to 1.
-    """
+    """Share of the gap that oil fills: 1, or h_rupture / h downstream of where a line's film ruptured."""
     share = np.ones_like(work.thickness)
     ruptured, h = _ruptured(work), work.thickness
     for i in np.flatnonzero(ruptured.any(axis=1)):

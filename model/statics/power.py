@@ -14,17 +14,6 @@ def power_loss(equilibrium: Equilibrium, surface_speed: float, turbulent: bool =
 
     Where the film is ruptured only its striated share shears; that share is h_rupture / h, taken from the film
     thickness at the line's rupture. NaN where a film is lost.
-
-    Parameters
-    ----------
-    equilibrium : Equilibrium
-    surface_speed : float
-        Of the journal [m/s].
-
-    Returns
-    -------
-    float
-        [W]
     """
     total = 0.0
     for film in equilibrium.films:

@@ -28,39 +28,7 @@ NEW_TABLE = 1e-3
 
 @dataclass
 class Search:
-    """What an iteration carries along.
-
-    Attributes
-    ----------
-    setup : Setup
-    load : (2,) ndarray
-        [N]
-    speed : float
-        [rad/s]
-    films : list of PadFilm
-    position : (2,) ndarray
-        Journal [m].
-    limited : float
-        Largest share of a film's flow that had to be limited, see `model.film.energy.solve_energy`.
-    journal : float
-        The journal's temperature [degC]; NaN where it takes no heat.
-    relaxation : float
-        Share of a change of temperature that is made.
-    warm : bool
-        Whether it stands at a neighbour's state.
-    heat : float
-        Share of the films' heat that is made, 1 but on the way to an equilibrium.
-    warmth : float
-        Temperature of the journal that the clearances belong to [degC].
-    warming : float
-        What the present step changes it by [K].
-    held : set of int
-        Numbers of pads that friction holds off their loaded attitude.
-    works : FilmWork
-        The arrays of all films side by side, with a leading axis for the pad.
-    shifts : (n, unknowns) ndarray
-        Their changes of pressure.
-    """
+    """What an iteration carries along."""
 
     setup: Setup
     load: FloatArray
@@ -125,12 +93,7 @@ class Search:
         return abs(asked)
 
     def grow(self, share: float) -> None:
-        """Let the journal grow by a share of what `warm_up` said.
-
-        Parameters
-        ----------
-        share : float
-        """
+        """Let the journal grow by a share of what `warm_up` said."""
         if self.warming:
             self._set_warmth(self.warmth + share * self.warming)
 
@@ -152,17 +115,7 @@ class Search:
                 film.branch = None
 
     def start_from(self, start: Equilibrium) -> bool:
-        """Take over a neighbour's state; False if it has none or its mesh does not fit.
-
-        Parameters
-        ----------
-        start : Equilibrium
-            The neighbour.
-
-        Returns
-        -------
-        bool
-        """
+        """Take over a neighbour's state; False if it has none or its mesh does not fit."""
         if len(start.films) != len(self.films) or not start.converged:
             return False
         coupled = couples_heat(self.setup)
@@ -230,13 +183,7 @@ class Search:
         return np.concatenate(parts)
 
     def set_vector(self, state: FloatArray) -> None:
-        """Undo `vector`.
-
-        Parameters
-        ----------
-        state : (n,) ndarray
-            Micrometres and kelvins.
-        """
+        """Undo `vector`."""
         self.position = state[:2] * MICROMETRE
         if self.setup.growth is not None:
             self._set_warmth(float(state[2]))

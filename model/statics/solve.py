@@ -24,23 +24,7 @@ FIRST_SHARE, LEAST_STEP = 0.25, 0.02
 
 
 def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equilibrium | None = None) -> Equilibrium:
-    """Find where the journal stands.
-
-    Parameters
-    ----------
-    setup : Setup
-    load : (2,) ndarray
-        Static load on the shaft [N]; the film pushes the housing with the same force.
-    speed : float
-        Shaft speed [rad/s], counter-clockwise, positive.
-    start : Equilibrium, optional
-        A neighbouring solution on the same mesh (warm start).
-
-    Returns
-    -------
-    Equilibrium
-        ``status`` names what is wrong, if anything is.
-    """
+    """Find where the journal stands."""
     search = Search(setup, np.asarray(load, float), speed)
     if start is not None and search.start_from(start):
         result = _iterated(search, cold=False)

@@ -22,19 +22,7 @@ from model.setup import Setup
 
 
 class TiltHold(NamedTuple):
-    """The moment that holds a pad back, and its slopes.
-
-    Attributes
-    ----------
-    moment : float
-        [N m], against a positive tilt where it is positive.
-    stiffness : float
-        Its slope by the tilt [N m/rad].
-    arm : float
-        Its slope by the pad's load [m].
-    slides : bool
-        Whether friction is overcome.
-    """
+    """The moment that holds a pad back, and its slopes."""
 
     moment: float
     stiffness: float
@@ -43,20 +31,7 @@ class TiltHold(NamedTuple):
 
 
 def tilt_hold(setup: Setup, tilt: float, load: float) -> TiltHold:
-    """Moment that holds a pad back at a tilt [rad] and pad load [N].
-
-    Parameters
-    ----------
-    setup : Setup
-    tilt : float
-        [rad]
-    load : float
-        Pad load [N].
-
-    Returns
-    -------
-    TiltHold
-    """
+    """Moment that holds a pad back at a tilt [rad] and pad load [N]."""
     stiffness, arm = setup.rotational_stiffness, 0.0
     if setup.rolling:
         roll = setup.rolling * rolling_radius(setup.bearing.pivot)
@@ -76,16 +51,7 @@ def tilt_hold(setup: Setup, tilt: float, load: float) -> TiltHold:
 
 
 def rolling_radius(pivot: Pivot) -> float:
-    """R_H R_b / (R_H - R_b): how far the contact moves per radian of tilt [m]; zero for a knife edge.
-
-    Parameters
-    ----------
-    pivot : Pivot
-
-    Returns
-    -------
-    float
-    """
+    """R_H R_b / (R_H - R_b): how far the contact moves per radian of tilt [m]; zero for a knife edge."""
     if pivot.kind == "rocker":
         seat, back = 0.5 * pivot.housing_diameter, 0.5 * pivot.pivot_diameter
         return seat * back / (seat - back)
@@ -93,19 +59,7 @@ def rolling_radius(pivot: Pivot) -> float:
 
 
 def friction_limits(setup: Setup, load: float) -> tuple[float, float]:
-    """Rotational stiffness of a sphere that does not slide [N m/rad], and the moment at which it does [N m].
-
-    Parameters
-    ----------
-    setup : Setup
-    load : float
-        Pad load [N].
-
-    Returns
-    -------
-    stick, slip : float
-        [N m/rad], [N m]
-    """
+    """Rotational stiffness of a sphere that does not slide [N m/rad], and the moment at which it does [N m]."""
     pivot = setup.bearing.pivot
     radius, load = 0.5 * pivot.sphere_diameter, max(load, 0.0)
     modulus, ratio = pivot.youngs_modulus, pivot.poissons_ratio

@@ -9,20 +9,7 @@ from model.statics.equilibrium import Equilibrium
 
 
 def extrapolated_state(before: Equilibrium, last: Equilibrium, share: float = 1.0) -> Equilibrium:
-    """Where a sweep is heading: a start for its next point.
-
-    Parameters
-    ----------
-    before, last : Equilibrium
-        Solutions of the two points behind, on one mesh.
-    share : float
-        The coming step over the one between them.
-
-    Returns
-    -------
-    Equilibrium
-        `last` itself where a pad has taken up or shed its load in between: that does not go on.
-    """
+    """Where a sweep is heading: a start for its next point."""
     if not before.converged or [f.idle for f in before.films] != [f.idle for f in last.films]:
         return last
     films = []

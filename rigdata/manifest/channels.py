@@ -54,17 +54,7 @@ _PATH_STEPS = {"", ".", ".."}
 
 
 def read_channels(table: Table, findings: Findings, files: TextFile | None = None) -> dict[str, Channel]:
-    """Read every channel; what is wrong is noted in `findings`, and that channel left out.
-
-    Parameters
-    ----------
-    table : Table
-        ``channels`` of the manifest.
-    findings : Findings
-        Receives the problems.
-    files : callable, optional
-        Reads the tables that `filter_table` names; without it they are refused.
-    """
+    """Read every channel; what is wrong is noted in `findings`, and that channel left out."""
     channels: dict[str, Channel] = {}
     if not table.data:
         findings.error(("channels",), "no channels are described", "Add a [channels.NAME] table per column")

@@ -29,19 +29,7 @@ _CSV = ("delimiter", "decimal", "encoding", "header_line", "units_line", "names"
 
 @dataclass(frozen=True)
 class CsvSpec:
-    """What the manifest says of the CSV dialect; None is detected.
-
-    Attributes
-    ----------
-    delimiter, decimal : str or None
-        One character each.
-    encoding : str or None
-        Python codec name.
-    header_line, units_line : int or None
-        1-based lines of the column names and of their units.
-    names : tuple of str
-        Of the columns, where the files have none; empty else.
-    """
+    """What the manifest says of the CSV dialect; None is detected."""
 
     delimiter: str | None = None
     decimal: str | None = None
@@ -53,26 +41,7 @@ class CsvSpec:
 
 @dataclass(frozen=True)
 class Manifest:
-    """A checked manifest, SI.
-
-    Attributes
-    ----------
-    id, bearing, description : str
-        `bearing` is the file name as written.
-    housing_mass : float
-        Stator mass between film and cells [kg]; NaN where the manifest gives none (then no run is dynamic).
-    sample_rate : float or None
-        Of ``[acquisition]`` [Hz].
-    csv : CsvSpec
-    channels : mapping of str to Channel
-    runs : tuple of RunEntry
-    notes : tuple of Problem
-        Findings that do not stop a campaign from being used.
-    mass_uncertainty : float
-        Of `housing_mass`, one standard deviation [kg].
-    mains : float or None
-        Mains frequency [Hz]; None where the manifest gives none.
-    """
+    """A checked manifest, SI."""
 
     id: str
     bearing: str
@@ -88,26 +57,7 @@ class Manifest:
 
 
 def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | None = None) -> Manifest:
-    """Read and check the text of a manifest.
-
-    Parameters
-    ----------
-    text : str
-        TOML.
-    file : str
-        What to call it in messages.
-    files : callable, optional
-        Called with the name of a file that the manifest names and the place where it does; gives its text.
-
-    Returns
-    -------
-    Manifest
-
-    Raises
-    ------
-    RigDataError
-        With every problem found.
-    """
+    """Read and check the text of a manifest."""
     data = _load_toml(text, file)
     findings = Findings(file, key_lines(text))
     top = Table(data, (), findings)

@@ -44,30 +44,7 @@ _MAX_RUNS = 100_000
 
 @dataclass(frozen=True)
 class RunEntry:
-    """One run as the manifest states it, SI.
-
-    Attributes
-    ----------
-    id, kind : str
-    file : str
-        As written; "" where none is given (allowed in HDF5).
-    point : OperatingPoint
-    excitation_direction : float or None
-        [rad]
-    pad : int or None
-    branch : str
-        "up", "down" or "cycle".
-    sample_rate : float or None
-        [Hz]
-    stated : frozenset of str
-        Keys that the manifest gives, for what a default cannot tell.
-    index : int
-        Place among the runs, from 0.
-    excitation : str
-        "sine", "multisine", "sweep", "random" or "impact".
-    band : (float, float) or None
-        Lowest and highest frequency excited [Hz].
-    """
+    """One run as the manifest states it, SI."""
 
     id: str
     kind: str
@@ -84,15 +61,7 @@ class RunEntry:
 
 
 def read_runs(data: object, findings: Findings) -> tuple[RunEntry, ...]:
-    """Read every run; what is wrong is noted in `findings`, and that run left out.
-
-    Parameters
-    ----------
-    data : object
-        ``runs`` of the manifest, or None.
-    findings : Findings
-        Receives the problems.
-    """
+    """Read every run; what is wrong is noted in `findings`, and that run left out."""
     if not isinstance(data, list) or not data:
         findings.error(("runs",), "no runs are listed", "Add a [[runs]] table per record")
         return ()

@@ -20,15 +20,7 @@ Path = tuple[str | int, ...]
 
 
 def shown(value: object, length: int = 60) -> str:
-    """`value` as it stands in a message: quoted, short, on one line, controls escaped.
-
-    Parameters
-    ----------
-    value : object
-        Of a manifest.
-    length : int, optional
-        Characters at most.
-    """
+    """`value` as it stands in a message: quoted, short, on one line, controls escaped."""
     if isinstance(value, str):
         text = _printable(value)
     elif isinstance(value, (dict, list)):  # may be nested too deeply to be printed
@@ -44,15 +36,7 @@ def _printable(text: str) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Name the nearest of `known`, as the cure for an unknown `name`.
-
-    Parameters
-    ----------
-    name : str
-        As the user wrote it.
-    known : iterable of str
-        Names that are known.
-    """
+    """Name the nearest of `known`, as the cure for an unknown `name`."""
     names = list(known)
     close = nearest_name(name.lower(), names, cutoff=0.4)
     return f"Did you mean {close!r}?" if close else f"Known: {', '.join(names)}"
@@ -72,37 +56,12 @@ class Findings:
         return any(p.severity == "error" for p in self.problems)
 
     def add(self, severity: Severity, path: Path, what: str, cure: str, run: str | None = None) -> None:
-        """Note a problem of the key at `path`.
-
-        Parameters
-        ----------
-        severity : Severity
-        path : tuple
-            Keys down to the one meant.
-        what : str
-            What is wrong.
-        cure : str
-            What to do.
-        run : str or None, optional
-            Run id, where it belongs to one.
-        """
+        """Note a problem of the key at `path`."""
         if len(self.problems) < _MAX_FINDINGS:
             self.problems.append(Problem(severity, self.file, _place_of(self.lines, path), what, cure, run))
 
     def error(self, path: Path, what: str, cure: str, run: str | None = None) -> None:
-        """Note an error of the key at `path`.
-
-        Parameters
-        ----------
-        path : tuple
-            Keys down to the one meant.
-        what : str
-            What is wrong.
-        cure : str
-            What to do.
-        run : str or None, optional
-            Run id, where it belongs to one.
-        """
+        """Note an error of the key at `path`."""
         self.add("error", path, what, cure, run)
 
 
@@ -117,41 +76,17 @@ class Table:
             findings.error(path, f"is {shown(data)}, not a table", "Write it as a [table] with keys")
 
     def only(self, known: tuple[str, ...], where: str) -> None:
-        """Note every key that is not in `known`.
-
-        Parameters
-        ----------
-        known : tuple of str
-            Keys allowed.
-        where : str
-            Name of the table, for the message.
-        """
+        """Note every key that is not in `known`."""
         for key in self.data:
             if key not in known:
                 self.findings.error((*self.path, key), f"unknown key {shown(key)} in {where}", nearest(key, known))
 
     def subtable(self, key: str) -> Table:
-        """Give the table under `key`, empty where absent.
-
-        Parameters
-        ----------
-        key : str
-            Key of the table.
-        """
+        """Give the table under `key`, empty where absent."""
         return Table(self.data.get(key, {}), (*self.path, key), self.findings)
 
     def error(self, key: str, what: str, cure: str) -> None:
-        """Note an error of `key`.
-
-        Parameters
-        ----------
-        key : str
-            Key of the table.
-        what : str
-            What is wrong.
-        cure : str
-            What to do.
-        """
+        """Note an error of `key`."""
         self.findings.error((*self.path, key), what, cure)
 
     def _get(self, key: str, required: bool, cure: str) -> Any:
@@ -160,15 +95,7 @@ class Table:
         return self.data.get(key)
 
     def text(self, key: str, required: bool = False) -> str | None:
-        """Give a string, not longer than is sane.
-
-        Parameters
-        ----------
-        key : str
-            Key of the table.
-        required : bool, optional
-            Whether its absence is an error.
-        """
+        """Give a string, not longer than is sane."""
         value = self._get(key, required, f'Add {key} = "..."')
         if value is None:
             return None
@@ -184,17 +111,7 @@ class Table:
         return value
 
     def choice(self, key: str, known: tuple[str, ...], required: bool = False) -> str | None:
-        """Give one of the texts `known`.
-
-        Parameters
-        ----------
-        key : str
-            Key of the table.
-        known : tuple of str
-            Texts allowed.
-        required : bool, optional
-            Whether its absence is an error.
-        """
+        """Give one of the texts `known`."""
         value = self.text(key, required)
         if value is not None and value not in known:
             self.error(key, f"{key} {shown(value)} is unknown", nearest(value, known))
@@ -202,17 +119,7 @@ class Table:
         return value
 
     def integer(self, key: str, low: int, high: int = 10_000_000) -> int | None:
-        """Give a whole number between `low` and `high`.
-
-        Parameters
-        ----------
-        key : str
-            Key of the table.
-        low : int
-            Least value allowed.
-        high : int, optional
-            Greatest value allowed.
-        """
+        """Give a whole number between `low` and `high`."""
         value = self.data.get(key)
         if value is None:
             return None
@@ -229,21 +136,7 @@ class Table:
         above: float | None = None,
         required: bool = False,
     ) -> float | None:
-        """Give an SI value not below `low` and greater than `above`.
-
-        Parameters
-        ----------
-        key : str
-            Key of the table.
-        dimension : str
-            Key of `rigdata.units.DIMENSIONS`.
-        low : float or None, optional
-            Least value allowed, SI.
-        above : float or None, optional
-            Bound that the value must exceed, SI.
-        required : bool, optional
-            Whether its absence is an error.
-        """
+        """Give an SI value not below `low` and greater than `above`."""
         value = self._get(key, required, f"Add {key}, a {dimension} with its unit")
         if value is None:
             return None
@@ -260,19 +153,7 @@ class Table:
 
 
 def key_lines(text: str) -> dict[Path, int]:
-    """Map the path of every table and key to its line (1-based).
-
-    Parameters
-    ----------
-    text : str
-        TOML. Entries of arrays of tables count from 0: ``("runs", 3, "file")``.
-
-    Returns
-    -------
-    dict
-        A best effort: keys inside inline tables and multi-line strings are not told apart from others,
-        so the lines serve messages only.
-    """
+    """Map the path of every table and key to its line (1-based)."""
     lines: dict[Path, int] = {}
     counts: dict[str, int] = {}
     table: Path = ()

@@ -85,19 +85,7 @@ class RunReader(Protocol):
 
 
 def undescribed(names: Sequence[str], what: str, file: str, run: str) -> tuple[Problem, ...]:
-    """Note columns or datasets that the manifest does not describe.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Of channels.
-    what : str
-        What they are called in this kind of file.
-    file : str
-        Display name.
-    run : str
-        Run id, for messages.
-    """
+    """Note columns or datasets that the manifest does not describe."""
     if not names:
         return ()
     listed = ", ".join(ascii(n)[1:-1][:40] for n in names[:6]) + (
@@ -108,17 +96,7 @@ def undescribed(names: Sequence[str], what: str, file: str, run: str) -> tuple[P
 
 
 def missing_channel(name: str, known: Iterable[str], held: str) -> tuple[str, str, str]:
-    """Place, what is wrong and what to do where a file lacks a channel: the nearest it has, or all of them.
-
-    Parameters
-    ----------
-    name : str
-        As the manifest states it.
-    known : iterable of str
-        Names in the file.
-    held : str
-        How the list of them begins.
-    """
+    """Place, what is wrong and what to do where a file lacks a channel: the nearest it has, or all of them."""
     names = list(known)
     close = nearest_name(name, names)
     cure = f"Did you mean {close!r}?" if close else f"{held}: {', '.join(names)[:200]}"
@@ -130,11 +108,6 @@ def rate_of_time(time: FloatArray) -> float:
 
     The median step over many samples is free of gaps, of jitter and of the rounding of the column
     (0.000, 0.001, 0.001, 0.002 at 2 kHz); NaN where no two times are known or time stands still.
-
-    Parameters
-    ----------
-    time : (n,) ndarray
-        Seconds.
     """
     known = time[np.isfinite(time)]
     span = min(1000, len(known) // 4) or len(known) - 1
@@ -146,13 +119,7 @@ def rate_of_time(time: FloatArray) -> float:
 
 
 def suffix_hint(path: Path) -> str:
-    """What to do about a suffix that no reader is known by; "" where it is known.
-
-    Parameters
-    ----------
-    path : Path
-        Of a record, or of what was taken for one.
-    """
+    """What to do about a suffix that no reader is known by; "" where it is known."""
     suffix = path.suffix.lower()
     known = (*TEXT, *FORMATS)
     if suffix in known:

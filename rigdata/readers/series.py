@@ -61,17 +61,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Columns:
-    """Channels on one clock.
-
-    Attributes
-    ----------
-    values : dict of str to (n,) ndarray
-    units : dict of str to str
-    time : (n,) ndarray or None
-        Seconds; None where the file knows no times.
-    notes : tuple of str
-        What was done to bring the channels together.
-    """
+    """Channels on one clock."""
 
     values: dict[str, FloatArray] = field(repr=False)
     units: dict[str, str]
@@ -90,17 +80,7 @@ class Columns:
 
 
 def set_aside(values: FloatArray) -> FloatArray:
-    """Move a long channel out of memory: it is in a file without a name, which goes when nobody holds it any more.
-
-    Parameters
-    ----------
-    values : (n,) ndarray
-
-    Returns
-    -------
-    (n,) ndarray
-        The same numbers; short ones as they are. In memory where no temporary file can be written.
-    """
+    """Move a long channel out of memory: it is in a file without a name, which goes when nobody holds it any more."""
     if values.nbytes <= SET_ASIDE or isinstance(values, np.memmap):
         return values
     try:
@@ -114,30 +94,14 @@ def set_aside(values: FloatArray) -> FloatArray:
 
 @functools.lru_cache(maxsize=1)  # the channels of a file mostly share one clock
 def equidistant(count: int, step: float, start: float = 0.0) -> FloatArray:
-    """Seconds of `count` samples, `step` apart.
-
-    Parameters
-    ----------
-    count : int
-        Samples.
-    step : float
-        Between two samples [s].
-    start : float, optional
-        Of the first sample [s].
-    """
+    """Seconds of `count` samples, `step` apart."""
     seconds = start + step * np.arange(count, dtype=np.float64)
     seconds.flags.writeable = False
     return set_aside(seconds)
 
 
 def without_twins(series: Sequence[Series]) -> list[Series]:
-    """Give channels of one name in several groups the group's name as a prefix; number what is still alike.
-
-    Parameters
-    ----------
-    series : sequence of Series
-        Of one file.
-    """
+    """Give channels of one name in several groups the group's name as a prefix; number what is still alike."""
     counts: dict[str, int] = {}
     for one in series:
         counts[one.name] = counts.get(one.name, 0) + 1
@@ -155,17 +119,6 @@ def on_one_clock(series: Sequence[Series], file: str, run: str | None = None) ->
 
     Slower channels (temperatures beside displacements) are interpolated linearly between their samples and missing
     (NaN) before their first and after their last one.
-
-    Parameters
-    ----------
-    series : sequence of Series
-    file, run : str
-        For messages.
-
-    Raises
-    ------
-    RigDataError
-        No channel, channels of different length without any times, or a result too large to hold.
     """
     chosen = without_twins(series)
     if not chosen:
@@ -233,11 +186,6 @@ def _refuse(file: str, run: str | None, what: str, cure: str) -> RigDataError:
 def is_time(name: str) -> bool:
     """Whether a column of this name holds times.
 
-    Parameters
-    ----------
-    name : str
-        As the file has it.
-
     >>> [is_time(n) for n in ("Zeit", "Time  1 - default sample rate", "t", "T", "T1", "Temperature")]
     [True, True, True, False, False, False]
     """
@@ -245,13 +193,5 @@ def is_time(name: str) -> bool:
 
 
 def seconds(values: FloatArray, unit: str) -> FloatArray:
-    """Times in seconds; an unknown unit counts as seconds.
-
-    Parameters
-    ----------
-    values : (n,) ndarray
-        As read.
-    unit : str
-        As the file states it.
-    """
+    """Times in seconds; an unknown unit counts as seconds."""
     return values * _FACTORS.get(unit.strip().strip("[]()"), 1.0)

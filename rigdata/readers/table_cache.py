@@ -31,13 +31,7 @@ class TableCache:
         return TableCache, (self._limit,)  # a worker process starts with an empty one
 
     def get(self, key: tuple[object, ...]) -> Any:
-        """Give the table under `key`, None where it is not kept.
-
-        Parameters
-        ----------
-        key : tuple
-            State of a file, and what of it.
-        """
+        """Give the table under `key`, None where it is not kept."""
         with self._lock:
             table = self._tables.get(key)
             if table is not None:
@@ -45,15 +39,7 @@ class TableCache:
             return table
 
     def put(self, key: tuple[object, ...], table: _Sized) -> None:
-        """Keep `table`, letting go of the longest unused ones.
-
-        Parameters
-        ----------
-        key : tuple
-            State of a file, and what of it.
-        table : Table
-            Parsed columns.
-        """
+        """Keep `table`, letting go of the longest unused ones."""
         with self._lock:
             self._tables[key] = table
             self._tables.move_to_end(key)
@@ -63,15 +49,7 @@ class TableCache:
                 size -= old.nbytes
 
     def dialect(self, key: tuple[object, ...], find: Callable[[], Any]) -> Any:
-        """Give the dialect under `key`, found once.
-
-        Parameters
-        ----------
-        key : tuple
-            State of a file, and what of it.
-        find : callable
-            Finds it where it is not known.
-        """
+        """Give the dialect under `key`, found once."""
         known = self._dialects.get(key)
         if known is None:
             known = find()

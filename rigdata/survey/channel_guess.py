@@ -25,18 +25,7 @@ _SPELT = {"U/min": "rpm", "1/min": "rpm", "min-1": "rpm", "degc": "degC", "C": "
 
 @dataclass(frozen=True)
 class ChannelGuess:
-    """What a channel may be.
-
-    Attributes
-    ----------
-    quantity : str
-        As in the manifest; "" if nothing points to one.
-    unit : str
-        Fit for the manifest; "" if the file states none.
-    axis : str
-        Direction in words of the manifest; "" if the name does not tell.
-    why : str
-    """
+    """What a channel may be."""
 
     quantity: str
     unit: str
@@ -45,13 +34,7 @@ class ChannelGuess:
 
 
 def guess_channel(name: str, unit: str) -> ChannelGuess:
-    """Guess quantity and direction of a channel.
-
-    Parameters
-    ----------
-    name, unit : str
-        As the file has them.
-    """
+    """Guess quantity and direction of a channel."""
     usable = usable_unit(unit)
     if is_time(name):
         return ChannelGuess("time", usable or "s", "", "by its name")
@@ -65,13 +48,7 @@ def guess_channel(name: str, unit: str) -> ChannelGuess:
 
 
 def usable_unit(unit: str) -> str:
-    """Write a logger's unit so that a manifest can hold it; "" if it is none.
-
-    Parameters
-    ----------
-    unit : str
-        As written by the logger or in the manifest.
-    """
+    """Write a logger's unit so that a manifest can hold it; "" if it is none."""
     text = unit.strip().replace("°", "deg").replace("µ", "u").replace("μ", "u")
     text = re.sub(r"\s*/\s*", "/", text)
     text = _SPELT.get(text, text)
@@ -83,13 +60,7 @@ def usable_unit(unit: str) -> str:
 
 
 def quantity_of_unit(unit: str) -> str:
-    """Quantity that an engineering unit belongs to; "" for volts and for nothing known.
-
-    Parameters
-    ----------
-    unit : str
-        As written by the logger or in the manifest.
-    """
+    """Quantity that an engineering unit belongs to; "" for volts and for nothing known."""
     if not unit or _is_signal(unit):
         return ""
     for quantity, dimension in DIMENSIONS.items():

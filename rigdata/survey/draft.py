@@ -38,26 +38,7 @@ _MOST_OF = 0.8
 
 @dataclass(frozen=True)
 class Survey:
-    """What was found in a folder of exports.
-
-    Attributes
-    ----------
-    exports : tuple of str
-        Names of the files, in order.
-    rates : tuple of float
-        Sample rate of each [Hz]; NaN where the file knows no times.
-    channels : dict of str to ChannelGuess
-    runs : tuple of RunGuess
-        One per file.
-    speed_line : float
-        Frequency that stands in every running record [Hz]: perhaps the shaft speed; NaN if none does.
-    clock : str
-        Name of the time column of text files; "" without one.
-    nameless : int
-        Columns of text files that have no names; 0 where they have.
-    per_hertz : dict of str to float
-        Reading per hertz of tachometers in volts, where the speed shows in the probes.
-    """
+    """What was found in a folder of exports."""
 
     exports: tuple[str, ...]
     rates: tuple[float, ...]
@@ -70,14 +51,7 @@ class Survey:
 
 
 def survey(exports: Sequence[Export], given: Mapping[str, ChannelGuess] | None = None) -> Survey:
-    """Guess channels and runs of a folder of exports.
-
-    Parameters
-    ----------
-    exports : sequence of Export
-    given : mapping of str to ChannelGuess, optional
-        What is known of channels by name: its quantity, unit and axis count before every guess.
-    """
+    """Guess channels and runs of a folder of exports."""
     channels: dict[str, ChannelGuess] = {}
     for export in exports:
         for one in export.series:
@@ -188,21 +162,7 @@ def _common_line(exports: Sequence[Export], quantities: dict[str, str], runs: Se
 
 
 def draft_manifest(found: Survey, name: str, bearing: str | None) -> str:
-    """Write the text of a draft.
-
-    Parameters
-    ----------
-    found : Survey
-    name : str
-        Id of the campaign.
-    bearing : str or None
-        File name of the bearing, if one lies in the folder.
-
-    Returns
-    -------
-    str
-        TOML; every place with `MARK` is for the person at the rig.
-    """
+    """Write the text of a draft."""
     lines = [
         "# Draft by `tpjb init`. Places marked ?? only you can know; what is marked (guess) is worth a look.",
         "# After changes to channels, `tpjb init --update` guesses the rest anew; `tpjb check` lists what is left.",
@@ -237,12 +197,7 @@ def draft_manifest(found: Survey, name: str, bearing: str | None) -> str:
 
 
 def channel_blocks(found: Survey) -> dict[str, list[str]]:
-    """Lines of every channel's table; sensors of one kind and unit are described once, the others are `like` it.
-
-    Parameters
-    ----------
-    found : Survey
-    """
+    """Lines of every channel's table; sensors of one kind and unit are described once, the others are `like` it."""
     first: dict[tuple[str, str], str] = {}
     blocks = {}
     for name, guess in found.channels.items():
@@ -286,16 +241,7 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str) -> list[str]:
 
 
 def run_lines(export: str, run: RunGuess, found: Survey) -> list[str]:
-    """Lines of a run's table.
-
-    Parameters
-    ----------
-    export : str
-        Name of its file.
-    run : RunGuess
-    found : Survey
-        Of the folder.
-    """
+    """Lines of a run's table."""
     stem = export.rpartition("/")[2].rpartition(".")[0]
     kind = f'kind = "{MARK}"   # dynamic, dry_pivot, locus, clearance'
     if run.kind:

@@ -20,19 +20,7 @@ MOST_FILES = 5000
 
 @dataclass(frozen=True)
 class Export:
-    """One record file as it was found.
-
-    Attributes
-    ----------
-    name : str
-        Path relative to the folder, with slashes.
-    series : tuple of Series
-        Its channels, each on its own clock.
-    clock : str
-        Name of the time column of a text file; "" without one.
-    nameless : int
-        Columns of a text file without names, which are then ``column1``, ``column2``, ..; 0 where it has names.
-    """
+    """One record file as it was found."""
 
     name: str
     series: tuple[Series, ...] = field(repr=False)
@@ -47,17 +35,7 @@ class Export:
 
 
 def record_files(folder: Path) -> list[Path]:
-    """List files below `folder` that may be records, by suffix, in order of name.
-
-    Parameters
-    ----------
-    folder : Path
-
-    Raises
-    ------
-    RigDataError
-        There are none, or absurdly many.
-    """
+    """List files below `folder` that may be records, by suffix, in order of name."""
     found = records_below(folder)
     if not found:
         others = [p for p in sorted(folder.rglob("*")) if p.is_file() and not p.name.startswith(".")][:1]
@@ -68,17 +46,7 @@ def record_files(folder: Path) -> list[Path]:
 
 
 def records_below(folder: Path) -> list[Path]:
-    """Files below `folder` that may be records, none among them; hidden ones are left alone.
-
-    Parameters
-    ----------
-    folder : Path
-
-    Raises
-    ------
-    RigDataError
-        There are absurdly many.
-    """
+    """Files below `folder` that may be records, none among them; hidden ones are left alone."""
     known = (*TEXT, *FORMATS)
     found = []
     for path in sorted(folder.rglob("*")):
@@ -92,19 +60,7 @@ def records_below(folder: Path) -> list[Path]:
 
 
 def read_export(path: Path, name: str | None = None) -> Export:
-    """Read one record file of any known kind, without a manifest.
-
-    Parameters
-    ----------
-    path : Path
-    name : str or None, optional
-        Display name; default that of the file.
-
-    Raises
-    ------
-    RigDataError
-        It cannot be read; says why.
-    """
+    """Read one record file of any known kind, without a manifest."""
     name = name or path.name
     series = tuple(without_twins(read_foreign(path, name)))
     if path.suffix.lower() not in TEXT:
@@ -126,14 +82,7 @@ def _counts_evenly(one: Series) -> bool:
 
 
 def read_exports(folder: Path, problems: list[Problem]) -> Iterator[Export]:
-    """Read all records of a folder one by one; what cannot be read is noted in `problems` and left out.
-
-    Parameters
-    ----------
-    folder : Path
-    problems : list of Problem
-        What cannot be read is added here.
-    """
+    """Read all records of a folder one by one; what cannot be read is noted in `problems` and left out."""
     for path in record_files(folder):
         try:
             yield read_export(path, path.relative_to(folder).as_posix())

@@ -34,28 +34,7 @@ _BY_NAME = (
 
 @dataclass(frozen=True)
 class RunGuess:
-    """What a record may be.
-
-    Attributes
-    ----------
-    kind : str
-        ``"dynamic"``, ``"dry_pivot"``, ``"locus"``, ``"clearance"``, or "" if nothing tells.
-    why : str
-    lines : tuple of SpectralPeak
-        Strongest lines of forces or displacements, strongest first.
-    load : float
-        Static load [N] that the file's name seems to state; NaN without one.
-    direction : float
-        Of the load on the shaft [deg], by the cells: of its change in load steps, of its mean else; NaN if unknown.
-    pad : int
-        Number of the pad that the file's name states; 0 without one.
-    speed : float
-        Shaft speed [Hz] that a tachometer in engineering units or the file's name states; NaN without one.
-    excitation : float
-        Excitation frequency [Hz] that the file's name states and the record's lines confirm; NaN without one.
-    why_speed : str
-        Where the speed comes from.
-    """
+    """What a record may be."""
 
     kind: str
     why: str
@@ -69,14 +48,7 @@ class RunGuess:
 
 
 def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
-    """Guess what a record is.
-
-    Parameters
-    ----------
-    export : Export
-    channels : mapping of str to ChannelGuess
-        By channel name.
-    """
+    """Guess what a record is."""
     quantities = {name: guess.quantity for name, guess in channels.items()}
     forces = [s for s in export.series if quantities.get(s.name) == "force"]
     moves = [s for s in export.series if quantities.get(s.name) == "displacement"]
@@ -178,12 +150,7 @@ def _slow(series: Series) -> FloatArray:
 
 
 def strongest_lines(series: list[Series]) -> tuple[SpectralPeak, ...]:
-    """Lines of the channel that swings most, strongest first.
-
-    Parameters
-    ----------
-    series : list of Series
-    """
+    """Lines of the channel that swings most, strongest first."""
     best: tuple[SpectralPeak, ...] = ()
     size = 0.0
     for one in series:

@@ -25,20 +25,7 @@ class SpectralPeak:
 
 @dataclass(frozen=True)
 class Look:
-    """What a first look at a channel shows.
-
-    Attributes
-    ----------
-    count : int
-    missing : int
-        Samples without a value.
-    mean, deviation, low, high : float
-        NaN where no sample has a value.
-    frequency, amplitude : (m,) ndarray
-        Spectrum [Hz] and peak amplitude; empty where the rate is unknown or the record is short.
-    lines : tuple of SpectralPeak
-        The strongest ones, strongest first.
-    """
+    """What a first look at a channel shows."""
 
     count: int
     missing: int
@@ -57,15 +44,7 @@ class Look:
 
 
 def look_at(values: FloatArray, rate: float) -> Look:
-    """Take a first look at a channel.
-
-    Parameters
-    ----------
-    values : (n,) ndarray
-        NaN where missing.
-    rate : float
-        Sample rate [Hz]; NaN if unknown.
-    """
+    """Take a first look at a channel."""
     good = np.isfinite(values)
     kept = values[good]
     empty = np.empty(0)
@@ -90,13 +69,6 @@ def amplitude_spectrum(values: FloatArray, rate: float) -> tuple[FloatArray, Flo
     """Peak amplitudes over frequency [Hz], Hann window, straight trend taken off; empty if there is too little.
 
     Gaps are filled in between, which is good enough for a look and for nothing else.
-
-    Parameters
-    ----------
-    values : (n,) ndarray
-        SI; NaN where missing.
-    rate : float
-        [Hz]
     """
     good = np.isfinite(values)
     n = len(values)
@@ -112,17 +84,7 @@ def amplitude_spectrum(values: FloatArray, rate: float) -> tuple[FloatArray, Flo
 
 
 def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> tuple[SpectralPeak, ...]:
-    """Name the strongest peaks that stand out of their neighbourhood; slow drift below four bins is no line.
-
-    Parameters
-    ----------
-    frequency : (m,) ndarray
-        [Hz]
-    amplitude : (m,) ndarray
-        Peak amplitudes, in the unit of the signal.
-    most : int
-        Peaks named at most.
-    """
+    """Name the strongest peaks that stand out of their neighbourhood; slow drift below four bins is no line."""
     found: list[SpectralPeak] = []
     if len(amplitude) < 16:
         return ()

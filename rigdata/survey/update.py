@@ -40,13 +40,7 @@ def _known_channels(text: str) -> dict[str, ChannelGuess]:
 
 
 def column_names(text: str) -> tuple[str, ...]:
-    """Names that a manifest gives to the columns of files that have none.
-
-    Parameters
-    ----------
-    text : str
-        Of the manifest.
-    """
+    """Names that a manifest gives to the columns of files that have none."""
     try:
         names = tomllib.loads(text).get("csv", {}).get("names", ())
     except (tomllib.TOMLDecodeError, AttributeError):
@@ -63,19 +57,6 @@ def updated_manifest(text: str, exports: Sequence[Export]) -> tuple[str, list[st
     """Carry a manifest on: runs for new records, entries that a named channel lacks, guesses made anew.
 
     An entry counts as a guess while it holds what `tpjb init` had guessed; one that was changed by hand stays.
-
-    Parameters
-    ----------
-    text : str
-        Of the manifest.
-    exports : sequence of Export
-        All records of the folder.
-
-    Returns
-    -------
-    text : str
-    changes : list of str
-        One sentence each.
     """
     given = _known_channels(text)
     before, after = survey(exports), survey(exports, given)
@@ -187,15 +168,7 @@ def _values(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
 
 
 def renamed(export: Export, names: Sequence[str]) -> Export:
-    """An export whose nameless columns bear the names of the manifest.
-
-    Parameters
-    ----------
-    export : Export
-        With channels ``column1``, ``column2``, ..
-    names : sequence of str
-        One per column.
-    """
+    """An export whose nameless columns bear the names of the manifest."""
 
     def name(old: str) -> str:
         number = old.removeprefix("column")

@@ -15,16 +15,7 @@ UPPER = 0.3  # sine of a pivot's angle above which its pad counts as an upper on
 
 
 def dry_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> RunPhysics:
-    """Physics of a dry pivot test: position along the pad = clearance + deflection under the load on the pivot.
-
-    Parameters
-    ----------
-    run : PlannedRun
-    truth : RigTruth
-    noise : Noise
-    seed : int
-        Of the random numbers.
-    """
+    """Physics of a dry pivot test: position along the pad = clearance + deflection under the load on the pivot."""
     test = run.test
     if not isinstance(test, DryTest) or run.direction is None:
         raise VirtualRigError(f"run {run.id} is not a dry pivot test")
@@ -56,14 +47,7 @@ def dry_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Ru
 
 
 def load_history(test: DryTest, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Time (n,) [s] and load (n,) [N] of a dry test: ramps and holds.
-
-    Parameters
-    ----------
-    test : DryTest
-    rate : float
-        [Hz]
-    """
+    """Time (n,) [s] and load (n,) [N] of a dry test: ramps and holds."""
     knots, level, held = [0.0], [test.start], []
     rising = list(zip(test.levels, test.holds))
     order = {"up": rising, "down": rising[::-1], "cycle": rising + rising[-2::-1]}[test.branch]
@@ -93,13 +77,6 @@ def held_back(load: FloatArray, friction: float) -> FloatArray:
 
     The play operator: going up the pivot feels (1 - friction) of the load, going down (1 + friction), and on
     reversal it waits until the load has crossed that gap.
-
-    Parameters
-    ----------
-    load : (n,) ndarray
-        [N]
-    friction : float
-        Dry friction over force.
     """
     if friction == 0.0:
         return load
@@ -122,16 +99,7 @@ def _cold(truth: RigTruth) -> FloatArray:
 
 
 def clearance_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> RunPhysics:
-    """Physics of a clearance sweep.
-
-    Parameters
-    ----------
-    run : PlannedRun
-    truth : RigTruth
-    noise : Noise
-    seed : int
-        Of the random numbers.
-    """
+    """Physics of a clearance sweep."""
     sweep = run.test
     if not isinstance(sweep, ClearanceSweep):
         raise VirtualRigError(f"run {run.id} is not a clearance sweep")
@@ -152,18 +120,6 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
     of the load and gives by its own law. It slides along a pad's side to the next corner when the load has
     passed that pad by `lag`, over about `width` (friction). On its way that pad alone carries, push times the cosine
     of the angle between them: there the side stands at clearance + deflection(that).
-
-    Parameters
-    ----------
-    truth : RigTruth
-    push : float
-        [N]
-    direction : (n,) ndarray
-        Of the load [rad].
-    lag : float
-        By which the shaft follows late [rad].
-    width : float
-        Over which a corner is rounded [rad].
     """
     pads = _sides(truth)
     normals = np.array([[np.cos(truth.pivot_angles[k]), np.sin(truth.pivot_angles[k])] for k in pads])
@@ -193,12 +149,7 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
 
 
 def corners(truth: RigTruth) -> FloatArray:
-    """Corners (n_sides, 2) [m] of the cold polygon without load, counter-clockwise.
-
-    Parameters
-    ----------
-    truth : RigTruth
-    """
+    """Corners (n_sides, 2) [m] of the cold polygon without load, counter-clockwise."""
     pads = _sides(truth)
     return np.array([_corner(truth, k, pads[(i + 1) % len(pads)]) for i, k in enumerate(pads)])
 

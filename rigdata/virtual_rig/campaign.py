@@ -35,29 +35,7 @@ def write_campaign(
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> CampaignTruth:
-    """Write a campaign in the `tpjb-rig/1` format.
-
-    Parameters
-    ----------
-    out : path
-        The HDF5 file, or the folder, to make. Its parent must exist.
-    rig : VirtualRig
-    layout : CsvLayout, Hdf5Layout or str
-        Or a name out of `layout.LAYOUTS`: "hdf5", "csv", "csv-german", "csv-tabbed", "csv-bare".
-    overwrite : bool
-        Replace an existing campaign; anything else is never replaced.
-    progress : callable(done, total, run id), optional
-
-    Returns
-    -------
-    CampaignTruth
-        What was really put in. It is not part of the campaign: write it elsewhere.
-
-    Raises
-    ------
-    VirtualRigError
-        The plan, the truth or the target cannot be used; then nothing has been written.
-    """
+    """Write a campaign in the `tpjb-rig/1` format."""
     target = Path(out)
     chosen = layout_named(layout)
     _check_target(target, chosen, overwrite)

@@ -66,23 +66,7 @@ NEEDS_TIME = {"time_jitter"}
 
 @dataclass(frozen=True)
 class Fault:
-    """One defect.
-
-    Attributes
-    ----------
-    kind : str
-        One of `KINDS`, which says what each does.
-    run : str
-        Run id or pattern (``"d-05000-*"``); ``"*"`` is every run.
-    channel : str or None
-        Channel name or pattern, for faults of one channel.
-    value : float or None
-        See `KINDS`.
-    start, length : float
-        [s] from the record's start; `length` defaults to the record's end.
-    other : str or None
-        The other channel or run.
-    """
+    """One defect."""
 
     kind: str
     run: str = "*"
@@ -109,31 +93,14 @@ class Fault:
         return KINDS[self.kind][0]
 
     def strikes(self, run: str, channel: str | None = None) -> bool:
-        """Whether it concerns a run, and a channel of it.
-
-        Parameters
-        ----------
-        run : str
-            Run id.
-        channel : str or None, optional
-            Channel name; None for the run as a whole.
-        """
+        """Whether it concerns a run, and a channel of it."""
         return fnmatchcase(run, self.run) and (
             channel is None or self.channel is None or fnmatchcase(channel, self.channel)
         )
 
 
 def check_faults(faults: Iterable[Fault], runs: Iterable[str], channels: Iterable[str]) -> None:
-    """Refuse faults that would strike nothing: a campaign must hold what was asked for.
-
-    Parameters
-    ----------
-    faults : iterable of Fault
-    runs : iterable of str
-        Run ids.
-    channels : iterable of str
-        Channel names.
-    """
+    """Refuse faults that would strike nothing: a campaign must hold what was asked for."""
     runs, channels = list(runs), list(channels)
     for fault in faults:
         if not any(fnmatchcase(run, fault.run) for run in runs):
@@ -146,15 +113,7 @@ def check_faults(faults: Iterable[Fault], runs: Iterable[str], channels: Iterabl
 
 
 def faulty_instruments(instruments: Instruments, faults: Iterable[Fault], run: str) -> Instruments:
-    """Instruments of one run, with the faults of its sensors.
-
-    Parameters
-    ----------
-    instruments : Instruments
-    faults : iterable of Fault
-    run : str
-        Run id.
-    """
+    """Instruments of one run, with the faults of its sensors."""
     sensors = list(instruments.sensors)
     for fault in faults:
         for i, sensor in enumerate(sensors):
@@ -182,17 +141,7 @@ def spoil_record(
     run: str,
     rng: np.random.Generator,
 ) -> Readings:
-    """Readings with the record faults of this run; the given ones stay as they are.
-
-    Parameters
-    ----------
-    readings : Readings
-    instruments : Instruments
-    faults : iterable of Fault
-    run : str
-        Run id.
-    rng : numpy.random.Generator
-    """
+    """Readings with the record faults of this run; the given ones stay as they are."""
     columns = dict(readings.columns)
     time = readings.time
     for fault in faults:

@@ -17,21 +17,7 @@ STANDARD_GRAVITY = 9.80665
 
 @dataclass(frozen=True)
 class SensorError:
-    """How a sensor departs from its stated calibration.
-
-    Attributes
-    ----------
-    gain : float
-        Readings are this factor times the truth.
-    angle : float
-        The sensor really stands at its stated axis + this [rad].
-    cross : float
-        Fraction of the other sensor's axis (of the same quantity) that it also reads.
-    delay : float
-        It is recorded this much late [s].
-    offset : float
-        Added to the quantity [SI].
-    """
+    """How a sensor departs from its stated calibration."""
 
     gain: float = 1.0
     angle: float = 0.0
@@ -42,31 +28,7 @@ class SensorError:
 
 @dataclass(frozen=True)
 class Sensor:
-    """One channel.
-
-    Attributes
-    ----------
-    name : str
-    quantity : {"displacement", "force", "acceleration", "temperature", "speed"}
-    unit : str
-        Of the readings, as in the manifest.
-    scale : float
-        Reading per SI unit (per K from 0 degC for temperatures).
-    axis : float or None
-        Stated direction [rad].
-    polarity : {1, -1}
-    zero : float
-        Reading when the quantity is zero: the gap voltage of a probe.
-    span : float
-        The converter takes readings from -span to +span.
-    stated : tuple of (str, str)
-        Further manifest entries: sensitivity, full scale, excitation, ...
-    uncertainty : float
-        Stated, relative, one standard deviation; 0 where none is stated.
-    pad : int or None
-        Of a temperature sensor, 1 for pad #1.
-    error : SensorError
-    """
+    """One channel."""
 
     name: str
     quantity: str
@@ -83,16 +45,7 @@ class Sensor:
 
     @classmethod
     def probe(cls, name: str, axis: float, gap_voltage: float = 8.0) -> Sensor:
-        """Eddy-current probe of 7.78 mV/um: the reading falls as the shaft comes nearer.
-
-        Parameters
-        ----------
-        name : str
-        axis : float
-            Direction [rad].
-        gap_voltage : float, optional
-            Reading at the centre [V].
-        """
+        """Eddy-current probe of 7.78 mV/um: the reading falls as the shaft comes nearer."""
         stated = (("sensitivity", "7.78 mV/um"),)
         return cls(
             name, "displacement", "V", 7.78e3, axis, polarity=-1, zero=gap_voltage, stated=stated, uncertainty=0.005
@@ -100,53 +53,25 @@ class Sensor:
 
     @classmethod
     def load_cell(cls, name: str, axis: float) -> Sensor:
-        """Strain-gauge cell of 20 kN in a bridge: 2 mV/V at full scale, supplied with 5 V.
-
-        Parameters
-        ----------
-        name : str
-        axis : float
-            Direction [rad].
-        """
+        """Strain-gauge cell of 20 kN in a bridge: 2 mV/V at full scale, supplied with 5 V."""
         stated = (("sensitivity", "2.0 mV/V"), ("full_scale", "20 kN"), ("excitation", "5 V"))
         return cls(name, "force", "mV", 10.0 / 20e3, axis, span=10.0, stated=stated, uncertainty=0.002)
 
     @classmethod
     def accelerometer(cls, name: str, axis: float) -> Sensor:
-        """Accelerometer of 10 mV/g on a converter of 0.05 V.
-
-        Parameters
-        ----------
-        name : str
-        axis : float
-            Direction [rad].
-        """
+        """Accelerometer of 10 mV/g on a converter of 0.05 V."""
         stated = (("sensitivity", "10 mV/g"),)
         return cls(name, "acceleration", "V", 10.0 * 1e-3 / STANDARD_GRAVITY, axis, span=0.05, stated=stated)
 
     @classmethod
     def thermometer(cls, name: str, pad: int) -> Sensor:
-        """Pt100 with its amplifier, at three quarters of a pad's arc.
-
-        Parameters
-        ----------
-        name : str
-        pad : int
-            From 1.
-        """
+        """Pt100 with its amplifier, at three quarters of a pad's arc."""
         stated = (("position", "0.75"), ("sensitivity", "15 K/V"), ("zero", "0 degC"))
         return cls(name, "temperature", "V", 1 / 15.0, stated=stated, pad=pad)
 
     @classmethod
     def tachometer(cls, name: str, mv_per_hz: float = 100.0) -> Sensor:
-        """Speed as a voltage.
-
-        Parameters
-        ----------
-        name : str
-        mv_per_hz : float, optional
-            [mV/Hz]
-        """
+        """Speed as a voltage."""
         stated = (("sensitivity", f"{mv_per_hz:g} mV/Hz"),)
         return cls(name, "speed", "V", mv_per_hz * 1e-3 / hz(1.0), stated=stated)
 
@@ -167,19 +92,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Instruments:
-    """All sensors, and the housing between film and cells.
-
-    Attributes
-    ----------
-    sensors : tuple of Sensor
-        Sensors of a vector quantity come in pairs, one after the other.
-    housing_mass : float
-        Stated [kg].
-    housing_mass_error : float
-        True mass minus stated mass [kg].
-    cell_stiffness : (float, float)
-        The housing stands on these springs, along X and Y [N/m]; infinite is allowed.
-    """
+    """All sensors, and the housing between film and cells."""
 
     sensors: tuple[Sensor, ...] = field(repr=False)
     housing_mass: float = 30.0
@@ -202,12 +115,6 @@ class Instruments:
 
         With a `seed`, gap voltages and the zeros of accelerometers and Pt100s are drawn; without, the probes
         stand at 8 V and everything else is at zero.
-
-        Parameters
-        ----------
-        n_pads : int, optional
-        seed : int or None, optional
-            Draws the gains from their uncertainties; None leaves them exact.
         """
         rng = None if seed is None else np.random.default_rng([seed, 0])
         gaps = (8.0, 8.0) if rng is None else tuple(rng.normal(8.0, 0.2, 2))
@@ -233,35 +140,18 @@ class Instruments:
         return self.housing_mass + self.housing_mass_error
 
     def of(self, quantity: str) -> tuple[Sensor, ...]:
-        """All sensors of a quantity.
-
-        Parameters
-        ----------
-        quantity : str
-            ``"displacement"``, ``"force"`` or ``"acceleration"``.
-        """
+        """All sensors of a quantity."""
         return tuple(sensor for sensor in self.sensors if sensor.quantity == quantity)
 
     def named(self, name: str) -> Sensor:
-        """Look up one sensor by its channel name.
-
-        Parameters
-        ----------
-        name : str
-        """
+        """Look up one sensor by its channel name."""
         for sensor in self.sensors:
             if sensor.name == name:
                 return sensor
         raise VirtualRigError(f"no channel {name!r}; there are {[s.name for s in self.sensors]}")
 
     def partner(self, sensor: Sensor) -> Sensor:
-        """Find the other sensor of its pair.
-
-        Parameters
-        ----------
-        sensor : Sensor
-            One of two of its quantity.
-        """
+        """Find the other sensor of its pair."""
         family = [s.name for s in self.of(sensor.quantity)]
         return self.named(family[family.index(sensor.name) ^ 1])
 
@@ -278,21 +168,7 @@ class Instruments:
         channel_delay: float = 0.0,
         mass_error: float = 0.0,
     ) -> Instruments:
-        """Add measurement effects by their canonical names and meanings (physics.md).
-
-        Parameters
-        ----------
-        probe_gain, loadcell_gain : float
-            Readings are this factor times the truth.
-        probe_rotation : float
-            Both probes really stand at their stated angle + this [rad].
-        loadcell_crosstalk : float
-            Each cell also reads this fraction of the other axis.
-        channel_delay : float
-            Displacement channels are recorded this much later than the others [s].
-        mass_error : float
-            True housing mass = stated mass + this [kg].
-        """
+        """Add measurement effects by their canonical names and meanings (physics.md)."""
 
         def changed(sensor: Sensor) -> Sensor:
             error = sensor.error

@@ -9,25 +9,7 @@ from rigdata.virtual_rig.truth import VirtualRigError
 
 @dataclass(frozen=True)
 class CsvLayout:
-    """Folder with `campaign.toml` and one CSV file per record.
-
-    Attributes
-    ----------
-    delimiter, decimal, encoding, newline : str
-    preamble : tuple of str
-        Lines above the column names; ``{rate}`` and ``{count}`` stand for sample rate [Hz] and row count.
-    units_line : bool
-        Whether a line of units follows the names.
-    time_name : str or None
-        Name of the time column; None: no such column.
-    missing : str
-        How a missing value is written.
-    trailing_delimiter : bool
-        A delimiter at the end of every line.
-    blank_last_lines : int
-    declared : bool
-        Whether the manifest says all this; otherwise the reader has to find out.
-    """
+    """Folder with `campaign.toml` and one CSV file per record."""
 
     delimiter: str = ","
     decimal: str = "."
@@ -93,17 +75,7 @@ class CsvLayout:
 
 @dataclass(frozen=True)
 class Hdf5Layout:
-    """One HDF5 file, a group per run, a dataset per channel.
-
-    Attributes
-    ----------
-    precision : {"float32", "float64"} or None
-        None: float32, which holds 16-bit readings exactly; float64 where the converter is switched off.
-    compression : int
-        gzip level, 0 for none.
-    time_name : str or None
-        Name of a dataset of times; None: only the sample rate is stored.
-    """
+    """One HDF5 file, a group per run, a dataset per channel."""
 
     precision: str | None = None
     compression: int = 4
@@ -126,12 +98,7 @@ LAYOUTS: dict[str, Layout] = {
 
 
 def layout_named(layout: str | Layout) -> Layout:
-    """Layout by its name; one that is already a layout is returned as it is.
-
-    Parameters
-    ----------
-    layout : str or Layout
-    """
+    """Layout by its name; one that is already a layout is returned as it is."""
     if not isinstance(layout, str):
         return layout
     if layout not in LAYOUTS:

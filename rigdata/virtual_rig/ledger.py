@@ -23,30 +23,7 @@ PIVOT_LOADS = np.arange(250.0, 8001.0, 250.0)
 
 @dataclass(frozen=True)
 class CampaignTruth:
-    """What was really put into a campaign.
-
-    Attributes
-    ----------
-    campaign : str
-    seed : int
-    points : tuple of mapping
-        Per dynamic set point: K, C (rows [[xx, xy], [yx, yy]]), K_apparent and C_apparent (what instrument
-        errors make of them), x_m, y_m, pad_temperature_C. At the set point, not at the point really run.
-    locus : tuple of mapping
-        static_load_N, static_load_direction_deg, x_m, y_m.
-    pivot_curves : tuple of mapping
-        pad, force_N, deflection_m, stiffness_N_per_m (tangent).
-    clearance_cold_m : tuple of float
-    gap_voltage_V : mapping of str to float
-        Reading of each probe with the shaft in the bearing centre.
-    housing_mass_kg : float
-        The true one.
-    cell_stiffness_N_per_m : tuple of float
-    sensor_errors : mapping of str to mapping
-    faults : tuple of mapping
-    runs : mapping of str to mapping
-        Per record: the point really run, force and displacement phasors, glitches.
-    """
+    """What was really put into a campaign."""
 
     campaign: str
     seed: int
@@ -66,12 +43,7 @@ class CampaignTruth:
         return {"schema": "tpjb-truth/1", **asdict(self)}
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write as JSON, whole or not at all; never into the campaign itself. What is infinite becomes null.
-
-        Parameters
-        ----------
-        path : str or path-like
-        """
+        """Write as JSON, whole or not at all; never into the campaign itself. What is infinite becomes null."""
         target = Path(path)
         spare = target.with_name(f".{target.name}.part")
         spare.write_text(json.dumps(_finite(self.to_dict()), indent=1, allow_nan=False), encoding="utf-8")
@@ -90,14 +62,7 @@ def _finite(value: object) -> object:
 
 
 def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) -> CampaignTruth:
-    """Gather the truth of a rig and of its simulated runs.
-
-    Parameters
-    ----------
-    rig : VirtualRig
-    runs : mapping of str to mapping
-        Facts of every record, by run id.
-    """
+    """Gather the truth of a rig and of its simulated runs."""
     cells = rig.instruments.cell_stiffness
     return CampaignTruth(
         campaign=rig.campaign,
@@ -116,12 +81,7 @@ def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) ->
 
 
 def run_facts(record: SimulatedRun) -> dict[str, object]:
-    """Facts of one record for the truth.
-
-    Parameters
-    ----------
-    record : SimulatedRun
-    """
+    """Facts of one record for the truth."""
     return {
         "kind": record.run.kind,
         "recorded_in": record.source,
@@ -187,14 +147,6 @@ def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instrumen
 
     Instrument errors are linear maps, so this needs no records: the difference to the truth is what the errors alone
     do, and a sharp test of whoever evaluates the records.
-
-    Parameters
-    ----------
-    h : (2, 2) complex ndarray
-        Dynamic stiffness [N/m].
-    frequency : float
-        [rad/s]
-    instruments : Instruments
     """
     lines = [answer(frequency, force, h, instruments) for force in np.eye(2, dtype=complex)]
     seen = {}

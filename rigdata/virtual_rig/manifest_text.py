@@ -22,20 +22,7 @@ def manifest_text(
     layout: Layout,
     faults: Iterable[Fault] = (),
 ) -> str:
-    """Write the manifest (`tpjb-rig/1`).
-
-    Parameters
-    ----------
-    header : dict
-        id, bearing (file name) and description.
-    instruments : Instruments
-        Only what is stated of them is written.
-    runs : sequence of PlannedRun
-        In the order of the test.
-    layout : Layout
-    faults : iterable of Fault
-        The "wrong_..." faults of runs change what stands here.
-    """
+    """Write the manifest (`tpjb-rig/1`)."""
     common = max({run.rate for run in runs}, key=[run.rate for run in runs].count)
     blocks = [
         _table(None, {"schema": "tpjb-rig/1", **header}),

@@ -47,21 +47,7 @@ class Motion(Protocol):
 
 @dataclass(frozen=True)
 class MotionLine:
-    """One spectral line, phasors of exp(+i omega t).
-
-    Attributes
-    ----------
-    frequency : float
-        [rad/s]
-    oil_force : (2,) complex
-        What the film puts on the housing [N].
-    displacement : (2,) complex
-        Shaft relative to housing [m].
-    cell_force : (2,) complex
-        What the housing puts on the cells [N].
-    acceleration : (2,) complex
-        Of the housing [m/s^2].
-    """
+    """One spectral line, phasors of exp(+i omega t)."""
 
     frequency: float
     oil_force: ComplexArray
@@ -70,32 +56,13 @@ class MotionLine:
     acceleration: ComplexArray
 
     def phasor(self, quantity: str) -> ComplexArray:
-        """Phasor (2,) of a measured quantity.
-
-        Parameters
-        ----------
-        quantity : str
-            ``"displacement"``, ``"force"`` or ``"acceleration"``.
-        """
+        """Phasor (2,) of a measured quantity."""
         return self.cell_force if quantity == "force" else getattr(self, quantity)
 
 
 @dataclass(frozen=True)
 class SteadyMotion:
-    """A mean state with spectral lines on it.
-
-    Attributes
-    ----------
-    position, load : (2,) ndarray
-        Mean shaft position [m] and mean force on the housing [N].
-    lines : tuple of MotionLine
-    temperature : (n_pads,) ndarray
-        [degC]
-    speed : float
-        [rad/s]
-    surface : (n_orders,) complex
-        Runout of the shaft's surface at 1X, 2X, ... [m], phase at time 0.
-    """
+    """A mean state with spectral lines on it."""
 
     position: FloatArray
     load: FloatArray
@@ -105,15 +72,7 @@ class SteadyMotion:
     surface: ComplexArray
 
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
-        """See `Motion`.
-
-        Parameters
-        ----------
-        quantity : str
-            ``"displacement"``, ``"force"``, ..
-        time : (n,) ndarray
-            [s]
-        """
+        """See `Motion`."""
         mean = {"displacement": self.position, "force": self.load}.get(quantity, np.zeros(2))
         out = np.broadcast_to(mean, (len(time), 2)).copy()
         for line in self.lines:
@@ -123,15 +82,7 @@ class SteadyMotion:
         return out
 
     def runout(self, axis: float, time: FloatArray) -> FloatArray:
-        """See `Motion`. A point of the surface passes the probe at `axis` that much later.
-
-        Parameters
-        ----------
-        axis : float
-            Direction of the probe [rad].
-        time : (n,) ndarray
-            [s]
-        """
+        """See `Motion`. A point of the surface passes the probe at `axis` that much later."""
         out = np.zeros(len(time))
         for order, phasor in enumerate(self.surface, 1):
             out += (phasor * np.exp(1j * order * (self.speed * time - axis))).real
@@ -140,17 +91,7 @@ class SteadyMotion:
 
 @dataclass(frozen=True)
 class SlowMotion:
-    """A quasi-static test, given on a time grid: no accelerations, no rotation.
-
-    Attributes
-    ----------
-    time : (n,) ndarray
-        [s]
-    position, load : (n, 2) ndarray
-        Shaft position [m] and force on the housing [N].
-    temperature : (n_pads,) ndarray
-        [degC]
-    """
+    """A quasi-static test, given on a time grid: no accelerations, no rotation."""
 
     time: FloatArray
     position: FloatArray
@@ -159,15 +100,7 @@ class SlowMotion:
     speed: float = 0.0
 
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
-        """See `Motion`.
-
-        Parameters
-        ----------
-        quantity : str
-            ``"displacement"``, ``"force"``, ..
-        time : (n,) ndarray
-            [s]
-        """
+        """See `Motion`."""
         if quantity == "acceleration":
             return np.zeros((len(time), 2))
         values = self.position if quantity == "displacement" else self.load
@@ -176,30 +109,13 @@ class SlowMotion:
         return np.stack([np.interp(time, self.time, column) for column in values.T], axis=1)
 
     def runout(self, axis: float, time: FloatArray) -> FloatArray:
-        """See `Motion`: the shaft stands still, its runout is part of the gap voltage.
-
-        Parameters
-        ----------
-        axis : float
-            Direction of the probe [rad].
-        time : (n,) ndarray
-            [s]
-        """
+        """See `Motion`: the shaft stands still, its runout is part of the gap voltage."""
         return np.zeros(len(time))
 
 
 @dataclass(frozen=True)
 class RunPhysics:
-    """A run as it really was.
-
-    Attributes
-    ----------
-    time : (n,) ndarray
-        Of the samples [s].
-    motion : Motion
-    facts : mapping
-        What a truth file tells of the run: plain numbers, strings and lists.
-    """
+    """A run as it really was."""
 
     time: FloatArray = field(repr=False)
     motion: Motion = field(repr=False)

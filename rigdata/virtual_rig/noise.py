@@ -17,19 +17,7 @@ from rigdata.virtual_rig.truth import VirtualRigError
 
 @dataclass(frozen=True)
 class ChannelNoise:
-    """Noise of one quantity, in its SI unit (K for temperatures).
-
-    Attributes
-    ----------
-    white : float
-        Root mean square per sample.
-    flicker : float
-        1/f noise: amplitude density at 1 Hz [per sqrt(Hz)].
-    mains : float
-        Amplitude of the pick-up at the mains frequency.
-    drift : float
-        Slow drift within a record: standard deviation of its value at the record's end against the start.
-    """
+    """Noise of one quantity, in its SI unit (K for temperatures)."""
 
     white: float = 0.0
     flicker: float = 0.0
@@ -41,26 +29,13 @@ class ChannelNoise:
             raise VirtualRigError(f"noise must be finite and not negative: {self}")
 
     def scaled(self, factor: float) -> ChannelNoise:
-        """Return the same noise, `factor` times as strong.
-
-        Parameters
-        ----------
-        factor : float
-        """
+        """Return the same noise, `factor` times as strong."""
         return ChannelNoise(*(getattr(self, f.name) * factor for f in fields(self)))
 
 
 @dataclass(frozen=True)
 class ShaftDefects:
-    """What the turning shaft adds.
-
-    Attributes
-    ----------
-    runout : tuple of float
-        Surface runout at 1X, 2X, ..., amplitude [m]; only the probes see it.
-    unbalance : float
-        Mass times eccentricity [kg m]: a force m e Omega^2 turning with the shaft, answered by the bearing.
-    """
+    """What the turning shaft adds."""
 
     runout: tuple[float, ...] = ()
     unbalance: float = 0.0
@@ -68,17 +43,7 @@ class ShaftDefects:
 
 @dataclass(frozen=True)
 class ActuatorDefects:
-    """What the actuators do beside the command.
-
-    Attributes
-    ----------
-    harmonics : tuple of float
-        2nd, 3rd, ... harmonic as fractions of the commanded amplitude.
-    scatter : float
-        Relative scatter of the amplitude, one standard deviation.
-    cross_talk : float
-        Force across the commanded direction, with a phase of its own, as a fraction, root mean square.
-    """
+    """What the actuators do beside the command."""
 
     harmonics: tuple[float, ...] = ()
     scatter: float = 0.0
@@ -87,20 +52,7 @@ class ActuatorDefects:
 
 @dataclass(frozen=True)
 class SetPointMiss:
-    """By how much a run misses its set point, standard deviations.
-
-    Attributes
-    ----------
-    load : float
-        Relative.
-    direction : float
-        [rad]
-    speed : float
-        Relative.
-    stiffness_follows, position_follows : bool
-        Whether the truth is asked at the point that was really run, or at the set point. The mean force, the load's
-        direction and the 1X frequency always are those of the point really run.
-    """
+    """By how much a run misses its set point, standard deviations."""
 
     load: float = 0.0
     direction: float = 0.0
@@ -111,17 +63,7 @@ class SetPointMiss:
 
 @dataclass(frozen=True)
 class Glitches:
-    """Bursts in which a displacement or force channel stands off by a constant.
-
-    Attributes
-    ----------
-    share : float
-        Share of the running records that have one (a second one with the same probability again).
-    shortest, longest : int
-        Samples.
-    displacement, force : float
-        Largest size [m], [N]; sizes are between 0.4 and 1 times this, either sign.
-    """
+    """Bursts in which a displacement or force channel stands off by a constant."""
 
     share: float = 0.0
     shortest: int = 3
@@ -136,25 +78,7 @@ class Glitches:
 
 @dataclass(frozen=True)
 class DryImperfections:
-    """What goes wrong in dry tests.
-
-    Attributes
-    ----------
-    direction : (float, float)
-        The load is off the pad's direction by an angle between these, either sign [rad].
-    side : (float, float)
-        The shaft also moves sideways by a fraction of the radial deflection between these, either sign.
-    side_start : float
-        Sideways position at no load, standard deviation [m].
-    friction : float
-        Fraction of the force that friction holds back (up) or keeps on (down).
-    contact_gap : (float, float)
-        On upper pads this much contact is missing at no load [m], gone with exp(-F / contact_load).
-    contact_load : float
-        [N]
-    push_scatter : float
-        Relative scatter of the swept load's set point in the clearance test, one standard deviation.
-    """
+    """What goes wrong in dry tests."""
 
     direction: tuple[float, float] = (0.0, 0.0)
     side: tuple[float, float] = (0.0, 0.0)
@@ -167,23 +91,7 @@ class DryImperfections:
 
 @dataclass(frozen=True)
 class Noise:
-    """All disturbances of a campaign.
-
-    Attributes
-    ----------
-    displacement, force, acceleration, temperature, speed : ChannelNoise
-    mains_frequency, mains_scatter : float
-        [Hz] and its standard deviation from run to run.
-    mains_harmonics : tuple of float
-        Pick-up at 2, 3, ... times the mains frequency, relative to the first.
-    shaft : ShaftDefects
-    actuators : ActuatorDefects
-    set_point : SetPointMiss
-    glitches : Glitches
-    dry : DryImperfections
-    bits : int or None
-        Of the converter; None: no steps, and nothing saturates.
-    """
+    """All disturbances of a campaign."""
 
     displacement: ChannelNoise = ChannelNoise()
     force: ChannelNoise = ChannelNoise()
@@ -236,12 +144,7 @@ class Noise:
         )
 
     def scaled(self, factor: float) -> Noise:
-        """Return it with the channels' noise `factor` times as strong; shaft, actuators, dry tests as they are.
-
-        Parameters
-        ----------
-        factor : float
-        """
+        """Return it with the channels' noise `factor` times as strong; shaft, actuators, dry tests as they are."""
         names = ("displacement", "force", "acceleration", "temperature", "speed")
         return replace(self, **{name: getattr(self, name).scaled(factor) for name in names})
 
@@ -251,15 +154,5 @@ PURPOSES = ("physics", "noise", "mains", "glitches", "dry", "faults", "campaign"
 
 
 def stream(seed: int, run: str, purpose: str) -> np.random.Generator:
-    """Generator for one run (by its id) and purpose; the same for the same arguments, on every machine.
-
-    Parameters
-    ----------
-    seed : int
-        Of the random numbers.
-    run : str
-        Run id.
-    purpose : str
-        What the numbers are for.
-    """
+    """Generator for one run (by its id) and purpose; the same for the same arguments, on every machine."""
     return np.random.default_rng([seed, crc32(run.encode()), PURPOSES.index(purpose)])

@@ -16,26 +16,7 @@ DOWNWARD = -pi / 2
 
 @dataclass(frozen=True)
 class DryTest:
-    """Load steps toward one pad, no oil, no rotation.
-
-    Attributes
-    ----------
-    pad : int
-        1 for pad #1.
-    levels : tuple of float
-        Load of each step, rising [N].
-    hold : float or tuple of float
-        How long each step is held [s]; one value, or one per level in rising order.
-    ramp : float
-        From one level to the next [s].
-    start : float
-        Load before the first step (after the last, going down) [N].
-    branch : {"up", "down", "cycle"}
-    overshoot : float
-        The load overshoots each step by this fraction of it, gone within some tenths of a second.
-    load_drift : float
-        Relative change of the load during a hold [1/s]: leakage of the hydraulics is negative.
-    """
+    """Load steps toward one pad, no oil, no rotation."""
 
     pad: int
     levels: tuple[float, ...] = tuple(500.0 * (i + 1) for i in range(10))
@@ -64,20 +45,7 @@ class DryTest:
 
 @dataclass(frozen=True)
 class ClearanceSweep:
-    """A small load swept once around, no oil, no rotation.
-
-    Attributes
-    ----------
-    push : float
-        [N]
-    seconds : float
-        For one turn.
-    start : float
-        First direction of the load [rad].
-    slide_lag, slide_width : float
-        The shaft slides from one corner of the polygon to the next when the load has passed the pad between
-        them by this angle, over about this angle [rad]: friction.
-    """
+    """A small load swept once around, no oil, no rotation."""
 
     push: float = 200.0
     seconds: float = 20.0
@@ -106,26 +74,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """One run of the plan.
-
-    Attributes
-    ----------
-    id : str
-    kind : {"dynamic", "locus", "dry_pivot", "clearance"}
-    rate : float
-        [Hz]
-    point : OperatingPoint or None
-        Set point; None in dry tests.
-    direction : float or None
-        Of the excitation, or of the load in a dry test [rad].
-    lines : tuple of (float, float)
-        What the actuators excite: frequency [rad/s] and amplitude [N].
-    record : str
-        Id of the run whose record this is: runs at several frequencies can share one.
-    test : DryTest or ClearanceSweep or None
-    seconds : float
-        Record length of a running test.
-    """
+    """One run of the plan."""
 
     id: str
     kind: Literal["dynamic", "locus", "dry_pivot", "clearance"]
@@ -140,26 +89,7 @@ class PlannedRun:
 
 @dataclass(frozen=True)
 class RigPlan:
-    """A whole test series.
-
-    Attributes
-    ----------
-    dynamic : tuple of OperatingPoint
-        Set points with their excitation frequency.
-    directions : tuple of float
-        Excitation directions at every one of them [rad].
-    dynamic_fraction : float
-        Dynamic load / static load.
-    repeats : int
-        Records per point and direction.
-    joint_frequencies : bool
-        Excite all frequencies of one load and speed at once, in one record, the root mean square kept: each
-        line gets 1/sqrt(n) of the amplitude, and the runs of the n frequencies share the record.
-    locus : tuple of OperatingPoint
-    dry : tuple of DryTest
-    clearance : tuple of ClearanceSweep
-    timing : Timing
-    """
+    """A whole test series."""
 
     dynamic: tuple[OperatingPoint, ...] = ()
     directions: tuple[float, ...] = tuple(radians(30.0 * i) for i in range(6))
@@ -194,13 +124,7 @@ class RigPlan:
         )
 
     def runs(self, pivot_angles: Sequence[float]) -> tuple[PlannedRun, ...]:
-        """All runs in order; `pivot_angles` [rad] give the dry tests their directions.
-
-        Parameters
-        ----------
-        pivot_angles : sequence of float
-            Pad directions [rad], pad #1 first.
-        """
+        """All runs in order; `pivot_angles` [rad] give the dry tests their directions."""
         runs = (
             *self._dynamic_runs(),
             *self._locus_runs(),
@@ -286,30 +210,12 @@ class RigPlan:
 def operating_points(
     pairs: Iterable[tuple[float, float]], direction: float = DOWNWARD, speed: float = hz(22.0)
 ) -> tuple[OperatingPoint, ...]:
-    """Make set points of (load [N], excitation [Hz]) at one load direction [rad] and speed [rad/s].
-
-    Parameters
-    ----------
-    pairs : iterable of (float, float)
-        Load [N] and excitation [Hz].
-    direction : float, optional
-        [rad]
-    speed : float, optional
-        [rad/s]
-    """
+    """Make set points of (load [N], excitation [Hz]) at one load direction [rad] and speed [rad/s]."""
     return tuple(OperatingPoint(load, direction, speed, hz(frequency)) for load, frequency in pairs)
 
 
 def locus_points(count: int, load: float = 5000.0) -> tuple[OperatingPoint, ...]:
-    """Give `count` directions of one load [N], evenly all around, counter-clockwise from straight down, at 22 Hz.
-
-    Parameters
-    ----------
-    count : int
-        Directions.
-    load : float, optional
-        [N]
-    """
+    """Give `count` directions of one load [N], evenly all around, counter-clockwise from straight down, at 22 Hz."""
     return tuple(OperatingPoint(load, DOWNWARD + 2 * pi * i / count, hz(22.0)) for i in range(count))
 
 

@@ -26,19 +26,7 @@ from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
 
 @dataclass(frozen=True)
 class SimulatedRun:
-    """One record, and what is in it.
-
-    Attributes
-    ----------
-    run : PlannedRun
-    readings : Readings
-        As the recorder stored them.
-    physics : RunPhysics
-        What really happened.
-    glitches : tuple of Glitch
-    source : str
-        Id of the run in which it was recorded; not the run's own where a record was copied.
-    """
+    """One record, and what is in it."""
 
     run: PlannedRun
     readings: Readings = field(repr=False)
@@ -49,23 +37,7 @@ class SimulatedRun:
 
 @dataclass(frozen=True)
 class VirtualRig:
-    """Everything that determines a campaign, to the last bit.
-
-    Attributes
-    ----------
-    truth : RigTruth
-    plan : RigPlan
-    instruments : Instruments
-    noise : Noise
-    faults : tuple of Fault
-    seed : int
-        Each run and purpose draws from a stream of its own: more runs, other noise or a fault leave the
-        rest of the campaign as it was.
-    campaign : str
-        Its id.
-    description : str
-        Free text for the manifest; whoever hides an effect must not tell here.
-    """
+    """Everything that determines a campaign, to the last bit."""
 
     truth: RigTruth
     plan: RigPlan = field(default_factory=RigPlan.like_paper)
@@ -99,13 +71,7 @@ class VirtualRig:
         return tuple(run for run in self.runs() if run.record == run.id)
 
     def simulate(self, run_id: str) -> SimulatedRun:
-        """Make the record of one run (or the one that it shares).
-
-        Parameters
-        ----------
-        run_id : str
-            Id of the plan.
-        """
+        """Make the record of one run (or the one that it shares)."""
         runs = {run.id: run for run in self.runs()}
         if run_id not in runs:
             raise VirtualRigError(f"no run {run_id!r} in the plan")
@@ -117,13 +83,7 @@ class VirtualRig:
             yield self._recorded(run)
 
     def faults_of(self, record: str) -> tuple[Fault, ...]:
-        """Faults that strike one of the runs of a record, made to strike it.
-
-        Parameters
-        ----------
-        record : str
-            Run id of the record.
-        """
+        """Faults that strike one of the runs of a record, made to strike it."""
         if not self.faults:
             return ()
         members = [run.id for run in self.runs() if run.record == record]

@@ -20,15 +20,6 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
 
     The actuators' force goes through the film: F_oil = H d at every line, d shaft relative to housing. The
     housing stands on its cells, so F_oil = F_cell + m_h a_h with F_cell = k_cell x_h.
-
-    Parameters
-    ----------
-    run : PlannedRun
-    truth : RigTruth
-    instruments : Instruments
-    noise : Noise
-    seed : int
-        Of the random numbers.
     """
     if run.point is None:
         raise VirtualRigError(f"run {run.id} needs a set point")
@@ -93,16 +84,6 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
     """How shaft and housing answer an oil force phasor (2,) [N] at one frequency [rad/s].
 
     The film passes the force on to the housing: k_cell x_h - m_h omega^2 x_h = F_oil.
-
-    Parameters
-    ----------
-    frequency : float
-        [rad/s]
-    force : (2,) complex ndarray
-        Oil force phasor [N].
-    h : (2, 2) complex ndarray
-        Dynamic stiffness [N/m].
-    instruments : Instruments
     """
     cells = np.array(instruments.cell_stiffness)
     # written with the compliance, so that rigid cells (infinite stiffness) are no special case

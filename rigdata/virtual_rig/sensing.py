@@ -36,18 +36,7 @@ class Readings:
 def analogue_readings(
     physics: RunPhysics, instruments: Instruments, noise: Noise, seed: int, run: str
 ) -> dict[str, FloatArray]:
-    """Readings of all sensors before the converter, each (n,) in its own unit.
-
-    Parameters
-    ----------
-    physics : RunPhysics
-    instruments : Instruments
-    noise : Noise
-    seed : int
-        Of the random numbers.
-    run : str
-        Run id.
-    """
+    """Readings of all sensors before the converter, each (n,) in its own unit."""
     time = physics.time
     disturbance = channel_noise(instruments.sensors, noise, time, seed, run)
     vectors: dict[tuple[str, float], FloatArray] = {}
@@ -80,13 +69,7 @@ def _sensed(sensor: Sensor, instruments: Instruments, physics: RunPhysics, vecto
 
 
 def felt_direction(sensor: Sensor, instruments: Instruments) -> FloatArray:
-    """Vector (2,) whose product with the quantity gives what the sensor feels: its axis, and cross-talk.
-
-    Parameters
-    ----------
-    sensor : Sensor
-    instruments : Instruments
-    """
+    """Vector (2,) whose product with the quantity gives what the sensor feels: its axis, and cross-talk."""
     direction = sensor.direction
     if sensor.error.cross:
         direction = direction + sensor.error.cross * instruments.partner(sensor).direction
@@ -94,19 +77,7 @@ def felt_direction(sensor: Sensor, instruments: Instruments) -> FloatArray:
 
 
 def draw_glitches(instruments: Instruments, noise: Noise, samples: int, seed: int, run: str) -> tuple[Glitch, ...]:
-    """Draw the glitches of a run.
-
-    Parameters
-    ----------
-    instruments : Instruments
-    noise : Noise
-    samples : int
-        Of the run.
-    seed : int
-        Of the random numbers.
-    run : str
-        Run id.
-    """
+    """Draw the glitches of a run."""
     rules = noise.glitches
     channels = [s for s in instruments.sensors if s.quantity in ("displacement", "force")]
     rng = stream(seed, run, "glitches")
@@ -121,15 +92,7 @@ def draw_glitches(instruments: Instruments, noise: Noise, samples: int, seed: in
 
 
 def add_glitches(columns: dict[str, FloatArray], instruments: Instruments, glitches: Iterable[Glitch]) -> None:
-    """Put bursts into the readings, in place.
-
-    Parameters
-    ----------
-    columns : dict of str to (n,) ndarray
-        Readings by channel, changed in place.
-    instruments : Instruments
-    glitches : iterable of Glitch
-    """
+    """Put bursts into the readings, in place."""
     for glitch in glitches:
         sensor = instruments.named(glitch.channel)
         burst = slice(glitch.first, glitch.first + glitch.count)
@@ -137,16 +100,7 @@ def add_glitches(columns: dict[str, FloatArray], instruments: Instruments, glitc
 
 
 def converted(reading: FloatArray, sensor: Sensor, bits: int | None) -> FloatArray:
-    """Reading after the converter: limited to its span and rounded to its steps.
-
-    Parameters
-    ----------
-    reading : (n,) ndarray
-        In the sensor's own unit.
-    sensor : Sensor
-    bits : int or None
-        Of the converter; None for none.
-    """
+    """Reading after the converter: limited to its span and rounded to its steps."""
     if bits is None:
         return reading
     step = converter_step(sensor, bits)
@@ -155,31 +109,12 @@ def converted(reading: FloatArray, sensor: Sensor, bits: int | None) -> FloatArr
 
 
 def converter_step(sensor: Sensor, bits: int) -> float:
-    """One step of the converter, in the reading's unit.
-
-    Parameters
-    ----------
-    sensor : Sensor
-    bits : int or None
-        Of the converter; None for none.
-    """
+    """One step of the converter, in the reading's unit."""
     return 2 * sensor.span / 2**bits
 
 
 def channel_noise(sensors: tuple[Sensor, ...], noise: Noise, time: FloatArray, seed: int, run: str) -> FloatArray:
-    """Noise of each sensor over `time` (n,) [s] -> (n_sensors, n), in the SI unit of its quantity.
-
-    Parameters
-    ----------
-    sensors : tuple of Sensor
-    noise : Noise
-    time : (n,) ndarray
-        [s]
-    seed : int
-        Of the random numbers.
-    run : str
-        Run id.
-    """
+    """Noise of each sensor over `time` (n,) [s] -> (n_sensors, n), in the SI unit of its quantity."""
     kinds: list[ChannelNoise] = [getattr(noise, sensor.quantity) for sensor in sensors]
     amounts = np.array([[k.white, k.flicker, k.mains, k.drift] for k in kinds]).T[..., None]
     white, pink, mains, drift = amounts
@@ -199,16 +134,6 @@ def flicker(rng: np.random.Generator, rows: int, n: int, rate: float) -> FloatAr
 
     Shaped in the frequency domain over twice the length and cut, because one period of a periodic series would
     end where it began, which drift does not.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    rows : int
-        Signals.
-    n : int
-        Samples.
-    rate : float
-        [Hz]
     """
     length = next_fast_len(2 * n, real=True)
     frequency = np.arange(1, length // 2 + 1) * rate / length
@@ -220,16 +145,7 @@ def flicker(rng: np.random.Generator, rows: int, n: int, rate: float) -> FloatAr
 
 
 def slow_drift(rng: np.random.Generator, rows: int, time: FloatArray) -> FloatArray:
-    """Slow monotone drift (rows, n), zero in the mean, with a standard deviation of 1 from start to end.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    rows : int
-        Signals.
-    time : (n,) ndarray
-        [s]
-    """
+    """Slow monotone drift (rows, n), zero in the mean, with a standard deviation of 1 from start to end."""
     share = np.linspace(-0.5, 0.5, len(time))
     size = rng.standard_normal((rows, 1))
     bend = rng.uniform(-1.0, 1.0, (rows, 1))

@@ -32,32 +32,7 @@ class VirtualRigError(RigError):
 
 @dataclass(frozen=True)
 class RigTruth:
-    """The physics of one virtual test bearing.
-
-    Attributes
-    ----------
-    stiffness : callable(OperatingPoint) -> (2, 2) complex
-        Dynamic stiffness H(point.excitation) = K + i omega C [N/m], rows force, columns displacement
-        (Eq. 13: dF_oil = H d). It is also asked at running speed (unbalance) and at the actuators'
-        harmonics. Consecutive questions often differ in `excitation` only: cache the equilibrium.
-    position : callable(OperatingPoint) -> (2,)
-        Mean shaft position from the bearing centre [m]; asked with `excitation` 0.
-    temperature : callable(OperatingPoint) -> (n_pads,)
-        Film temperature at the sensors [degC]; asked with `excitation` 0.
-    pivot_deflection : callable(pad, load) -> (n,)
-        Deflection [m] of pivot `pad` (1 is pad #1) under each `load` (n,) >= 0 [N]; monotone, 0 at 0.
-        Whatever else gives way between probes and pad in a dry test (the housing) belongs in it.
-    pivot_angles : tuple of float
-        [rad], counter-clockwise from +X, pad #1 first.
-    clearance : tuple of float
-        Assembled radial clearance of each pad, cold [m].
-    bearing_name : str
-        File name under which the bearing's description is stored.
-    bearing_text : str
-        The bearing file, a text to `rigdata`.
-    cold_temperature : float
-        Of everything in the dry tests [degC].
-    """
+    """The physics of one virtual test bearing."""
 
     stiffness: StiffnessLaw = field(repr=False)
     position: PositionLaw = field(repr=False)
@@ -84,17 +59,7 @@ class RigTruth:
 
     @classmethod
     def constant(cls, k: Any, c: Any, pivot_stiffness: float | Sequence[float] = 6e8, **fields: Any) -> RigTruth:
-        """Make a truth with one K and C at all points: a linear bearing.
-
-        Parameters
-        ----------
-        k, c : (2, 2) array_like
-            Stiffness [N/m] and damping [N s/m].
-        pivot_stiffness : float or (n_pads,)
-            Linear pivots [N/m].
-        **fields
-            Any other attribute of the class, to replace what the linear bearing gives.
-        """
+        """Make a truth with one K and C at all points: a linear bearing."""
         stiffness = np.array(k, dtype=float)
         damping = np.array(c, dtype=float)
         angles = fields.get("pivot_angles", FIVE_PADS)
@@ -120,12 +85,7 @@ class RigTruth:
         )
 
     def h(self, point: OperatingPoint) -> ComplexArray:
-        """Dynamic stiffness at a point, (2, 2) complex [N/m], checked.
-
-        Parameters
-        ----------
-        point : OperatingPoint
-        """
+        """Dynamic stiffness at a point, (2, 2) complex [N/m], checked."""
         h = np.asarray(self.stiffness(point), dtype=complex)
         if h.shape != (2, 2) or not np.isfinite(h).all():
             raise VirtualRigError(f"stiffness({point}) must be (2, 2) finite complex, got shape {h.shape}: {h}")
@@ -134,56 +94,27 @@ class RigTruth:
         return h
 
     def centre(self, point: OperatingPoint) -> FloatArray:
-        """Mean shaft position at a point, (2,) [m], checked.
-
-        Parameters
-        ----------
-        point : OperatingPoint
-        """
+        """Mean shaft position at a point, (2,) [m], checked."""
         return _checked(self.position(point), (2,), f"position({point})")
 
     def temperatures(self, point: OperatingPoint) -> FloatArray:
-        """Film temperatures at a point, (n_pads,) [degC], checked.
-
-        Parameters
-        ----------
-        point : OperatingPoint
-        """
+        """Film temperatures at a point, (n_pads,) [degC], checked."""
         return _checked(self.temperature(point), (len(self.pivot_angles),), f"temperature({point})")
 
     def deflection(self, pad: int, load: FloatArray) -> FloatArray:
-        """Pivot deflection of `pad` (1 is pad #1) under `load` (n,) [N] -> (n,) [m], checked; 0 where it lifts off.
-
-        Parameters
-        ----------
-        pad : int
-            From 1.
-        load : array_like
-            [N], not negative.
-        """
+        """Pivot deflection of `pad` (1 is pad #1) under `load` (n,) [N] -> (n,) [m], checked; 0 where it lifts off."""
         pushed = np.maximum(load, 0.0)
         return _checked(self.pivot_deflection(pad, pushed), pushed.shape, f"pivot_deflection({pad}, load)")
 
 
 def load_vector(point: OperatingPoint) -> FloatArray:
-    """Static load of a point as (2,) [N]: what pushes the shaft, and what the film puts on the housing.
-
-    Parameters
-    ----------
-    point : OperatingPoint
-    """
+    """Static load of a point as (2,) [N]: what pushes the shaft, and what the film puts on the housing."""
     angle = point.static_load_direction
     return point.static_load * np.array([np.cos(angle), np.sin(angle)])
 
 
 def hz(frequency: float) -> float:
-    """Frequency in Hz as rad/s.
-
-    Parameters
-    ----------
-    frequency : float
-        [Hz]
-    """
+    """Frequency in Hz as rad/s."""
     return 2 * pi * frequency
 
 

@@ -3,9 +3,9 @@
     python -m tests.studies.golden run OUT [--only identify,pivot] [--campaign rocker-baseline]
     python -m tests.studies.golden compare BEFORE AFTER
 
-`run` writes the results folder and the printed text of each command below OUT; `compare` prints each file that is not the
-same to the bit, with the largest difference of its numbers (of the value, or of its standard deviation where the table has
-one). A difference above 1e-9 ends it with exit code 1. An older checkout runs a copy of this file in its own `tests/studies`.
+`run` writes the results folder and the printed text of each command below OUT. `compare` prints each file that is not
+the same to the bit, with the largest difference of its numbers (of the value, or of its standard deviation where the
+table has one); above 1e-9 it ends with exit code 1. An older checkout runs a copy of this file in its own folder.
 """
 
 from __future__ import annotations

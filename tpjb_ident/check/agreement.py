@@ -33,18 +33,7 @@ _MIN_RUNS, _MOST = 4, 1 / 3
 
 @dataclass(frozen=True)
 class Answer:
-    """One dynamic run: force and displacement phasors.
-
-    Attributes
-    ----------
-    seen : Observation
-    force : (2,) complex ndarray
-        X, Y [N].
-    readings : (2,) complex ndarray
-        Of the two displacement channels, SI.
-    channels : tuple of Channel
-        These two.
-    """
+    """One dynamic run: force and displacement phasors."""
 
     seen: Observation
     force: ComplexArray
@@ -63,14 +52,7 @@ class Answer:
 
 
 def answer_of(seen: Observation, mass: float) -> Answer | None:
-    """Take the phasors of a run; None where it does not show them, or its force is in doubt already.
-
-    Parameters
-    ----------
-    seen : Observation
-    mass : float
-        Of the housing [kg]; NaN where not stated.
-    """
+    """Take the phasors of a run; None where it does not show them, or its force is in doubt already."""
     where = seen.pick("displacement")
     force = oil_force(seen, mass)
     if len(where) != 2 or force is None or seen.lines is None or "force" in seen.report.doubts or not excited(seen):
@@ -87,29 +69,14 @@ def _solve_stiffness(answers: Sequence[Answer]) -> ComplexArray | None:
 
 
 def misfit_of(answer: Answer, stiffness: ComplexArray, repair: FloatArray | None = None) -> float:
-    """Share of the force that H does not explain, after a repair (2, 2) of the displacement readings.
-
-    Parameters
-    ----------
-    answer : Answer
-    stiffness : (2, 2) complex ndarray
-        H [N/m].
-    repair : (2, 2) ndarray, optional
-        On the readings of the two channels.
-    """
+    """Share of the force that H does not explain, after a repair (2, 2) of the displacement readings."""
     readings = answer.readings if repair is None else repair @ answer.readings
     predicted = stiffness @ to_plane(answer.channels, readings)
     return float(np.linalg.norm(answer.force - predicted) / np.linalg.norm(answer.force))
 
 
 def robust_stiffness(group: Sequence[Answer]) -> ComplexArray | None:
-    """H with the least median misfit among all pairs of runs, so that a faulty run cannot pull it.
-
-    Parameters
-    ----------
-    group : sequence of Answer
-        Runs of one operating point.
-    """
+    """H with the least median misfit among all pairs of runs, so that a faulty run cannot pull it."""
     best: tuple[float, ComplexArray] | None = None
     for pair in combinations(group[:24], 2):
         stiffness = _solve_stiffness(pair)
@@ -128,17 +95,7 @@ def robust_stiffness(group: Sequence[Answer]) -> ComplexArray | None:
 def check_agreement(
     group: Sequence[Answer], stiffness: ComplexArray, readings: PointReadings | None = None
 ) -> set[int]:
-    """Name runs that answer otherwise than the others at their operating point; their places in the group.
-
-    Parameters
-    ----------
-    group : sequence of Answer
-        Runs of one operating point.
-    stiffness : (2, 2) complex ndarray
-        H that most of them agree on.
-    readings : PointReadings, optional
-        Of the same runs, for naming the channel whose gain explains one of them.
-    """
+    """Name runs that answer otherwise than the others at their operating point; their places in the group."""
     if len(group) < _MIN_RUNS:
         return set()
     misfits = np.array([misfit_of(a, stiffness) for a in group])

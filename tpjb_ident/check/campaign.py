@@ -56,14 +56,7 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
 
 
 def judged(campaign: Campaign, seen: Sequence[Observation]) -> list[Observation]:
-    """Judge runs beside each other; what is found stands in the reports of the copies that are given back.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    seen : sequence of Observation
-        What `observe` gave of each run. Left as it is, so that it can be judged again beside more runs.
-    """
+    """Judge runs beside each other; what is found stands in the reports of the copies that are given back."""
     seen = [replace(one, report=one.report.copy()) for one in seen]
     of_kind = {k: [s for s in seen if s.run.kind == k] for k in ("dynamic", "dry_pivot", "locus", "clearance")}
     dynamic = of_kind["dynamic"]

@@ -40,12 +40,7 @@ _LIKE_RUNS, _STEP, _LEAST_STEP = 4, 6.0, 15e-6
 
 
 def check_load_ratios(runs: Sequence[Observation]) -> None:
-    """Mean force over set point of every dynamic and locus run against that of all others.
-
-    Parameters
-    ----------
-    runs : sequence of Observation
-    """
+    """Mean force over set point of every dynamic and locus run against that of all others."""
     shown: list[tuple[Observation, complex]] = []
     for seen in runs:
         stated = seen.run.point.static_load
@@ -74,13 +69,7 @@ def check_load_ratios(runs: Sequence[Observation]) -> None:
 
 
 def check_housing(runs: Sequence[Observation]) -> None:
-    """Acceleration against cell force of the dynamic runs of one frequency: one matrix serves them all.
-
-    Parameters
-    ----------
-    runs : sequence of Observation
-        Dynamic ones.
-    """
+    """Acceleration against cell force of the dynamic runs of one frequency: one matrix serves them all."""
     groups: dict[tuple[float, tuple[str, ...]], list[tuple[Observation, ComplexArray, ComplexArray]]] = {}
     for seen in runs:
         where = seen.pick("acceleration")
@@ -140,12 +129,7 @@ def _judge_housing(group: Sequence[tuple[Observation, ComplexArray, ComplexArray
 
 
 def check_positions(runs: Sequence[Observation]) -> None:
-    """Mean readings of the probes (gap voltage included) run against run, and their travel.
-
-    Parameters
-    ----------
-    runs : sequence of Observation
-    """
+    """Mean readings of the probes (gap voltage included) run against run, and their travel."""
     places: dict[tuple[str, str], list[tuple[Observation, float]]] = {}
     for seen in runs:
         for index in seen.pick("displacement"):

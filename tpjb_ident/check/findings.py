@@ -13,14 +13,7 @@ _LISTED = 4
 
 @dataclass(frozen=True)
 class Finding:
-    """A problem of one run, with a key that equal problems of other runs share.
-
-    Attributes
-    ----------
-    problem : Problem
-    key : str
-        E.g. ``"dead X1A"``.
-    """
+    """A problem of one run, with a key that equal problems of other runs share."""
 
     problem: Problem
     key: str
@@ -28,17 +21,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Reporter:
-    """Gathers the findings of one run.
-
-    Attributes
-    ----------
-    run : Run
-    found : list of Finding
-    doubts : set of str
-        Quantities that an error of this run makes useless for further conclusions.
-    gains : dict of str to float
-        Standard deviation that a finding adds to the gain of a channel, by its name.
-    """
+    """Gathers the findings of one run."""
 
     run: Run
     found: list[Finding] = field(default_factory=list)
@@ -50,29 +33,11 @@ class Reporter:
         return Reporter(self.run, list(self.found), set(self.doubts), dict(self.gains))
 
     def say(self, key: str, severity: Severity, place: str, what: str, cure: str) -> None:
-        """Note a finding; `key` is the same for equal findings in other runs.
-
-        Parameters
-        ----------
-        key : str
-            The same for equal findings in other runs.
-        severity : Severity
-        place : str
-            Where in the file.
-        what : str
-            What is wrong.
-        cure : str
-            What to do.
-        """
+        """Note a finding; `key` is the same for equal findings in other runs."""
         self.found.append(Finding(Problem(severity, self.run.file, place, what, cure, self.run.id), key))
 
     def take(self, problems: Sequence[Problem]) -> None:
-        """Note problems that a reader raised.
-
-        Parameters
-        ----------
-        problems : sequence of Problem
-        """
+        """Note problems that a reader raised."""
         self.found.extend(Finding(p, f"{p.place} {p.what}") for p in problems)
 
 
@@ -82,21 +47,7 @@ def _is_shared(concerned: int, alike: int) -> bool:
 
 
 def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[Problem]:
-    """Tell a finding once that a third (three at least) of the runs of its kinds share.
-
-    Parameters
-    ----------
-    findings : sequence of Finding
-    file : str
-        Display name of the campaign's manifest or file.
-    runs : sequence of Run
-        All runs of the campaign.
-
-    Returns
-    -------
-    list of Problem
-        In the order of first appearance.
-    """
+    """Tell a finding once that a third (three at least) of the runs of its kinds share."""
     groups: dict[tuple[str, str], list[Problem]] = {}
     for finding in findings:
         groups.setdefault((finding.key, finding.problem.severity), []).append(finding.problem)
@@ -118,19 +69,7 @@ def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[P
 
 @dataclass(frozen=True)
 class Verdicts:
-    """Findings by run.
-
-    Attributes
-    ----------
-    unusable : dict of str to Problem
-        Runs with an error of their own: they say nothing, the others stand.
-    shared : dict of str to list of Problem
-        Errors that a third of the runs or more have in common: what is wrong is wrong with the campaign.
-    doubtful : dict of str to list of Problem
-        Warnings.
-    gains : dict of str to float
-        What differences between channels that should agree add to the uncertainty of their gains.
-    """
+    """Findings by run."""
 
     unusable: dict[str, Problem] = field(default_factory=dict)
     shared: dict[str, list[Problem]] = field(default_factory=dict)
@@ -139,13 +78,7 @@ class Verdicts:
 
 
 def verdicts(reports: Sequence[Reporter]) -> Verdicts:
-    """Sort the findings of runs of one kind.
-
-    Parameters
-    ----------
-    reports : sequence of Reporter
-        As of the observations that `tpjb_ident.check.campaign.judged` gives.
-    """
+    """Sort the findings of runs of one kind."""
     groups: dict[tuple[str, Severity], dict[str, Problem]] = {}
     found = Verdicts()
     for one in reports:

@@ -32,24 +32,7 @@ _LEVER_KNOWN = 0.25
 
 @dataclass(frozen=True)
 class PointReadings:
-    """Readings of the n runs of one operating point, SI.
-
-    Attributes
-    ----------
-    probes, cells : (n, 2) complex ndarray
-        Phasors at the excitation [m], [N], one column per channel.
-    inertia : (n, 2) complex ndarray
-        Housing mass times acceleration, X and Y [N].
-    probe_means, cell_means : (n, 2) ndarray
-        Mean readings [m], [N].
-    probe_plane, cell_plane : (2, 2) ndarray
-        From the two readings to X and Y.
-    centre : tuple of float or None
-        What each probe reads at the bearing's centre [m], None where not known.
-    noise : (n, 4) ndarray or None
-        Standard deviation that the records' noise gives the real part of each phasor (probes, then cells), where the
-        records tell it.
-    """
+    """Readings of the n runs of one operating point, SI."""
 
     probes: ComplexArray
     cells: ComplexArray
@@ -74,18 +57,7 @@ class PointReadings:
 
 @dataclass(frozen=True)
 class Difference:
-    """How one run differs from what the others foretell, with its covariance.
-
-    Attributes
-    ----------
-    rest : (m,) ndarray
-    noise : (m, m) ndarray
-        Covariance that the others' scatter tells.
-    honest : (m, m) ndarray
-        Covariance of what honest runs differ by beyond it.
-    spare : int
-        Degrees of freedom of `noise`.
-    """
+    """How one run differs from what the others foretell, with its covariance."""
 
     rest: FloatArray
     noise: FloatArray
@@ -93,12 +65,7 @@ class Difference:
     spare: int
 
     def evidence(self, pattern: FloatArray) -> Evidence:
-        """Estimate the factor of `pattern` (m,) in the rest; of nothing where the pattern does not show.
-
-        Parameters
-        ----------
-        pattern : (m,) ndarray
-        """
+        """Estimate the factor of `pattern` (m,) in the rest; of nothing where the pattern does not show."""
         weights = np.linalg.solve(self.noise + self.honest, pattern)
         information = float(pattern @ weights)
         if not information > 0:
@@ -107,27 +74,12 @@ class Difference:
         return Evidence(float(weights @ self.rest) / information, information, share**2 / self.spare)
 
     def misfit(self, pattern: FloatArray, part: float) -> float:
-        """Squared distance of the rest from `part` times the pattern, per equation, in units of its covariance.
-
-        Parameters
-        ----------
-        pattern : (m,) ndarray
-        part : float
-            Factor of the pattern.
-        """
+        """Squared distance of the rest from `part` times the pattern, per equation, in units of its covariance."""
         left = self.rest - part * pattern
         return float(left @ np.linalg.solve(self.noise + self.honest, left)) / len(left)
 
     def widened(self, place: int, deviation: float) -> Difference:
-        """The same with one equation less certain.
-
-        Parameters
-        ----------
-        place : int
-            Of the equation.
-        deviation : float
-            Standard deviation added.
-        """
+        """The same with one equation less certain."""
         honest = self.honest.copy()
         honest[place, place] += deviation**2
         return Difference(self.rest, self.noise, honest, self.spare)
@@ -135,16 +87,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Evidence:
-    """An estimate of 1 - 1/g.
-
-    Attributes
-    ----------
-    part : float
-    information : float
-        One over its variance; 0 where there is no evidence.
-    doubt : float
-        Sum of (share of the variance that is estimated)^2 over its degrees of freedom.
-    """
+    """An estimate of 1 - 1/g."""
 
     part: float
     information: float
@@ -165,12 +108,7 @@ class Evidence:
         return float(2 * stdtr(min(self.freedom, 1e9), -abs(self.part) * np.sqrt(self.information)))
 
     def joined(self, other: Evidence) -> Evidence:
-        """Weighted mean of two independent estimates.
-
-        Parameters
-        ----------
-        other : Evidence
-        """
+        """Weighted mean of two independent estimates."""
         information = self.information + other.information
         if information <= 0:
             return self
@@ -184,16 +122,6 @@ def dynamic_difference(
     """Force of run `one` minus H of the `others` times its displacement: Re X, Re Y, Im X, Im Y [N].
 
     H is their `common_stiffness`; None where they leave no scatter.
-
-    Parameters
-    ----------
-    readings : PointReadings
-    one : int
-        Place of the run.
-    others : sequence of int
-        Places of the runs that it is held against.
-    stiffness : (2, 2) complex ndarray
-        H [N/m].
     """
     spare = 2 * (2 * len(others) - 4)
     if spare < 4:
@@ -247,25 +175,12 @@ def _noise_error(readings: PointReadings, runs: Sequence[int], stiffness: Comple
 
 
 def common_stiffness(readings: PointReadings, runs: Sequence[int]) -> ComplexArray | None:
-    """H (2, 2) of F = H D over some runs; None where not determined.
-
-    Parameters
-    ----------
-    readings : PointReadings
-    runs : sequence of int
-        Places.
-    """
+    """H (2, 2) of F = H D over some runs; None where not determined."""
     return stiffness_of(readings.displacement[list(runs)], readings.force[list(runs)])
 
 
 def stiffness_of(displacement: ComplexArray, force: ComplexArray) -> ComplexArray | None:
-    """H (2, 2) of F = H D, every run weighted by one over its displacement; None where they move along one line.
-
-    Parameters
-    ----------
-    displacement, force : (n, 2) complex ndarray
-        Of the runs [m], [N].
-    """
+    """H (2, 2) of F = H D, every run weighted by one over its displacement; None where they move along one line."""
     sizes = np.linalg.norm(displacement, axis=1)
     if len(sizes) < 2 or not np.all(sizes > 0) or not np.all(np.isfinite(sizes)):
         return None
@@ -277,15 +192,7 @@ def stiffness_of(displacement: ComplexArray, force: ComplexArray) -> ComplexArra
 
 
 def leverage(fitted: ComplexArray, own: ComplexArray) -> float:
-    """Variance that a matrix fitted to displacements (n, 2) gives to its answer to one more (2,), over theirs.
-
-    Parameters
-    ----------
-    fitted : (n, 2) complex ndarray
-        Displacements that the matrix was fitted to.
-    own : (2,) complex ndarray
-        The displacement asked for, in the same unit.
-    """
+    """Variance that a matrix fitted to displacements (n, 2) gives to its answer to one more (2,), over theirs."""
     return float(np.real(own.conj() @ np.linalg.solve(fitted.T @ fitted.conj(), own)))
 
 
@@ -296,16 +203,6 @@ def static_difference(
 
     A load that misses its set point shows in the cells and, over the stiffness, in the probes; what positions wander by
     besides is their scatter. None where the stiffness cannot carry a load.
-
-    Parameters
-    ----------
-    readings : PointReadings
-    one : int
-        Place of the run.
-    others : sequence of int
-        Places of the runs that it is held against.
-    stiffness : (2, 2) complex ndarray
-        H [N/m].
     """
     if len(others) < 2 or np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
         return None
@@ -334,33 +231,14 @@ def static_difference(
 
 
 def dynamic_pattern(readings: PointReadings, one: int, channel: int, stiffness: ComplexArray) -> FloatArray:
-    """What a channel (probes 0 and 1, cells 2 and 3) contributes to force minus H times displacement, as `_stacked`.
-
-    Parameters
-    ----------
-    readings : PointReadings
-    one : int
-        Place of the run.
-    channel : int
-        0 and 1: probes, 2 and 3: cells.
-    stiffness : (2, 2) complex ndarray
-        H [N/m].
-    """
+    """What a channel (probes 0 and 1, cells 2 and 3) contributes to force minus H times displacement, as `_stacked`."""
     if channel < 2:
         return _stacked(-stiffness @ readings.probe_plane[:, channel] * readings.probes[one, channel])
     return _stacked(readings.cell_plane[:, channel - 2] * readings.cells[one, channel - 2])
 
 
 def lever_slack(lever: float, part: float) -> float:
-    """How uncertain a shift of the mean is, because the zero from which a probe's gain counts is [m].
-
-    Parameters
-    ----------
-    lever : float
-        Distance of the mean from the zero of the probe's gain [m].
-    part : float
-        Of the gain that the mean shows.
-    """
+    """How uncertain a shift of the mean is, because the zero from which a probe's gain counts is [m]."""
     return abs(_LEVER_KNOWN * lever * part)
 
 

@@ -37,20 +37,7 @@ _LONGEST = 2**16
 
 @dataclass(frozen=True)
 class RecordLines:
-    """What the fit found, for m channels.
-
-    Attributes
-    ----------
-    mean : (m,) ndarray
-    phasor : (m,) complex ndarray
-        At the first of the frequencies; ``Re(phasor exp(i omega t))``.
-    floor : (m,) ndarray
-        Amplitude that lines beside it reach by noise alone.
-    glitches : (m,) int ndarray
-        Samples left out because they stand off the fit.
-    scatter : (m,) ndarray
-        Standard deviation of what is left.
-    """
+    """What the fit found, for m channels."""
 
     mean: FloatArray
     phasor: ComplexArray
@@ -62,25 +49,7 @@ class RecordLines:
 def fit_lines(
     time: FloatArray, values: FloatArray, frequencies: Sequence[float], inexact: Sequence[float] = ()
 ) -> RecordLines:
-    """Fit mean, drift and lines to every column.
-
-    Parameters
-    ----------
-    time : (n,) ndarray
-        Seconds.
-    values : (n, m) ndarray
-        NaN where missing.
-    frequencies : sequence of float
-        [Hz]; the first is the one wanted, others nearer to it than the record can part are dropped.
-    inexact : sequence of float
-        Those of them known to a fraction of 1 / record length only [Hz]: their amplitude may change along the record,
-        which is the first order of a wrong frequency, and no part of it leaks into the line wanted.
-
-    Returns
-    -------
-    RecordLines
-        NaN for columns with too few samples.
-    """
+    """Fit mean, drift and lines to every column."""
     span = max(float(time[-1] - time[0]), 1e-300)
     kept: list[float] = []
     for frequency in frequencies:
@@ -137,16 +106,7 @@ def _floor(time: FloatArray, rest: FloatArray, frequency: float, span: float) ->
 
 
 def strongest_line(time: FloatArray, values: FloatArray, apart_from: Sequence[float]) -> float:
-    """Frequency of the strongest line, leaving out some and the slowest [Hz]; NaN where there is none.
-
-    Parameters
-    ----------
-    time : (n,) ndarray
-        Seconds, nearly equidistant.
-    values : (n,) ndarray
-    apart_from : sequence of float
-        Known lines [Hz].
-    """
+    """Frequency of the strongest line, leaving out some and the slowest [Hz]; NaN where there is none."""
     if len(time) < 16:
         return float("nan")
     filled = np.where(np.isfinite(values), values, np.nanmedian(values)) if np.isfinite(values).any() else None
@@ -171,17 +131,6 @@ def band_lines(
 
     What channels owe one another (two planes of probes, cells and accelerometers) holds at every line, so a few that
     stand clear of the noise, away from shaft and mains, serve the checks as the one line of a sine does.
-
-    Parameters
-    ----------
-    run : rigdata.run.Run
-        Excited over a band.
-    values : (n, m) ndarray
-        Samples of its channels, SI; NaN where missing.
-    force : sequence of int
-        Columns that are forces.
-    disturbing : sequence of float
-        Other lines, with all their harmonics [Hz].
     """
     none = np.empty((0, values.shape[1]), complex), np.full(values.shape[1], np.nan)
     known = np.isfinite(values)
@@ -204,24 +153,7 @@ def band_lines(
 
 
 def turning_frequency(time: FloatArray, values: FloatArray, stated: float, lines: Sequence[float]) -> float:
-    """Frequency of the 1X line [Hz], from the peak of a Hann spectrum summed over the channels.
-
-    Parameters
-    ----------
-    time : (n,) ndarray
-        Seconds, nearly equidistant.
-    values : (n, m) ndarray
-        Displacements; NaN where missing.
-    stated : float
-        Set point [Hz].
-    lines : sequence of float
-        Other lines [Hz].
-
-    Returns
-    -------
-    float
-        The set point where no line stands out beside it, or another one hides it.
-    """
+    """Frequency of the 1X line [Hz], from the peak of a Hann spectrum summed over the channels."""
     count = min(len(time), _LONGEST)
     span = float(time[count - 1] - time[0])
     known = np.isfinite(values[:count]).all(axis=0)

@@ -29,30 +29,7 @@ _SPREAD = 8192
 
 @dataclass(frozen=True)
 class Observation:
-    """One run, seen once.
-
-    Attributes
-    ----------
-    run : Run
-    channels : tuple of Channel
-        Displacement, force and acceleration channels that could be read and live.
-    lines : RecordLines or None
-        Mean, phasor at the excitation, noise of `channels`, SI.
-    spread : (3, m) ndarray
-        2 %, 50 % and 98 % quantiles of `channels`, SI.
-    other_line : float
-        Strongest line of the force in a dynamic run apart from the known ones [Hz]; NaN where none.
-    samples : (n, m) ndarray
-        Thinned to a few thousand, SI; kept of dry and clearance runs only.
-    speed : float
-        Mean of the speed channel [rad/s]; NaN where there is none.
-    digest : str
-        Of all displacement and force readings; "" where none could be read.
-    report : Reporter
-        Findings so far.
-    band : (k, m) complex ndarray
-        Phasors of `channels` at some strong lines of an excitation over a band, SI; without rows for a sine.
-    """
+    """One run, seen once."""
 
     run: Run
     channels: tuple[Channel, ...]
@@ -73,25 +50,12 @@ class Observation:
         return np.asarray(self.lines.phasor, dtype=np.complex128)[None]
 
     def pick(self, quantity: str) -> list[int]:
-        """Places of the channels of `quantity` in `channels`.
-
-        Parameters
-        ----------
-        quantity : str
-            ``"displacement"``, ``"force"`` or ``"acceleration"``.
-        """
+        """Places of the channels of `quantity` in `channels`."""
         return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
 
 
 def observe(run: Run, driven: Sequence[float] = ()) -> Observation:
-    """Read every channel of `run` once, block by block, and judge each by itself.
-
-    Parameters
-    ----------
-    run : Run
-    driven : sequence of float, optional
-        Other excitations in its record [Hz].
-    """
+    """Read every channel of `run` once, block by block, and judge each by itself."""
     report = Reporter(run)
     try:
         length = run.length

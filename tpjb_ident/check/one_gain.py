@@ -46,23 +46,7 @@ _MIN_RUNS, _MOST = 4, 1 / 3
 
 @dataclass(frozen=True)
 class WrongGain:
-    """A gain that one channel has in one run only.
-
-    Attributes
-    ----------
-    run : int
-        Its place among the runs.
-    channels : tuple of int
-        Probes 0 and 1, cells 2 and 3; the likeliest first, then those that would explain the run as well.
-    gain : float
-        Reading over truth of the first.
-    error : float
-        Standard error of the gain.
-    means : bool
-        Whether the mean readings speak for it too.
-    chance : float
-        Probability of as clear a gain where there is none, for one channel of one run.
-    """
+    """A gain that one channel has in one run only."""
 
     run: int
     channels: tuple[int, ...]
@@ -83,19 +67,7 @@ class _Try:
 
 
 def wrong_gains(readings: PointReadings, known: Collection[int] = ()) -> list[WrongGain]:
-    """Find runs with one wrong gain, the clearest first.
-
-    Parameters
-    ----------
-    readings : PointReadings
-    known : collection of int
-        Runs that are at fault already; nothing is held against them.
-
-    Returns
-    -------
-    list of WrongGain
-        Empty for fewer than four runs; a third of them at most, with the known ones.
-    """
+    """Find runs with one wrong gain, the clearest first."""
     count, apart, found = len(readings.probes), set(known), list[WrongGain]()
     while len(apart) + 1 <= _MOST * count:
         left = [i for i in range(count) if i not in apart]
@@ -115,14 +87,6 @@ def gain_of_run(readings: PointReadings, one: int, others: Sequence[int]) -> Wro
     """The gain of one channel that explains run `one` best beside the `others`; None where no single one does.
 
     Where the best is too small to be a fault, no worse one is named in its place.
-
-    Parameters
-    ----------
-    readings : PointReadings
-    one : int
-        Place of the run.
-    others : sequence of int
-        Places of the runs that it is held against.
     """
     tried = sorted(_tries(readings, one, others), key=lambda t: t.left)
     if not tried or abs(tried[0].joint.part) < _LEAST:

@@ -33,16 +33,7 @@ RECTANGLE = math.sqrt(2.0 / 3.0)
 
 @dataclass(frozen=True)
 class ApartChannels:
-    """Channels of one quantity that do not tell the same vector.
-
-    Attributes
-    ----------
-    quantity : str
-    names : tuple of str
-        All channels of the quantity.
-    gains : (m,) ndarray
-        Least changes of their gains that make them agree.
-    """
+    """Channels of one quantity that do not tell the same vector."""
 
     quantity: str
     names: tuple[str, ...]
@@ -64,18 +55,7 @@ class ApartChannels:
 
 
 def channels_apart(runs: Sequence[Observation]) -> tuple[ApartChannels, ...]:
-    """Find the quantities whose channels contradict each other in all runs alike.
-
-    Parameters
-    ----------
-    runs : sequence of Observation
-        Dynamic ones.
-
-    Returns
-    -------
-    tuple of ApartChannels
-        Empty where no quantity has more than two channels, or where these agree within their uncertainties.
-    """
+    """Find the quantities whose channels contradict each other in all runs alike."""
     found = []
     for quantity in ("displacement", "force"):
         groups: dict[tuple[str, ...], list[ComplexArray]] = {}
@@ -116,13 +96,7 @@ def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) ->
 
 
 def report_apart(runs: Sequence[Observation]) -> None:
-    """Warn of channels that contradict each other, and note what that adds to the uncertainty of their gains.
-
-    Parameters
-    ----------
-    runs : sequence of Observation
-        Dynamic ones.
-    """
+    """Warn of channels that contradict each other, and note what that adds to the uncertainty of their gains."""
     cure = "Calibrate them against each other, or state the `uncertainty` of their gains"
     for apart in channels_apart(runs):
         for report in {seen.run.id: seen.report for seen in runs if seen.pick(apart.quantity)}.values():
@@ -132,14 +106,7 @@ def report_apart(runs: Sequence[Observation]) -> None:
 
 
 def widened(channels: Mapping[str, Channel], more: Mapping[str, float]) -> dict[str, Channel]:
-    """Channels with the uncertainty that their differences add to what the manifest states.
-
-    Parameters
-    ----------
-    channels : mapping of str to Channel
-    more : mapping of str to float
-        Standard deviation of gains, by channel, as `ApartChannels.uncertainty` gives it.
-    """
+    """Channels with the uncertainty that their differences add to what the manifest states."""
     return {
         n: replace(c, uncertainty=math.hypot(c.uncertainty or 0.0, more[n])) if n in more else c
         for n, c in channels.items()

@@ -28,17 +28,7 @@ _MAX_ANISOTROPY = 6.0
 
 
 def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[Observation] = ()) -> None:
-    """Compare the dynamic runs of every operating point with each other and with what a film can do.
-
-    Parameters
-    ----------
-    runs : sequence of Observation
-        All dynamic ones.
-    mass : float
-        Of the housing [kg]; NaN where not stated.
-    sweeps : sequence of Observation
-        Clearance runs, for what the probes read at the bearing's centre.
-    """
+    """Compare the dynamic runs of every operating point with each other and with what a film can do."""
     groups: dict[object, list[Answer]] = {}
     for seen in runs:
         point = seen.run.point
@@ -61,12 +51,7 @@ def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[O
 
 
 def definiteness(matrix: AnyArray) -> float:
-    """Least over greatest eigenvalue of the symmetric part; 1 is isotropic, not above 0 impossible.
-
-    Parameters
-    ----------
-    matrix : (2, 2) ndarray
-    """
+    """Least over greatest eigenvalue of the symmetric part; 1 is isotropic, not above 0 impossible."""
     low, high = np.linalg.eigvalsh((matrix + matrix.T) / 2)
     return float(low / high) if high > 0 else -1.0
 
@@ -76,15 +61,7 @@ def _film_like(stiffness: ComplexArray) -> float:
 
 
 def mirrored(channels: Sequence[Channel], repair: FloatArray) -> FloatArray:
-    """What a repair (2, 2) of the readings of two channels does to X, Y (2, 2).
-
-    Parameters
-    ----------
-    channels : sequence of Channel
-        Two.
-    repair : (2, 2) ndarray
-        On the readings of the two channels.
-    """
+    """What a repair (2, 2) of the readings of two channels does to X, Y (2, 2)."""
     plane = plane_of(channels)
     return np.asarray(plane @ repair @ np.linalg.inv(plane))
 
@@ -125,13 +102,7 @@ def _check_scales(group: Sequence[Answer], stiffness: ComplexArray, names: str) 
 
 
 def check_accelerometers(runs: Sequence[Observation]) -> None:
-    """Housing acceleration against cell force: on springs, the two are in antiphase.
-
-    Parameters
-    ----------
-    runs : sequence of Observation
-        Dynamic ones.
-    """
+    """Housing acceleration against cell force: on springs, the two are in antiphase."""
     shown: dict[str, list[tuple[Observation, complex]]] = {}
     for seen in runs:
         for name, ratio in _accelerations(seen):

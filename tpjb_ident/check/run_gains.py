@@ -22,30 +22,15 @@ _SECTORS, _MET = 36, 0.9
 
 
 def check_gains(group: Sequence[Answer], known_outliers: Collection[int], readings: PointReadings) -> None:
-    """Name runs with one wrong gain.
-
-    Parameters
-    ----------
-    group : sequence of Answer
-        Runs of one operating point, with the same displacement channels.
-    known_outliers : collection of int
-        Places of those already named as differing.
-    readings : PointReadings
-        Of the same runs.
-    """
+    """Name runs with one wrong gain."""
     for found in wrong_gains(readings, known_outliers):
         _tell(group[found.run], found, [group[0].names[i] for i in found.channels])
 
 
 def point_readings(group: Sequence[Answer], centres: dict[str, float]) -> PointReadings | None:
-    """Phasors and means of all runs of a point, by channel; None where they have not the same two cells, or no means.
+    """Phasors and means of all runs of a point, by channel.
 
-    Parameters
-    ----------
-    group : sequence of Answer
-        Runs of one operating point, with the same displacement channels.
-    centres : dict
-        What probes read at the bearing's centre, by channel [m].
+    None where they have not the same two cells, or no means.
     """
     probes, seen = group[0].channels, [a.seen for a in group]
     cells = _cells(seen[0])
@@ -74,12 +59,7 @@ def _cells(seen: Observation) -> list[Channel]:
 
 
 def probe_centres(sweeps: Sequence[Observation]) -> dict[str, float]:
-    """What every probe reads at the bearing's centre [m], from clearance runs whose load goes around.
-
-    Parameters
-    ----------
-    sweeps : sequence of Observation
-    """
+    """What every probe reads at the bearing's centre [m], from clearance runs whose load goes around."""
     found: dict[str, list[float]] = {}
     for seen in sweeps:
         cells, probes = seen.pick("force"), seen.pick("displacement")
@@ -97,13 +77,6 @@ def swept_centre(load: FloatArray, reading: FloatArray) -> float | None:
     """Mean of a probe's readings (n,) over all directions of a sweeping load (n, 2); None where it does not go around.
 
     Sides and corners of the clearance polygon lie evenly around the centre.
-
-    Parameters
-    ----------
-    load : (n, 2) ndarray
-        X and Y [N].
-    reading : (n,) ndarray
-        [m]
     """
     known = np.isfinite(load).all(axis=1) & np.isfinite(reading)
     if not known.any():
@@ -121,14 +94,7 @@ def _tell(answer: Answer, found: WrongGain, names: Sequence[str]) -> None:
 
 
 def gain_in_words(found: WrongGain, names: Sequence[str]) -> str:
-    """What a wrong gain looks like; `names` are those of its channels, the likeliest first.
-
-    Parameters
-    ----------
-    found : WrongGain
-    names : sequence of str
-        Of its channels, the likeliest first.
-    """
+    """What a wrong gain looks like; `names` are those of its channels, the likeliest first."""
     off = found.gain - 1
     others = f" (or {' or '.join(names[1:])} another gain)" if len(names) > 1 else ""
     by = "phasor and mean say so" if found.means else "its phasor says so, its mean cannot"

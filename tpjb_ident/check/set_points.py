@@ -23,38 +23,17 @@ NO_STATIC = (0.002, 0.02)
 
 
 def plane_of(channels: Sequence[Channel]) -> FloatArray:
-    """Matrix (2, m) from one reading per channel to X, Y.
-
-    Parameters
-    ----------
-    channels : sequence of Channel
-    """
+    """Matrix (2, m) from one reading per channel to X, Y."""
     return inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
 
 
 def to_plane(channels: Sequence[Channel], readings: AnyArray) -> AnyArray:
-    """X, Y from one value per channel; complex stays complex.
-
-    Parameters
-    ----------
-    channels : sequence of Channel
-    readings : (m,) or (m, n) ndarray
-        One row per channel, SI.
-    """
+    """X, Y from one value per channel; complex stays complex."""
     return np.asarray(plane_of(channels) @ readings)
 
 
 def plane_vector(seen: Observation, quantity: str, values: AnyArray) -> AnyArray | None:
-    """X, Y of one value per channel of `quantity`; None where its channels do not span the plane.
-
-    Parameters
-    ----------
-    seen : Observation
-    quantity : str
-        ``"displacement"``, ``"force"`` or ``"acceleration"``.
-    values : (m,) ndarray
-        One per channel of the run, SI.
-    """
+    """X, Y of one value per channel of `quantity`; None where its channels do not span the plane."""
     where = seen.pick(quantity)
     if len(where) < 2:
         return None
@@ -63,17 +42,7 @@ def plane_vector(seen: Observation, quantity: str, values: AnyArray) -> AnyArray
 
 
 def angle_between(first: float, second: float, period: float = 360.0) -> float:
-    """Smallest angle between two directions [deg].
-
-    Parameters
-    ----------
-    first : float
-        [deg]
-    second : float
-        [deg]
-    period : float, optional
-        After which directions repeat [deg].
-    """
+    """Smallest angle between two directions [deg]."""
     return abs((first - second + period / 2) % period - period / 2)
 
 
@@ -82,15 +51,6 @@ def check_static_loads(seen: Sequence[Observation]) -> bool:
 
     Cells that show no static force in any run are of a kind that shows none: that is a note, and nothing is held
     against them.
-
-    Parameters
-    ----------
-    seen : sequence of Observation
-
-    Returns
-    -------
-    bool
-        Whether the cells show a static force.
     """
     shown = []
     for one in seen:
@@ -111,13 +71,7 @@ def check_static_loads(seen: Sequence[Observation]) -> bool:
 
 
 def without_static_part(ratios: ComplexArray) -> bool:
-    """Whether the cells show no static force at all, as piezo-electric ones: not a little of it, but none.
-
-    Parameters
-    ----------
-    ratios : (n,) complex ndarray
-        Mean force over set point of the runs.
-    """
+    """Whether the cells show no static force at all, as piezo-electric ones: not a little of it, but none."""
     if not len(ratios):
         return False
     mean = abs(complex(ratios.mean()))
@@ -162,12 +116,7 @@ def _check_size(seen: Observation, ratio: float) -> None:
 
 
 def check_speed(seen: Observation) -> None:
-    """Speed channel against the stated shaft speed.
-
-    Parameters
-    ----------
-    seen : Observation
-    """
+    """Speed channel against the stated shaft speed."""
     stated, measured = seen.run.point.shaft_speed, seen.speed
     if math.isnan(measured):
         return
@@ -185,14 +134,7 @@ def check_speed(seen: Observation) -> None:
 
 
 def oil_force(seen: Observation, mass: float) -> ComplexArray | None:
-    """Force phasor of the film on the housing, F_cell + m_h a_h, X and Y [N]; None where not measured.
-
-    Parameters
-    ----------
-    seen : Observation
-    mass : float
-        Of the housing [kg]; NaN where not stated.
-    """
+    """Force phasor of the film on the housing, F_cell + m_h a_h, X and Y [N]; None where not measured."""
     if seen.lines is None:
         return None
     force = plane_vector(seen, "force", seen.lines.phasor)
@@ -205,12 +147,7 @@ def oil_force(seen: Observation, mass: float) -> ComplexArray | None:
 
 
 def excited(seen: Observation) -> bool:
-    """Whether the force shows the excitation line above its noise.
-
-    Parameters
-    ----------
-    seen : Observation
-    """
+    """Whether the force shows the excitation line above its noise."""
     if seen.lines is None:
         return False
     where = seen.pick("force")
@@ -219,15 +156,7 @@ def excited(seen: Observation) -> bool:
 
 
 def check_excitation(runs: Sequence[Observation], mass: float) -> None:
-    """Excitation of dynamic runs: there at all, as strong as in the other runs, in the stated direction.
-
-    Parameters
-    ----------
-    runs : sequence of Observation
-        Dynamic ones.
-    mass : float
-        Of the housing [kg]; NaN where not stated.
-    """
+    """Excitation of dynamic runs: there at all, as strong as in the other runs, in the stated direction."""
     forces = {id(s): f for s in runs if (f := oil_force(s, mass)) is not None}
     relative = {
         id(s): float(np.linalg.norm(forces[id(s)])) / max(s.run.point.static_load, 1e-9)

@@ -26,32 +26,12 @@ _MIN_CYCLES = 5.0
 
 
 def needed(run: Run, channel: Channel) -> bool:
-    """Whether `run` cannot be used without `channel`.
-
-    Parameters
-    ----------
-    run : Run
-    channel : Channel
-    """
+    """Whether `run` cannot be used without `channel`."""
     return channel.quantity in NEEDED[run.kind]
 
 
 def check_signal(report: Reporter, channel: Channel, seen: ChannelStatistics, noise_free: bool, alone: bool) -> None:
-    """Judge one channel of one run.
-
-    Parameters
-    ----------
-    report : Reporter
-        Receives the findings.
-    channel : Channel
-    seen : ChannelStatistics
-        Of its raw readings.
-    noise_free : bool
-        The run's other channels show no noise above the converter's steps: then a constant reading is
-        no dead channel.
-    alone : bool
-        No other channel of this quantity lives in this run.
-    """
+    """Judge one channel of one run."""
     grave: Severity = "error" if needed(report.run, channel) else "warning"
     place = f"channel {channel.name}"
     if seen.values == 0:
@@ -118,15 +98,7 @@ def _temperature(report: Reporter, channel: Channel, seen: ChannelStatistics) ->
 
 
 def check_clock(report: Reporter, time: FloatArray) -> None:
-    """Judge the times of a run.
-
-    Parameters
-    ----------
-    report : Reporter
-        Receives the findings.
-    time : (n,) ndarray
-        Seconds, not decreasing.
-    """
+    """Judge the times of a run."""
     rate = report.run.sample_rate
     _check_length(report, len(time), rate)
     if len(time) < 3:

@@ -50,13 +50,7 @@ def _directions(seen: Observation, where: Sequence[int]) -> FloatArray:
 
 
 def check_dry(runs: Sequence[Observation]) -> None:
-    """Dry pivot runs: a load that rises, its direction, pads told apart.
-
-    Parameters
-    ----------
-    runs : sequence of Observation
-        Dry ones.
-    """
+    """Dry pivot runs: a load that rises, its direction, pads told apart."""
     directions: list[tuple[Observation, float]] = []
     for seen in runs:
         planes = _planes(seen)
@@ -74,13 +68,7 @@ def check_dry(runs: Sequence[Observation]) -> None:
 
 
 def check_shaft_follows(runs: Sequence[Observation]) -> None:
-    """Dry pivot runs: the shaft goes toward the pad, where the force can be trusted.
-
-    Parameters
-    ----------
-    runs : sequence of Observation
-        Dry ones.
-    """
+    """Dry pivot runs: the shaft goes toward the pad, where the force can be trusted."""
     for seen in runs:
         planes = _planes(seen)
         push = None if planes is None or "force" in seen.report.doubts else _main_move(planes[0])
@@ -136,13 +124,7 @@ def _check_follows(seen: Observation, planes: tuple[FloatArray, FloatArray], pus
 
 
 def check_sweeps(runs: Sequence[Observation]) -> None:
-    """Clearance runs: the shaft moves to the side to which the small load pushes it.
-
-    Parameters
-    ----------
-    runs : sequence of Observation
-        Clearance ones.
-    """
+    """Clearance runs: the shaft moves to the side to which the small load pushes it."""
     for seen in runs:
         planes = _planes(seen)
         if planes is None:
@@ -158,13 +140,7 @@ def check_sweeps(runs: Sequence[Observation]) -> None:
 
 
 def check_locus(runs: Sequence[Observation]) -> None:
-    """Locus runs together: mean positions follow the directions of the loads.
-
-    Parameters
-    ----------
-    runs : sequence of Observation
-        Locus ones.
-    """
+    """Locus runs together: mean positions follow the directions of the loads."""
     groups: dict[object, list[Observation]] = {}
     for seen in runs:
         measured = len(seen.pick("displacement")) == 2 and len(seen.pick("force")) >= 2

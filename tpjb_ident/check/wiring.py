@@ -13,15 +13,7 @@ from tpjb_ident.arrays import FloatArray
 
 
 def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple[str, FloatArray]]:
-    """Every simple mending of two channels' readings, as a matrix on them, with the fault in words.
-
-    Parameters
-    ----------
-    channels : sequence of Channel
-        Two.
-    scales : bool
-        Whether to try factors of ten on one channel too.
-    """
+    """Every simple mending of two channels' readings, as a matrix on them, with the fault in words."""
     first, second = (c.name for c in channels)
     yield f"{first} and {second} were swapped", np.array([[0.0, 1.0], [1.0, 0.0]])
     yield f"{first} had the wrong sign", np.diag([-1.0, 1.0])
@@ -34,18 +26,7 @@ def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple
 
 
 def guess_wiring(channels: Sequence[Channel], readings: FloatArray, wanted: FloatArray, within: float = 8.0) -> str:
-    """Say which fault would turn the readings into the direction `wanted`; "" where not just one would.
-
-    Parameters
-    ----------
-    channels : sequence of Channel
-    readings : (m,) ndarray
-        SI, one per channel.
-    wanted : (2,) ndarray
-        Unit vector.
-    within : float
-        Largest angle that counts as that direction [deg].
-    """
+    """Say which fault would turn the readings into the direction `wanted`; "" where not just one would."""
     if len(channels) != 2 or not np.all(np.isfinite(readings)):
         return ""
     axes = np.array([c.axis for c in channels])
@@ -60,15 +41,7 @@ def guess_wiring(channels: Sequence[Channel], readings: FloatArray, wanted: Floa
 
 
 def name_fault(channels: Sequence[Channel], quality: Callable[[FloatArray], float]) -> str:
-    """Name the fault of two channels whose mending is clearly the best; "" where none is.
-
-    Parameters
-    ----------
-    channels : sequence of Channel
-        Two.
-    quality : callable
-        Of the answer after a repair (2, 2) of the readings: 1 is perfect, 0 or less impossible.
-    """
+    """Name the fault of two channels whose mending is clearly the best; "" where none is."""
     tried = sorted(((quality(matrix), words) for words, matrix in repairs(channels)), reverse=True)
     best, second = tried[0], tried[1]
     return f"; as if {best[1]}" if best[0] > 0.15 and best[0] > 2 * second[0] else ""

@@ -180,17 +180,7 @@ def measure_run(
     curves: Sequence[PivotCurve] | None = None,
     rule: CentreRule = "least-absolute",
 ) -> ClearancePolygon:
-    """Measure the polygon of one run; parameters as `measure_clearance`.
-
-    Parameters
-    ----------
-    run : Run
-        Of kind ``clearance``.
-    pivot_angles : sequence of float
-        Pad directions [rad], pad #1 first.
-    curves : sequence of PivotCurve, optional
-    rule : CentreRule, optional
-    """
+    """Measure the polygon of one run; parameters as `measure_clearance`."""
     angles = np.asarray(pivot_angles, dtype=float)
     touch = read_sweep(run, angles)
     reached = np.bincount(touch.pad, minlength=len(angles)) >= FEWEST_BLOCKS
@@ -283,13 +273,7 @@ def _mean_temperature(run: Run) -> float:
 
 
 def coldest_run(runs: Sequence[Run]) -> Run:
-    """The sweep at rest, or at the lowest speed, that is cold; of several such the one with the smallest push.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        Clearance runs.
-    """
+    """The sweep at rest, or at the lowest speed, that is cold; of several such the one with the smallest push."""
     if len(runs) == 1:
         return runs[0]
     slowest = min(run.point.shaft_speed for run in runs)

@@ -31,17 +31,7 @@ EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for
 
 @dataclass(frozen=True)
 class GainRatio:
-    """How much more the first probe reads than the second, as the sides of a polygon tell.
-
-    Attributes
-    ----------
-    value : float
-        Gain of the first over that of the second, minus 1.
-    se : float
-        Its standard error; widened by what the sides scatter about the model.
-    turn : float
-        Common turn of all sides [rad].
-    """
+    """How much more the first probe reads than the second, as the sides of a polygon tell."""
 
     value: float
     se: float
@@ -50,17 +40,7 @@ class GainRatio:
 
 @dataclass(frozen=True)
 class Centre:
-    """Centre of a polygon of sides n_k . p = d_k.
-
-    Attributes
-    ----------
-    position : (2,) ndarray
-        [m], in the coordinates of the distances.
-    clearance : float
-        Common clearance [m].
-    gain : (3, n) ndarray
-        Derivative of (position, clearance) with respect to the distances: carries their covariance on.
-    """
+    """Centre of a polygon of sides n_k . p = d_k."""
 
     position: FloatArray
     clearance: float
@@ -70,28 +50,7 @@ class Centre:
 def find_centre(
     angles: FloatArray, distances: FloatArray, covariance: FloatArray, rule: CentreRule = "least-absolute"
 ) -> Centre:
-    """Centre of a clearance polygon.
-
-    Parameters
-    ----------
-    angles : (n,) ndarray
-        Pad directions [rad]; at least three pads that surround the shaft.
-    distances : (n,) ndarray
-        Distance of each side from the origin, at zero load [m].
-    covariance : (n, n) ndarray
-        Of the distances [m^2].
-    rule : {"least-absolute", "least-squares"}
-        See the module.
-
-    Returns
-    -------
-    Centre
-
-    Raises
-    ------
-    ArgumentError
-        When fewer than three pads are given or they do not surround the shaft.
-    """
+    """Centre of a clearance polygon."""
     design = np.column_stack([directions(angles), np.ones(len(angles))])
     if len(angles) < 3 or np.linalg.cond(design) > 1e3:
         raise ArgumentError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
@@ -112,18 +71,7 @@ def find_centre(
 
 
 def corners(angles: FloatArray, clearances: FloatArray) -> FloatArray:
-    """Corners between neighbouring sides.
-
-    Parameters
-    ----------
-    angles, clearances : (n,) ndarray
-        Sides n_k . p = clearance_k, in circular order.
-
-    Returns
-    -------
-    (n, 2) ndarray
-        Corner k lies between side k and side k + 1 [m], from the centre.
-    """
+    """Corners between neighbouring sides."""
     n = directions(angles)
     following = np.roll(n, -1, axis=0)
     systems = np.stack([n, following], axis=1)
@@ -142,20 +90,6 @@ def gain_ratio(angles: FloatArray, tilt: FloatArray, tilt_se: FloatArray, axes: 
         -g (b . n_k) (n_k x c)
 
     which no common turn of the frame imitates. A gain that both probes share leaves all directions as they are.
-
-    Parameters
-    ----------
-    angles : (n,) ndarray
-        Pad directions [rad].
-    tilt, tilt_se : (n,) ndarray
-        Turn of every side [rad]; NaN where it was not reached.
-    axes : (float, float)
-        Of the two probes [rad].
-
-    Returns
-    -------
-    GainRatio
-        NaN where fewer than four sides, or probes along one line, tell nothing.
     """
     known = np.isfinite(tilt) & np.isfinite(tilt_se) & (tilt_se > 0)
     rows = np.array([[np.cos(a), np.sin(a)] for a in axes])

@@ -23,15 +23,7 @@ RISE = 0.2  # of the lighter push load: less tells nothing of the stiffness
 
 @dataclass(frozen=True)
 class RadialStiffness:
-    """Pivot stiffness from two sweeps with different push loads.
-
-    Attributes
-    ----------
-    load : float
-        Middle of the two push loads [N].
-    stiffness, stiffness_se : (n,) ndarray
-        Difference of load over difference of pushed position, per pad [N/m].
-    """
+    """Pivot stiffness from two sweeps with different push loads."""
 
     load: float
     stiffness: FloatArray
@@ -39,22 +31,7 @@ class RadialStiffness:
 
 
 def radial_stiffness(light: ClearancePolygon, heavy: ClearancePolygon) -> RadialStiffness:
-    """Secant between two push loads of the same bearing in the same condition.
-
-    Parameters
-    ----------
-    light, heavy : ClearancePolygon
-        Measured with the smaller and the larger push load.
-
-    Returns
-    -------
-    RadialStiffness
-
-    Raises
-    ------
-    ArgumentError
-        When the push loads are not clearly different.
-    """
+    """Secant between two push loads of the same bearing in the same condition."""
     rise = heavy.push_load - light.push_load
     if rise <= RISE * light.push_load:
         loads = f"{light.push_load:.0f} and {heavy.push_load:.0f} N"
@@ -69,17 +46,7 @@ def radial_stiffness(light: ClearancePolygon, heavy: ClearancePolygon) -> Radial
 
 @dataclass(frozen=True)
 class ClearanceChange:
-    """Growth of the clearance from one condition to another.
-
-    Attributes
-    ----------
-    per_pad, per_pad_se : (n,) ndarray
-        Each polygon about its own centre [m].
-    mean, mean_se : float
-        Over the pads [m]: what `physics.md` calls ``thermal_growth`` when the second polygon is hot.
-    centre_shift : (2,) ndarray
-        How far the centre's reading moved [m]; the probes' zero may have wandered with the temperature.
-    """
+    """Growth of the clearance from one condition to another."""
 
     per_pad: FloatArray
     per_pad_se: FloatArray
@@ -89,22 +56,7 @@ class ClearanceChange:
 
 
 def clearance_change(before: ClearancePolygon, after: ClearancePolygon) -> ClearanceChange:
-    """How much the clearance at zero load changed, as from cold to hot.
-
-    Parameters
-    ----------
-    before, after : ClearancePolygon
-        Of one bearing: the same pads.
-
-    Returns
-    -------
-    ClearanceChange
-
-    Raises
-    ------
-    ArgumentError
-        When the polygons have other pad directions.
-    """
+    """How much the clearance at zero load changed, as from cold to hot."""
     if before.angles.shape != after.angles.shape or not np.allclose(before.angles, after.angles, atol=1e-6):
         raise ArgumentError("both polygons must be of one bearing: their pad directions differ")
     shift = after.centre - before.centre
@@ -119,22 +71,7 @@ def clearance_change(before: ClearancePolygon, after: ClearancePolygon) -> Clear
 
 
 def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> pd.DataFrame:
-    """Every other polygon against one: `clearance_pairs.csv`, one row per pad.
-
-    Parameters
-    ----------
-    base : ClearancePolygon
-        Cold, light push.
-    others : sequence of ClearancePolygon
-        Of the same bearing.
-
-    Returns
-    -------
-    DataFrame
-        ``run``, ``against``, ``compared`` (``push load``: only the push differs; ``condition``: temperature or speed
-        do), ``pad``, ``change_m`` and ``change_m_se`` (clearance at zero push load), and for two push loads
-        ``stiffness_N_per_m`` with ``_se`` at ``load_N``.
-    """
+    """Every other polygon against one: `clearance_pairs.csv`, one row per pad."""
     import pandas as pd
 
     rows = []

@@ -34,25 +34,7 @@ SLIDING = 0.03  # of the give: while the shaft slides, its next pad may already 
 
 @dataclass(frozen=True)
 class SideFit:
-    """Sides of a polygon, from the probes' zero.
-
-    Attributes
-    ----------
-    distance : (n,) ndarray
-        At zero push load [m]; NaN for pads that were not reached.
-    tilt, tilt_se : (n,) ndarray
-        Turn of each side [rad].
-    covariance : (n, n) ndarray
-        Of the distances [m^2].
-    give, give_se : (n,) ndarray
-        Deflection of each pivot under the full push load [m].
-    scale, scale_se : float
-        g, and its standard error; NaN without curves.
-    noise : NoiseModel
-        Of the probes in this run.
-    misfit : float
-        Whitened residual variance; 1 when the noise explains all.
-    """
+    """Sides of a polygon, from the probes' zero."""
 
     distance: FloatArray
     tilt: FloatArray
@@ -77,23 +59,7 @@ def _known_give(curves: Sequence[PivotCurve], pad: IntArray, load: FloatArray) -
 
 @dataclass(frozen=True)
 class _System:
-    """The used averages, whitened together.
-
-    Attributes
-    ----------
-    touch : Touch
-        Used averages only.
-    place : (m,) ndarray
-        Along each side, from the foot of the centre [m].
-    whitener : (m, m) ndarray
-        Inverse Cholesky factor of their covariance.
-    pads : (r,) ndarray of int
-        Reached pads.
-    count : int
-        All pads.
-    noise : NoiseModel
-        Of the probes.
-    """
+    """The used averages, whitened together."""
 
     touch: Touch
     place: FloatArray
@@ -104,24 +70,7 @@ class _System:
 
 
 def fit_sides(touch: Touch, angles: FloatArray, reached: BoolArray, curves: Sequence[PivotCurve] | None) -> SideFit:
-    """Fit all sides of a sweep.
-
-    Parameters
-    ----------
-    touch : Touch
-        The sweep.
-    angles : (n,) ndarray
-        Pad directions [rad].
-    reached : (n,) ndarray of bool
-        Pads with enough data.
-    curves : sequence of PivotCurve or None
-        What the pivots give; without them it is fitted, in proportion to the load and with one curvature for
-        all pads.
-
-    Returns
-    -------
-    SideFit
-    """
+    """Fit all sides of a sweep."""
     place = _place_along_side(touch, angles, reached)
     usable = reached[touch.pad] & _consistent(touch, place)
     used, place = touch.take(usable), place[usable]

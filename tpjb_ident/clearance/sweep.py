@@ -31,23 +31,7 @@ TURN_NEEDED = 2.0 * np.pi * 0.97
 
 @dataclass(frozen=True)
 class Touch:
-    """Averages during which a pad was touched: m pieces, each of one pad.
-
-    Attributes
-    ----------
-    time, duration : (m,) ndarray
-        [s]
-    pad : (m,) ndarray of int
-        Index of the pad, from 0.
-    along, across : (m,) ndarray
-        Position on the pad's axes [m], from the probes' zero.
-    load : (m,) ndarray
-        What the pad carries [N].
-    push : float
-        Median of the load's magnitude [N].
-    alone : (m,) ndarray of bool
-        True where no other pad was touched (sliding).
-    """
+    """Averages during which a pad was touched: m pieces, each of one pad."""
 
     time: FloatArray
     duration: FloatArray
@@ -59,35 +43,13 @@ class Touch:
     alone: BoolArray
 
     def take(self, keep: BoolArray) -> Touch:
-        """The averages where `keep` (m,) is true.
-
-        Parameters
-        ----------
-        keep : (m,) ndarray of bool
-        """
+        """The averages where `keep` (m,) is true."""
         of_piece = ("time", "duration", "pad", "along", "across", "load", "alone")
         return replace(self, **{name: getattr(self, name)[keep] for name in of_piece})
 
 
 def read_sweep(run: Run, angles: FloatArray) -> Touch:
-    """Read a run of kind ``clearance``.
-
-    Parameters
-    ----------
-    run : Run
-        The sweep.
-    angles : (n,) ndarray
-        Pad directions [rad].
-
-    Returns
-    -------
-    Touch
-
-    Raises
-    ------
-    RigDataError
-        When the load does not go all around or the shaft does not follow it.
-    """
+    """Read a run of kind ``clearance``."""
     time, load, position, good = slow_samples(run)
     if good.sum() < 200:
         raise _refused(run, f"has only {int(good.sum())} usable samples", "Repeat the sweep")

@@ -34,15 +34,7 @@ class TableSource:
 
 @dataclass(frozen=True)
 class TableRow:
-    """Coefficients of one operating point.
-
-    Attributes
-    ----------
-    load, direction, speed, omega : float
-        Static load [N] and its direction [rad], shaft speed and excitation [rad/s].
-    coefficients : dict of str to (float, float)
-        Value and standard error of those that are known, by name: ``"kxx"`` [N/m], ``"cyy"`` [N s/m].
-    """
+    """Coefficients of one operating point."""
 
     load: float
     direction: float
@@ -52,28 +44,7 @@ class TableRow:
 
 
 def read_coefficients(path: Path, reading_error: float | None = None) -> tuple[TableRow, ...]:
-    """Read a table of coefficients.
-
-    Parameters
-    ----------
-    path : Path
-        CSV with the columns of ``coefficients.csv``: ``static_load_N``, ``shaft_speed_Hz``, one of the coefficients at
-        least (``kxx_N_per_m`` .. ``cyy_Ns_per_m``) with ``.._se`` or ``.._lo`` and ``.._hi``;
-        ``static_load_direction_deg`` (else -90) and ``excitation_Hz`` (else the shaft's). Empty cells are left out.
-    reading_error : float, optional
-        Standard error of a coefficient without one in the table, as a share of its value.
-
-    Returns
-    -------
-    tuple of TableRow
-        Those that hold a coefficient.
-
-    Raises
-    ------
-    BadInputError
-        No such file or column, a cell that is no number, a coefficient without any error, two rows for one point, or
-        no coefficient at all.
-    """
+    """Read a table of coefficients."""
     rows: list[TableRow] = []
     points: set[tuple[float, ...]] = set()
     for number, row in enumerate(_read(path).to_dict("records"), start=2):

@@ -70,17 +70,7 @@ class CompareSettings:
 
 @dataclass(frozen=True)
 class Variant:
-    """Predictions with one pivot model.
-
-    Attributes
-    ----------
-    name : str
-        Out of `VARIANTS`.
-    points : tuple of PointPrediction
-        At the identified points, in their order.
-    locus : tuple of PointPrediction
-        At the points of the measured locus, in its order.
-    """
+    """Predictions with one pivot model."""
 
     name: str
     points: tuple[PointPrediction, ...] = field(repr=False)
@@ -199,17 +189,7 @@ def compare_campaign(
 def joined(
     campaign: Campaign, bearing: Bearing, settings: CompareSettings, identification: Identification, side: ModelSide
 ) -> Comparison:
-    """Set what was identified beside the model's side.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    bearing : Bearing
-    settings : CompareSettings
-    identification : Identification
-    side : ModelSide
-        With every point that was identified.
-    """
+    """Set what was identified beside the model's side."""
     static, names = side.static, list(side.predicted)
     clearance, locus = static.clearance, static.locus
     remarks = [*side.remarks, *(condition.sentence() for condition in static.left_out)]

@@ -28,23 +28,7 @@ def compare_table(
     reading_error: float | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Comparison:
-    """Predict the operating points of a table of coefficients with every pivot model but measured ones.
-
-    Parameters
-    ----------
-    path, reading_error
-        See `read_coefficients`.
-    bearing : Bearing
-        As drawn.
-    settings : CompareSettings, optional
-    progress : callable, optional
-        Called as progress(text, done, total).
-
-    Raises
-    ------
-    BadInputError
-        The table cannot be taken.
-    """
+    """Predict the operating points of a table of coefficients with every pivot model but measured ones."""
     settings = settings or CompareSettings()
     tell = progress or (lambda text, done, total: None)
     points = tuple(_point(row) for row in read_coefficients(path, reading_error))

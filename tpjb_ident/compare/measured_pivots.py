@@ -16,21 +16,7 @@ if TYPE_CHECKING:
 
 
 def measured_laws(curves: Sequence[PivotCurve], n_pads: int, source: str = "") -> tuple[PivotLaw, ...]:
-    """Turn measured curves into pivot laws, pad #1 first.
-
-    Parameters
-    ----------
-    curves : sequence of PivotCurve
-        One per pad.
-    n_pads : int
-    source : str
-        Id of the campaign.
-
-    Raises
-    ------
-    model.bearing.BearingError
-        A pad has no curve.
-    """
+    """Turn measured curves into pivot laws, pad #1 first."""
     from tpjb_ident.pivot.pivots_toml import pad_table
 
     if not curves:
@@ -46,53 +32,24 @@ MEASURED = "measured pivots"
 
 
 def counted_twice(effects: Sequence[Effect]) -> tuple[str, ...]:
-    """Names of the effects that measured pivots hold already.
-
-    Parameters
-    ----------
-    effects : sequence of Effect
-    """
+    """Names of the effects that measured pivots hold already."""
     return tuple(dict.fromkeys(e.name for e in effects if e.name in PIVOT_EFFECTS))
 
 
 def beside_measured(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Effects without those that measured pivots hold already.
-
-    Parameters
-    ----------
-    effects : sequence of Effect
-    """
+    """Effects without those that measured pivots hold already."""
     return tuple(e for e in effects if e.name not in PIVOT_EFFECTS)
 
 
 def counts_from_measured(path: Path | None) -> bool:
-    """Whether an effects file says that its sizes are meant beside measured pivots.
-
-    Parameters
-    ----------
-    path : Path, optional
-        An effects file that can be read.
-    """
+    """Whether an effects file says that its sizes are meant beside measured pivots."""
     if path is None:
         return False
     return bool(parse_toml(path.read_text(encoding="utf-8-sig")).get(COUNTED_FROM) == MEASURED)
 
 
 def refuse_counted_twice(pivots: Any, effects: Sequence[Effect], path: Path | None) -> None:
-    """Refuse measured pivots together with effects that count from the printed formula.
-
-    Parameters
-    ----------
-    pivots : object
-        What --pivots says: the path of a file, ``"measured"``, or something else.
-    effects : sequence of Effect
-    path : Path, optional
-        The file they come from.
-
-    Raises
-    ------
-    BadInputError
-    """
+    """Refuse measured pivots together with effects that count from the printed formula."""
     twice = counted_twice(effects)
     if not (isinstance(pivots, Path) or pivots == "measured") or not twice or counts_from_measured(path):
         return

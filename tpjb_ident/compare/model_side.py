@@ -23,47 +23,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Asked:
-    """Pivot models, each with the effects that are switched on with it, and the heat model.
-
-    Attributes
-    ----------
-    effects : dict
-        Tuple of effects by pivot model, in the order of the tables.
-    thermal : {"isothermal", "adiabatic", "tehd", "thd"}
-    """
+    """Pivot models, each with the effects that are switched on with it, and the heat model."""
 
     effects: dict[str, tuple[Effect, ...]]
     thermal: str
 
     @classmethod
     def of(cls, variants: tuple[str, ...], thermal: str, effects: tuple[Effect, ...], from_measured: bool) -> Asked:
-        """With measured pivots, effects that these hold already are left out, unless they are sizes beside them.
-
-        Parameters
-        ----------
-        variants : tuple of str
-            Pivot models.
-        thermal : str
-        effects : tuple of Effect
-        from_measured : bool
-            The effects are sizes beside measured pivots.
-        """
+        """With measured pivots, effects that these hold already are left out, unless they are sizes beside them."""
         held = effects if from_measured else beside_measured(effects)
         return cls({name: held if name == "measured" else effects for name in variants}, thermal)
 
 
 @dataclass(frozen=True)
 class ModelSide:
-    """Static tests, and predictions with every pivot model.
-
-    Attributes
-    ----------
-    static : StaticTests
-    remarks : tuple of str
-        About pivot models that are left out.
-    predicted : dict
-        By pivot model: prediction by operating point.
-    """
+    """Static tests, and predictions with every pivot model."""
 
     static: StaticTests
     remarks: tuple[str, ...]
@@ -77,17 +51,7 @@ def model_side(
     points: tuple[OperatingPoint, ...],
     progress: Progress | None = None,
 ) -> ModelSide:
-    """Measure the static tests and predict points and locus with every pivot model.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    bearing : Bearing
-    asked : Asked
-    points : tuple of OperatingPoint
-    progress : callable, optional
-        Called as progress(text, done, total).
-    """
+    """Measure the static tests and predict points and locus with every pivot model."""
     from tpjb_ident.compare.static_tests import measure_static  # late: a process that asks another one needs none of it
 
     tell = progress or (lambda text, done, total: None)
@@ -111,16 +75,7 @@ def model_side(
 def possible_variants(
     variants: tuple[str, ...], curves: tuple[PivotCurve, ...], bearing: Bearing
 ) -> tuple[list[str], list[str]]:
-    """Pivot models that a campaign and a bearing allow, and remarks about the others.
-
-    Parameters
-    ----------
-    variants : tuple of str
-        Those asked for.
-    curves : tuple of PivotCurve
-        From its dry tests.
-    bearing : Bearing
-    """
+    """Pivot models that a campaign and a bearing allow, and remarks about the others."""
     names, remarks = list(variants), []
     missing = sorted(set(range(1, len(bearing.pads) + 1)) - {c.pad for c in curves})
     if "measured" in names and missing:

@@ -12,18 +12,7 @@ Formula = Callable[[int, float], tuple[float, float]]
 
 
 def printed_formula(bearing: Bearing) -> Formula | None:
-    """Kirk and Reedy's formula for a bearing's pivots, Eq. (16) or (17); None if its pivots are rigid.
-
-    Parameters
-    ----------
-    bearing : Bearing
-        Its pivots count.
-
-    Returns
-    -------
-    callable or None
-        ``formula(pad, load)`` gives the secant (as printed) and the tangent stiffness [N/m].
-    """
+    """Kirk and Reedy's formula for a bearing's pivots, Eq. (16) or (17); None if its pivots are rigid."""
     if bearing.pivot.kind == "rigid":
         return None
     printed = formula_pivot(bearing.pivot, secant_vibrations=True)

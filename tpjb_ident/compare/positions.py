@@ -16,12 +16,7 @@ if TYPE_CHECKING:
 
 
 def measured_locus(comparison: Comparison) -> FloatArray:
-    """Measured positions (n, 2) [m], from the bearing centre if the campaign has a clearance run.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    """
+    """Measured positions (n, 2) [m], from the bearing centre if the campaign has a clearance run."""
     if comparison.locus is None:
         return np.zeros((0, 2))
     return np.array([p.position for p in comparison.locus.points]).reshape(-1, 2)
@@ -32,11 +27,6 @@ def predicted_locus(comparison: Comparison, variant: Variant) -> FloatArray:
 
     Without a clearance run the probes' zero stands anywhere: then the prediction is shifted by the mean difference,
     and only the shape of the two can be compared.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    variant : Variant
     """
     places = np.array([p.prediction.position for p in variant.locus]).reshape(-1, 2)
     if comparison.clearance is None and len(places):
@@ -45,13 +35,7 @@ def predicted_locus(comparison: Comparison, variant: Variant) -> FloatArray:
 
 
 def locus_distance(comparison: Comparison, variant: Variant) -> float:
-    """Root mean square distance between the two loci [m]; NaN without locus runs.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    variant : Variant
-    """
+    """Root mean square distance between the two loci [m]; NaN without locus runs."""
     off = predicted_locus(comparison, variant) - measured_locus(comparison)
     distance = np.hypot(off[:, 0], off[:, 1])
     distance = distance[np.isfinite(distance)]
@@ -59,13 +43,7 @@ def locus_distance(comparison: Comparison, variant: Variant) -> float:
 
 
 def locus_frame(comparison: Comparison) -> pd.DataFrame:
-    """Build locus_comparison.csv: measured and predicted position per load direction and pivot model.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        With a measured locus.
-    """
+    """Build locus_comparison.csv: measured and predicted position per load direction and pivot model."""
     import pandas as pd
 
     if comparison.locus is None:

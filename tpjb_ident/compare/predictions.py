@@ -26,17 +26,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class ModelSettings:
-    """Which model is asked.
-
-    Attributes
-    ----------
-    pivots : str, float, path or laws per pad
-        As `model.predict.predict` takes them.
-    thermal : {"isothermal", "adiabatic", "tehd", "thd"}
-    effects : tuple of Effect
-    options : Options
-        Physics beyond the paper's model.
-    """
+    """Which model is asked."""
 
     pivots: Any = "kirk"
     thermal: str = "adiabatic"
@@ -46,16 +36,7 @@ class ModelSettings:
 
 @dataclass(frozen=True)
 class PointPrediction:
-    """One operating point, and where in a prediction over several frequencies it stands.
-
-    Attributes
-    ----------
-    point : OperatingPoint
-    prediction : Prediction
-        Over all excitation frequencies of this static point.
-    index : int
-        Place of this point's frequency in ``prediction.excitation``.
-    """
+    """One operating point, and where in a prediction over several frequencies it stands."""
 
     point: OperatingPoint
     prediction: Prediction = field(repr=False)
@@ -78,26 +59,7 @@ def predict_points(
     settings: ModelSettings | None = None,
     progress: Progress | None = None,
 ) -> tuple[PointPrediction, ...]:
-    """Predict every operating point.
-
-    Parameters
-    ----------
-    bearing : Bearing
-    points : iterable of OperatingPoint
-        Points without an excitation are predicted at synchronous frequency.
-    settings : ModelSettings, optional
-    progress : callable, optional
-
-    Returns
-    -------
-    tuple of PointPrediction
-        In the order of `points`. A point without convergence has NaN coefficients and a status.
-
-    Raises
-    ------
-    ValueError
-        Impossible operating point, pivot choice or effect; the message says which.
-    """
+    """Predict every operating point."""
     settings = settings or ModelSettings()
     wanted = tuple(points)
     groups: dict[OperatingPoint, list[float]] = {}
@@ -136,13 +98,7 @@ def _static(point: OperatingPoint) -> OperatingPoint:
 
 
 def point_columns(point: OperatingPoint) -> dict[str, float]:
-    """Key columns of every table over operating points (outputs.md).
-
-    Parameters
-    ----------
-    point : OperatingPoint
-        Without an excitation: synchronous.
-    """
+    """Key columns of every table over operating points (outputs.md)."""
     return {
         "static_load_N": point.static_load,
         "static_load_direction_deg": point.static_load_direction_deg,
@@ -152,45 +108,19 @@ def point_columns(point: OperatingPoint) -> dict[str, float]:
 
 
 def coefficient_names(kind: str) -> tuple[str, ...]:
-    """Column names of the four stiffnesses (``"k"``) or dampings (``"c"``), row by row.
-
-    Parameters
-    ----------
-    kind : str
-        "k" or "c".
-    """
+    """Column names of the four stiffnesses (``"k"``) or dampings (``"c"``), row by row."""
     return KINDS[kind].columns
 
 
 def prediction_frame(predictions: Sequence[PointPrediction], mesh_error: bool = True) -> pd.DataFrame:
-    """Build prediction.csv: one row per operating point.
-
-    Parameters
-    ----------
-    predictions : sequence of PointPrediction
-    mesh_error : bool
-        Also estimate the error from the mesh, which solves every static point once more, coarsely.
-
-    Returns
-    -------
-    DataFrame
-        Columns as in coefficients.csv, the shaft position, and per pad load, tilt, deflection, largest pressure
-        and temperature, least film.
-    """
+    """Build prediction.csv: one row per operating point."""
     import pandas as pd
 
     return pd.DataFrame(prediction_rows(predictions, mesh_error))
 
 
 def prediction_rows(predictions: Sequence[PointPrediction], mesh_error: bool = True) -> list[dict[str, Any]]:
-    """Rows of `prediction_frame`, for a process that needs no table.
-
-    Parameters
-    ----------
-    predictions : sequence of PointPrediction
-    mesh_error : bool
-        See `prediction_frame`.
-    """
+    """Rows of `prediction_frame`, for a process that needs no table."""
     return [_row(one, mesh_error) for one in predictions]
 
 

@@ -41,22 +41,7 @@ class ModelConvergenceError(TpjbError):
 
 
 def rig_truth(bearing: Bearing, settings: ModelSettings, bearing_text: str = "") -> RigTruth:
-    """Give a bearing's physics to the virtual rig.
-
-    Parameters
-    ----------
-    bearing : Bearing
-        As drawn; this is what the campaign's bearing file says.
-    settings : ModelSettings
-        What it is really like. Effects on the records are left out here: see `erring_instruments`.
-    bearing_text : str
-        Text of the bearing file, for the campaign.
-
-    Raises
-    ------
-    ModelConvergenceError
-        When a campaign is written: no equilibrium at one of its points.
-    """
+    """Give a bearing's physics to the virtual rig."""
     physical = [effect for effect in settings.effects if effect.name not in INSTRUMENT_ERRORS]
     return truth_of(
         apply_effects(Setup(bearing, pivot_laws(settings.pivots, bearing), settings.thermal), physical), bearing_text
@@ -64,15 +49,7 @@ def rig_truth(bearing: Bearing, settings: ModelSettings, bearing_text: str = "")
 
 
 def truth_of(setup: Setup, bearing_text: str = "") -> RigTruth:
-    """Give a set-up's physics to the virtual rig.
-
-    Parameters
-    ----------
-    setup : Setup
-        What the bearing is really like.
-    bearing_text : str
-        Text of the bearing file, for the campaign.
-    """
+    """Give a set-up's physics to the virtual rig."""
     world = _World(setup)
     return RigTruth(
         stiffness=world.stiffness,
@@ -87,15 +64,7 @@ def truth_of(setup: Setup, bearing_text: str = "") -> RigTruth:
 
 
 def erring_instruments(instruments: Instruments, effects: Iterable[Effect]) -> Instruments:
-    """Add the effects that act on the records to a rig's instruments; other effects do nothing here.
-
-    Parameters
-    ----------
-    instruments : Instruments
-        Of the rig.
-    effects : Iterable[Effect]
-        Of any side.
-    """
+    """Add the effects that act on the records to a rig's instruments; other effects do nothing here."""
     for effect in effects:
         if effect.name in INSTRUMENT_ERRORS:
             argument, parameter = INSTRUMENT_ERRORS[effect.name]

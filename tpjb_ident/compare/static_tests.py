@@ -29,17 +29,7 @@ SCALE = (0.5, 2.0)
 
 @dataclass(frozen=True)
 class StaticTests:
-    """Results of the static tests.
-
-    Attributes
-    ----------
-    curves : tuple of PivotCurve
-        Empty without dry tests, or if not asked for.
-    clearance : ClearancePolygon or None
-    locus : Locus or None
-    left_out : tuple of Condition
-        Name the records that take no part, and say why.
-    """
+    """Results of the static tests."""
 
     curves: tuple[PivotCurve, ...] = field(repr=False)
     clearance: ClearancePolygon | None = field(repr=False)
@@ -48,21 +38,7 @@ class StaticTests:
 
 
 def measure_static(campaign: Campaign, bearing: Bearing, with_pivots: bool = True) -> StaticTests:
-    """Measure what the campaign holds of pivot curves, clearance polygon and locus.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    bearing : Bearing
-        Gives the directions of the pads.
-    with_pivots : bool
-        Whether pivot curves are wanted.
-
-    Raises
-    ------
-    RigDataError
-        Half of the dry runs or of the locus runs, or more, cannot be used: that is no accident of single records.
-    """
+    """Measure what the campaign holds of pivot curves, clearance polygon and locus."""
     from tpjb_ident.clearance.locus import measure_locus
     from tpjb_ident.pivot import PivotSettings, fit_pivots
 
@@ -95,15 +71,7 @@ def _clearance(
 
 
 def bearing_problems(campaign: Campaign, bearing: Bearing, known: Sequence[Problem] = ()) -> list[Problem]:
-    """Problems that show in the clearance sweeps of a campaign whose bearing is known.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    bearing : Bearing
-    known : sequence of Problem
-        Found already; sweeps with an error are not looked at.
-    """
+    """Problems that show in the clearance sweeps of a campaign whose bearing is known."""
     sound = [
         run
         for run in campaign.of_kind("clearance")

@@ -32,20 +32,7 @@ PIVOTS_IN_WORDS = {
 
 @dataclass(frozen=True)
 class Deviation:
-    """How one pivot model does on one direct coefficient.
-
-    Attributes
-    ----------
-    pivots : str
-    coefficient : str
-        ``"kxx"``, ``"kyy"``, ``"cxx"`` or ``"cyy"``.
-    median, worst : float
-        Median, and largest in size, of predicted / measured - 1 over the points.
-    n : int
-        Points compared.
-    inside : int
-        Points whose 95 % interval holds the prediction.
-    """
+    """How one pivot model does on one direct coefficient."""
 
     pivots: str
     coefficient: str
@@ -56,14 +43,7 @@ class Deviation:
 
 
 def deviations(comparison: Comparison, frame: pd.DataFrame | None = None) -> tuple[Deviation, ...]:
-    """Deviation of every pivot model in every direct coefficient.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    frame : DataFrame, optional
-        As comparison.csv; default: made.
-    """
+    """Deviation of every pivot model in every direct coefficient."""
     table = comparison_frame(comparison) if frame is None else frame
     found = []
     for variant in comparison.variants:
@@ -80,13 +60,7 @@ def deviations(comparison: Comparison, frame: pd.DataFrame | None = None) -> tup
 
 
 def closest(found: tuple[Deviation, ...]) -> str | None:
-    """Pivot model with the smallest mean size of its four medians; None if nothing could be compared.
-
-    Parameters
-    ----------
-    found : tuple of Deviation
-        Of all pivot models.
-    """
+    """Pivot model with the smallest mean size of its four medians; None if nothing could be compared."""
     scores: dict[str, list[float]] = {}
     for d in found:
         if math.isfinite(d.median):
@@ -99,11 +73,9 @@ OFF = 0.05
 
 
 def worth_a_diagnosis(found: tuple[Deviation, ...]) -> bool:
-    """Whether even the closest pivot model is off: a direct coefficient by its tolerance, half of its points or more.
+    """Whether even the closest pivot model is off.
 
-    Parameters
-    ----------
-    found : tuple of Deviation
+    A direct coefficient by its tolerance, half of its points or more.
     """
     own = [d for d in found if d.pivots == closest(found) and math.isfinite(d.median)]
     return any(abs(d.median) > OFF and d.inside <= 0.5 * d.n for d in own)
@@ -143,14 +115,7 @@ def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
 
 
 def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None) -> tuple[str, ...]:
-    """Say what the comparison found, the answer first.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    frame : DataFrame, optional
-        As comparison.csv; default: made.
-    """
+    """Say what the comparison found, the answer first."""
     found = deviations(comparison, frame)
     best = closest(found)
     sentences = []

@@ -20,19 +20,7 @@ DIRECT = tuple(name for name in NAMES if name[1:3] in ("xx", "yy"))
 
 
 def comparison_frame(comparison: Comparison) -> pd.DataFrame:
-    """Build comparison.csv.
-
-    Parameters
-    ----------
-    comparison : Comparison
-
-    Returns
-    -------
-    DataFrame
-        Per coefficient the measured value with ``_lo`` and ``_hi`` (95 %), ``_predicted``, ``_difference``
-        (predicted - measured) and ``_ratio`` (predicted / measured; NaN where the measured interval holds zero);
-        ``pivot_extrapolated`` says that a pad's load lies beyond its measured curve.
-    """
+    """Build comparison.csv."""
     import pandas as pd
 
     rows = [
@@ -67,12 +55,7 @@ def _row(variant: Variant, measured: PointResult, predicted: PointPrediction) ->
 
 
 def pivot_extrapolated(predicted: PointPrediction) -> bool:
-    """Whether a pad that carries presses its pivot harder than the dry test did.
-
-    Parameters
-    ----------
-    predicted : PointPrediction
-    """
+    """Whether a pad that carries presses its pivot harder than the dry test did."""
     p = predicted.prediction
     loads = zip(p.setup.pivots, p.pad_load, strict=True)
     return any(load > getattr(law, "valid_to", np.inf) for law, load in loads)

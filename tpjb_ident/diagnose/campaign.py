@@ -43,16 +43,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Baseline:
-    """Where a diagnosis starts from.
-
-    Attributes
-    ----------
-    pivots : object
-        ``"kirk"``, ``"rigid"``, ``"measured"``, a path or laws.
-    thermal : str
-    effects : tuple of Effect
-        Already in the model.
-    """
+    """Where a diagnosis starts from."""
 
     pivots: Any = "kirk"
     thermal: str = "adiabatic"
@@ -84,33 +75,13 @@ class CampaignDiagnosis(Presented):
         return "\n".join(verdict_sentences(name, self.diagnosis.verdict, off))
 
     def plot(self, **options: Any) -> Any:
-        """Draw the gap by observable, before and after; see `tpjb_ident.report.plots.gap`.
-
-        Parameters
-        ----------
-        **options
-            ``logarithmic``, ``title``.
-        """
+        """Draw the gap by observable, before and after; see `tpjb_ident.report.plots.gap`."""
         return shown_by("report.plots", "gap")(self.diagnosis, **options)
 
 
 @dataclass(frozen=True)
 class Measured:
-    """All that a diagnosis needs of a campaign, without its records; it can be kept and diagnosed again.
-
-    Attributes
-    ----------
-    identification : Identification
-    curves : tuple of PivotCurve
-    polygon : ClearancePolygon or None
-    locus : Locus or None
-    instruments : Instruments
-        Housing mass and stiffness of the cells under it, as the campaign shows them.
-    tolerances : Tolerances
-        What may be off, as bearing file, manifest and defaults state it.
-    sensors : tuple of float
-        Fraction of the arc at which every pad carries its thermometer.
-    """
+    """All that a diagnosis needs of a campaign, without its records; it can be kept and diagnosed again."""
 
     identification: Identification = field(repr=False)
     curves: tuple[PivotCurve, ...] = field(repr=False)
@@ -160,20 +131,7 @@ def measure_campaign(
     progress: Callable[[str, int, int], None] | None = None,
     ahead: Callable[[], StaticTests | None] | None = None,
 ) -> Measured:
-    """Identify a campaign and measure its static tests.
-
-    Parameters
-    ----------
-    campaign, bearing, progress, ahead
-        As of `diagnose_campaign`.
-    known : Tolerances, optional
-        What counts where bearing file and manifest are silent; what the command line states counts in any case.
-
-    Raises
-    ------
-    ComparisonError
-        The campaign has no dynamic runs.
-    """
+    """Identify a campaign and measure its static tests."""
     tell = progress or (lambda text, done, total: None)
     if not campaign.of_kind("dynamic"):
         raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to diagnose")
@@ -229,17 +187,7 @@ def diagnose_table(
     reading_error: float | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> CampaignDiagnosis:
-    """Find what a model lacks to give the K and C of a table.
-
-    Parameters
-    ----------
-    path : Path
-        See `observe_table`.
-    bearing, baseline, settings, progress
-        As of `diagnose_campaign`.
-    reading_error : float, optional
-        Standard error of values without one in the table, as a share.
-    """
+    """Find what a model lacks to give the K and C of a table."""
     baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
     tell = progress or (lambda text, done, total: None)
     if baseline.pivots == "measured":
@@ -255,11 +203,6 @@ def unknown_centre(locus: Locus) -> float:
     """How far the bearing's centre may lie from where positions are counted when no clearance sweep tells it [m].
 
     Positions then count from the probes' own zero, and only their differences say something about the bearing.
-
-    Parameters
-    ----------
-    locus : Locus
-        Mean positions under constant load [m].
     """
     return max(1e-3, 3.0 * max(math.hypot(*p.position) for p in locus.points))
 

@@ -49,16 +49,7 @@ BEFORE, AFTER = "model before", "with the effects found"
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """A verdict and everything it rests on (for reports and next tests).
-
-    Attributes
-    ----------
-    verdict : Verdict
-    problem : Problem
-    found : Search
-    after : (n,) ndarray
-        What the model predicts with exactly the effects that are named.
-    """
+    """A verdict and everything it rests on (for reports and next tests)."""
 
     verdict: Verdict
     problem: Problem = field(repr=False)
@@ -117,15 +108,7 @@ def _exact(forward: Forward, found: Search) -> FloatArray | None:
 
 
 def pose(observations: Observations, forward: Forward, settings: DiagnoseSettings) -> Problem:
-    """Set a campaign beside a model: baseline, nuisances, candidates.
-
-    Parameters
-    ----------
-    observations : Observations
-    forward : ForwardModel
-    settings : DiagnoseSettings
-        Settings of the diagnosis.
-    """
+    """Set a campaign beside a model: baseline, nuisances, candidates."""
     base = forward()
     trusted = loosened(observations, forward.pad_shares(), settings.tolerance)
     known = nuisances(trusted.elements, forward.setup, settings.tolerances)
@@ -214,20 +197,7 @@ def _thinned(observations: Observations) -> Observations:
 
 
 def before_and_after(diagnosis: Diagnosis, identification: Identification | None) -> pd.DataFrame:
-    """Make a table as comparison.csv of a diagnosis.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    identification : Identification or None
-        That it was made from; without one, from a table of coefficients, there are no rows.
-
-    Returns
-    -------
-    DataFrame
-        One row per operating point and model: ``pivots`` is `BEFORE` or `AFTER`; the latter only where effects were
-        named. Points that the diagnosis left out have no prediction.
-    """
+    """Make a table as comparison.csv of a diagnosis."""
     import pandas as pd
 
     models = [(BEFORE, diagnosis.problem.base)]
@@ -258,18 +228,7 @@ def _by_point(diagnosis: Diagnosis, prediction: FloatArray) -> dict[tuple[float,
 
 
 def median_deviations(table: pd.DataFrame) -> dict[str, tuple[float, float]]:
-    """Median of predicted / measured - 1 before and after, of every direct coefficient.
-
-    Parameters
-    ----------
-    table : DataFrame
-        As `before_and_after` gives it.
-
-    Returns
-    -------
-    dict of str to (float, float)
-        Equal where no effect was named.
-    """
+    """Median of predicted / measured - 1 before and after, of every direct coefficient."""
     found: dict[str, tuple[float, float]] = {}
     if table.empty:
         return found

@@ -117,20 +117,7 @@ def plan(
 
 
 def points_of(given: Mapping[str, Any]) -> list[OperatingPoint]:
-    """Every combination of loads, directions, speeds and excitation frequencies.
-
-    Parameters
-    ----------
-    given : mapping of str to float, sequence or pint quantity
-        ``load`` [N], ``speed`` and ``excitation`` [rad/s], ``load_direction`` [rad] by default straight down.
-
-    Raises
-    ------
-    ArgumentError
-        One is lacking, or unknown: says the nearest.
-    UnitError
-        A quantity of another dimension, by its name.
-    """
+    """Every combination of loads, directions, speeds and excitation frequencies."""
     for name in given:
         if name not in _POINT:
             raise ArgumentError(f"points: {unknown_name('set point', name, _POINT)}")
@@ -149,21 +136,7 @@ def points_of(given: Mapping[str, Any]) -> list[OperatingPoint]:
 
 
 def planned_layout(bearing: Bearing, points: Sequence[OperatingPoint], static: tuple[int, bool, float, bool]) -> Layout:
-    """Lay out the tests of a plan.
-
-    Parameters
-    ----------
-    bearing : Bearing
-    points : sequence of OperatingPoint
-        Of the dynamic runs.
-    static : tuple of (int, bool, float, bool)
-        Load directions of the locus, dry tests or not, push load of the sweep [N], pad temperatures or not.
-
-    Raises
-    ------
-    ArgumentError
-        No dynamic runs.
-    """
+    """Lay out the tests of a plan."""
     directions, with_dry, push, sensors = static
     if not points:
         raise ArgumentError("points: the plan has no dynamic runs. Give at least one operating point.")
@@ -192,17 +165,7 @@ def _bearing_of(campaign: Campaign, given: Bearing | str | Path | None) -> Beari
 
 
 def as_bearing(given: Bearing | str | Path) -> Bearing:
-    """Return the bearing given, or read its file.
-
-    Parameters
-    ----------
-    given : Bearing, str or Path
-
-    Raises
-    ------
-    ArgumentError
-        Neither.
-    """
+    """Return the bearing given, or read its file."""
     if isinstance(given, Bearing):
         return given
     if isinstance(given, (str, Path)):

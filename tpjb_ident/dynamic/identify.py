@@ -141,18 +141,7 @@ def assemble(
     tell: Progress,
     workers: Workers | None = None,
 ) -> Identification:
-    """Estimate all points from runs already turned to phasors, a few points' windows in memory at a time.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    finished : FinishedRuns
-    settings : IdentifySettings
-    tell : callable
-        Called as tell(text, done, total).
-    workers : Workers, optional
-        Who estimates the points; the numbers are the same.
-    """
+    """Estimate all points from runs already turned to phasors, a few points' windows in memory at a time."""
     workers = workers or InProcessWorkers()
     checked = check_finished(campaign, finished)
     digests = finished.digests
@@ -275,11 +264,6 @@ def directions_differ(first: list[DynamicStiffness]) -> bool:
 
     Few runs per point tell little about it; the cause (set points that are missed a little) is the same
     at all points. Beyond doubt means: the summed chi-square has a probability below 1e-4.
-
-    Parameters
-    ----------
-    first : list of DynamicStiffness
-        One per point.
     """
     known = [est for est in first if np.isfinite(est.chi_square) and est.spare_equations > 0]
     dof = sum(est.spare_equations for est in known)

@@ -33,32 +33,13 @@ MIN_SINE = 0.1
 
 
 def first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffness:
-    """Estimate before any correction, for how H changes with load and how runs scatter; its weights are not needed.
-
-    Parameters
-    ----------
-    data : PointData
-        Windows of the point.
-    settings : IdentifySettings
-        For the method.
-
-    Returns
-    -------
-    DynamicStiffness
-        Without weights.
-    """
+    """Estimate before any correction, for how H changes with load and how runs scatter; its weights are not needed."""
     found = estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, own_method(settings.method))
     return replace(found, weights=np.empty((0, 2)))
 
 
 def own_method(method: str) -> str:
-    """A method that needs no instruments, the one asked for if it is such.
-
-    Parameters
-    ----------
-    method : str
-        Name of an estimator, with its norm after a colon.
-    """
+    """A method that needs no instruments, the one asked for if it is such."""
     return "mm-eiv" if method == "iv" else method.partition(":")[0]
 
 
@@ -86,17 +67,7 @@ class Completion:
 
 
 def point_figures(data: PointData, settings: IdentifySettings, differ: bool, known: float = 0.0) -> Figures:
-    """Every method's answer on the windows of a point, and what is said of the default one.
-
-    Parameters
-    ----------
-    data : PointData
-    settings : IdentifySettings
-    differ : bool
-        Whether runs differ by more than their windows explain.
-    known : float, optional
-        Force of another phase in every run that the intervals allow for [N].
-    """
+    """Every method's answer on the windows of a point, and what is said of the default one."""
     by_method = _all_methods(data, settings, differ)
     best = by_method[settings.method]
     weights = best.weights.min(axis=1)
@@ -124,26 +95,7 @@ def point_result(
     temperatures: dict[str, dict[int, float]],
     settings: IdentifySettings,
 ) -> PointResult:
-    """The point, made once, with everything that is known of it.
-
-    Parameters
-    ----------
-    data : PointData
-        Windows of the point as they were fitted.
-    figures : Figures
-        What the raw readings and the windows tell (amplitudes, noise, drift).
-    completion : Completion
-        Estimates of every method, with the whole budget.
-    temperatures : dict of str to dict of int to float
-        Mean [degC] of every sensor, by run.
-    settings : IdentifySettings
-        Which method is the one to be used.
-
-    Returns
-    -------
-    PointResult
-        All that is known of the point.
-    """
+    """The point, made once, with everything that is known of it."""
     positions = data.mean_positions
     return PointResult(
         point=data.point,
@@ -185,14 +137,7 @@ def _all_methods(data: PointData, settings: IdentifySettings, differ: bool) -> d
 
 
 def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[Condition, ...]:
-    """Say which methods differ from the default beyond both intervals.
-
-    Parameters
-    ----------
-    by_method : dict of str to DynamicStiffness
-    default : str
-        Method that the others are held against.
-    """
+    """Say which methods differ from the default beyond both intervals."""
     best = by_method[default]
     found = []
     for name, other in by_method.items():
@@ -214,15 +159,6 @@ def nominal_drive(data: PointData) -> ComplexArray | None:
     The format has no channel for the actuators' command. But every run states the direction of its excitation, and the
     part of its own mean force along that direction has the size and phase of the command: averaged over the run's
     windows it knows next to nothing of a single window's noise, and nothing of the displacements' noise.
-
-    Parameters
-    ----------
-    data : PointData
-
-    Returns
-    -------
-    (n, 2) complex ndarray or None
-        None where a run states no direction, has too few windows, or all directions are alike.
     """
     angles = [run.direction for run in data.runs]
     known = np.array([a for a in angles if a is not None])

@@ -35,15 +35,7 @@ FIGURES = ("norm", "window_s", "n_records", "n_windows", "status")
 
 @dataclass(frozen=True)
 class PlainSettings:
-    """How the plain solution is made.
-
-    Attributes
-    ----------
-    window : float
-        Length of a window [s].
-    norm : str
-        Of statsmodels' RLM, as `tpjb_ident.dynamic.estimators.rlm.NORMS` names it.
-    """
+    """How the plain solution is made."""
 
     window: float = 0.5
     norm: str = "huber"
@@ -51,22 +43,7 @@ class PlainSettings:
 
 @dataclass(frozen=True)
 class PlainPoint:
-    """One operating point, solved as printed.
-
-    Attributes
-    ----------
-    data : PointData
-        Its windows.
-    R : (2 n, 4) complex ndarray
-        [m]
-    f : (2 n,) complex ndarray
-        [N]
-    h : (2, 2) complex ndarray
-        [N/m]
-    standard_error : (8,) ndarray
-        statsmodels' own, of Re and Im of h [N/m].
-    status : tuple of str
-    """
+    """One operating point, solved as printed."""
 
     data: PointData = field(repr=False)
     R: ComplexArray = field(repr=False)
@@ -77,18 +54,7 @@ class PlainPoint:
 
 
 def plain_points(campaign: Campaign, settings: PlainSettings) -> list[PlainPoint]:
-    """Solve every operating point of a campaign as the paper prints it.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    settings : PlainSettings
-
-    Raises
-    ------
-    rigdata.problem.RigDataError, RecordTooShortError
-        Of the first run that cannot be used: nothing is left out here.
-    """
+    """Solve every operating point of a campaign as the paper prints it."""
     phasors = PhasorSettings(windows=WindowSettings(length=settings.window, max_inflation=np.inf, min_cycles=1.0))
     runs = []
     for run in (run for run in campaign.of_kind("dynamic") if not is_broadband(run)):
@@ -112,20 +78,7 @@ def _solved(data: PointData, settings: PlainSettings) -> PlainPoint:
 
 
 def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.DataFrame:
-    """One row per operating point: ``plain.csv``.
-
-    Parameters
-    ----------
-    points : sequence of PlainPoint
-        Results by Eq. (13)-(15) alone.
-    settings : PlainSettings
-        For the level of the intervals.
-
-    Returns
-    -------
-    DataFrame
-        Columns as in docs/results.md.
-    """
+    """One row per operating point: ``plain.csv``."""
     import pandas as pd
 
     rows = []
@@ -144,15 +97,7 @@ def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.Dat
 
 
 def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:
-    """Write R and f of Eq. (15), one group per point, with the run of every window, as HDF5.
-
-    Parameters
-    ----------
-    path : Path
-        File to be written.
-    points : sequence of PlainPoint
-        Their R matrices are written as they were fitted.
-    """
+    """Write R and f of Eq. (15), one group per point, with the run of every window, as HDF5."""
     import h5py
 
     with h5py.File(path, "w") as file:

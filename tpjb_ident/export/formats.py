@@ -70,18 +70,7 @@ FORMATS: dict[str, Format] = {
 
 
 def export_format(name: str) -> Format:
-    """Format of a name.
-
-    Parameters
-    ----------
-    name : str
-        A key of `FORMATS`.
-
-    Raises
-    ------
-    ExportError
-        Unknown; names the nearest.
-    """
+    """Format of a name."""
     if name not in FORMATS:
         near = nearest_name(name, FORMATS)
         hint = f"Did you mean {near!r}?" if near else f"Use one of {', '.join(FORMATS)}."

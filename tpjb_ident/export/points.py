@@ -71,16 +71,7 @@ class StaticPoint:
 
 @dataclass(frozen=True)
 class Chosen:
-    """What of a table can leave.
-
-    Attributes
-    ----------
-    points : tuple of StaticPoint
-    left_out : tuple of str
-        Points without finite coefficients, which no program can use.
-    doubtful : tuple of str
-        Points that are not to be trusted, with the reason: left out, or among `points` where that was forced.
-    """
+    """What of a table can leave."""
 
     points: tuple[StaticPoint, ...]
     left_out: tuple[str, ...] = ()
@@ -88,20 +79,7 @@ class Chosen:
 
 
 def static_points(frame: pd.DataFrame, force: bool = False) -> Chosen:
-    """Sort a coefficient table by static point; what is not to be trusted stays behind.
-
-    Parameters
-    ----------
-    frame : DataFrame
-        As in coefficients.csv or prediction.csv.
-    force : bool
-        Also take the points that are not to be trusted, marked.
-
-    Raises
-    ------
-    ExportError
-        A column is missing, a point stands twice, or no point has finite coefficients.
-    """
+    """Sort a coefficient table by static point; what is not to be trusted stays behind."""
     needed = [*POINT_COLUMNS, *COLUMNS.values()]
     missing = [name for name in needed if name not in frame.columns]
     if missing:
@@ -155,16 +133,6 @@ def doubts(row: Mapping[str, Any]) -> str:
 
     A film's direct stiffness and damping are positive by the sign convention of CONTRIBUTING; a wrong polarity of a
     probe or cell turns the sign of one or of all of them.
-
-    Parameters
-    ----------
-    row : mapping of str to value
-        A row of coefficients.csv or prediction.csv.
-
-    Returns
-    -------
-    str
-        Empty if nothing forbids trust.
     """
     quality = row.get("quality")
     found = [name for name in quality.split("; ") if name in ERRORS] if isinstance(quality, str) else []

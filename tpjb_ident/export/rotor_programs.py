@@ -27,13 +27,6 @@ def ross_text(point: StaticPoint, source: str) -> str:
     ROSS interpolates over one axis, which it takes for the excitation frequency in a forced response and for the
     speed elsewhere; here it is the excitation frequency, at constant speed. A smoothing spline keeps stiffness to
     1e-8 but would smooth a mass array away, so Re h stands as K and M is zero.
-
-    Parameters
-    ----------
-    point : StaticPoint
-        A single frequency becomes constant coefficients.
-    source : str
-        Where the coefficients come from.
     """
     several = len(point.frequency) > 1
     lines = [
@@ -71,21 +64,7 @@ def write_ross(folder: Path, points: tuple[StaticPoint, ...], source: str) -> No
 
 @dataclass(frozen=True)
 class SpeedTable:
-    """Coefficients over shaft speed, of one static load and one excitation frequency.
-
-    Attributes
-    ----------
-    load, direction : float
-        [N], [deg]
-    frequency : float
-        Excitation [rad/s]; NaN where it was the running speed everywhere.
-    speed : (n,) ndarray
-        [Hz], rising.
-    k, c : (n, 4) ndarray
-        xx, xy, yx, yy [N/m], [N s/m].
-    trusted : (n,) bool ndarray
-        False where they are exported against advice.
-    """
+    """Coefficients over shaft speed, of one static load and one excitation frequency."""
 
     load: float
     direction: float
@@ -115,13 +94,7 @@ class SpeedTable:
 
 
 def speed_tables(points: tuple[StaticPoint, ...]) -> tuple[SpeedTable, ...]:
-    """Sort coefficients by load, direction and excitation frequency, each over shaft speed.
-
-    Parameters
-    ----------
-    points : tuple of StaticPoint
-        Of one export.
-    """
+    """Sort coefficients by load, direction and excitation frequency, each over shaft speed."""
     rows = []
     for p in points:
         for i, omega in enumerate(p.frequency):

@@ -26,18 +26,7 @@ FIELDS = (
 
 
 def coefficient_table(points: tuple[StaticPoint, ...]) -> pd.DataFrame:
-    """One row per static point and frequency.
-
-    Parameters
-    ----------
-    points : tuple of StaticPoint
-
-    Returns
-    -------
-    DataFrame
-        Speed in rpm, frequency in rad/s, K and C in SI, each with ``_lo`` and ``_hi`` (95 %), ``quality`` (named
-        conditions) and ``trusted``.
-    """
+    """One row per static point and frequency."""
     import pandas as pd
 
     parts = [

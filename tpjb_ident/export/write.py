@@ -94,18 +94,7 @@ def export(
 
 
 def result_table(path: Path) -> Path | None:
-    """Find the table of coefficients in an output folder of tpjb.
-
-    Parameters
-    ----------
-    path : Path
-        The folder, or the table itself.
-
-    Returns
-    -------
-    Path or None
-        None if there is none.
-    """
+    """Find the table of coefficients in an output folder of tpjb."""
     if path.is_file() and path.suffix == ".csv":
         return path
     found = [path / name for name in RESULT_TABLES if (path / name).is_file()]
@@ -113,18 +102,7 @@ def result_table(path: Path) -> Path | None:
 
 
 def read_result_table(path: Path) -> pd.DataFrame:
-    """Read a table of coefficients.
-
-    Parameters
-    ----------
-    path : Path
-        A CSV file.
-
-    Raises
-    ------
-    ExportError
-        It is no table.
-    """
+    """Read a table of coefficients."""
     import pandas as pd
 
     try:

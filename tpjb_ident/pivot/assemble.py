@@ -30,23 +30,7 @@ MANY_LOST = 0.05
 
 @dataclass(frozen=True)
 class Choice:
-    """What was fitted to one pad.
-
-    Attributes
-    ----------
-    records : tuple of DryRecord
-        Its runs.
-    good : tuple of (m,) ndarray of bool
-        Used blocks per run.
-    directions : tuple of (PadDirection, PadDirection)
-        Load and displacement direction per run.
-    fits : tuple of LawFit
-        Likely laws, most likely first.
-    weights : (n,) ndarray
-        Their shares.
-    structure : str
-        What is said of a structure that bends the displacements; empty where there is none.
-    """
+    """What was fitted to one pad."""
 
     records: tuple[DryRecord, ...]
     good: tuple[BoolArray, ...]
@@ -57,23 +41,7 @@ class Choice:
 
 
 def assemble_curve(choice: Choice, noise: NoiseModel, settings: PivotSettings, refused: tuple[str, ...]) -> PivotCurve:
-    """Make the curve of one pad.
-
-    Parameters
-    ----------
-    choice : Choice
-        Records and fits.
-    noise : NoiseModel
-        For the points' standard errors.
-    settings : PivotSettings
-        Contact tolerance, warning angle.
-    refused : tuple of str
-        Runs of the campaign that were left out, each with the reason.
-
-    Returns
-    -------
-    PivotCurve
-    """
+    """Make the curve of one pad."""
     choice = replace(choice, fits=tuple(_widened(fit) for fit in choice.fits))
     law = choice.fits[0]
     first = choice.records[0]
@@ -221,13 +189,6 @@ def contact_onset(fit: LawFit, tolerance: float) -> float:
     onset it is extrapolated.
 
     Zero where no contact loss was fitted.
-
-    Parameters
-    ----------
-    fit : LawFit
-        The leading law.
-    tolerance : float
-        Share of the pivot's own compliance.
     """
     if not fit.contact:
         return 0.0
@@ -246,14 +207,7 @@ def contact_onset(fit: LawFit, tolerance: float) -> float:
 
 
 def contact_onset_se(fit: LawFit, tolerance: float) -> float:
-    """Standard error of the onset [N], by finite differences through the parameters.
-
-    Parameters
-    ----------
-    fit : LawFit
-    tolerance : float
-        Share of the pivot's own compliance.
-    """
+    """Standard error of the onset [N], by finite differences through the parameters."""
     if not fit.contact:
         return 0.0
     centre = contact_onset(fit, tolerance)

@@ -28,25 +28,7 @@ STICKS_WITHIN = 0.08  # of the load at a reversal: twice the friction of a poor 
 def bad_blocks(
     record: DryRecord, noise: NoiseModel, laws: Mapping[str, Law], make_data: MakeData, settings: PivotSettings
 ) -> BoolArray:
-    """Blocks (m,) that belong to bad steps, or to a reversal.
-
-    Parameters
-    ----------
-    record : DryRecord
-        One run.
-    noise : NoiseModel
-        As seen within holds.
-    laws : mapping of str to Law
-        ``spline`` is used.
-    make_data : callable
-        Builds the fit's input from records, used blocks, noise and settings.
-    settings : PivotSettings
-        `bad_hold_limit`.
-
-    Returns
-    -------
-    (m,) ndarray of bool
-    """
+    """Blocks (m,) that belong to bad steps, or to a reversal."""
     groups = _groups(record)
     bad = sticking(record.projection.load, record.blocks.branch)
     for _ in range(int(MOST_BAD * len(np.unique(groups)))):
@@ -66,15 +48,7 @@ def _with_ramps(groups: IntArray, group: int) -> BoolArray:
 
 
 def sticking(load: FloatArray, branch: IntArray) -> BoolArray:
-    """Blocks (m,) just after a reversal of the load, where friction holds the pivot and no law applies.
-
-    Parameters
-    ----------
-    load : (m,) ndarray
-        [N], in order of time.
-    branch : (m,) ndarray of int
-        +1 loading, -1 unloading.
-    """
+    """Blocks (m,) just after a reversal of the load, where friction holds the pivot and no law applies."""
     stuck = np.zeros(len(load), dtype=bool)
     turned_at: float | None = None
     for k in range(1, len(load)):

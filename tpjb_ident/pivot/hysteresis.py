@@ -42,25 +42,7 @@ class Hysteresis:
 def measure_loop(
     load: FloatArray, deflection: FloatArray, covariance: FloatArray, branch: IntArray
 ) -> Hysteresis | None:
-    """Area between loading and unloading points.
-
-    Parameters
-    ----------
-    load : (n,) ndarray
-        As measured, along the pad [N] (what friction holds back not taken off: it is the loop).
-    deflection : (n,) ndarray
-        [m].
-    covariance : (n, n) ndarray
-        Of the deflections [m^2]: the errors of a loop are those that its points share (drift from one branch to the
-        other), not their scatter.
-    branch : (n,) ndarray
-        +1 loading, -1 unloading.
-
-    Returns
-    -------
-    Hysteresis or None
-        None unless each branch has two points at overlapping loads.
-    """
+    """Area between loading and unloading points."""
     up, down = branch > 0, branch < 0
     if up.sum() < 2 or down.sum() < 2:
         return None

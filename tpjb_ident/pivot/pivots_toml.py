@@ -25,30 +25,12 @@ EXTRAPOLATE_TO = 2.5
 
 
 def table_loads(curve: PivotCurve) -> FloatArray:
-    """Loads of the table [N]: zero, then geometric steps (n,).
-
-    Parameters
-    ----------
-    curve : PivotCurve
-    """
+    """Loads of the table [N]: zero, then geometric steps (n,)."""
     return np.r_[0.0, np.geomspace(SMALLEST * curve.valid_to, EXTRAPOLATE_TO * curve.valid_to, ROWS)]
 
 
 def pivots_text(curves: Sequence[PivotCurve], source: str) -> str:
-    """Text of `pivots.toml`.
-
-    Parameters
-    ----------
-    curves : sequence of PivotCurve
-        One per pad.
-    source : str
-        Id of the campaign.
-
-    Returns
-    -------
-    str
-        TOML; loads [N], deflections [m], stiffnesses [N/m].
-    """
+    """Text of `pivots.toml`."""
     if not curves:
         raise ArgumentError("curves must hold at least one PivotCurve")
     lines = [
@@ -85,17 +67,9 @@ def write_pivots(path: str | Path, curves: Sequence[PivotCurve], source: str) ->
 
 
 def pad_table(curve: PivotCurve) -> dict[str, Any]:
-    """Numbers of one pad as they stand in the file, rounded: what is made of them is what a reader of the file makes.
+    """Numbers of one pad as they stand in the file, rounded.
 
-    Parameters
-    ----------
-    curve : PivotCurve
-
-    Returns
-    -------
-    dict
-        Pad, law, loads [N] between which it was measured, and the dense table, (161,) each: ``force_N``,
-        ``deflection_m``, ``stiffness_N_per_m``, ``stiffness_relative_se``.
+    What is made of them is what a reader of the file makes.
     """
     loads = table_loads(curve)
     positive = loads[1:]

@@ -22,14 +22,7 @@ ROWS = 20  # up to the largest measured load
 
 
 def load_grid(curves: Sequence[PivotCurve], extrapolate_to: float = 1.6) -> FloatArray:
-    """Round loads [N] up to `extrapolate_to` times the largest measured one (n,).
-
-    Parameters
-    ----------
-    curves : sequence of PivotCurve
-    extrapolate_to : float, optional
-        Times the largest measured load.
-    """
+    """Round loads [N] up to `extrapolate_to` times the largest measured one (n,)."""
     largest = max(curve.valid_to for curve in curves)
     raw = largest / ROWS
     decade = 10.0 ** np.floor(np.log10(raw))
@@ -106,20 +99,7 @@ def _rows(curve: PivotCurve, loads: FloatArray, formula: Formula | None, level: 
 
 
 def pads_table(curves: Sequence[PivotCurve]) -> pd.DataFrame:
-    """What a curve says beside its values.
-
-    Parameters
-    ----------
-    curves : sequence of PivotCurve
-
-    Returns
-    -------
-    DataFrame
-        ``pad``, ``law`` and its posterior share, ``valid_from_N``, ``valid_to_N``, ``onset_N`` with ``_se`` (zero: the
-        shaft was in contact from the start), angles of load and displacement off the pad [deg] with ``_se``,
-        ``loop_energy_J`` and ``loss_factor`` with ``_se`` (empty without unloading), ``includes_housing``,
-        ``relative_calibration``, ``status``.
-    """
+    """What a curve says beside its values."""
     import pandas as pd
 
     rows = []

@@ -28,19 +28,7 @@ def _nothing(_: Comparison) -> str:
 
 @dataclass(frozen=True)
 class ReportOrder:
-    """Where a report is written, and what stands in it beside the comparison.
-
-    Attributes
-    ----------
-    folder : Path
-        Existing.
-    settings : mapping of str to object
-        How it was made, for the reader.
-    inputs : mapping of str to str
-        SHA-256 by file name.
-    then : callable
-        Gives the command that comes next, for a comparison.
-    """
+    """Where a report is written, and what stands in it beside the comparison."""
 
     folder: Path
     settings: Mapping[str, Any]
@@ -48,36 +36,20 @@ class ReportOrder:
     then: Callable[[Comparison], str] = field(default=_nothing)
 
     def carry_out(self, comparison: Comparison) -> None:
-        """Write report.html and its figures.
-
-        Parameters
-        ----------
-        comparison : Comparison
-        """
+        """Write report.html and its figures."""
         from tpjb_ident.report.comparison_page import write_report
 
         write_report(self.folder, comparison, self.settings, self.inputs, self.then(comparison))
 
 
 class OtherHalf:
-    """What another process has done meanwhile; nothing, where there is none.
-
-    Parameters
-    ----------
-    process : Companion or None
-    """
+    """What another process has done meanwhile; nothing, where there is none."""
 
     def __init__(self, process: Companion | None) -> None:
         self._process = process
 
     def side(self, settings: CompareSettings, identification: Identification) -> ModelSide | None:
-        """Tell what was identified, and take the model's side; None: it must be worked out here.
-
-        Parameters
-        ----------
-        settings : CompareSettings
-        identification : Identification
-        """
+        """Tell what was identified, and take the model's side; None: it must be worked out here."""
         if self._process is None:
             return None
         self._process.tell((settings, identification))
@@ -91,20 +63,7 @@ class OtherHalf:
 
 @contextmanager
 def comparison_beside(campaign: Campaign, bearing: Any, asked: Asked, order: ReportOrder) -> Iterator[OtherHalf]:
-    """Let another process work out the model's side for the points that the manifest names, then draw the report.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    bearing : Bearing
-    asked : Asked
-    order : ReportOrder
-
-    Yields
-    ------
-    OtherHalf
-        Without a process where there is but one core.
-    """
+    """Let another process work out the model's side for the points that the manifest names, then draw the report."""
     if cores() < 2:
         yield OtherHalf(None)
         return

@@ -28,22 +28,12 @@ PIVOT_LOADS = (2000.0, 4000.0)
 
 
 def point_label(p: PointResult) -> str:
-    """Load and excitation of a point, in words.
-
-    Parameters
-    ----------
-    p : PointResult
-    """
+    """Load and excitation of a point, in words."""
     return f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz"
 
 
 def measured_table(result: Identification) -> Table:
-    """K and C of every point with intervals.
-
-    Parameters
-    ----------
-    result : Identification
-    """
+    """K and C of every point with intervals."""
     rows = []
     for p in result.points:
         lo, hi = p.stiffness.interval()
@@ -59,13 +49,7 @@ def measured_table(result: Identification) -> Table:
 
 
 def predicted_table(frame: pd.DataFrame) -> Table:
-    """Direct coefficients predicted with every pivot model, and how far off each is.
-
-    Parameters
-    ----------
-    frame : DataFrame
-        As comparison.csv.
-    """
+    """Direct coefficients predicted with every pivot model, and how far off each is."""
     rows = []
     ordered = frame.sort_values(["static_load_N", "excitation_Hz"], kind="stable")
     for _, row in ordered.iterrows():
@@ -85,12 +69,7 @@ def predicted_table(frame: pd.DataFrame) -> Table:
 
 
 def flag_table(comparison: Comparison) -> Table:
-    """Every flag of points, pivot curves, polygon and locus, in plain words; what says the same stands in one row.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    """
+    """Every flag of points, pivot curves, polygon and locus, in plain words; what says the same stands in one row."""
     identified = comparison.identification
     parts: list[tuple[str, Sequence[Condition]]] = [(point_label(p), p.quality) for p in identified.points]
     parts.append(("campaign", identified.conditions))
@@ -116,14 +95,7 @@ def _gathered(rows: Sequence[Sequence[str]]) -> list[list[str]]:
 
 
 def pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -> Table:
-    """Tangent stiffness of every pad at two loads beside the printed formula's.
-
-    Parameters
-    ----------
-    curves : sequence of PivotCurve
-    formula : Formula, optional
-        ``formula(pad, load)`` gives the printed (secant, tangent) stiffness [N/m].
-    """
+    """Tangent stiffness of every pad at two loads beside the printed formula's."""
     columns = ["pad", "law"]
     for load in PIVOT_LOADS:
         columns += [f"at {load / 1e3:g} kN, MN/m", "of Kirk's tangent"]
@@ -141,14 +113,7 @@ def pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) ->
 
 
 def clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
-    """Clearance per pad beside the drawing's, in µm.
-
-    Parameters
-    ----------
-    polygon : ClearancePolygon
-    drawn : ndarray
-        Assembled clearances of the drawing [m], (n_pads,).
-    """
+    """Clearance per pad beside the drawing's, in µm."""
     rows = []
     for k, drawing in enumerate(drawn):
         value, half = polygon.clearance[k], 1.96 * polygon.clearance_se[k]

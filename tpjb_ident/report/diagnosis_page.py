@@ -51,28 +51,7 @@ def write_diagnosis_report(
     inputs: Mapping[str, str],
     then: str = "",
 ) -> Path:
-    """Write report.html and its figures into an existing folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Exists already; what stands in it under the same names is replaced.
-    campaign : Campaign or TableSource
-        What was diagnosed.
-    result : CampaignDiagnosis
-        Diagnosis with identification and setup.
-    settings : mapping
-        Settings of the command, for the last section.
-    inputs : mapping of str to str
-        Input files and their hashes.
-    then : str
-        The command that comes next.
-
-    Returns
-    -------
-    Path
-        The page.
-    """
+    """Write report.html and its figures into an existing folder."""
     verdict = result.diagnosis.verdict
     table = before_and_after(result.diagnosis, result.identification)
     answer, *more = verdict_sentences(campaign.id, verdict, median_deviations(table))

@@ -29,16 +29,7 @@ DIRECT = ("kxx", "kyy", "cxx", "cyy")
 def verdict_sentences(
     name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, float]] | None = None
 ) -> list[str]:
-    """Say what came out, the answer first.
-
-    Parameters
-    ----------
-    name : str
-        Of the campaign.
-    verdict : Verdict
-    deviations : mapping of str to (float, float), optional
-        Median of predicted / measured - 1 before and after, by coefficient.
-    """
+    """Say what came out, the answer first."""
     sentences = [_answer(name, verdict, deviations)]
     if deviations and verdict.verdict != "consistent":
         before = ", ".join(f"{c} {percent(deviations[c][0])}" for c in DIRECT if c in deviations)
@@ -117,24 +108,12 @@ def _get(entry: Any, name: str) -> str:
 
 
 def observable(name: str) -> str:
-    """An observable in words.
-
-    Parameters
-    ----------
-    name : str
-        As in ``diagnosis.json``: ``"kxx"``, ``"locus_x"``, ..
-    """
+    """An observable in words."""
     return OBSERVABLES.get(name, label_in_words(name))
 
 
 def place(where: str) -> str:
-    """A range of operating points in words and in kN, Hz and degrees.
-
-    Parameters
-    ----------
-    where : str
-        As the diagnosis writes it: ``"static_load 2500-5000 N"``, ``"pad 5"``, ..
-    """
+    """A range of operating points in words and in kN, Hz and degrees."""
 
     def kilo(match: re.Match[str]) -> str:
         return f"{' to '.join(f'{float(v) / 1e3:g}' for v in match[1].split('-'))} kN"
@@ -147,12 +126,7 @@ def place(where: str) -> str:
 
 
 def in_words(text: str) -> str:
-    """A sentence of a diagnosis without the names of its variables.
-
-    Parameters
-    ----------
-    text : str
-    """
+    """A sentence of a diagnosis without the names of its variables."""
     found = place(text).removeprefix("at ")
     for name, words in OBSERVABLES.items():
         found = found.replace(name, words)
@@ -170,16 +144,7 @@ def _worse(gap: Mapping[str, float]) -> bool:
 
 
 def next_command(campaign: str, bearing: str, verdict: Verdict, folder: str) -> str:
-    """How to use what was found, as a command to type.
-
-    Parameters
-    ----------
-    campaign, bearing : str
-        As the diagnosis was called; an empty bearing where the campaign names its own.
-    verdict : Verdict
-    folder : str
-        Where ``updated.effects.toml`` lies.
-    """
+    """How to use what was found, as a command to type."""
     drawn = f" --bearing {bearing}" if bearing else ""
     if verdict.effects:
         return f"tpjb compare {campaign}{drawn} --effects {folder}/updated.effects.toml"
@@ -189,12 +154,7 @@ def next_command(campaign: str, bearing: str, verdict: Verdict, folder: str) -> 
 
 
 def parameter_rows(verdict: Verdict) -> list[list[str]]:
-    """One row per parameter of the effects, in the units that people read.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    """
+    """One row per parameter of the effects, in the units that people read."""
     return [
         [label_in_words(e.name), label_in_words(key), f"#{p.value:.0f}" if key == "pad" else amount(p)]
         for e in verdict.effects

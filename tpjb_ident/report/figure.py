@@ -33,19 +33,7 @@ _ID = re.compile(r"(\bid=\"|href=\"#|url\(#)([^\")]+)")
 
 @dataclass(frozen=True)
 class Panel:
-    """One figure of a report.
-
-    Attributes
-    ----------
-    name : str
-        File name without suffix, and anchor in the report.
-    title : str
-        What it shows, in words.
-    drawing : callable
-        Makes the figure; not before somebody asks for it, so that several processes share that too.
-    group : str
-        Heading under which it stands.
-    """
+    """One figure of a report."""
 
     name: str
     title: str
@@ -61,12 +49,9 @@ class Panel:
 
 
 def shape(svg: str) -> str:
-    """How a picture stands on a page: ``"wide"``, several panels side by side; ``"tall"``, on top of each other; or "".
+    """How a picture stands on a page: ``"wide"``, several panels side by side; ``"tall"``, on top of each other.
 
-    Parameters
-    ----------
-    svg : str
-        As `svg_text` gives it.
+    Or "".
     """
     found = _SIZE.search(svg)
     assert found is not None
@@ -84,31 +69,12 @@ _numbers = itertools.count()
 
 
 def panel(name: str, title: str, figure: Figure | Callable[[], Figure], group: str) -> Panel:
-    """Make a panel of a picture.
-
-    Parameters
-    ----------
-    name : str
-        File name without suffix.
-    title : str
-        What it shows, in words.
-    figure : Figure or callable
-        Or what makes it, once it is asked for.
-    group : str
-        Heading under which it stands.
-    """
+    """Make a panel of a picture."""
     return Panel(name, title, figure if callable(figure) else lambda: figure, group)
 
 
 def svg_text(figure: Figure, name: str) -> str:
-    """Draw a figure as SVG with text as text, markers with their values; the same figure gives the same bytes.
-
-    Parameters
-    ----------
-    figure : Figure
-    name : str
-        From which its ids are made.
-    """
+    """Draw a figure as SVG with text as text, markers with their values; the same figure gives the same bytes."""
     buffer = io.StringIO()
     spots = mark_lines(figure)
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
@@ -117,17 +83,7 @@ def svg_text(figure: Figure, name: str) -> str:
 
 
 def inline_svg(text: str, name: str, title: str) -> str:
-    """Turn the text of an SVG file into an element of a page: page colours, page font, unique ids, a spoken title.
-
-    Parameters
-    ----------
-    text : str
-        As `svg_text` gives it.
-    name : str
-        Prefix of the ids.
-    title : str
-        What a screen reader says; must be escaped already.
-    """
+    """Turn the text of an SVG file into an element of a page: page colours, page font, unique ids, a spoken title."""
     body = text[text.index("<svg") :]
     for role, colour in LIGHT.items():
         body = body.replace(colour, f"var(--{role})")
@@ -141,15 +97,7 @@ def inline_svg(text: str, name: str, title: str) -> str:
 
 
 def prefixed_ids(svg: str, prefix: str) -> str:
-    """Rename every id and what refers to it, so that several drawings can share one page.
-
-    Parameters
-    ----------
-    svg : str
-        Text of the drawing.
-    prefix : str
-        Put before every id.
-    """
+    """Rename every id and what refers to it, so that several drawings can share one page."""
     return _ID.sub(rf"\g<1>{prefix}-\g<2>", svg)
 
 
@@ -161,14 +109,7 @@ def make_ready() -> None:
 
 
 def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:
-    """Write every panel as SVG and PNG, on white ground; return the SVG texts, without ground, by name.
-
-    Parameters
-    ----------
-    panels : sequence of Panel
-    folder : Path
-        Made if need be.
-    """
+    """Write every panel as SVG and PNG, on white ground; return the SVG texts, without ground, by name."""
     folder.mkdir(exist_ok=True)
     number = next(_numbers)
     _drawn[number] = tuple(panels)

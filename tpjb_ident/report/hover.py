@@ -34,13 +34,7 @@ class Spots:
 
 
 def mark_lines(figure: Figure) -> tuple[Spots, ...]:
-    """Give every line with markers a name that the SVG keeps, and work out what its points say.
-
-    Parameters
-    ----------
-    figure : Figure
-        Its lines get a `gid`; nothing else changes.
-    """
+    """Give every line with markers a name that the SVG keeps, and work out what its points say."""
     found = []
     for i, axes in enumerate(figure.axes):
         axes.get_xlim(), axes.get_ylim()  # limits are set late: asking settles them
@@ -90,15 +84,7 @@ def _with_unit(label: str, value: float, spread: str = "") -> str:
 
 
 def with_titles(svg: str, spots: tuple[Spots, ...]) -> str:
-    """Put a title into every marker of the drawing that `mark_lines` knows.
-
-    Parameters
-    ----------
-    svg : str
-        Text of the drawing.
-    spots : tuple of Spots
-        As `mark_lines` gives them.
-    """
+    """Put a title into every marker of the drawing that `mark_lines` knows."""
     for one in spots:
         start = svg.find(f'<g id="{one.gid}"')
         if start < 0:

@@ -42,12 +42,7 @@ EVIDENCE = "Raw evidence of one run"
 
 
 def set_up_section(comparison: Comparison) -> Section:
-    """Sensors with their calibration, bearing and oil, and what was run.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    """
+    """Sensors with their calibration, bearing and oil, and what was run."""
     campaign = comparison.campaign
     if isinstance(campaign, TableSource):
         return Section("Set-up", tables=[_bearing_table(comparison)])
@@ -112,18 +107,9 @@ def _run_matrix(runs: Sequence[Run]) -> Table:
 
 
 def evidence_section(campaign: Campaign, result: Identification) -> Section | None:
-    """Orbit, spectra, coherence of one run in the middle of the campaign; h over frequency; coherence of every point.
+    """Orbit, spectra, coherence of one run in the middle of the campaign; h over frequency.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    result : Identification
-        Of it.
-
-    Returns
-    -------
-    Section or None
-        None where there is nothing to draw.
+    Coherence of every point.
     """
     panels = [*_run_panels(campaign, result), *_stiffness_panels(result)]
     if result.points:
@@ -168,12 +154,7 @@ def _stiffness_panels(result: Identification) -> list[Panel]:
 
 
 def budget_table(result: Identification) -> Table:
-    """What the 95 % intervals of all coefficients are made of, source by source, as in ``budget.csv``.
-
-    Parameters
-    ----------
-    result : Identification
-    """
+    """What the 95 % intervals of all coefficients are made of, source by source, as in ``budget.csv``."""
     sources = list(dict.fromkeys(name for p in result.points for name in p.budget))
     rows = []
     for p in result.points:

@@ -19,16 +19,7 @@ from tpjb_ident.runtime.tables import printable, readable, write_text
 
 @dataclass(frozen=True)
 class Table:
-    """A table of ready-made text cells.
-
-    Attributes
-    ----------
-    caption : str
-    columns : sequence of str
-    rows : sequence of sequence of str
-    text_columns : frozenset of int
-        Columns of words; the others are numbers, set right.
-    """
+    """A table of ready-made text cells."""
 
     caption: str
     columns: Sequence[str]
@@ -38,16 +29,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with what stands under it.
-
-    Attributes
-    ----------
-    heading : str
-    notes : sequence of str
-        Paragraphs.
-    panels : sequence of Panel
-    tables : sequence of Table
-    """
+    """A heading with what stands under it."""
 
     heading: str
     notes: Sequence[str] = ()
@@ -57,27 +39,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Page:
-    """A report.
-
-    Attributes
-    ----------
-    title, subtitle : str
-    answer : str
-        The first sentence: what came out.
-    more : sequence of str
-        Further findings.
-    key_table : Table or None
-        The answer in numbers.
-    then : str
-        The command that comes next.
-    sections : sequence of Section
-    settings, inputs : mapping of str to str
-        How it was made; SHA-256 of what it was made from.
-    refresh : int
-        Seconds after which a browser loads the page again; 0: never.
-    beside : str
-        What lies beside the page.
-    """
+    """A report."""
 
     title: str
     subtitle: str
@@ -93,19 +55,7 @@ class Page:
 
 
 def render_page(page: Page, svg: Mapping[str, str]) -> str:
-    """Render a report as HTML.
-
-    Parameters
-    ----------
-    page : Page
-    svg : mapping of str to str
-        Text of every panel's SVG file, by its name.
-
-    Returns
-    -------
-    str
-        One file, nothing loaded from anywhere. Its one script sorts tables; the page is complete without it.
-    """
+    """Render a report as HTML."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
         autoescape=True,
@@ -130,14 +80,7 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
 
 
 def write_page(folder: Path, page: Page) -> Path:
-    """Write ``report.html`` and its figures, as SVG and PNG in ``figures``.
-
-    Parameters
-    ----------
-    folder : Path
-        Existing; what stands in it under the same names is replaced.
-    page : Page
-    """
+    """Write ``report.html`` and its figures, as SVG and PNG in ``figures``."""
     texts = save_panels([panel for section in page.sections for panel in section.panels], folder / "figures")
     path = folder / "report.html"
     write_text(path, render_page(page, texts))
@@ -145,12 +88,7 @@ def write_page(folder: Path, page: Page) -> Path:
 
 
 def grouped(panels: Iterable[Panel]) -> list[Section]:
-    """A section for every group of panels, in their order.
-
-    Parameters
-    ----------
-    panels : iterable of Panel
-    """
+    """A section for every group of panels, in their order."""
     groups: dict[str, list[Panel]] = {}
     for panel in panels:
         groups.setdefault(panel.group, []).append(panel)

@@ -32,18 +32,7 @@ OVER: tuple[Literal["load", "frequency"], ...] = ("load", "frequency")
 
 
 def coefficient_panels(table: pd.DataFrame) -> list[Panel]:
-    """Draw every series of at least two points.
-
-    Parameters
-    ----------
-    table : DataFrame
-        As comparison.csv.
-
-    Returns
-    -------
-    list of Panel
-        Direct coefficients over load and over frequency, then cross-coupled ones.
-    """
+    """Draw every series of at least two points."""
     panels = []
     for over in OVER:
         series = longest_series(table, over)
@@ -58,14 +47,7 @@ def coefficient_panels(table: pd.DataFrame) -> list[Panel]:
 
 
 def pivot_panels(curves: Sequence[PivotCurve], formula: Formula | None = None) -> list[Panel]:
-    """Draw the tangent stiffness of every pad, its load steps, and how they were projected.
-
-    Parameters
-    ----------
-    curves : sequence of PivotCurve
-    formula : callable, optional
-        The printed formula, see `pivot_stiffness`.
-    """
+    """Draw the tangent stiffness of every pad, its load steps, and how they were projected."""
     if not curves:
         return []
     bands = "Pivot tangent stiffness over load, 95 % bands"
@@ -86,20 +68,7 @@ def position_panels(
     predicted: Mapping[str, FloatArray],
     others: Sequence[ClearancePolygon] = (),
 ) -> list[Panel]:
-    """Draw polygon and locus in one square panel.
-
-    Parameters
-    ----------
-    polygon : ClearancePolygon or None
-    drawn : (n_pads,), (n_pads,) ndarray
-        Pad angles [rad] and assembled clearances [m] of the drawing.
-    measured : Locus or (n, 2) ndarray or None
-        Measured positions [m].
-    predicted : mapping of str to (n, 2) ndarray
-        Predicted ones by pivot model.
-    others : sequence of ClearancePolygon
-        Of further sweeps.
-    """
+    """Draw polygon and locus in one square panel."""
     nothing = measured is None or (isinstance(measured, np.ndarray) and not len(measured))
     if polygon is None and nothing:
         return []
@@ -111,15 +80,7 @@ def position_panels(
 
 
 def save_isolability(folder: Path, plans: Mapping[str, CampaignPlan]) -> None:
-    """Draw the isolability matrix of every plan as ``figures/NAME.svg`` and ``.png``.
-
-    Parameters
-    ----------
-    folder : Path
-        Existing.
-    plans : mapping of str to CampaignPlan
-        By file name.
-    """
+    """Draw the isolability matrix of every plan as ``figures/NAME.svg`` and ``.png``."""
     panels = [
         panel(name.replace("_", "-"), f"Isolability, {name}", isolability(p), "Isolability")
         for name, p in plans.items()

@@ -26,33 +26,12 @@ _POINTS = 4000
 
 
 def write_quick_look(folder: Path, title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> None:
-    """Write ``figures/quick-look.svg`` and ``.png``.
-
-    Parameters
-    ----------
-    folder : Path
-        Existing.
-    title : str
-        Of the picture.
-    series : sequence of Series
-        Channels.
-    looks : mapping of str to Look
-        By channel name.
-    """
+    """Write ``figures/quick-look.svg`` and ``.png``."""
     save_panels([panel("quick-look", title, quick_look(title, series, looks), "")], folder / "figures")
 
 
 def quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Figure:
-    """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum.
-
-    Parameters
-    ----------
-    title : str
-    series : sequence of Series
-        The first 24 are drawn.
-    looks : mapping of str to Look
-        By channel name.
-    """
+    """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
     shown = list(series)[:MOST]
     height = _ROW * len(shown) + 0.9
     figure = Figure(figsize=(_WIDTH, height))

@@ -29,18 +29,7 @@ KINDS = {"dynamic": "dynamic runs", "locus": "locus runs", "clearance": "clearan
 
 
 def write_watch_page(folder: Path, snapshot: Snapshot, refresh: int, settings: Mapping[str, str]) -> Path:
-    """Write ``watch.html``, whole or not at all, with its figures inside.
-
-    Parameters
-    ----------
-    folder : Path
-        Existing.
-    snapshot : Snapshot
-    refresh : int
-        Seconds after which the browser loads it again; 0: never.
-    settings : mapping of str to str
-        How it was made, for the reader.
-    """
+    """Write ``watch.html``, whole or not at all, with its figures inside."""
     answer, *more = [step.text for step in snapshot.steps] or ["Nothing to do: records are being written."]
     landed = snapshot.count("good", "look", "repeat", "replaced")
     page = Page(
@@ -63,12 +52,7 @@ def write_watch_page(folder: Path, snapshot: Snapshot, refresh: int, settings: M
 
 
 def coverage_table(snapshot: Snapshot) -> Table:
-    """How many runs of every kind and set-up have landed.
-
-    Parameters
-    ----------
-    snapshot : Snapshot
-    """
+    """How many runs of every kind and set-up have landed."""
     groups: dict[str, list[RunStatus]] = {}
     for status in snapshot.states:
         groups.setdefault(_group(status), []).append(status)

@@ -19,37 +19,21 @@ from tpjb_ident.runtime.threads import one_thread_each
 
 
 class Talk:
-    """One end of the line between two processes.
-
-    Parameters
-    ----------
-    connection : Connection
-    """
+    """One end of the line between two processes."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self._sending: threading.Thread | None = None
 
     def tell(self, value: Any) -> None:
-        """Send a value; this process goes on, whether or not the other one listens yet.
-
-        Parameters
-        ----------
-        value : object
-        """
+        """Send a value; this process goes on, whether or not the other one listens yet."""
         self.settle()
         packed = ForkingPickler.dumps(value)
         self._sending = threading.Thread(target=self._send, args=(packed,), daemon=True)
         self._sending.start()
 
     def hear(self) -> Any:
-        """Wait for the next value.
-
-        Raises
-        ------
-        EOFError, ConnectionError
-            The other process is gone.
-        """
+        """Wait for the next value."""
         return self._connection.recv()
 
     def settle(self) -> None:
@@ -82,19 +66,7 @@ class Companion(Talk):
 
 @contextmanager
 def companion(task: Task, *job: Any) -> Iterator[Companion]:
-    """Run a task in a process of its own while the block goes on; the process is ended with the block.
-
-    Parameters
-    ----------
-    task : callable
-        Of a module, so that another process finds it. Called as ``task(talk, *job)`` with its own end of the line.
-    *job : object
-        Its other arguments.
-
-    Yields
-    ------
-    Companion
-    """
+    """Run a task in a process of its own while the block goes on; the process is ended with the block."""
     context: Any = multiprocessing.get_context("fork" if forks() else "spawn")  # a copy need not import anything again
     ours, theirs = context.Pipe()
     process = context.Process(target=_run, args=(theirs, task, job))
@@ -110,20 +82,7 @@ def companion(task: Task, *job: Any) -> Iterator[Companion]:
 
 @contextmanager
 def beside(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
-    """Run one job in a process of its own while the block goes on; see `companion`.
-
-    Parameters
-    ----------
-    task : callable
-        Of a module.
-    *job : object
-        Its arguments.
-
-    Yields
-    ------
-    callable
-        Waits for the value; None as of `Companion.hear`. Called a second time, it gives the same.
-    """
+    """Run one job in a process of its own while the block goes on; see `companion`."""
     with companion(_silent, task, job) as other:
         yield functools.cache(other.hear)
 

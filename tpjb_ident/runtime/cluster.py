@@ -27,23 +27,7 @@ class ClusterError(TpjbError):
 
 @contextmanager
 def dask_workers(address: str, patience: float = PATIENCE) -> Iterator[Workers]:
-    """Open the workers of a running Dask scheduler.
-
-    Parameters
-    ----------
-    address : str
-        ``"tcp://host:8786"``, or the path of a scheduler file.
-    patience : float
-        Seconds to wait for the scheduler, and for its first worker.
-
-    Yields
-    ------
-    Workers
-
-    Raises
-    ------
-    ClusterError
-    """
+    """Open the workers of a running Dask scheduler."""
     try:
         from distributed import Client
     except ImportError as error:

@@ -48,15 +48,7 @@ class LostJobsError(TpjbError):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job: its value, or the error that it ended with.
-
-    Attributes
-    ----------
-    value : object
-    error : Exception or None
-    warned : tuple
-        Warnings of a job that ran elsewhere, as (message, category, file, line).
-    """
+    """What became of a job: its value, or the error that it ended with."""
 
     value: Any = None
     error: Exception | None = None
@@ -101,14 +93,7 @@ def in_order(
     jobs: Sequence[Job],
     shared: Any = None,
 ) -> Iterator[Any]:
-    """Yield the values of all jobs in their order; raise the error of the first job, in order, that has one.
-
-    Parameters
-    ----------
-    workers : Workers
-    task, jobs, shared
-        As of `Workers.outcomes`.
-    """
+    """Yield the values of all jobs in their order; raise the error of the first job, in order, that has one."""
     early: dict[int, Outcome] = {}
     due = 0
     for index, outcome in workers.outcomes(task, jobs, shared):
@@ -124,13 +109,6 @@ def each_finished(
     """Hand every value to ``finished(index, value)`` as its job ends; nothing is held back to be put in order.
 
     When all jobs before the first one in order that has an error have ended, that error is raised.
-
-    Parameters
-    ----------
-    workers : Workers
-    task, jobs, shared
-        As of `Workers.outcomes`.
-    finished : callable
     """
     ended = bytearray(len(jobs))
     errors: dict[int, Outcome] = {}
@@ -164,17 +142,7 @@ class InProcessWorkers:
 
 
 class PoolWorkers:
-    """Jobs spread by any `concurrent.futures.Executor`; one that breaks is replaced and its jobs are run again.
-
-    Parameters
-    ----------
-    opened : callable
-        Makes the executor.
-    count : int
-        Jobs that it runs at a time.
-    alive : callable, optional
-        Whether anybody is there to work; asked when nothing has come back for a minute.
-    """
+    """Jobs spread by any `concurrent.futures.Executor`; one that breaks is replaced and its jobs are run again."""
 
     def __init__(self, opened: Callable[[], Executor], count: int, alive: Callable[[], bool] | None = None) -> None:
         self._opened, self.count, self._alive = opened, count, alive
@@ -187,13 +155,7 @@ class PoolWorkers:
             self._executor.submit(int).result()
 
     def close(self, wait: bool = True) -> None:
-        """End the executor; with it the jobs that have not begun.
-
-        Parameters
-        ----------
-        wait : bool, optional
-            Whether to wait for the jobs that run.
-        """
+        """End the executor; with it the jobs that have not begun."""
         if self._executor is not None:
             if isinstance(self._executor, ProcessPoolExecutor):
                 self._executor.shutdown(wait=wait, cancel_futures=True)
@@ -276,16 +238,7 @@ class PoolWorkers:
 
 
 def attempt(task: Task, packed: bytes | None, job: Job) -> Outcome:
-    """Run a job on a worker; whatever it raises or warns of travels back as a value.
-
-    Parameters
-    ----------
-    task : callable
-    packed : bytes, optional
-        First argument, pickled.
-    job : tuple
-        The others.
-    """
+    """Run a job on a worker; whatever it raises or warns of travels back as a value."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("default")  # the process that asked decides what a warning means
         try:
@@ -344,21 +297,7 @@ def cores() -> int:
 
 @contextmanager
 def local_workers(count: int, start: str | None = None, preload: Sequence[str] = ()) -> Iterator[Workers]:
-    """Open processes on this machine; one alone is this process itself.
-
-    Parameters
-    ----------
-    count : int
-    start : {"forkserver", "spawn", "fork"}, optional
-        How processes begin. The default forks from a clean process where that exists (a fork of this one, with
-        its threads, can hang); ``"fork"`` takes along what was registered here, as users' own effects are.
-    preload : sequence of str
-        Modules that the clean process imports once for all workers.
-
-    Yields
-    ------
-    Workers
-    """
+    """Open processes on this machine; one alone is this process itself."""
     if count <= 1:
         yield InProcessWorkers()
         return

@@ -15,16 +15,7 @@ except ImportError:  # Windows: no advisory locks on folders; two runs into one 
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of `folder` while the block runs; wait for whoever has it.
-
-    Parameters
-    ----------
-    folder : Path
-
-    Yields
-    ------
-    None
-    """
+    """Hold the lock of `folder` while the block runs; wait for whoever has it."""
     handle = _open(folder, wait=True)
     try:
         yield
@@ -33,34 +24,18 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def hold(folder: Path) -> int | None:
-    """Take the lock of a folder that nobody else knows yet; give it to `release`.
-
-    Parameters
-    ----------
-    folder : Path
-    """
+    """Take the lock of a folder that nobody else knows yet; give it to `release`."""
     return _open(folder, wait=False)
 
 
 def release(handle: int | None) -> None:
-    """Drop a lock.
-
-    Parameters
-    ----------
-    handle : int or None
-        Given by `hold`.
-    """
+    """Drop a lock."""
     if handle is not None:
         os.close(handle)
 
 
 def is_abandoned(folder: Path) -> bool:
-    """Whether the process that held the lock of `folder` is gone; False where that cannot be told.
-
-    Parameters
-    ----------
-    folder : Path
-    """
+    """Whether the process that held the lock of `folder` is gone; False where that cannot be told."""
     if fcntl is None:
         return False
     try:

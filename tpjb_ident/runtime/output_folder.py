@@ -23,28 +23,7 @@ _FULL = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 
 @contextlib.contextmanager
 def output_folder(out: Path, command: str, inputs: tuple[Path, ...] = ()) -> Iterator[Path]:
-    """Give a temporary folder to fill; move its content to `out` when the block ends well.
-
-    Parameters
-    ----------
-    out : Path
-        Where the results shall be. Made if missing. In an existing folder only files that a former run of tpjb
-        wrote are replaced.
-    command : str
-        Name of the command, the key of its entry in run.json.
-    inputs : tuple of Path
-        Campaigns and files that were read; `out` must not lie among them.
-
-    Yields
-    ------
-    Path
-        The temporary folder, beside `out`.
-
-    Raises
-    ------
-    BadInputError
-        `out` is a file, lies in a campaign, holds files of the same names that tpjb did not write, or its disk is full.
-    """
+    """Give a temporary folder to fill; move its content to `out` when the block ends well."""
     target = _checked(out, inputs)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

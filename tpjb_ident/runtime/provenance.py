@@ -25,24 +25,16 @@ def versions() -> dict[str, str]:
 
 
 def sha256(path: Path) -> str:
-    """SHA-256 of a file, in hexadecimal.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """SHA-256 of a file, in hexadecimal."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @functools.cache
 def source_stamp(packages: tuple[str, ...] = ("rigdata", "tpjb_ident")) -> str:
-    """SHA-256 of the versions of all packages and of the sources of some: kept results of other code count for nothing.
+    """SHA-256 of the versions of all packages and of the sources of some.
 
-    Parameters
-    ----------
-    packages : tuple of str
-        Whose sources count.
+    Kept results of other code count for nothing.
     """
     import importlib.util
 

@@ -23,12 +23,7 @@ READY = ".tpjb-moving-in"
 
 
 def former_runs(folder: Path) -> dict[str, dict]:
-    """Return what run.json of an output folder tells, by command; empty if there is none.
-
-    Parameters
-    ----------
-    folder : Path
-    """
+    """Return what run.json of an output folder tells, by command; empty if there is none."""
     try:
         data = json.loads((folder / RECORD).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -39,33 +34,12 @@ def former_runs(folder: Path) -> dict[str, dict]:
 
 
 def record_text(commands: Mapping[str, Any]) -> str:
-    """Text of run.json.
-
-    Parameters
-    ----------
-    commands : mapping of str
-        Entries of run.json, by command.
-    """
+    """Text of run.json."""
     return json.dumps({"schema": "tpjb-run/1", "commands": dict(commands)}, indent=1, ensure_ascii=False) + "\n"
 
 
 def move_in(staging: Path, target: Path, command: str) -> None:
-    """Move results into an existing folder, whose lock the caller holds; drop what the command left there before.
-
-    Parameters
-    ----------
-    staging : Path
-        Folder with the new results.
-    target : Path
-        Folder that they go to.
-    command : str
-        Name of the command.
-
-    Raises
-    ------
-    BadInputError
-        A file of the same name is there that tpjb did not write; nothing was changed.
-    """
+    """Move results into an existing folder, whose lock the caller holds; drop what the command left there before."""
     finish_moving(target)
     new = files_in(staging)
     before = former_runs(target)
@@ -87,13 +61,7 @@ def move_in(staging: Path, target: Path, command: str) -> None:
 
 
 def finish_moving(target: Path) -> bool:
-    """Bring in what waits in `READY`; whether there was anything.
-
-    Parameters
-    ----------
-    target : Path
-        The output folder.
-    """
+    """Bring in what waits in `READY`; whether there was anything."""
     ready = target / READY
     if not ready.is_dir():
         return False
@@ -122,36 +90,18 @@ def _drop_stale(target: Path, ready: Path, new: list[str]) -> None:
 
 
 def outputs_of(entry: Mapping[str, Any]) -> list[str]:
-    """Files that an entry of run.json lists.
-
-    Parameters
-    ----------
-    entry : mapping
-        Of one command.
-    """
+    """Files that an entry of run.json lists."""
     outputs = entry.get("outputs", ())
     return [name for name in outputs if isinstance(name, str)] if isinstance(outputs, list) else []
 
 
 def files_in(folder: Path) -> list[str]:
-    """Relative names of all files, sorted.
-
-    Parameters
-    ----------
-    folder : Path
-    """
+    """Relative names of all files, sorted."""
     return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
 
 
 def flush(folder: Path, deep: bool = True) -> None:
-    """Have the system write a folder, and with `deep` its files, to the disk, so that a power cut loses nothing.
-
-    Parameters
-    ----------
-    folder : Path
-    deep : bool, optional
-        Whether its files too.
-    """
+    """Have the system write a folder, and with `deep` its files, to the disk, so that a power cut loses nothing."""
     if os.name != "posix":
         return
     paths = [folder, *(folder.rglob("*") if deep else ())]

@@ -20,20 +20,7 @@ _UNIT = re.compile(r"(?:(?<=\d )|(?<=nan )|\A)(um|degC|m/s\^2)(?![\w/^'\"])")
 
 
 def write_atomic(path: Path, write: Callable[[Path], None]) -> None:
-    """Let `write` fill a temporary file beside `path`, then put it in place in one step.
-
-    Parameters
-    ----------
-    path : Path
-        Where the file shall be; an existing one is replaced.
-    write : callable
-        Gets the temporary path.
-
-    Raises
-    ------
-    OSError
-        The folder cannot be written to. Nothing is left behind.
-    """
+    """Let `write` fill a temporary file beside `path`, then put it in place in one step."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
     os.close(handle)
     temporary = Path(name)
@@ -47,13 +34,7 @@ def write_atomic(path: Path, write: Callable[[Path], None]) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8 text with Unix line ends, whole or not at all.
-
-    Parameters
-    ----------
-    path : Path
-    text : str
-    """
+    """Write UTF-8 text with Unix line ends, whole or not at all."""
     write_atomic(path, lambda temporary: _write_utf8(temporary, text))
 
 
@@ -63,23 +44,7 @@ def _write_utf8(path: Path, text: str) -> None:
 
 
 def write_table(folder: Path, name: str, frame: pd.DataFrame) -> tuple[Path, Path]:
-    """Write ``name.csv`` and ``name.parquet``.
-
-    Parameters
-    ----------
-    folder : Path
-        Existing folder.
-    name : str
-        File name without suffix.
-    frame : DataFrame
-        Numbers in SI; the column names carry the units. Text that a spreadsheet would take for a formula
-        gets a leading apostrophe in the CSV file.
-
-    Returns
-    -------
-    tuple of Path
-        The two files.
-    """
+    """Write ``name.csv`` and ``name.parquet``."""
     csv, parquet = folder / f"{name}.csv", folder / f"{name}.parquet"
     safe = safe_for_spreadsheets(frame)
     write_atomic(csv, lambda path: safe.to_csv(path, index=False, encoding="utf-8", lineterminator="\n"))
@@ -88,12 +53,7 @@ def write_table(folder: Path, name: str, frame: pd.DataFrame) -> tuple[Path, Pat
 
 
 def safe_for_spreadsheets(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return a copy whose text cells and column names no spreadsheet takes for formulas.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-    """
+    """Return a copy whose text cells and column names no spreadsheet takes for formulas."""
     safe = frame.copy()
     for column in safe.columns:
         if safe[column].dtype.kind not in "biufcmM":
@@ -113,11 +73,6 @@ def _disarm(cell: Any) -> Any:
 def readable(text: object) -> str:
     """`printable`, its units with the signs that people write: µm, °C, m/s².
 
-    Parameters
-    ----------
-    text : object
-        For a terminal or a page; what a program reads, or a user typed in quotes, keeps its letters.
-
     >>> readable("30 um at 45 degC, '30 um'")
     "30 µm at 45 °C, '30 um'"
     """
@@ -125,11 +80,5 @@ def readable(text: object) -> str:
 
 
 def printable(text: object) -> str:
-    """Text from outside without control characters: nothing that steers a terminal or turns writing round.
-
-    Parameters
-    ----------
-    text : object
-        From a file or a name.
-    """
+    """Text from outside without control characters: nothing that steers a terminal or turns writing round."""
     return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", str(text))

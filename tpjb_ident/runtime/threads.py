@@ -40,10 +40,6 @@ def limit_threads(count: int = 1) -> None:
 
     The variables of the environment act on libraries that are loaded later: numpy is there before any worker is, and
     processes that are forked have what their parent has.
-
-    Parameters
-    ----------
-    count : int
     """
     for _, limit in _loaded():
         limit(count)
@@ -51,12 +47,7 @@ def limit_threads(count: int = 1) -> None:
 
 @contextmanager
 def limited_threads(count: int = 1) -> Iterator[None]:
-    """Do the same for a while.
-
-    Parameters
-    ----------
-    count : int
-    """
+    """Do the same for a while."""
     before = [asked() for asked, _ in _loaded()]
     limit_threads(count)
     try:

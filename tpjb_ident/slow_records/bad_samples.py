@@ -30,28 +30,7 @@ NOISE_FREE = 0.5  # share of repeated readings, apart from the longest stretch: 
 
 
 def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Both vectors of a slow record on one time base, and which samples are good.
-
-    Parameters
-    ----------
-    run : rigdata.run.Run
-    longest : int, optional
-        Of a glitch [samples].
-
-    Returns
-    -------
-    time : (n,) ndarray
-        [s]
-    force, displacement : (n, 2) ndarray
-        [N], [m]
-    good : (n,) ndarray of bool
-        Neither missing nor part of a glitch.
-
-    Raises
-    ------
-    RigDataError
-        A channel stands still for a while.
-    """
+    """Both vectors of a slow record on one time base, and which samples are good."""
     refuse_flat_channels(run)
     force, displacement = run.vector("force"), run.vector("displacement")
     n = min(len(force), len(displacement))
@@ -60,31 +39,13 @@ def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, F
 
 
 def piece_means(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
-    """Means of the rows of `values` (n, k) over pieces first..last-1 (m,), (m, k).
-
-    Parameters
-    ----------
-    values : (n, k) ndarray
-    first, last : (m,) ndarray of int
-    """
+    """Means of the rows of `values` (n, k) over pieces first..last-1 (m,), (m, k)."""
     total = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(values - values[0], axis=0)])
     return np.asarray((total[last] - total[first]) / (last - first)[:, None] + values[0])
 
 
 def good_samples(values: FloatArray, longest: int = 60) -> BoolArray:
-    """Samples that are neither missing nor part of a glitch.
-
-    Parameters
-    ----------
-    values : (n, d) ndarray
-        Records sampled together; a glitch in one of them spoils the sample.
-    longest : int
-        Longest glitch to recognise [samples].
-
-    Returns
-    -------
-    (n,) ndarray of bool
-    """
+    """Samples that are neither missing nor part of a glitch."""
     finite = np.asarray(np.isfinite(values).all(axis=1))
     good = finite.copy()
     index = np.flatnonzero(finite)
@@ -132,16 +93,6 @@ def refuse_flat_channels(run: Run) -> None:
 
     A force or displacement that stops in the middle of a staircase looks like a very stiff or very soft pivot: nothing
     in the curve itself gives it away, but readings without noise do.
-
-    Parameters
-    ----------
-    run : Run
-        Of any kind.
-
-    Raises
-    ------
-    RigDataError
-        Names every such channel, from when on, and for how long.
     """
     problems = []
     for quantity in ("force", "displacement"):

@@ -36,35 +36,14 @@ def _flicker_gain() -> float:
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Levels of the three kinds of noise.
-
-    Attributes
-    ----------
-    white : float
-        Variance times averaging time [m^2 s].
-    flicker : float
-        Power density at 1 Hz [m^2/Hz] of the 1/f part.
-    drift : float
-        Standard deviation, over runs, of the drift rate [m/s].
-    """
+    """Levels of the three kinds of noise."""
 
     white: float
     flicker: float
     drift: float
 
     def covariance(self, time: FloatArray, duration: FloatArray) -> FloatArray:
-        """Covariance of block averages.
-
-        Parameters
-        ----------
-        time, duration : (m,) ndarray
-            Middle and length of the blocks [s].
-
-        Returns
-        -------
-        (m, m) ndarray
-            [m^2], positive definite.
-        """
+        """Covariance of block averages."""
         centred = time - np.mean(time)
         span = max(float(np.ptp(time)), 1e-300)
         bent = BEND * (centred**2 - np.mean(centred**2)) / span * 2.0
@@ -75,13 +54,7 @@ class NoiseModel:
         )
 
     def mean_variance(self, duration: float) -> float:
-        """Variance of one average over `duration` seconds about the run's own level [m^2].
-
-        Parameters
-        ----------
-        duration : float
-            [s]
-        """
+        """Variance of one average over `duration` seconds about the run's own level [m^2]."""
         m = 40
         time = (np.arange(m) + 0.5) * duration / m
         total = NoiseModel(self.white, self.flicker, 0.0).covariance(time, np.full(m, duration / m))
@@ -89,15 +62,7 @@ class NoiseModel:
 
 
 def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> FloatArray:
-    """Covariance (m, m) of 1/f noise of unit power density at 1 Hz; of averages where `duration` is given.
-
-    Parameters
-    ----------
-    time : (m,) ndarray
-        Middles [s].
-    duration : (m,) ndarray, optional
-        Averaging times [s].
-    """
+    """Covariance (m, m) of 1/f noise of unit power density at 1 Hz; of averages where `duration` is given."""
     apart = np.abs(time[:, None] - time[None, :])
     kernel = np.zeros_like(apart)
     for tau in FLICKER_TIMES:
@@ -112,17 +77,7 @@ def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> Floa
 
 @dataclass(frozen=True)
 class NoiseSeries:
-    """One series from which noise is learnt.
-
-    Attributes
-    ----------
-    time, duration : (m,) ndarray
-        Blocks [s].
-    values : (m,) ndarray
-        Block averages [m].
-    mean : (m, p) ndarray
-        Columns that span the signal; nothing within their span counts as noise.
-    """
+    """One series from which noise is learnt."""
 
     time: FloatArray
     duration: FloatArray
@@ -178,27 +133,7 @@ def _by_shape(series: Sequence[NoiseSeries]) -> list[list[NoiseSeries]]:
 
 
 def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float, learn_drift: bool = True) -> NoiseModel:
-    """Estimate the noise levels common to several series.
-
-    Parameters
-    ----------
-    series : sequence of NoiseSeries
-        Any number, of any length above their number of signal columns.
-    drift_rate : float
-        Centre of the log-normal prior (factor e) of the drift rate [m/s].
-    learn_drift : bool
-        False where the signal itself grows with time (a ramp): what looks like drift there is the signal's own shape,
-        and the prior is all that is known of drift.
-
-    Returns
-    -------
-    NoiseModel
-
-    Raises
-    ------
-    BadInputError
-        When no series has more blocks than signal columns.
-    """
+    """Estimate the noise levels common to several series."""
     usable = [s for s in series if len(s.time) > s.mean.shape[1] + 2]
     if not usable:
         raise BadInputError("no series is long enough to learn noise from: record longer holds")

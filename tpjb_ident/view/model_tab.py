@@ -21,12 +21,7 @@ _NEAR = 0.02
 
 
 def model_tab(session: Session) -> Any:
-    """Build the tab; the session has a predictor and identified points.
-
-    Parameters
-    ----------
-    session : Session
-    """
+    """Build the tab; the session has a predictor and identified points."""
     from bokeh.layouts import column
     from bokeh.models import Div
 
@@ -164,21 +159,7 @@ def _measured_columns(points: list[PointResult], part: str, scale: float) -> dic
 
 
 def describe(curve: Curve, line: float, load: float, pivots: str, measured: int) -> str:
-    """What the sliders show, in one sentence; HTML.
-
-    Parameters
-    ----------
-    curve : Curve
-        What the model says over frequency.
-    line : float
-        Excitation [Hz].
-    load : float
-        [N]
-    pivots : str
-        Of the model.
-    measured : int
-        Points measured at that load.
-    """
+    """What the sliders show, in one sentence; HTML."""
     if curve.status:
         import html
 

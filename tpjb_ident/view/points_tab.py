@@ -15,13 +15,7 @@ if TYPE_CHECKING:
 
 
 def points_tab(found: Identification) -> Any:
-    """Build the tab.
-
-    Parameters
-    ----------
-    found : Identification
-        What was identified.
-    """
+    """Build the tab."""
     from bokeh.layouts import column
     from bokeh.models import ColumnDataSource, DataTable, HoverTool, Select, TableColumn
 
@@ -72,13 +66,7 @@ def _stiffness_plot(found: Identification) -> Any:
 
 
 def label(p: PointResult) -> str:
-    """Name of a point that tells it from the others.
-
-    Parameters
-    ----------
-    p : PointResult
-        A point.
-    """
+    """Name of a point that tells it from the others."""
     point = p.point
     return (
         f"{point.static_load / 1e3:g} kN at {point.static_load_direction_deg:g} deg, {point.shaft_speed_hz:g} Hz, "

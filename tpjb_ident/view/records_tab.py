@@ -33,12 +33,7 @@ _UNITS = {
 
 
 def records_tab(campaign: Campaign) -> Any:
-    """Build the tab.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    """
+    """Build the tab."""
     from bokeh.layouts import column
     from bokeh.models import ColumnDataSource, Div, MultiSelect, Select
 
@@ -94,16 +89,7 @@ def records_tab(campaign: Campaign) -> Any:
 
 
 def show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict[str, Any]) -> str:
-    """Draw channels of one quantity over time and frequency; what is to be said of them.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        The first decides the unit; those of other quantities are left out and named.
-    plots : tuple of figure
-        Over time, over frequency.
-    data : dict of str to ColumnDataSource
-    """
+    """Draw channels of one quantity over time and frequency; what is to be said of them."""
     first = records[0]
     unit, scale = _UNITS.get(first.quantity, ("", 1.0))
     drawn = [r for r in records if r.quantity == first.quantity][: len(COLOURS)]
@@ -140,13 +126,7 @@ def _waterfall_plot(source: Any) -> Any:
 
 
 def waterfall(record: Record) -> dict[str, Any]:
-    """Spectra of short stretches one above the other, in dB below the strongest line.
-
-    Parameters
-    ----------
-    record : Record
-        Of at least a few hundred samples; else nothing is drawn.
-    """
+    """Spectra of short stretches one above the other, in dB below the strongest line."""
     values = np.nan_to_num(record.values - np.nanmean(record.values))
     length = min(MOST_LINES, len(values) // STRETCHES * 2)
     if length < 64:
@@ -175,15 +155,7 @@ def _orbits(run: Any) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def thinned(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lows and highs of so many blocks that a screen can show them; short records as they are.
-
-    Parameters
-    ----------
-    time : np.ndarray
-        [s]
-    values : np.ndarray
-        Samples.
-    """
+    """Lows and highs of so many blocks that a screen can show them; short records as they are."""
     step = -(-len(values) // (MOST_POINTS // 2))
     if step <= 2:
         return time, values

@@ -27,23 +27,7 @@ class ViewError(TpjbError):
 
 
 def serve(session: Session, port: int, ready: Callable[[str], None], seconds: float | None = None) -> None:
-    """Serve until interrupted.
-
-    Parameters
-    ----------
-    session : Session
-    port : int
-        0: any free one.
-    ready : callable
-        Called with the address as soon as the page can be opened.
-    seconds : float, optional
-        Stop after this time.
-
-    Raises
-    ------
-    ViewError
-        Bokeh is not installed, or the port is taken.
-    """
+    """Serve until interrupted."""
     try:
         from bokeh.application import Application
         from bokeh.application.handlers.function import FunctionHandler
@@ -67,14 +51,7 @@ def serve(session: Session, port: int, ready: Callable[[str], None], seconds: fl
 
 
 def build(document: Any, session: Session) -> None:
-    """Fill a Bokeh document with the tabs that the session has something for.
-
-    Parameters
-    ----------
-    document : object
-        A Bokeh document.
-    session : Session
-    """
+    """Fill a Bokeh document with the tabs that the session has something for."""
     from bokeh.layouts import column
     from bokeh.models import Div, TabPanel, Tabs
 

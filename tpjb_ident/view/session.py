@@ -18,17 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Curve:
-    """Predicted coefficients at one static load.
-
-    Attributes
-    ----------
-    frequency : (n,) ndarray
-        [Hz]
-    k, c : (n, 2, 2) ndarray
-        [N/m], [N s/m]; NaN without convergence.
-    status : str
-        What the model says of it; "" if all is well.
-    """
+    """Predicted coefficients at one static load."""
 
     frequency: FloatArray = field(repr=False)
     k: FloatArray = field(repr=False)
@@ -42,21 +32,7 @@ Predictor = Callable[[float, float, float, FloatArray, str], Curve]
 
 @dataclass
 class Session:
-    """Everything that the tabs share; what takes time is computed once, when it is first asked for.
-
-    Attributes
-    ----------
-    name : str
-    campaign : Campaign or None
-    tables : mapping of str to DataFrame
-        Result tables of a folder, by file name.
-    identify : callable or None
-        Identifies the campaign.
-    predict : callable or None
-        See `Predictor`.
-    pivots : tuple of str
-        Pivot models that `predict` knows.
-    """
+    """Everything that the tabs share; what takes time is computed once, when it is first asked for."""
 
     name: str
     campaign: Campaign | None = None

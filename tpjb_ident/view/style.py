@@ -9,28 +9,14 @@ COLOURS = (BLUE, ORANGE, GREEN, RED, "#b9609a", GREY)
 
 
 def side_by_side(*parts: Any) -> Any:
-    """Set parts beside each other; on a narrow screen below each other.
-
-    Parameters
-    ----------
-    *parts
-        Bokeh models.
-    """
+    """Set parts beside each other; on a narrow screen below each other."""
     from bokeh.layouts import row
 
     return row(*parts, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"})
 
 
 def new_plot(title: str, x: str, y: str, **options: Any) -> Any:
-    """Make an empty plot.
-
-    Parameters
-    ----------
-    title, x, y : str
-        Axes with units.
-    **options
-        Of `bokeh.plotting.figure`.
-    """
+    """Make an empty plot."""
     from bokeh.plotting import figure
 
     settings = {

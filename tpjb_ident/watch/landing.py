@@ -10,17 +10,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class FileState:
-    """What tells whether a file is still the one that was read.
-
-    Attributes
-    ----------
-    size : int
-        [bytes]
-    changed : int
-        Time of the last change [ns], by the file system's clock.
-    node : int
-        Changes where a file was put in another's place.
-    """
+    """What tells whether a file is still the one that was read."""
 
     size: int
     changed: int
@@ -28,12 +18,7 @@ class FileState:
 
 
 def file_state(path: Path) -> FileState | None:
-    """State of an ordinary file; None where there is none, or none that may be looked at.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """State of an ordinary file; None where there is none, or none that may be looked at."""
     try:
         found = path.stat()
     except OSError:
@@ -42,15 +27,7 @@ def file_state(path: Path) -> FileState | None:
 
 
 class Landings:
-    """Follows files until they rest.
-
-    Parameters
-    ----------
-    settle : float
-        Seconds without a change after which a file counts as written.
-    clock, steady : callable, optional
-        Time of day as the file system has it, and one that only goes forward [s].
-    """
+    """Follows files until they rest."""
 
     def __init__(
         self,
@@ -65,10 +42,6 @@ class Landings:
         """Files at rest with their state, and those that are still being written.
 
         An empty file is still being written: a logger has opened it and holds the samples back.
-
-        Parameters
-        ----------
-        paths : iterable of Path
         """
         resting: dict[Path, FileState] = {}
         moving: list[Path] = []

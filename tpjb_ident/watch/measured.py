@@ -30,17 +30,7 @@ REFUSALS = (RigError, TpjbError, np.linalg.LinAlgError)
 
 @dataclass(frozen=True)
 class Measured:
-    """Results so far.
-
-    Attributes
-    ----------
-    identification : Identification or None
-        None before the first dynamic run.
-    curves : tuple of PivotCurve
-    polygon : ClearancePolygon or None
-    refusals : tuple of str
-        What could not be made of runs that are there, and why.
-    """
+    """Results so far."""
 
     identification: Identification | None = None
     curves: tuple[PivotCurve, ...] = ()
@@ -55,16 +45,7 @@ class Measured:
 
 @dataclass
 class Measuring:
-    """Makes results of the runs so far, and only what has news.
-
-    Attributes
-    ----------
-    settings : IdentifySettings
-    pad_angles : tuple of float
-        Pad directions [rad]; empty where the bearing is not known: then pivots and clearance wait.
-    store : RunStore or None
-        Where phasors of finished runs are kept, so that a restart need not make them again.
-    """
+    """Makes results of the runs so far, and only what has news."""
 
     settings: IdentifySettings
     pad_angles: tuple[float, ...] = ()
@@ -74,15 +55,7 @@ class Measuring:
     _last: Measured = field(default_factory=Measured)
 
     def update(self, campaign: Campaign, marks: dict[str, object]) -> Measured:
-        """Results of a campaign of the runs that count.
-
-        Parameters
-        ----------
-        campaign : Campaign
-            Of the good runs alone.
-        marks : dict
-            By run id, what changes when its record does.
-        """
+        """Results of a campaign of the runs that count."""
         refusals: list[str] = []
         last = self._last
         found = Measured(

@@ -22,17 +22,7 @@ _LISTED = 4
 
 @dataclass(frozen=True)
 class Step:
-    """One thing to do.
-
-    Attributes
-    ----------
-    kind : str
-        ``"stop"``, ``"repeat"``, ``"mend"``, ``"more"`` or ``"next"``, most urgent first.
-    text : str
-        A sentence for the person at the rig.
-    runs : tuple of str
-        Ids of the runs concerned.
-    """
+    """One thing to do."""
 
     kind: str
     text: str
@@ -45,18 +35,7 @@ def next_steps(
     points: Sequence[PointResult],
     within: float | None = None,
 ) -> list[Step]:
-    """Everything to do, most urgent first.
-
-    Parameters
-    ----------
-    states : sequence of RunStatus
-    common : sequence of sequence of Finding
-        Findings that many runs share.
-    points : sequence of PointResult
-        What is identified so far.
-    within : float, optional
-        Half 95 % interval of the direct coefficients that is aimed at, as a share of their mean.
-    """
+    """Everything to do, most urgent first."""
     stop, stopped = _stop(states)
     at = here(states)
     return [
@@ -69,12 +48,7 @@ def next_steps(
 
 
 def here(states: Sequence[RunStatus]) -> Run | None:
-    """The running test that landed last: what the rig stands at.
-
-    Parameters
-    ----------
-    states : sequence of RunStatus
-    """
+    """The running test that landed last: what the rig stands at."""
     landed = [s for s in states if s.landed and s.run.kind in ("dynamic", "locus")]
     return max(reversed(landed), key=lambda s: s.landed).run if landed else None
 
@@ -85,12 +59,7 @@ def _set_up(run: Run) -> tuple[float, float, float]:
 
 
 def described(run: Run) -> str:
-    """A test in words and units.
-
-    Parameters
-    ----------
-    run : Run
-    """
+    """A test in words and units."""
     p = run.point
     if run.kind == "dry_pivot":
         return f"dry load steps on pad #{run.pad}, {run.branch}"
@@ -105,12 +74,7 @@ def described(run: Run) -> str:
 
 
 def lacking(point: PointResult) -> str:
-    """What an operating point lacks for K and C; "" where it has them.
-
-    Parameters
-    ----------
-    point : PointResult
-    """
+    """What an operating point lacks for K and C; "" where it has them."""
     if np.isfinite(point.stiffness.h).all():
         return ""
     if point.n_records == 1:
@@ -120,12 +84,7 @@ def lacking(point: PointResult) -> str:
 
 
 def said(problem: Problem) -> str:
-    """What is wrong and where, without the file's name.
-
-    Parameters
-    ----------
-    problem : Problem
-    """
+    """What is wrong and where, without the file's name."""
     return f"{problem.place}: {problem.what}" if problem.place else problem.what
 
 
@@ -232,15 +191,7 @@ def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
 
 
 def plan_lacks(runs: Sequence[Run], n_pads: int) -> list[str]:
-    """What a plan leaves out that the results will want.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        Planned and landed.
-    n_pads : int
-        Of the bearing; 0 where it is not known.
-    """
+    """What a plan leaves out that the results will want."""
     found = []
     single: dict[OperatingPoint, set[float | None]] = {}
     for run in runs:

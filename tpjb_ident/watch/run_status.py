@@ -20,21 +20,7 @@ COMMON_RUNS, COMMON_SHARE = 3, 1 / 3
 
 @dataclass(frozen=True)
 class RunStatus:
-    """One run of the plan, or beside it.
-
-    Attributes
-    ----------
-    run : Run
-        As it is read; of a run that has not landed, as it is planned.
-    state : str
-        ``"to run"``, ``"being written"``, ``"good"``, ``"look"``, ``"repeat"`` or ``"replaced"``.
-    findings : tuple of Finding
-        Of this run alone, gravest first.
-    landed : str
-        When its record was first seen whole, ISO; "" before.
-    planned : bool
-        Whether the manifest names it.
-    """
+    """One run of the plan, or beside it."""
 
     run: Run
     state: State
@@ -61,21 +47,7 @@ def judge_states(
     planned: frozenset[str],
     moving: frozenset[str],
 ) -> tuple[list[RunStatus], list[list[Finding]]]:
-    """State of every run, and the findings that so many runs share that no repeat will cure them.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        Planned and landed, in order.
-    seen : sequence of Observation
-        Judged, of those that landed.
-    landed : mapping of str to str
-        When, by run id.
-    planned : frozenset of str
-        Ids that the manifest names.
-    moving : frozenset of str
-        Ids whose files are being written.
-    """
+    """State of every run, and the findings that so many runs share that no repeat will cure them."""
     common = _common([one.report.found for one in seen], [one.run.kind for one in seen])
     shared = {id(f) for group in common for f in group}
     found = {one.run.id: [f for f in one.report.found if id(f) not in shared] for one in seen}

@@ -25,19 +25,7 @@ _DRIVEN = 0.5
 
 @dataclass(frozen=True)
 class Unplanned:
-    """A record that the manifest does not name.
-
-    Attributes
-    ----------
-    file : str
-        Path in the campaign's folder.
-    run : Run or None
-        What it is taken for; None where nothing fits.
-    like : str
-        Id of the planned run whose set points it has; "" where nothing fits.
-    why : str
-        What told.
-    """
+    """A record that the manifest does not name."""
 
     file: str
     run: Run | None
@@ -46,17 +34,7 @@ class Unplanned:
 
 
 def place_record(campaign: Campaign, path: Path, done: frozenset[str]) -> Unplanned:
-    """Find the planned run that a record is, or repeats.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        As its manifest has it.
-    path : Path
-        Of the record, at rest.
-    done : frozenset of str
-        Ids of the planned runs whose own records are there.
-    """
+    """Find the planned run that a record is, or repeats."""
     file = path.relative_to(campaign.path).as_posix()
     taken = {run.id for run in campaign.runs}
     named = [r for r in campaign.runs if _named_like(path.stem, r.id)]
@@ -130,11 +108,6 @@ def _line(values: FloatArray, frequency: float, rate: float) -> np.ndarray:
 
 
 def unplanned_problem(found: Sequence[Unplanned]) -> list[Problem]:
-    """What to do with records that nothing was found for.
-
-    Parameters
-    ----------
-    found : sequence of Unplanned
-    """
+    """What to do with records that nothing was found for."""
     cure = "Add a [[runs]] table for it to campaign.toml, or move it out of the folder"
     return [Problem("warning", one.file, "", one.why, cure) for one in found if one.run is None]

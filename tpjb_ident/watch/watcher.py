@@ -28,28 +28,7 @@ WHOLE = 0.8
 
 @dataclass(frozen=True)
 class Snapshot:
-    """How a campaign stands at one moment.
-
-    Attributes
-    ----------
-    campaign : Campaign
-        As its manifest has it.
-    states : tuple of RunStatus
-        Planned runs in the manifest's order, then those beside the plan.
-    steps : tuple of Step
-        What to do, most urgent first.
-    lacks : tuple of str
-        What the plan leaves out.
-    measured : Measured
-    problems : tuple of Problem
-        Of the campaign as a whole: its manifest, records that nothing fits.
-    new : tuple of str
-        Ids of runs that landed or changed since the last look.
-    hashes : dict of str to str
-        SHA-256 of the records, by file.
-    placed : tuple of Unplanned
-        Records that the manifest does not name, and what they were taken for.
-    """
+    """How a campaign stands at one moment."""
 
     campaign: Campaign
     states: tuple[RunStatus, ...]
@@ -62,12 +41,7 @@ class Snapshot:
     placed: tuple[Unplanned, ...] = ()
 
     def count(self, *states: str) -> int:
-        """Runs in some states.
-
-        Parameters
-        ----------
-        *states : str
-        """
+        """Runs in some states."""
         return sum(s.state in states for s in self.states)
 
 
@@ -84,17 +58,7 @@ class _Seen:
 
 @dataclass
 class Watcher:
-    """Follows one campaign folder.
-
-    Attributes
-    ----------
-    folder : Path
-        With ``campaign.toml``.
-    landings : Landings
-    measuring : Measuring
-    within : float or None
-        Half interval that is aimed at, as a share of the mean direct coefficient.
-    """
+    """Follows one campaign folder."""
 
     folder: Path
     landings: Landings
@@ -107,13 +71,7 @@ class Watcher:
     _last: tuple[object, ...] = ()
 
     def look(self) -> Snapshot | None:
-        """Look once; None where nothing has changed since the last look.
-
-        Raises
-        ------
-        RigDataError
-            The manifest cannot be read, and never could since the watch began.
-        """
+        """Look once; None where nothing has changed since the last look."""
         if not self.folder.is_dir():  # a share that is away comes back; its records are not gone
             return None
         campaign, problems = self._opened()
@@ -235,12 +193,7 @@ def _digest(path: Path) -> str:
 
 
 def seconds(run: Run) -> float:
-    """Length of a record [s]; 0 where it cannot be told.
-
-    Parameters
-    ----------
-    run : Run
-    """
+    """Length of a record [s]; 0 where it cannot be told."""
     try:
         return run.length / run.sample_rate
     except RigDataError:

@@ -13,19 +13,7 @@ DEPTH = 4
 
 @inner
 def mixed(images: FloatArray, residuals: FloatArray, count: int) -> FloatArray:
-    """Next state of a fixed-point iteration.
-
-    Parameters
-    ----------
-    images, residuals : (DEPTH + 1, n) ndarray
-        g(x) and g(x) - x of the last steps, the newest last.
-    count : int
-        How many there are.
-
-    Returns
-    -------
-    (n,) ndarray
-    """
+    """Next state of a fixed-point iteration."""
     last = images[count - 1].copy()
     k = count - 1
     if k == 0:
@@ -55,15 +43,7 @@ def mixed(images: FloatArray, residuals: FloatArray, count: int) -> FloatArray:
 
 @inner
 def least_squares(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Least-squares solution of a symmetric system that may be singular, by Jacobi's rotations.
-
-    Parameters
-    ----------
-    matrix : (k, k) ndarray
-        Overwritten.
-    right : (k,) ndarray
-        Eigenvalues below 1e-12 of the largest count as zero.
-    """
+    """Least-squares solution of a symmetric system that may be singular, by Jacobi's rotations."""
     k = len(right)
     vectors = np.zeros((k, k))
     for i in range(k):

@@ -17,25 +17,7 @@ from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of,
 
 
 class BodyStack(NamedTuple):
-    """The matrices of k different pads and which of them the films have; n = (nt + 1)(nz + 1) film nodes.
-
-    Attributes
-    ----------
-    which : (pads,) ndarray of int
-        Body of every film; empty for rigid pads.
-    answer : (k, n, unknowns + c) ndarray of float32
-        Deformation by the pressure at the unknown nodes [m/Pa] and by the temperatures of the pad's coarser nodes
-        [m/K]: half the memory, which is what the product waits for, at a ten-millionth of a deformation.
-    to_coarse : (k, c, n) ndarray of float32
-        Those temperatures by the film's.
-    shapes : (k, nt + 1, nz + 1, m) ndarray
-    amplitudes : (k, m, n) ndarray
-    response : (k, m, unknowns) ndarray
-    weights : (k, 2, unknowns) ndarray
-        See `model.pad.bending.PadDeformation`; the factor on the deformation is in `answer` and `response`.
-    supply : float
-        Temperature at which the pads have their drawn shape [degC].
-    """
+    """The matrices of k different pads and which of them the films have; n = (nt + 1)(nz + 1) film nodes."""
 
     which: IntArray
     answer: np.ndarray
@@ -57,19 +39,7 @@ class Shapes(NamedTuple):
 def stacked_bodies(
     bodies: tuple[PadDeformation, ...], unknown: tuple[int, int], factor: float, supply: float
 ) -> BodyStack:
-    """Matrices of the pads side by side.
-
-    Parameters
-    ----------
-    bodies : tuple of PadDeformation
-        One per film; none for rigid pads.
-    unknown : tuple of int
-        First unknown node across, and how many nodes there are across.
-    factor : float
-        On the computed deformation.
-    supply : float
-        [degC]
-    """
+    """Matrices of the pads side by side."""
     if not bodies:
         return _RIGID._replace(supply=supply)
     return _stacked(bodies, unknown, factor)._replace(supply=supply)
@@ -109,22 +79,7 @@ _RIGID = BodyStack(
 
 @inner
 def bend_pads(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState) -> float:
-    """Close the loop of pressure and deformation for every pad that carries.
-
-    Parameters
-    ----------
-    shapes : Shapes
-    pads : PadStack
-    works : FilmWork
-        With a leading axis for the pad.
-    state : PadState
-        What the journal feels, and what a move does to the shapes, are set.
-
-    Returns
-    -------
-    float
-        Largest change of shape asked for, over the least film.
-    """
+    """Close the loop of pressure and deformation for every pad that carries."""
     grids, bodies = shapes
     count = len(state.tilt)
     unknowns, coarse, across = works.unknown.shape[1], bodies.to_coarse.shape[1], state.bent.shape[2]
@@ -260,19 +215,7 @@ def _solve(matrix: FloatArray, right: FloatArray) -> None:
 
 @inner
 def change_shape(state: PadState, bodies: BodyStack, m: int, da: float, db: float) -> None:
-    """Add to the change of a pad's deformation, `PadState.mismatch`, what belongs to a move of its film.
-
-    Parameters
-    ----------
-    state : PadState
-    bodies : BodyStack
-    m : int
-        Pad, from 0.
-    da : float
-        Change of a [m].
-    db : float
-        Change of b [m].
-    """
+    """Add to the change of a pad's deformation, `PadState.mismatch`, what belongs to a move of its film."""
     out, shapes = state.mismatch[m], bodies.shapes[bodies.which[m]]
     for r in range(shapes.shape[2]):
         amount = state.amplitude[m, r, 0] + state.amplitude[m, r, 1] * da + state.amplitude[m, r, 2] * db

@@ -20,21 +20,7 @@ EVERY = 4
 
 
 class Case(NamedTuple):
-    """The numbers of one search.
-
-    Attributes
-    ----------
-    load : (2,) ndarray
-        [N]
-    running : Running
-    hold : tuple of float
-        Rotational stiffness of the pivots [N m/rad], and what every newton of pad load adds to it [m].
-    size : float
-        R^2 L of a film [m^3].
-    accuracy : float
-        See `model.setup.Setup`.
-    isothermal : bool
-    """
+    """The numbers of one search."""
 
     load: FloatArray
     running: Running
@@ -46,43 +32,19 @@ class Case(NamedTuple):
 
 @inner
 def rigid_approach(pads: PadStack, state: PadState, m: int) -> float:
-    """Approach of a film if its pivot were rigid [m].
-
-    Parameters
-    ----------
-    pads : PadStack
-    state : PadState
-    m : int
-        Pad, from 0.
-    """
+    """Approach of a film if its pivot were rigid [m]."""
     return pads.preload[m] + pads.frame[m, 0, 0] * state.position[0] + pads.frame[m, 0, 1] * state.position[1]
 
 
 @inner
 def along(pads: PadStack, state: PadState, m: int) -> float:
-    """Journal's place across the pivot line [m].
-
-    Parameters
-    ----------
-    pads : PadStack
-    state : PadState
-    m : int
-        Pad, from 0.
-    """
+    """Journal's place across the pivot line [m]."""
     return pads.frame[m, 1, 0] * state.position[0] + pads.frame[m, 1, 1] * state.position[1]
 
 
 @inner
 def margin(pads: PadStack, state: PadState, m: int) -> float:
-    """How far a pad is from where it stops carrying, as a share of its clearance; negative beyond.
-
-    Parameters
-    ----------
-    pads : PadStack
-    state : PadState
-    m : int
-        Pad, from 0.
-    """
+    """How far a pad is from where it stops carrying, as a share of its clearance; negative beyond."""
     return (reach(pads, state, m) - state.branch[m, 0, 0]) / pads.clearance[m]
 
 
@@ -97,48 +59,19 @@ def _bulge(pads: PadStack, state: PadState, m: int) -> float:
 
 @inner
 def reach(pads: PadStack, state: PadState, m: int) -> float:
-    """How near the journal is to a pad on a rigid pivot [m], counting by how much a warm pad's face stands inward.
-
-    Parameters
-    ----------
-    pads : PadStack
-    state : PadState
-    m : int
-        Pad, from 0.
-    """
+    """How near the journal is to a pad on a rigid pivot [m], counting by how much a warm pad's face stands inward."""
     return rigid_approach(pads, state, m) + _bulge(pads, state, m)
 
 
 @inner
 def edge(pads: PadStack, state: PadState, m: int) -> float:
-    """Share of the clearance by which the table of rigid pads may be wrong about where a pad stops carrying.
-
-    Parameters
-    ----------
-    pads : PadStack
-    state : PadState
-    m : int
-        Pad, from 0.
-    """
+    """Share of the clearance by which the table of rigid pads may be wrong about where a pad stops carrying."""
     return EDGE + CROWN * abs(_bulge(pads, state, m)) / pads.clearance[m]
 
 
 @inner
 def find_branch(case: Case, pads: PadStack, works: FilmWork, state: PadState, m: int, hotter: float) -> None:
-    """Loaded attitudes of a pad at its film's mean temperature, or `hotter` [K] than that.
-
-    Parameters
-    ----------
-    case : Case
-    pads : PadStack
-    works : FilmWork
-        With a leading axis for the pad.
-    state : PadState
-    m : int
-        Pad, from 0.
-    hotter : float
-        [K]
-    """
+    """Loaded attitudes of a pad at its film's mean temperature, or `hotter` [K] than that."""
     count = pads.rows[m]
     if count < 2:
         state.branch[m] = 0.0
@@ -194,19 +127,7 @@ def _sorted(load: FloatArray) -> FloatArray:
 
 @inner
 def interpolate(x: FloatArray, y: FloatArray, count: int, at: float) -> float:
-    """Straight between the first `count` points, constant beyond them.
-
-    Parameters
-    ----------
-    x : ndarray
-        Rising.
-    y : ndarray
-        Values there.
-    count : int
-        How many count.
-    at : float
-        Where.
-    """
+    """Straight between the first `count` points, constant beyond them."""
     if at <= x[0]:
         return y[0]
     if at >= x[count - 1]:
@@ -223,14 +144,7 @@ def interpolate(x: FloatArray, y: FloatArray, count: int, at: float) -> float:
 
 @inner
 def let_idle(state: PadState, m: int) -> None:
-    """Let a pad carry nothing.
-
-    Parameters
-    ----------
-    state : PadState
-    m : int
-        Pad, from 0.
-    """
+    """Let a pad carry nothing."""
     state.idle[m] = True
     state.deflection[m] = 0.0
     state.tilt[m] = 0.0
@@ -238,17 +152,7 @@ def let_idle(state: PadState, m: int) -> None:
 
 @inner
 def set_loaded(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None:
-    """Put a pad on its loaded attitude, or let it idle.
-
-    Parameters
-    ----------
-    pads : PadStack
-    works : FilmWork
-        With a leading axis for the pad.
-    state : PadState
-    m : int
-        Pad, from 0.
-    """
+    """Put a pad on its loaded attitude, or let it idle."""
     let_idle(state, m)
     state.idle[m] = margin(pads, state, m) <= 0.0
     works.ruptured[m] = False
@@ -262,33 +166,14 @@ def set_loaded(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None
 
 @inner
 def hold_of(case: Case, state: PadState, m: int, load: float) -> tuple[float, float]:
-    """What holds a tilt back: its slope by the tilt [N m/rad] and by the pad's load [m].
-
-    Parameters
-    ----------
-    case : Case
-    state : PadState
-    m : int
-        Pad, from 0.
-    load : float
-        Pad load [N].
-    """
+    """What holds a tilt back: its slope by the tilt [N m/rad] and by the pad's load [m]."""
     stiffness = case.hold[0] + case.hold[1] * max(load, 0.0)
     return stiffness, case.hold[1] * state.tilt[m] if load > 0.0 else 0.0
 
 
 @inner
 def is_stable(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
-    """Whether film and pivot push a pad back from a small change of tilt and deflection.
-
-    Parameters
-    ----------
-    case : Case
-    pads : PadStack
-    state : PadState
-    m : int
-        Pad, from 0.
-    """
+    """Whether film and pivot push a pad back from a small change of tilt and deflection."""
     k, load, radius = state.stiffness[m], state.force[m, 0], pads.pivot_radius[m]
     give = compliance(pads.laws[m], pads.curves[m], max(load, 1e-6))
     stiffness, arm = hold_of(case, state, m, load)
@@ -299,16 +184,7 @@ def is_stable(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
 
 @inner
 def update_carrying(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> bool:
-    """Let pads take up or shed their load as the journal's position has it; True if any did.
-
-    Parameters
-    ----------
-    case : Case
-    pads : PadStack
-    works : FilmWork
-        With a leading axis for the pad.
-    state : PadState
-    """
+    """Let pads take up or shed their load as the journal's position has it; True if any did."""
     changed = False
     for m in range(len(state.tilt)):
         if state.length[m] == 0 or abs(margin(pads, state, m)) < NEAR_EDGE:
@@ -334,16 +210,7 @@ def _keeps_its_load(case: Case, pads: PadStack, state: PadState, m: int, inside:
 
 @inner
 def leave_unstable(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> bool:
-    """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any.
-
-    Parameters
-    ----------
-    case : Case
-    pads : PadStack
-    works : FilmWork
-        With a leading axis for the pad.
-    state : PadState
-    """
+    """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any."""
     found = False
     for m in range(len(state.tilt)):
         if not state.solved[m] or case.hold[0] > 0.0 or is_stable(case, pads, state, m):

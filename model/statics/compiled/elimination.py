@@ -17,27 +17,7 @@ from model.compilation import compiled, inner
 
 
 class PadEquations(NamedTuple):
-    """What a Newton step needs to know of the n pads that carry, in the (radial, tangential) frame of each.
-
-    Attributes
-    ----------
-    frame : (n, 2, 2) ndarray
-        Rows: unit vectors along the pivot (normal) and across it (tangent).
-    force : (n, 2) ndarray
-        Of the film [N].
-    stiffness : (n, 2, 2) ndarray
-        Its derivatives by (a, b) [N/m].
-    pivot_radius : (n,) ndarray
-        R_P [m].
-    holding_force : (n,) ndarray
-        Moment that holds the tilt back, over R_P [N].
-    holding_slopes : (n, 2) ndarray
-        Its derivatives by the tilt, k_theta / R_P [N/rad], and by the pad's load.
-    missing_deflection : (n,) ndarray
-        delta(W) less the present deflection [m].
-    pivot_compliance : (n,) ndarray
-        d delta / d W [m/N].
-    """
+    """What a Newton step needs to know of the n pads that carry, in the (radial, tangential) frame of each."""
 
     frame: FloatArray
     force: FloatArray
@@ -51,24 +31,7 @@ class PadEquations(NamedTuple):
 
 @compiled
 def eliminate(load: FloatArray, pads: PadEquations) -> tuple[float, FloatArray, FloatArray]:
-    """Eliminate every pad's tilt and deflection, and solve for the journal's move.
-
-    Parameters
-    ----------
-    load : (2,) ndarray
-        [N]
-    pads : PadEquations
-        Of the n pads that carry.
-
-    Returns
-    -------
-    residual : float
-        Unbalanced force, moment over R_P, or deflection times stiffness, as a share of the load (or of 1 N).
-    shift : (2,) ndarray
-        [m]
-    moves : (n, 2) ndarray
-        Changes of tilt [rad] and deflection [m].
-    """
+    """Eliminate every pad's tilt and deflection, and solve for the journal's move."""
     n = pads.pivot_radius.shape[0]
     size = max(math.hypot(load[0], load[1]), 1.0)
     worst = 0.0

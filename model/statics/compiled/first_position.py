@@ -15,23 +15,7 @@ GOOD_ENOUGH = 0.002
 
 
 def first_position(load: FloatArray, normals: FloatArray, distances: FloatArray, branches: list[Branch]) -> FloatArray:
-    """Journal position that balances a load on tabulated isothermal films.
-
-    Parameters
-    ----------
-    load : (2,) ndarray
-        [N]
-    normals : (n_pads, 2) ndarray
-        Unit vectors at the pivots.
-    distances : (n_pads,) ndarray
-        Cp - Cb [m].
-    branches : list of Branch
-
-    Returns
-    -------
-    (2,) ndarray
-        [m]
-    """
+    """Journal position that balances a load on tabulated isothermal films."""
     longest = max(len(b.rigid_approach) for b in branches)
     curves = np.full((len(branches), 2, longest), math.nan)
     for row, branch in zip(curves, branches, strict=True):
@@ -47,21 +31,7 @@ def first_position(load: FloatArray, normals: FloatArray, distances: FloatArray,
 def balance(
     load: FloatArray, pads: FloatArray, rigid: FloatArray, carried: FloatArray, lengths: IntArray, room: float
 ) -> FloatArray:
-    """Journal position [m] that balances a load on tabulated films.
-
-    Parameters
-    ----------
-    load : (2,) ndarray
-        [N]
-    pads : (n, 3) ndarray
-        Unit vectors at the pivots, and Cp - Cb [m].
-    rigid, carried : (n, r) ndarray
-        Rigid approach [m], rising, and load [N] there.
-    lengths : (n,) ndarray of int
-        How many of the r there are.
-    room : float
-        Of the journal [m].
-    """
+    """Journal position [m] that balances a load on tabulated films."""
     size = math.hypot(load[0], load[1])
     position = np.zeros(2)
     if size == 0.0:

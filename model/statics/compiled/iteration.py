@@ -50,15 +50,6 @@ def start_cold(grids: GridStack, case: Case, pads: PadStack, works: FilmWork, st
     """Balance the load with the tabulated isothermal films, then put every pad on its loaded attitude.
 
     Films that make heat are balanced twice: as hot as their oil gets where it is only dragged along is known then.
-
-    Parameters
-    ----------
-    grids : GridStack
-    case : Case
-    pads : PadStack
-    works : FilmWork
-        With a leading axis for the pad.
-    state : PadState
     """
     for m in range(len(state.tilt)):
         works.temperature[m] = pads.inlet[m]
@@ -94,24 +85,7 @@ def _balance_films(case: Case, pads: PadStack, works: FilmWork, state: PadState,
 def iterate(
     shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, cold: bool
 ) -> tuple[int, int, float, float, float]:
-    """Iterate from where the arrays stand, or from a cold start.
-
-    Parameters
-    ----------
-    shapes : Shapes
-    pads : PadStack
-    works : FilmWork
-        With a leading axis for the pad.
-    state : PadState
-    case : Case
-    cold : bool
-        Start anew.
-
-    Returns
-    -------
-    tuple
-        How it ended, iterations, residual, change of temperature [K], limited share of a flow.
-    """
+    """Iterate from where the arrays stand, or from a cold start."""
     if cold:
         start_cold(shapes.grids, case, pads, works, state)
     best, residual, heat, stalled = math.inf, math.inf, math.inf, 0
@@ -199,17 +173,7 @@ def _size(works: FilmWork, state: PadState) -> int:
 
 @inner
 def write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatArray) -> None:
-    """Journal, pads, film temperatures and deformations as one vector, in micrometres and kelvins.
-
-    Parameters
-    ----------
-    pads : PadStack
-    works : FilmWork
-        With a leading axis for the pad.
-    state : PadState
-    out : ndarray
-        Overwritten.
-    """
+    """Journal, pads, film temperatures and deformations as one vector, in micrometres and kelvins."""
     out[0], out[1] = state.position[0] / MICROMETRE, state.position[1] / MICROMETRE
     at = 2
     for m in range(len(state.tilt)):
@@ -229,17 +193,7 @@ def write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatArr
 
 @inner
 def read_vector(pads: PadStack, works: FilmWork, state: PadState, vector: FloatArray) -> None:
-    """Undo `write_vector`.
-
-    Parameters
-    ----------
-    pads : PadStack
-    works : FilmWork
-        With a leading axis for the pad.
-    state : PadState
-    vector : ndarray
-        As written by `write_vector`.
-    """
+    """Undo `write_vector`."""
     state.position[0], state.position[1] = vector[0] * MICROMETRE, vector[1] * MICROMETRE
     at = 2
     for m in range(len(state.tilt)):

@@ -18,12 +18,7 @@ RIGID, CONSTANT, ROCKER, SPHERICAL, MEASURED = range(5)
 
 
 def encoded(laws: Sequence[PivotLaw]) -> tuple[FloatArray, FloatArray] | None:
-    """Laws as rows of numbers, (n, 4), and the measured curves among them, (n, 5, m); None for a law unknown here.
-
-    Parameters
-    ----------
-    laws : sequence of PivotLaw
-    """
+    """Laws as rows of numbers, (n, 4), and the measured curves among them, (n, 5, m); None for a law unknown here."""
     try:
         return _encoded(tuple(laws))
     except TypeError:  # a law of somebody's own that has no hash
@@ -69,17 +64,7 @@ def _row(law: PivotLaw) -> tuple[tuple[float, float, float, float], FloatArray] 
 
 @inner
 def deflection(law: FloatArray, curve: FloatArray, load: float) -> float:
-    """Give of a pivot, delta(W) [m].
-
-    Parameters
-    ----------
-    law : (4,) ndarray
-        A row of `encoded`.
-    curve : (5, m) ndarray
-        Of a measured one.
-    load : float
-        [N]
-    """
+    """Give of a pivot, delta(W) [m]."""
     if not load > 0.0 or law[0] == RIGID:
         return 0.0
     if law[0] == CONSTANT:
@@ -99,13 +84,7 @@ def deflection(law: FloatArray, curve: FloatArray, load: float) -> float:
 
 @inner
 def compliance(law: FloatArray, curve: FloatArray, load: float) -> float:
-    """Tangent d delta / dW [m/N]; zero for a rigid pivot.
-
-    Parameters
-    ----------
-    law, curve, load
-        As for `deflection`.
-    """
+    """Tangent d delta / dW [m/N]; zero for a rigid pivot."""
     if law[0] == RIGID:
         return 0.0
     if law[0] == CONSTANT:

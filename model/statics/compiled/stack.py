@@ -29,29 +29,7 @@ class GridStack(NamedTuple):
 
 
 class PadStack(NamedTuple):
-    """What a search leaves as it is.
-
-    Attributes
-    ----------
-    frame : (n, 2, 2) ndarray
-        Rows: unit vectors along the pivot (normal) and across it (tangent).
-    preload : (n,) ndarray
-        Cp - Cb, plus running changes [m].
-    pivot_radius, clearance : (n,) ndarray
-        R_P and Cp [m].
-    inlet : (n,) ndarray
-        [degC]
-    pivot : (n, 2) ndarray
-        Station before the pivot, and the pivot's place between it and the next one.
-    laws : (n, 4) ndarray
-        The pivots, see `model.statics.compiled.laws`.
-    curves : (n, 5, m) ndarray
-        Measured ones.
-    attitudes : (n, 3, r) ndarray
-        Curvature, wedge and load of the loaded attitudes, see `model.film.loaded_attitude.LoadedAttitude`.
-    rows : (n,) ndarray of int
-        How many of the r there are.
-    """
+    """What a search leaves as it is."""
 
     frame: FloatArray
     preload: FloatArray
@@ -66,45 +44,7 @@ class PadStack(NamedTuple):
 
 
 class PadState(NamedTuple):
-    """What a search changes besides the films' arrays.
-
-    Attributes
-    ----------
-    position : (2,) ndarray
-        Journal [m].
-    tilt, deflection : (n,) ndarray
-        t [rad], eta [m].
-    idle, solved : (n,) ndarray of bool
-        Carries nothing; has a pressure.
-    changes : (n,) ndarray of int
-        How often the pad has taken up or shed its load.
-    branch : (n, 4, r) ndarray
-        Rigid approach, approach, wedge and load, see `model.film.loaded_attitude.Branch`.
-    length : (n,) ndarray of int
-        How many of the r there are; 0 before the first.
-    wedge : (n, 2) ndarray
-        (a, b) that the pressure was solved with [m].
-    force, corrected : (n, 2) ndarray
-        As the pressure was solved, and at the temperature found since [N].
-    stiffness, damping : (n, 2, 2) ndarray
-        [N/m], [N s/m]
-    least : (n,) ndarray
-        Thinnest film [m].
-    steps : (n,) ndarray of int
-        See `model.film.reynolds.FilmForces`.
-    heating : (n,) ndarray
-        Largest change of temperature that the last step asked for [K].
-    shift : (n, unknowns) ndarray
-        See `model.statics.pad_film.PadFilm.pressure_change`.
-    felt : (n, 2) ndarray
-        `corrected`, and ...
-    felt_stiffness : (n, 2, 2) ndarray
-        ... `stiffness` with the pad giving way: what journal and pivot feel.
-    bent, mismatch : (n, nt + 1, nz + 1) ndarray
-        Deformation; what is missing of it besides the shapes of the Newton step [m]. Empty for rigid pads.
-    amplitude : (n, shapes, 3) ndarray
-        Change of their amplitudes at rest, and per metre of a and b.
-    """
+    """What a search changes besides the films' arrays."""
 
     position: FloatArray
     tilt: FloatArray
@@ -131,18 +71,7 @@ class PadState(NamedTuple):
 
 
 def stacked_grids(grids: tuple[FilmGrid, ...]) -> GridStack:
-    """The meshes of several pads as one.
-
-    Parameters
-    ----------
-    grids : tuple of FilmGrid
-        Of one shape.
-
-    Returns
-    -------
-    GridStack
-        The same object for the same meshes.
-    """
+    """The meshes of several pads as one."""
     return _stacked(tuple(map(_Same, grids)))
 
 
@@ -167,22 +96,7 @@ def _stacked(same: tuple[_Same, ...]) -> GridStack:
 
 
 def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWork, list[FilmWork]]:
-    """Allocate the arrays of all films, at rest at the inlet temperature.
-
-    Parameters
-    ----------
-    grids : list of FilmGrid
-        Of one shape.
-    inlet_temperature : float
-        [degC]
-
-    Returns
-    -------
-    stack : FilmWork
-        All of them, with a leading axis for the pad.
-    works : list of FilmWork
-        Every film's part of it.
-    """
+    """Allocate the arrays of all films, at rest at the inlet temperature."""
     nt, nz = len(grids[0].angle) - 1, len(grids[0].z) - 1
     unknowns = nz - grids[0].first
     count, n = len(grids), (nt - 1) * unknowns
@@ -211,14 +125,7 @@ def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWor
 
 @inner
 def grid_of(grids: GridStack, m: int) -> FilmGrid:
-    """One pad's mesh.
-
-    Parameters
-    ----------
-    grids : GridStack
-    m : int
-        Pad, from 0.
-    """
+    """One pad's mesh."""
     return FilmGrid(
         grids.angle[m], grids.z[m], grids.cos[m], grids.sin[m], grids.cos_face[m], grids.sin_face[m], grids.dx[m],
         grids.dz[m], grids.height[m], grids.area[m], grids.first,
@@ -227,15 +134,7 @@ def grid_of(grids: GridStack, m: int) -> FilmGrid:
 
 @inner
 def work_of(works: FilmWork, m: int) -> FilmWork:
-    """One film's arrays.
-
-    Parameters
-    ----------
-    works : FilmWork
-        With a leading axis for the pad.
-    m : int
-        Pad, from 0.
-    """
+    """One film's arrays."""
     return FilmWork(
         works.pressure[m], works.ruptured[m], works.temperature[m], works.viscosity[m], works.density[m],
         works.drag[m], works.exchange[m], works.gained[m], works.thickness[m], works.extra[m], works.flow_x[m],

@@ -24,20 +24,7 @@ from model.statics.compiled.stack import PadStack, PadState, grid_of, work_of
 def solve_pressure(
     film: tuple[FilmGrid, FilmWork], pads: PadStack, state: PadState, case: Case, m: int, sharp: bool
 ) -> None:
-    """Pressure of one film at its present temperature.
-
-    Parameters
-    ----------
-    film : tuple
-        Its mesh and arrays.
-    pads : PadStack
-    state : PadState
-    case : Case
-    m : int
-        Pad, from 0.
-    sharp : bool
-        See `model.film.reynolds.solve_film`.
-    """
+    """Pressure of one film at its present temperature."""
     grid, work = film
     if not sharp:
         set_viscosity(work, case.running.oil)
@@ -56,25 +43,7 @@ def solve_pressure(
 def solve_films(
     shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, relaxation: float
 ) -> tuple[float, float]:
-    """Solve every film that carries once: pressure, then temperature, then what the pads' deformation asks.
-
-    Parameters
-    ----------
-    shapes : Shapes
-    pads : PadStack
-    works : FilmWork
-        With a leading axis for the pad.
-    state : PadState
-    case : Case
-    relaxation : float
-        Of a change of temperature.
-
-    Returns
-    -------
-    tuple of float
-        Largest temperature change asked for [K], or change of shape of the same weight, infinite if a film is lost;
-        limited share of a flow.
-    """
+    """Solve every film that carries once: pressure, then temperature, then what the pads' deformation asks."""
     lost = False
     for m in range(len(state.tilt)):
         if not state.idle[m]:
@@ -115,21 +84,7 @@ def solve_films(
 
 @inner
 def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArray, FloatArray]:
-    """Solve the linearised equilibrium once.
-
-    Parameters
-    ----------
-    case : Case
-    pads : PadStack
-    state : PadState
-
-    Returns
-    -------
-    residual : float
-    shift : (2,) ndarray
-    moves : (n, 2) ndarray
-        See `model.statics.newton_step.newton_step`.
-    """
+    """Solve the linearised equilibrium once."""
     n = 0
     for m in range(len(state.tilt)):
         n += 1 if state.solved[m] else 0
@@ -170,20 +125,7 @@ def move(
     step: tuple[FloatArray, FloatArray],
     damping: float,
 ) -> bool:
-    """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way.
-
-    Parameters
-    ----------
-    shapes : Shapes
-    pads : PadStack
-    works : FilmWork
-        With a leading axis for the pad.
-    state : PadState
-    step : tuple
-        Shift of the journal and moves of the pads, see `newton`.
-    damping : float
-        Largest share of the step.
-    """
+    """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
     (grids, bodies), (shift, moves) = shapes, step
     least = math.inf
     for m in range(len(state.tilt)):

@@ -25,12 +25,7 @@ _TEXT = (".asc", ".txt")
 
 
 def is_foreign(path: Path) -> bool:
-    """Whether a record is for this reader: by its suffix, or a text file with several time bases.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Whether a record is for this reader: by its suffix, or a text file with several time bases."""
     if path.suffix.lower() in FORMATS:
         return True
     if path.suffix.lower() not in _TEXT or not path.is_file():
@@ -41,20 +36,7 @@ def is_foreign(path: Path) -> bool:
 
 
 def read_foreign(path: Path, file: str, run: str | None = None) -> list[Series]:
-    """Read every channel of a file, each on its own clock.
-
-    Parameters
-    ----------
-    path : Path
-    file : str
-        Display name.
-    run : str, optional
-
-    Raises
-    ------
-    RigDataError
-        Not there, too large, its library is not installed, or the library cannot read it.
-    """
+    """Read every channel of a file, each on its own clock."""
 
     def refuse(what: str, cure: str) -> RigDataError:
         return RigDataError(Problem("error", file, "", what, cure, run))
@@ -88,21 +70,7 @@ def read_foreign(path: Path, file: str, run: str | None = None) -> list[Series]:
 
 @dataclass(frozen=True)
 class ForeignReader:
-    """One run's file in a foreign format.
-
-    Attributes
-    ----------
-    path : Path
-    file : str
-        Display name.
-    run : str
-    described : frozenset of str
-        Names of all channels of the manifest.
-    stated_rate : float or None
-        Sample rate where the file knows no times [Hz].
-    cache : TableCache
-        Of the campaign: columns of the files that were read last.
-    """
+    """One run's file in a foreign format."""
 
     path: Path
     file: str
@@ -145,17 +113,7 @@ class ForeignReader:
         return self.stated_rate
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of `names`.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Of channels.
-        start : int
-            First sample.
-        stop : int
-            Sample after the last.
-        """
+        """Raw readings of `names`."""
         values = self._columns().values
         for name in names:
             if name not in values:
@@ -163,15 +121,7 @@ class ForeignReader:
         return [np.asarray(values[name][start:stop], dtype=float) for name in names]
 
     def time(self, start: int, stop: int) -> FloatArray:
-        """Seconds: the file's own, else counted from the rate.
-
-        Parameters
-        ----------
-        start : int
-            First sample.
-        stop : int
-            Sample after the last.
-        """
+        """Seconds: the file's own, else counted from the rate."""
         time = self._columns().time
         return np.arange(start, stop) / self.rate() if time is None else time[start:stop].copy()
 

@@ -204,16 +204,6 @@ def check_mat5(path: Path) -> None:
     scipy (1.17) looks the type of an element up in a table without asking whether it is one: a wrong byte there, and
     the process is gone. So types, sizes and nesting are checked here by the layout of MathWorks' "MAT-File Format",
     chapter 1; compressed variables are unpacked up to a limit, so that a small file cannot fill the memory.
-
-    Parameters
-    ----------
-    path : Path
-        MATLAB 5 to 7.2; other files are left to scipy to refuse.
-
-    Raises
-    ------
-    RigDataError
-        A type, size or depth that the format does not allow, or more than `LARGEST` bytes unpacked.
     """
     data = path.read_bytes()
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])

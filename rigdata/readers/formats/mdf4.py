@@ -32,13 +32,7 @@ def read_series(path: Path) -> list[Series]:
 
 
 def read_walled_in(path: Path) -> list[Series]:
-    """As `read_series`, in this process: a damaged file can end it.
-
-    Parameters
-    ----------
-    path : Path
-        Of the file.
-    """
+    """As `read_series`, in this process: a damaged file can end it."""
     from asammdf import MDF
 
     found = []

@@ -31,18 +31,7 @@ _AGAIN = "Export or copy it again from the logger"
 
 
 def read_walled(module: str, path: Path) -> list[Series]:
-    """Let ``rigdata.readers.<module>.read_walled_in(path)`` read a file in a child process.
-
-    Parameters
-    ----------
-    module : str
-    path : Path
-
-    Raises
-    ------
-    RigDataError
-        The child died, took longer or more memory than the file's size warrants, or could not read the file.
-    """
+    """Let ``rigdata.readers.<module>.read_walled_in(path)`` read a file in a child process."""
     seconds = SECONDS + path.stat().st_size / BYTES_PER_SECOND
     # The child must find the same rigdata as this process, wherever that came from.
     home = str(Path(__file__).parents[3])
@@ -122,15 +111,7 @@ def _limit_time(seconds: int) -> None:
 
 
 def main(module: str, path: Path) -> None:
-    """Read a file and write its channels to the standard output: one line of JSON, then the numbers.
-
-    Parameters
-    ----------
-    module : str
-        Name of the reader's module.
-    path : Path
-        Of the file.
-    """
+    """Read a file and write its channels to the standard output: one line of JSON, then the numbers."""
     reader = importlib.import_module(f"rigdata.readers.formats.{module}")
     _limit_memory(path)
     try:

@@ -14,21 +14,7 @@ _PLAIN = (0, 1, TEXT)
 
 
 def group_hash(path: Path, group: Any, names: tuple[str, ...]) -> str:
-    """Hash the datasets `names` of an open group: how they are stored, and every stored byte.
-
-    Parameters
-    ----------
-    path : Path
-        Of the file.
-    group : h5py.Group
-    names : tuple of str
-        Datasets that hold their data in this file (see `Hdf5Reader`).
-
-    Returns
-    -------
-    str
-        Hexadecimal.
-    """
+    """Hash the datasets `names` of an open group: how they are stored, and every stored byte."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         for name in sorted(names):
@@ -53,13 +39,6 @@ def is_plain(attribute: Any, most: int) -> bool:
 
     A text elsewhere in the file is as long as its reference says, and a damaged one says gigabytes, for which the
     library makes room before it looks.
-
-    Parameters
-    ----------
-    attribute : h5py.AttributeManager
-        Whose values are looked at.
-    most : int
-        Longest text that counts [bytes].
     """
     kind = attribute.get_type()
     within = kind.get_class() in _PLAIN and not (kind.get_class() == TEXT and kind.is_variable_str())

@@ -27,18 +27,7 @@ _MAX_STEPS = 64
 
 
 def broken_heap(path: Path) -> int | None:
-    """Find a global heap that cannot be walked.
-
-    Parameters
-    ----------
-    path : Path
-        HDF5 file; its first and last 64 MB are looked at.
-
-    Returns
-    -------
-    int or None
-        Its byte in the file; None where all are sound.
-    """
+    """Find a global heap that cannot be walked."""
     with path.open("rb") as stream:
         size = stream.seek(0, 2)
         for start, block in _ends(stream, size):
@@ -49,21 +38,9 @@ def broken_heap(path: Path) -> int | None:
 
 
 def too_long_text(path: Path, names: Sequence[str], base: int = 0) -> str | None:
-    """Find an attribute whose reference claims a text longer than the file: the library would make room for it first.
+    """Find an attribute whose reference claims a text longer than the file.
 
-    Parameters
-    ----------
-    path : Path
-        HDF5 file; its first and last 64 MB are looked at.
-    names : sequence of str
-        Of the attributes.
-    base : int
-        Size of the user block, from which addresses count [bytes].
-
-    Returns
-    -------
-    str or None
-        Its name; None where all are sound.
+    The library would make room for it first.
     """
     with path.open("rb") as stream:
         size = stream.seek(0, 2)
@@ -116,26 +93,7 @@ def _is_sound(stream: BinaryIO, at: int, size: int) -> bool:
 
 
 def resolve(start: Any, path: str, file: str, run: str | None = None) -> Any:
-    """Walk `path` from the group `start`, one link at a time.
-
-    Parameters
-    ----------
-    start : h5py.Group
-    path : str
-        Members parted by ``/``.
-    file, run : str
-        For the message.
-
-    Returns
-    -------
-    h5py.Group, h5py.Dataset or None
-        None where a member is absent.
-
-    Raises
-    ------
-    RigDataError
-        An external link anywhere on the way, a soft link that leads nowhere or in a circle.
-    """
+    """Walk `path` from the group `start`, one link at a time."""
     import h5py
 
     def refuse(place: str, what: str) -> RigDataError:
@@ -168,27 +126,12 @@ def resolve(start: Any, path: str, file: str, run: str | None = None) -> Any:
 
 
 def has_link(group: Any, name: str) -> bool:
-    """Whether the group has such a link: a dangling or external one counts and is never followed.
-
-    Parameters
-    ----------
-    group : h5py.Group
-        In which to look.
-    name : str
-        As the file has it.
-    """
+    """Whether the group has such a link: a dangling or external one counts and is never followed."""
     return bool(group.id.links.exists(name.encode("utf-8", "surrogateescape")))
 
 
 def chunk_bytes(group: Any, name: str) -> int:
-    """Bytes of a stored chunk; zero of what is no chunked dataset, or leads out of the file.
-
-    Parameters
-    ----------
-    group : h5py.Group
-    name : str
-        Of a member.
-    """
+    """Bytes of a stored chunk; zero of what is no chunked dataset, or leads out of the file."""
     import h5py
 
     if not isinstance(group.get(name, getlink=True), h5py.HardLink):

@@ -40,18 +40,7 @@ def _refuse(file: str, place: str, what: str, cure: str, run: str | None = None)
 
 @contextmanager
 def open_readonly(path: Path, file: str, run: str | None = None, cache: int | None = None) -> Iterator[Any]:
-    """Open an HDF5 file for reading; turn what h5py raises on a broken file into `RigDataError`.
-
-    Parameters
-    ----------
-    path : Path
-    file : str
-        Its name as the user knows it.
-    run : str, optional
-        Whose record is wanted, for the message.
-    cache : int, optional
-        Bytes of unpacked chunks that the library keeps per dataset.
-    """
+    """Open an HDF5 file for reading; turn what h5py raises on a broken file into `RigDataError`."""
     import h5py
 
     with _faults_told(file, run), h5py.File(path, "r", locking="best-effort", rdcc_nbytes=cache) as handle:
@@ -82,25 +71,7 @@ def _first_line(error: BaseException) -> str:
 
 
 def read_texts(path: Path, file: str) -> tuple[str, str]:
-    """Read the manifest and the bearing text from the root attributes.
-
-    Parameters
-    ----------
-    path : Path
-        HDF5 file.
-    file : str
-        Its display name.
-
-    Returns
-    -------
-    manifest, bearing : str
-        `bearing` is "" where the attribute is absent.
-
-    Raises
-    ------
-    RigDataError
-        No HDF5 file, no manifest, or no text.
-    """
+    """Read the manifest and the bearing text from the root attributes."""
     try:
         heap = broken_heap(path)
     except OSError as error:
@@ -150,22 +121,7 @@ class _Facts:
 
 @dataclass(frozen=True)
 class Hdf5Reader:
-    """One run's group in an HDF5 file; the file is opened for every request and closed again.
-
-    Attributes
-    ----------
-    path : Path
-    run : str
-        Group name below ``/runs``.
-    base : str
-        Display name of the file.
-    stated_rate : float or None
-        From the manifest [Hz]; the attribute ``sample_rate_hz`` wins over it.
-    described : frozenset of str
-        Names of all channels of the manifest.
-    clock : Channel or None
-        The manifest's time channel; not every file has its dataset.
-    """
+    """One run's group in an HDF5 file; the file is opened for every request and closed again."""
 
     path: Path
     run: str

@@ -24,19 +24,7 @@ _LINE = re.compile(rb"\r\n|\n|\r")
 
 
 def text_encoding(path: Path, stated: str | None) -> str:
-    """Codec of a text file: its byte-order mark, else what is stated, else detected.
-
-    Parameters
-    ----------
-    path : Path
-    stated : str or None
-        From the manifest.
-
-    Returns
-    -------
-    str
-        UTF-8 where the head is valid UTF-8, UTF-16 where every other byte of it is zero, else cp1252.
-    """
+    """Codec of a text file: its byte-order mark, else what is stated, else detected."""
     with path.open("rb") as stream:
         head = stream.read(65536)
     for mark, codec in _BOMS:
@@ -56,13 +44,7 @@ def text_encoding(path: Path, stated: str | None) -> str:
 
 
 def is_ascii_based(encoding: str) -> bool:
-    """Whether digits, delimiters and line ends are single ASCII bytes in `encoding`.
-
-    Parameters
-    ----------
-    encoding : str
-        Python codec.
-    """
+    """Whether digits, delimiters and line ends are single ASCII bytes in `encoding`."""
     if encoding in {"utf-8-sig", "utf-8"}:
         return True
     sample = '\t\r\n",.;|+-0123456789 eE'
@@ -70,13 +52,7 @@ def is_ascii_based(encoding: str) -> bool:
 
 
 def codec_of_bytes(encoding: str) -> str:
-    """Codec of the bytes that `open_ascii` gives for a file in `encoding`.
-
-    Parameters
-    ----------
-    encoding : str
-        Python codec.
-    """
+    """Codec of the bytes that `open_ascii` gives for a file in `encoding`."""
     return encoding if is_ascii_based(encoding) and encoding != "utf-8-sig" else "utf-8"
 
 
@@ -122,15 +98,7 @@ class _Transcoder(_Rewritten):
 
 
 def open_ascii(path: Path, encoding: str) -> BinaryIO:
-    """Open a text file for reading as bytes, transcoded to UTF-8 where needed, after its byte-order mark.
-
-    Parameters
-    ----------
-    path : Path
-        Of the file.
-    encoding : str
-        Python codec.
-    """
+    """Open a text file for reading as bytes, transcoded to UTF-8 where needed, after its byte-order mark."""
     if not is_ascii_based(encoding):
         stream = io.BufferedReader(_Transcoder(path, encoding), 2**18)
         if stream.peek(3)[:3] == codecs.BOM_UTF8:
@@ -143,15 +111,7 @@ def open_ascii(path: Path, encoding: str) -> BinaryIO:
 
 
 def skip_to(stream: BinaryIO, offset: int) -> None:
-    """Move forward to byte `offset` of a stream from `open_ascii` (which may not be seekable).
-
-    Parameters
-    ----------
-    stream : BinaryIO
-        What `open_ascii` gave.
-    offset : int
-        Bytes from the beginning.
-    """
+    """Move forward to byte `offset` of a stream from `open_ascii` (which may not be seekable)."""
     while offset > 0:
         block = stream.read(min(offset, 2**20))
         if not block:
@@ -160,15 +120,7 @@ def skip_to(stream: BinaryIO, offset: int) -> None:
 
 
 def head_lines(path: Path, encoding: str) -> list[tuple[bytes, int]]:
-    """Lines of the head of a file, without their ends, each with the byte it starts at.
-
-    Parameters
-    ----------
-    path : Path
-        Of the file.
-    encoding : str
-        Python codec.
-    """
+    """Lines of the head of a file, without their ends, each with the byte it starts at."""
     with open_ascii(path, encoding) as stream:
         head = stream.read(HEAD)
         complete = len(head) < HEAD
@@ -182,15 +134,7 @@ def head_lines(path: Path, encoding: str) -> list[tuple[bytes, int]]:
 
 
 def all_lines(path: Path, encoding: str) -> Iterator[bytes]:
-    """Every line of a file, without its end; lines beyond a megabyte come in pieces.
-
-    Parameters
-    ----------
-    path : Path
-        Of the file.
-    encoding : str
-        Python codec.
-    """
+    """Every line of a file, without its end; lines beyond a megabyte come in pieces."""
     with open_ascii(path, encoding) as stream:
         text = b""
         while block := stream.read(2**20):
@@ -225,24 +169,12 @@ class AsciiOnly(io.RawIOBase):
         return True
 
     def read(self, size: int = -1) -> bytes:
-        """Read up to `size` bytes.
-
-        Parameters
-        ----------
-        size : int
-            Bytes; -1: all.
-        """
+        """Read up to `size` bytes."""
         return self._stream.read(size).translate(self._TABLE)
 
 
 def squeeze_blanks(stream: BinaryIO) -> BinaryIO:
-    """Turn every run of blanks between cells into one tab, for files parted by white space.
-
-    Parameters
-    ----------
-    stream : BinaryIO
-        Of bytes.
-    """
+    """Turn every run of blanks between cells into one tab, for files parted by white space."""
     return io.BufferedReader(_Squeezer(stream), 2**18)  # type: ignore[return-value]
 
 

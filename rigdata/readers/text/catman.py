@@ -18,12 +18,7 @@ _SPARE = re.compile(r"\s+(?:\d+\s*)?-.*$")  # "Time  1 - default sample rate"
 
 
 def has_several_clocks(path: Path) -> bool:
-    """Whether the names line of a text file holds more than one time column.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Whether the names line of a text file holds more than one time column."""
     try:
         head = find_head(path)
     except (RigDataError, OSError):
@@ -32,28 +27,12 @@ def has_several_clocks(path: Path) -> bool:
 
 
 def time_column(path: Path) -> str:
-    """Name of the first time column of a text file; "" without one.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Name of the first time column of a text file; "" without one."""
     return next((n for n in map(_short, find_head(path).names) if is_time(n)), "")
 
 
 def read_series(path: Path) -> list[Series]:
-    """Read every column with the clock at its left.
-
-    Parameters
-    ----------
-    path : Path
-        Text with a delimiter, at least one line of names, and numbers.
-
-    Raises
-    ------
-    RigDataError
-        Not such a file, or text among the numbers, with its line and column.
-    """
+    """Read every column with the clock at its left."""
     head = find_head(path)
     labels = tuple(f"{i}:{_short(n)}" for i, n in enumerate(head.names))  # names need not be unique, labels must
     numbers = [label for i, label in enumerate(labels) if i not in head.dates]

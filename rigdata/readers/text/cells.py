@@ -90,11 +90,6 @@ _NUMBER = {
 def is_stamp(cell: str) -> bool:
     """Whether a cell holds a time of day, with or without a date.
 
-    Parameters
-    ----------
-    cell : str
-        Stripped.
-
     >>> [is_stamp(c) for c in ("2019-07-22T11:31:22.125Z", "22.07.2019 11:31:22,125", "11:31:22.5", "12.5")]
     [True, True, True, False]
     """
@@ -102,13 +97,7 @@ def is_stamp(cell: str) -> bool:
 
 
 def is_date(cell: str) -> bool:
-    """Whether a cell holds a date alone: such a column tells nothing within a run.
-
-    Parameters
-    ----------
-    cell : str
-        Stripped.
-    """
+    """Whether a cell holds a date alone: such a column tells nothing within a run."""
     return _DATE.fullmatch(cell) is not None
 
 
@@ -117,17 +106,6 @@ def stamp_seconds(cells: Sequence[str | None]) -> tuple[FloatArray, int]:
 
     Stamps coarser than the samples are spread evenly: several samples then bear one stamp, and the straight line
     through them is nearer to the truth than the steps. Midnight between stamps without a date is a day.
-
-    Parameters
-    ----------
-    cells : sequence of str or None
-        Stripped; None or "" where missing.
-
-    Returns
-    -------
-    seconds : (n,) ndarray
-        NaN where missing.
-    bad : int
     """
     found = [_STAMP.fullmatch(cell) if cell else None for cell in cells]
     bad = sum(match is None and bool(cell) for match, cell in zip(found, cells, strict=True))
@@ -176,46 +154,20 @@ def _spread(time: FloatArray) -> FloatArray:
 
 
 def is_missing(cell: str) -> bool:
-    """Whether `cell` (stripped) stands for no value.
-
-    Parameters
-    ----------
-    cell : str
-        Stripped.
-    """
+    """Whether `cell` (stripped) stands for no value."""
     return cell in _MISSING
 
 
 def is_number(cell: str, decimal: str) -> bool:
-    """Whether `cell` (stripped) is a number with that decimal mark.
-
-    Parameters
-    ----------
-    cell : str
-        Stripped.
-    decimal : str
-        Decimal mark, a point or a comma.
-    """
+    """Whether `cell` (stripped) is a number with that decimal mark."""
     return _NUMBER[decimal].fullmatch(cell) is not None
 
 
 def looks_like(cell: str) -> bool:
-    """Whether `cell` is a number with either decimal mark.
-
-    Parameters
-    ----------
-    cell : str
-        Stripped.
-    """
+    """Whether `cell` is a number with either decimal mark."""
     return is_number(cell, ".") or is_number(cell, ",")
 
 
 def number_pattern(decimal: str) -> str:
-    """Regular expression (RE2) of a number, for whole columns.
-
-    Parameters
-    ----------
-    decimal : str
-        Decimal mark, a point or a comma.
-    """
+    """Regular expression (RE2) of a number, for whole columns."""
     return f"^(?:{_NUMBER[decimal].pattern})$"

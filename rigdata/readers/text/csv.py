@@ -23,22 +23,7 @@ _LARGE_FILE = 2**29
 
 @dataclass(frozen=True)
 class CsvReader:
-    """One run's CSV file.
-
-    Attributes
-    ----------
-    path : Path
-    file : str
-        Display name.
-    run : str
-    spec : CsvSpec
-        What the manifest says of the dialect.
-    channels : mapping of str to Channel
-        All of the manifest.
-    stated_rate : float or None
-        Sample rate where the file has no time column [Hz].
-    cache : TableCache
-    """
+    """One run's CSV file."""
 
     path: Path
     file: str
@@ -104,17 +89,7 @@ class CsvReader:
         return self._table(()).length
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of `names`.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Of channels.
-        start : int
-            First sample.
-        stop : int
-            Sample after the last.
-        """
+        """Raw readings of `names`."""
         table = self._table(names)
         for name in names:
             if name not in table.columns:
@@ -143,15 +118,7 @@ class CsvReader:
         return self.stated_rate
 
     def time(self, start: int, stop: int) -> FloatArray:
-        """Seconds: the time column as it is, missing ones filled in between; else counted from the rate.
-
-        Parameters
-        ----------
-        start : int
-            First sample.
-        stop : int
-            Sample after the last.
-        """
+        """Seconds: the time column as it is, missing ones filled in between; else counted from the rate."""
         clock = self._clock()
         return np.arange(start, stop) / self.rate() if clock is None else self._times(clock)[start:stop].copy()
 

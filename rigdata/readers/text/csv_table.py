@@ -40,35 +40,13 @@ class Source:
     clock: str = ""
 
     def problem(self, severity: Any, place: str, what: str, cure: str) -> Problem:
-        """Make a finding about this file.
-
-        Parameters
-        ----------
-        severity : Severity
-            How grave it is.
-        place : str
-            Where in the file.
-        what : str
-            What is wrong.
-        cure : str
-            What to do.
-        """
+        """Make a finding about this file."""
         return Problem(severity, self.file, place, what, cure, self.run)
 
 
 @dataclass(frozen=True)
 class Table:
-    """Parsed columns.
-
-    Attributes
-    ----------
-    columns : dict of str to (n,) ndarray
-        Raw readings, NaN where missing; not writable.
-    length : int
-        n
-    problems : tuple of Problem
-        What was mended, such as a truncated last line.
-    """
+    """Parsed columns."""
 
     columns: dict[str, FloatArray]
     length: int
@@ -81,19 +59,7 @@ class Table:
 
 
 def read_table(source: Source, names: Sequence[str]) -> Table:
-    """Parse the columns `names`.
-
-    Parameters
-    ----------
-    source : Source
-    names : sequence of str
-        All in ``source.dialect.names``.
-
-    Raises
-    ------
-    RigDataError
-        Text in a numeric column, a line with too few or too many cells: with line and column.
-    """
+    """Parse the columns `names`."""
     import pyarrow as pa
 
     try:

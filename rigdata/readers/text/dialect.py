@@ -21,25 +21,7 @@ _MAX_UNIT_LINES = 5
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a CSV file is written.
-
-    Attributes
-    ----------
-    encoding : str
-        Codec of the names and of text.
-    delimiter, decimal : str
-        A delimiter of one space stands for any run of white space.
-    header_line, data_line : int
-        1-based lines of the names and of the first sample.
-    data_offset : int
-        Byte at which `data_line` starts, in the stream of `rigdata.readers.text.byte_stream.open_ascii`.
-    names : tuple of str
-        One per cell of a data line, "" where a column has no name.
-    sure : bool
-        Whether the decimal mark was given or seen; else the file's head holds whole numbers only.
-    stamps : frozenset of int
-        Columns of dates and times of day, counted from 0.
-    """
+    """How a CSV file is written."""
 
     encoding: str
     delimiter: str
@@ -74,13 +56,7 @@ class DialectFinder:
         return RigDataError(Problem("error", self.file, place, what, cure, self.run))
 
     def find(self) -> Dialect:
-        """Detect; a contradiction between manifest and file is an error that names both.
-
-        Raises
-        ------
-        RigDataError
-            No line holds the channel names, duplicate names, no data, wrong delimiter or decimal.
-        """
+        """Detect; a contradiction between manifest and file is an error that names both."""
         encoding = text_encoding(self.path, self.spec.encoding)
         raw = head_lines(self.path, encoding)
         codec = codec_of_bytes(encoding)
@@ -231,30 +207,14 @@ class DialectFinder:
 
 
 def columns_of(kind: Callable[[str], bool], sample: list[list[str]]) -> frozenset[int]:
-    """Columns whose cells are all of a kind, missing ones apart.
-
-    Parameters
-    ----------
-    kind : callable
-        Such as `is_stamp`.
-    sample : list of list of str
-        Cells of some lines.
-    """
+    """Columns whose cells are all of a kind, missing ones apart."""
     width = min((len(row) for row in sample), default=0)
     columns = [[row[i] for row in sample if row[i]] for i in range(width)]
     return frozenset(i for i, cells in enumerate(columns) if cells and all(kind(c) for c in cells))
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
-    """Cells of a line, stripped of white space and quotes; empty for a blank line.
-
-    Parameters
-    ----------
-    line : str
-        Without its end.
-    delimiter : str
-        A space stands for any run of white space.
-    """
+    """Cells of a line, stripped of white space and quotes; empty for a blank line."""
     if not line.strip():
         return []
     if delimiter == " ":

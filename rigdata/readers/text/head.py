@@ -20,17 +20,7 @@ _SAMPLE = 60
 
 @dataclass(frozen=True)
 class TextHead:
-    """What the first lines of a file tell.
-
-    Attributes
-    ----------
-    dialect : Dialect
-        As the CSV parser wants it; `header_line` is 0 where the columns have no names.
-    units : tuple of str
-        One per column; "" where there is none.
-    dates : frozenset of int
-        Columns of dates alone.
-    """
+    """What the first lines of a file tell."""
 
     dialect: Dialect
     units: tuple[str, ...]
@@ -43,17 +33,7 @@ class TextHead:
 
 
 def find_head(path: Path) -> TextHead:
-    """Look at the first lines of a text file.
-
-    Parameters
-    ----------
-    path : Path
-
-    Raises
-    ------
-    RigDataError
-        No table of numbers begins within the head of the file.
-    """
+    """Look at the first lines of a text file."""
     encoding = text_encoding(path, None)
     raw = head_lines(path, encoding)
     lines = [line.decode(codec_of_bytes(encoding), "replace") for line, _ in raw]

@@ -32,23 +32,7 @@ class _Segment:
 
 
 def read_series(path: Path) -> list[Series]:
-    """Read every channel over time; segments of the same channels follow each other.
-
-    Parameters
-    ----------
-    path : Path
-        Text with the mark ``LabVIEW Measurement`` in its first line; columns of X one, several or none
-        (``X_Columns``), a decimal point or comma, channels of different rates.
-
-    Returns
-    -------
-    list of Series
-
-    Raises
-    ------
-    RigDataError
-        No such file, no table in it, or text among the numbers.
-    """
+    """Read every channel over time; segments of the same channels follow each other."""
     encoding = text_encoding(path, None)
     codec = codec_of_bytes(encoding)
     lines = (line.decode(codec, "replace") for line in all_lines(path, encoding))

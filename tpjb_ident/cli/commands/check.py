@@ -68,12 +68,7 @@ def check(campaign: CampaignPath, out: Out = None) -> None:
 
 
 def gathered(problems: Sequence[Problem]) -> list[str]:
-    """One sentence per problem; what is the same but for its numbers in many runs is said once, with their count.
-
-    Parameters
-    ----------
-    problems : sequence of Problem
-    """
+    """One sentence per problem; what is the same but for its numbers in many runs is said once, with their count."""
     groups: dict[tuple[str, str, str], list[Problem]] = {}
     for p in problems:
         alike = re.sub(r"[-+]?\d[\d.e+-]*", "#", p.what)
@@ -151,16 +146,7 @@ def _against_drawing(campaign: Campaign, known: list[Problem]) -> list[Problem]:
 
 
 def check_summary(path: Path, problems: list[Problem], campaign: Campaign | None) -> dict[str, Any]:
-    """Gather the content of check.json; without a campaign, where it could not even be opened.
-
-    Parameters
-    ----------
-    path : Path
-        The campaign as it was given.
-    problems : list of Problem
-        All that were found.
-    campaign : Campaign, optional
-    """
+    """Gather the content of check.json; without a campaign, where it could not even be opened."""
     kinds: dict[str, int] = {}
     files: dict[str, str] = {}
     if campaign is not None:

@@ -124,17 +124,7 @@ def _variants(text: str) -> tuple[str, ...]:
 
 
 def write_comparison(order: ReportOrder, result: Comparison, other: OtherHalf, show: Progress) -> None:
-    """Write every table and pivots.toml, and the report unless the other process has written it.
-
-    Parameters
-    ----------
-    order : ReportOrder
-        With the folder.
-    result : Comparison
-    other : OtherHalf
-    show : Progress
-        Called with what is being done, how much is done, of how much.
-    """
+    """Write every table and pivots.toml, and the report unless the other process has written it."""
     from tpjb_ident.compare.pivot_formula import printed_formula
     from tpjb_ident.compare.positions import locus_frame
     from tpjb_ident.compare.tables import comparison_frame
@@ -159,14 +149,7 @@ def write_comparison(order: ReportOrder, result: Comparison, other: OtherHalf, s
 
 
 def show_comparison(result: Comparison, then: str = "") -> None:
-    """Print what to conclude, the command that comes next, and the median deviations with what belongs to them.
-
-    Parameters
-    ----------
-    result : Comparison
-    then : str
-        A command to type.
-    """
+    """Print what to conclude, the command that comes next, and the median deviations with what belongs to them."""
     from tpjb_ident.compare.summary import deviations, summary_sentences
     from tpjb_ident.compare.tables import comparison_frame
     from tpjb_ident.rounding import percent
@@ -186,15 +169,7 @@ def show_comparison(result: Comparison, then: str = "") -> None:
 
 
 def next_command(result: Comparison, source: str, bearing: Path | None) -> str:
-    """Command that comes next: a diagnosis where the model is off, an export where it is not.
-
-    Parameters
-    ----------
-    result : Comparison
-    source : str
-        What was compared, as the command was given it.
-    bearing : Path
-    """
+    """Command that comes next: a diagnosis where the model is off, an export where it is not."""
     from tpjb_ident.compare.summary import deviations, worth_a_diagnosis
 
     if worth_a_diagnosis(deviations(result)):
@@ -203,16 +178,7 @@ def next_command(result: Comparison, source: str, bearing: Path | None) -> str:
 
 
 def refuse_comparison(result: Comparison) -> None:
-    """End with exit code 3 if a point is not to be trusted, on either side.
-
-    Parameters
-    ----------
-    result : Comparison
-
-    Raises
-    ------
-    NotTrustedError
-    """
+    """End with exit code 3 if a point is not to be trusted, on either side."""
     from tpjb_ident.compare.coefficient_table import TableSource
 
     if not isinstance(result.campaign, TableSource):

@@ -66,13 +66,7 @@ def demo(out: Out = None) -> None:
 
 
 def sample(name: str) -> Path:
-    """Path of a bundled file.
-
-    Parameters
-    ----------
-    name : str
-        Of the file, without its folder.
-    """
+    """Path of a bundled file."""
     import rigdata
 
     return Path(rigdata.__path__[0]) / "samples" / name

@@ -112,11 +112,6 @@ def finished_runs(target: Path) -> Iterator[RunStore]:
 
     Results come into the folder whole or not at all; what is kept for a rerun stands apart from them, in a folder of
     its own, and goes when the command ends, well or with an error.
-
-    Parameters
-    ----------
-    target : Path
-        Output folder of the command.
     """
     from tpjb_ident.dynamic.runs.run_store import RunStore
 
@@ -163,21 +158,7 @@ def _phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings
 
 
 def identify_settings(campaign: Campaign, method: str, norm: str | None) -> Any:
-    """Build `IdentifySettings` from options, with the campaign's clearance for the amplitude check.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    method : str
-        Name of the estimator.
-    norm : str, optional
-        Norm of ``rlm``.
-
-    Raises
-    ------
-    BadInputError
-        Unknown method or norm, or a campaign without dynamic runs.
-    """
+    """Build `IdentifySettings` from options, with the campaign's clearance for the amplitude check."""
     from tpjb_ident.dynamic.estimators.estimate import METHODS, NORMS
     from tpjb_ident.dynamic.settings import IdentifySettings
 
@@ -207,14 +188,7 @@ def _clearance(campaign: Campaign) -> float | None:
 
 
 def write_identification(folder: Path, result: Identification) -> None:
-    """Write coefficients, estimators, windows and the models over frequency; h over the band where one was excited.
-
-    Parameters
-    ----------
-    folder : Path
-        Existing.
-    result : Identification
-    """
+    """Write coefficients, estimators, windows and the models over frequency; h over the band where one was excited."""
     from tpjb_ident.dynamic.broadband.band_result import frf_frame, models_frame
 
     if result.bands:
@@ -255,16 +229,7 @@ def _write_plain(folder: Path, campaign: Campaign, settings: PlainSettings, keep
 
 
 def refuse_untrusted(result: Identification) -> None:
-    """End with exit code 3 if a point has no answer, or one that is not to be trusted, or no run any more.
-
-    Parameters
-    ----------
-    result : Identification
-
-    Raises
-    ------
-    NotTrustedError
-    """
+    """End with exit code 3 if a point has no answer, or one that is not to be trusted, or no run any more."""
     import numpy as np
 
     bad = refused_bands(result.bands)

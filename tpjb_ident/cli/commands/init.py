@@ -107,19 +107,7 @@ def _marks(text: str) -> int:
 
 
 def looked_at(folder: Path, names: Sequence[str]) -> tuple[list[Export], list[Problem]]:
-    """Read all records of a folder; what is wrong with those that cannot be read.
-
-    Parameters
-    ----------
-    folder : Path
-    names : sequence of str
-        Of columns in files that have none.
-
-    Raises
-    ------
-    BadInputError
-        None can be read.
-    """
+    """Read all records of a folder; what is wrong with those that cannot be read."""
     from rigdata.survey.exports import read_exports, record_files
     from rigdata.survey.update import renamed
 
@@ -147,13 +135,7 @@ def _bearing_draft(found: Survey) -> str:
 
 
 def bearing_file(folder: Path) -> str | None:
-    """Name of the one bearing file in a folder; None if there is none, or several.
-
-    Parameters
-    ----------
-    folder : Path
-        Looked through, without what is below it.
-    """
+    """Name of the one bearing file in a folder; None if there is none, or several."""
     found = [
         p.name for p in sorted(folder.glob("*.toml")) if "tpjb-bearing/1" in p.read_text("utf-8", "replace")[:4000]
     ]

@@ -69,20 +69,7 @@ THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 
 
 def parse_physics(names: str | None, housing: str | None) -> Options:
-    """Read `--physics` and `--housing-temperature`.
-
-    Parameters
-    ----------
-    names : str, optional
-        Option --physics.
-    housing : str, optional
-        Option --housing-temperature.
-
-    Raises
-    ------
-    BadInputError
-        Unknown name, or a housing temperature without growth.
-    """
+    """Read `--physics` and `--housing-temperature`."""
     chosen = [part.strip() for part in (names or "").split(",") if part.strip()]
     for name in chosen:
         refuse_unknown(name, PHYSICS, "--physics", several=True)
@@ -190,19 +177,7 @@ def _rows(
 
 
 def operating_points(load: str, load_direction: str, speed: str, excitation: str | None) -> list[Any]:
-    """Every combination of the four options as `OperatingPoint`, SI.
-
-    Parameters
-    ----------
-    load : str
-        Option --load.
-    load_direction : str
-        Option --load-direction.
-    speed : str
-        Option --speed.
-    excitation : str, optional
-        Option --excitation; None: synchronous.
-    """
+    """Every combination of the four options as `OperatingPoint`, SI."""
     loads = parse_values(load, "force", "--load")
     directions = parse_values(load_direction, "angle", "--load-direction")
     speeds = parse_values(speed, "angular speed", "--speed")
@@ -224,13 +199,7 @@ def _positive(values: tuple[float, ...], option: str, cure: str) -> None:
 
 
 def pivot_choice(text: str) -> str | float | Path:
-    """What --pivots means: a name, a stiffness [N/m], or the path of a file.
-
-    Parameters
-    ----------
-    text : str
-        Option --pivots.
-    """
+    """What --pivots means: a name, a stiffness [N/m], or the path of a file."""
     if text in NAMED_PIVOTS:
         return text
     path = Path(text)
@@ -244,22 +213,7 @@ def pivot_choice(text: str) -> str | float | Path:
 
 
 def model_settings(pivots: Any, thermal: str, effects: Path | None) -> Any:
-    """Build `ModelSettings` from options.
-
-    Parameters
-    ----------
-    pivots : object
-        As `pivot_choice` gives it.
-    thermal : str
-        "isothermal", "adiabatic", "tehd" or "thd".
-    effects : Path, optional
-        An effects file.
-
-    Raises
-    ------
-    BadInputError
-        Unknown heat model.
-    """
+    """Build `ModelSettings` from options."""
     refuse_unknown(thermal, THERMAL, "--thermal")
     from tpjb_ident.compare.predictions import ModelSettings
 

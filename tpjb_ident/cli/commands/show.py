@@ -130,16 +130,7 @@ def _look(series: Series) -> Look:
 
 
 def show_channels(title: str, series: list[Series], looks: dict[str, Look]) -> None:
-    """Print statistics and a spectrum per channel.
-
-    Parameters
-    ----------
-    title : str
-    series : list of Series
-        Channels to show.
-    looks : mapping of str to Look
-        By channel name.
-    """
+    """Print statistics and a spectrum per channel."""
     rows = []
     for s in series:
         look = looks[s.name]
@@ -183,14 +174,6 @@ def _write(
 
 def sparkline(values: Sequence[float], width: int = 48, plain: bool = False) -> str:
     """Draw positive values on a logarithmic scale, the largest of neighbours where they share a cell.
-
-    Parameters
-    ----------
-    values : sequence of float
-    width : int
-        Cells.
-    plain : bool
-        Letters of ASCII instead of block elements.
 
     >>> sparkline([1.0, 10.0, 100.0, 1000.0], width=4)
     ' ▃▅█'

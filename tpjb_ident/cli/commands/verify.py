@@ -31,17 +31,7 @@ State = Literal["same", "changed", "missing", "not found", "not recorded"]
 
 @dataclass(frozen=True)
 class Checked:
-    """One file held against its recorded fingerprint.
-
-    Attributes
-    ----------
-    command : str
-        Whose entry of run.json it stands in.
-    role : {"result", "input"}
-    file : str
-    state : str
-        "same", "changed", "missing" (a result), "not found" (an input), "not recorded" (by an older version).
-    """
+    """One file held against its recorded fingerprint."""
 
     command: str
     role: Literal["result", "input"]
@@ -70,20 +60,7 @@ def verify(results: Folder, given: Inputs = None, out: Out = None) -> None:
 
 
 def recorded(results: Path) -> dict[str, dict[str, Any]]:
-    """Entries of run.json by command.
-
-    Parameters
-    ----------
-    results : Path
-        Output folder of former commands.
-
-    Raises
-    ------
-    BadInputError
-        There is no record, or it cannot be read.
-    NotTrustedError
-        A command was killed while its results moved in.
-    """
+    """Entries of run.json by command."""
     if not results.is_dir():
         raise BadInputError(f"{results}: is no folder. Give an output folder of tpjb, with its {RECORD}.")
     if (results / READY).is_dir():
@@ -181,22 +158,7 @@ def _write_checked(target: Path, results: Path, checked: Sequence[Checked]) -> N
 
 
 def judge(results: Path, checked: Sequence[Checked]) -> None:
-    """Turn the states into the command's end.
-
-    Parameters
-    ----------
-    results : Path
-        Output folder that was checked.
-    checked : sequence of Checked
-        State of every file.
-
-    Raises
-    ------
-    NotTrustedError
-        Something differs or a result is missing.
-    BadInputError
-        Nothing differs, but not everything could be looked at.
-    """
+    """Turn the states into the command's end."""
     differing = [one.file for one in checked if one.state in ("changed", "missing")]
     if differing:
         more = f" and {len(differing) - 5} more" if len(differing) > 5 else ""

@@ -207,18 +207,7 @@ def _landed_line(status: RunStatus, snapshot: Snapshot, with_result: bool) -> st
 
 
 def finish(snapshot: Snapshot | None, target: Path) -> None:
-    """Say where the results are; refuse with exit code 3 where a run must be repeated.
-
-    Parameters
-    ----------
-    snapshot : Snapshot, optional
-        None where nothing was looked at.
-    target : Path
-
-    Raises
-    ------
-    NotTrustedError
-    """
+    """Say where the results are; refuse with exit code 3 where a run must be repeated."""
     print_line(f"Results: {target}")
     urgent = [s for s in snapshot.steps if s.kind in URGENT] if snapshot is not None else []
     if urgent:

@@ -22,18 +22,7 @@ Command = TypeVar("Command", bound=Callable[..., None])
 
 
 def guarded(command: Command) -> Command:
-    """Wrap a command: any end of it is a result, one clear message, or a named bug. Never a traceback.
-
-    Parameters
-    ----------
-    command : callable
-        A command of the command line.
-
-    Returns
-    -------
-    callable
-        The same command, to be registered.
-    """
+    """Wrap a command: any end of it is a result, one clear message, or a named bug. Never a traceback."""
 
     @functools.wraps(command)
     def wrapper(*args: Any, **kwargs: Any) -> None:

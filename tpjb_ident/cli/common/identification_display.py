@@ -21,12 +21,7 @@ SHOWN = 5
 
 
 def show_identification(result: Identification) -> None:
-    """Print what was identified: a summary, coefficients and models over frequency, bands, remarks.
-
-    Parameters
-    ----------
-    result : Identification
-    """
+    """Print what was identified: a summary, coefficients and models over frequency, bands, remarks."""
     if result.points or not result.bands:
         _show_summary(result)
         _show_coefficients(result)
@@ -86,13 +81,7 @@ def _show_remarks(result: Identification) -> None:
 
 
 def with_half(value: float, half: float) -> str:
-    """A number with half its interval, or that there is none.
-
-    Parameters
-    ----------
-    value, half : float
-        In the units of the table.
-    """
+    """A number with half its interval, or that there is none."""
     if not math.isfinite(value):
         return "no answer"
     if not math.isfinite(half) or half <= 0:
@@ -102,13 +91,7 @@ def with_half(value: float, half: float) -> str:
 
 
 def cross_coupling_matters(values: FloatArray, halves: FloatArray) -> bool:
-    """Whether a cross-coupled term is beyond doubt more than a tenth of the direct ones.
-
-    Parameters
-    ----------
-    values, halves : (8,) ndarray
-        K and C, row by row, and half their intervals.
-    """
+    """Whether a cross-coupled term is beyond doubt more than a tenth of the direct ones."""
     import numpy as np
 
     for part in (slice(0, 4), slice(4, 8)):
@@ -190,12 +173,7 @@ def _lines(result: Identification) -> None:
 
 
 def refused_bands(bands: Sequence[BandResult]) -> list[str]:
-    """What forbids trust in bands that give no points, one line each; where there are points, they say it.
-
-    Parameters
-    ----------
-    bands : sequence of BandResult
-    """
+    """What forbids trust in bands that give no points, one line each; where there are points, they say it."""
     found = []
     for band in bands:
         serious = sentences(untrusted(band.quality))

@@ -20,18 +20,7 @@ HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
 
 
 def campaign_place(path: Path) -> Path:
-    """Return `path`, or the one campaign that lies in it, as in the output folder of `tpjb simulate`.
-
-    Parameters
-    ----------
-    path : Path
-        As the user gave it.
-
-    Raises
-    ------
-    BadInputError
-        A device or pipe, which would be waited for without end.
-    """
+    """Return `path`, or the one campaign that lies in it, as in the output folder of `tpjb simulate`."""
     refuse_special(path)
     if not path.is_dir() or (path / "campaign.toml").exists():
         return path
@@ -47,43 +36,14 @@ def refuse_special(*paths: Path | None) -> None:
 
 
 def open_campaign(path: Path) -> Campaign:
-    """Open a campaign.
-
-    Parameters
-    ----------
-    path : Path
-        As the user gave it.
-
-    Raises
-    ------
-    RigDataError
-        It cannot be used; says every reason.
-    """
+    """Open a campaign."""
     from rigdata import load_campaign
 
     return load_campaign(campaign_place(path))
 
 
 def open_bearing(campaign: Campaign, given: Path | None) -> tuple[Bearing, dict[str, str]]:
-    """Load the bearing of a campaign, or the one given instead.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    given : Path or None
-        Option --bearing.
-
-    Returns
-    -------
-    bearing : Bearing
-    inputs : dict
-        SHA-256 of the file given; empty if the campaign carries the bearing, whose bytes are known by the campaign.
-
-    Raises
-    ------
-    BadInputError
-        The campaign carries no bearing file and none was given.
-    """
+    """Load the bearing of a campaign, or the one given instead."""
     from model.bearing_file import load_bearing, parse_bearing
 
     refuse_special(given)
@@ -98,19 +58,7 @@ def open_bearing(campaign: Campaign, given: Path | None) -> tuple[Bearing, dict[
 
 
 def refuse_impossible(effects: Sequence[Effect], path: Path | None, bearing: Bearing) -> None:
-    """Refuse effects of a file that a bearing cannot have, such as one of a pad that it lacks.
-
-    Parameters
-    ----------
-    effects : sequence of Effect
-    path : Path, optional
-        The file they come from.
-    bearing : Bearing
-
-    Raises
-    ------
-    BadInputError
-    """
+    """Refuse effects of a file that a bearing cannot have, such as one of a pad that it lacks."""
     if path is None:
         return
     from model.effects import EffectError, apply_effects
@@ -125,23 +73,7 @@ def refuse_impossible(effects: Sequence[Effect], path: Path | None, bearing: Bea
 
 @dataclass(frozen=True)
 class Data:
-    """What stands beside the model: a campaign, or a table of coefficients in its place.
-
-    Attributes
-    ----------
-    source : Campaign or TableSource
-    bearing : Bearing
-    inputs : dict of str to str
-        SHA-256 of what it was made of.
-    path : Path
-        As the user gave it.
-    typed : str
-        The same, as it stands in a command.
-    given : Path or None
-        Option --bearing.
-    reading_error : float or None
-        How far values of a table hold, as a share.
-    """
+    """What stands beside the model: a campaign, or a table of coefficients in its place."""
 
     source: Campaign | TableSource
     bearing: Bearing
@@ -160,25 +92,7 @@ class Data:
 def open_data(
     command: str, campaign: Path | None, table: Path | None, bearing: Path | None, reading_error: str | None
 ) -> Data:
-    """Open a campaign with its bearing, or a table of coefficients with the one given.
-
-    Parameters
-    ----------
-    command : str
-        Its name, for messages.
-    campaign : Path, optional
-    table : Path, optional
-        Option --coefficients.
-    bearing : Path, optional
-        Option --bearing.
-    reading_error : str, optional
-        Option --reading-error.
-
-    Raises
-    ------
-    BadInputError
-        Both or neither, no bearing, or a share that is none.
-    """
+    """Open a campaign with its bearing, or a table of coefficients with the one given."""
     if table is None and campaign is not None:
         source = open_campaign(campaign)
         drawn, given = open_bearing(source, bearing)

@@ -96,46 +96,17 @@ Scheduler = Annotated[
 
 
 def as_given(arguments: Mapping[str, Any], *without: str) -> dict[str, Any]:
-    """What a command was called with, for its record: ``as_given(locals())`` before anything else has a name.
-
-    Parameters
-    ----------
-    arguments : mapping of str to object
-        By parameter.
-    *without : str
-        Parameters that change nothing in the result, besides ``out``, ``workers`` and ``scheduler``.
-    """
+    """What a command was called with, for its record: ``as_given(locals())`` before anything else has a name."""
     return {k: v for k, v in arguments.items() if k not in {"out", "workers", "scheduler", *without}}
 
 
 def named(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options as a report shows them: files by their names.
-
-    Parameters
-    ----------
-    options : mapping of str to object
-        As given.
-    """
+    """Options as a report shows them: files by their names."""
     return {name: getattr(value, "name", value) for name, value in options.items()}
 
 
 def refuse_unknown(value: str, known: Iterable[str], option: str, several: bool = False) -> None:
-    """Let a known name pass; answer another with the nearest.
-
-    Parameters
-    ----------
-    value : str
-    known : iterable of str
-    option : str
-        Name of the option, for the message.
-    several : bool
-        Whether the option takes several of the names.
-
-    Raises
-    ------
-    BadInputError
-        Not among the known names.
-    """
+    """Let a known name pass; answer another with the nearest."""
     names = tuple(known)
     if value not in names:
         near = nearest_name(value, names)
@@ -144,13 +115,5 @@ def refuse_unknown(value: str, known: Iterable[str], option: str, several: bool 
 
 
 def out_folder(out: Path | None, command: str) -> Path:
-    """Return the folder for the results of `command`.
-
-    Parameters
-    ----------
-    out : Path, optional
-        Option --out.
-    command : str
-        Its name.
-    """
+    """Return the folder for the results of `command`."""
     return out if out is not None else Path(f"tpjb-{command}-out")

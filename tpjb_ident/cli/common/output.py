@@ -21,23 +21,7 @@ MOST_ROWS = 5000
 
 @dataclass
 class CommandOutput:
-    """What a command has printed and written so far.
-
-    Attributes
-    ----------
-    command : str
-    as_json, quiet : bool
-    sentences : list of str
-        Sentences for standard output.
-    tables : list of dict
-        Short tables for people, as they would have been printed.
-    remarks : list of dict
-        ``kind`` ("note", "warning", "error", ..) and ``text``.
-    folder : Path or None
-        Where the results are.
-    outputs : tuple of str
-        Files in it, relative.
-    """
+    """What a command has printed and written so far."""
 
     command: str = ""
     as_json: bool = False
@@ -54,25 +38,11 @@ class CommandOutput:
         return self.as_json or self.quiet
 
     def add_files(self, folder: Path, outputs: Sequence[str]) -> None:
-        """Note where the results are.
-
-        Parameters
-        ----------
-        folder : Path
-            Output folder.
-        outputs : sequence of str
-            Names of files in it.
-        """
+        """Note where the results are."""
         self.folder, self.outputs = folder, (*self.outputs, *outputs)
 
     def document(self, exit_code: int) -> dict[str, Any]:
-        """Everything printed, as plain data; ``data`` holds the result tables and JSON files themselves.
-
-        Parameters
-        ----------
-        exit_code : int
-            With which the command ends.
-        """
+        """Everything printed, as plain data; ``data`` holds the result tables and JSON files themselves."""
         return {
             "schema": SCHEMA,
             "command": self.command,
@@ -96,15 +66,7 @@ def command_output() -> CommandOutput:
 
 @contextlib.contextmanager
 def output_of(command: str, as_json: bool, quiet: bool) -> Iterator[CommandOutput]:
-    """Collect the output of a command; with JSON, print the document when the command ends, however it does.
-
-    Parameters
-    ----------
-    command : str
-        Its name.
-    as_json, quiet : bool
-        As asked for.
-    """
+    """Collect the output of a command; with JSON, print the document when the command ends, however it does."""
     import typer
 
     global _current

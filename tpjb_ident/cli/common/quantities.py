@@ -29,27 +29,7 @@ EXAMPLES = {
 
 
 def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
-    """Read a list or range of quantities.
-
-    Parameters
-    ----------
-    text : str
-        As described at the top of this file.
-    dimension : str
-        What they must be: a key of `model.units.SI_UNITS`.
-    option : str
-        Name of the option, for messages.
-
-    Returns
-    -------
-    tuple of float
-        SI values in the order given, radians and rad/s for angles and frequencies.
-
-    Raises
-    ------
-    BadInputError
-        Not readable, no unit, a wrong unit, or a range that does not get from start to end.
-    """
+    """Read a list or range of quantities."""
     if re.search(r"\d,\d", text):
         raise BadInputError(
             f"{option}: {text!r} has a comma between digits. Write a decimal point (2.5 kN), or a space after "
@@ -69,22 +49,7 @@ def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
 
 
 def parse_value(text: str, dimension: str, option: str) -> float:
-    """Read one quantity; like `parse_values`.
-
-    Parameters
-    ----------
-    text : str
-        As of `parse_values`, one value.
-    dimension : str
-        A key of `model.units.SI_UNITS`.
-    option : str
-        Name of the option, for messages.
-
-    Raises
-    ------
-    BadInputError
-        Also if there are several.
-    """
+    """Read one quantity; like `parse_values`."""
     values = parse_values(text, dimension, option)
     if len(values) != 1:
         raise BadInputError(f"{option}: takes one value, got {len(values)} from {text!r}.")

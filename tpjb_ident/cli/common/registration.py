@@ -96,14 +96,7 @@ class Grouped(TyperCommand):
 
 
 def add_command(app: typer.Typer, command: Callable[..., None]) -> None:
-    """Register a command with the common options and its examples.
-
-    Parameters
-    ----------
-    app : Typer
-    command : callable
-        Guarded already; its name is the function's own.
-    """
+    """Register a command with the common options and its examples."""
     name = command.__name__
     app.command(name, cls=Grouped, epilog=_examples_text(name))(_with_output_options(command, name))
 

@@ -26,25 +26,6 @@ def write_record(
     """Write run.json into the temporary folder of a command, last.
 
     Commands that share an output folder share its run.json: one entry each.
-
-    Parameters
-    ----------
-    staging : Path
-        What `output_folder` gave; its files are listed as the outputs.
-    target : Path
-        The final folder, whose former run.json is carried on.
-    command : str
-    settings : mapping
-        Options as they were used.
-    inputs : mapping of str to str
-        SHA-256 by file name.
-    remarks : sequence of str
-        What the command has to say about its results.
-
-    Returns
-    -------
-    dict
-        The command's entry.
     """
     outputs = sorted(p.relative_to(staging).as_posix() for p in staging.rglob("*") if p.is_file())
     entry = {
@@ -63,15 +44,7 @@ def write_record(
 
 
 def places(settings: Mapping[str, Any], target: Path) -> dict[str, str]:
-    """Where the files and folders among `settings` lie, as seen from the output folder; only those that exist.
-
-    Parameters
-    ----------
-    settings : mapping
-        Options; values that are paths count.
-    target : Path
-        Output folder.
-    """
+    """Where the files and folders among `settings` lie, as seen from the output folder; only those that exist."""
     found = {}
     for name, value in settings.items():
         if isinstance(value, Path) and value.exists():

@@ -12,12 +12,7 @@ NARROWEST = 14
 
 
 def cell_len(text: str) -> int:
-    """Columns that a text takes on a terminal; wide letters take two.
-
-    Parameters
-    ----------
-    text : str
-    """
+    """Columns that a text takes on a terminal; wide letters take two."""
     if text.isascii():
         return len(text)
     from rich.cells import cell_len as measured  # only where it is needed: help shall be instant
@@ -26,36 +21,13 @@ def cell_len(text: str) -> int:
 
 
 def wrapped(text: str, width: int) -> list[str]:
-    """Break a sentence at spaces; words that are longer than a line, as paths are, stay whole.
-
-    Parameters
-    ----------
-    text : str
-    width : int
-        Columns.
-    """
+    """Break a sentence at spaces; words that are longer than a line, as paths are, stay whole."""
     lines = textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
     return lines or [""]
 
 
 def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int], width: int) -> list[str]:
-    """Lay out a table.
-
-    Parameters
-    ----------
-    columns : sequence of str
-        Headings.
-    rows : sequence of sequence of str
-    words : collection of int
-        Columns of words: they stand left and may wrap; numbers stand right.
-    width : int
-        Columns of the terminal.
-
-    Returns
-    -------
-    list of str
-        Heading, rule and rows.
-    """
+    """Lay out a table."""
     cells = [max((cell_len(row[i]) for row in rows), default=0) for i in range(len(columns))]
     heads = [max((cell_len(part) for part in column.split()), default=0) for column in columns]
     full = [max(c, cell_len(h)) for c, h in zip(cells, columns, strict=True)]

@@ -45,13 +45,7 @@ def width() -> int:
 
 
 def print_line(text: str) -> None:
-    """Print one line; text from outside is shown as it is, less its control characters.
-
-    Parameters
-    ----------
-    text : str
-        One sentence.
-    """
+    """Print one line; text from outside is shown as it is, less its control characters."""
     command_output().sentences.append(printable(text))
     if command_output().silent:
         return
@@ -67,12 +61,7 @@ def _fitted(text: str, stderr: bool = False) -> str:
 
 
 def command_line(text: str) -> None:
-    """Print a command to type, unbroken, so that it can be copied.
-
-    Parameters
-    ----------
-    text : str
-    """
+    """Print a command to type, unbroken, so that it can be copied."""
     line = f"Next: {printable(text)}"
     command_output().sentences.append(line)
     if not command_output().silent:
@@ -80,15 +69,7 @@ def command_line(text: str) -> None:
 
 
 def error_line(kind: str, text: str) -> None:
-    """Print a message to stderr, its lines kept.
-
-    Parameters
-    ----------
-    kind : str
-        "error", "bug", "not to be trusted", ..
-    text : str
-        One or several lines.
-    """
+    """Print a message to stderr, its lines kept."""
     lines = "\n".join(printable(line) for line in text.splitlines())
     command_output().remarks.append({"kind": kind, "text": lines})
     style = "bold red" if kind == "bug" else None
@@ -96,15 +77,7 @@ def error_line(kind: str, text: str) -> None:
 
 
 def note_line(kind: str, text: str) -> None:
-    """Print a remark to stderr; of a quiet command only warnings.
-
-    Parameters
-    ----------
-    kind : str
-        "note", "warning" or "doing".
-    text : str
-        One sentence.
-    """
+    """Print a remark to stderr; of a quiet command only warnings."""
     if kind != "doing":
         command_output().remarks.append({"kind": kind, "text": printable(text)})
     if command_output().silent and kind != "warning":
@@ -115,19 +88,7 @@ def note_line(kind: str, text: str) -> None:
 def table(
     title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int] = (0,), whole: str = ""
 ) -> None:
-    """Print a table that fits the terminal; columns of words stand left, numbers right.
-
-    Parameters
-    ----------
-    title : str
-    columns : sequence of str
-        Headings; they break at spaces where a column is narrower than its heading.
-    rows : sequence of sequence of str
-    words : collection of int
-        Columns of words.
-    whole : str
-        File that holds all of a long table; its first `MOST_ROWS` rows are printed.
-    """
+    """Print a table that fits the terminal; columns of words stand left, numbers right."""
     command_output().tables.append({"title": title, "columns": list(columns), "rows": [list(row) for row in rows]})
     if command_output().silent:
         return
@@ -141,13 +102,7 @@ def table(
 
 @contextlib.contextmanager
 def progress(what: str) -> Iterator[Progress]:
-    """Show a bar with the time left on a terminal while the block runs; elsewhere a line now and then.
-
-    Parameters
-    ----------
-    what : str
-        What is being done, for people.
-    """
+    """Show a bar with the time left on a terminal while the block runs; elsewhere a line now and then."""
     console = _console(stderr=True)
     if command_output().silent or not console.is_terminal:
         note_line("doing", what)

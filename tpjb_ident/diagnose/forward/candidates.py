@@ -22,24 +22,7 @@ DIRECTION_WIDTH = math.pi / 8
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect with one or several free amplitudes.
-
-    Attributes
-    ----------
-    name : str
-    free : tuple of Parameter
-        Fitted together, each in its nearly linear form.
-    fixed : mapping of str to float
-        The others (pad number, direction).
-    side : str
-        ``"bearing"``, ``"structure"`` or ``"measurement"``.
-    form : str
-        Of a generic term: ``"isotropic"``, ``"cross-coupled"``, ``"symmetric"``; empty for an effect.
-    basis : tuple of tuple of float
-        Of a generic term: what one amplitude adds to every free parameter, a row per amplitude.
-    about : mapping of str to float
-        Where a refined direction started.
-    """
+    """One effect with one or several free amplitudes."""
 
     name: str
     free: tuple[Parameter, ...]
@@ -111,13 +94,7 @@ class Candidate:
         return float(low[0]), float(high[0])
 
     def values(self, amplitudes: FloatArray) -> dict[str, float]:
-        """Parameters at amplitudes (k,), clipped to their bounds; fixed ones too.
-
-        Parameters
-        ----------
-        amplitudes : array, shape (k,)
-            One for every free parameter, in its nearly linear form.
-        """
+        """Parameters at amplitudes (k,), clipped to their bounds; fixed ones too."""
         amplitudes = np.atleast_1d(np.asarray(amplitudes, float))
         if self.basis:
             sizes = np.asarray(self.basis).T @ amplitudes
@@ -131,13 +108,7 @@ class Candidate:
         return {**table, **self.fixed}
 
     def effect(self, amplitudes: FloatArray | float) -> Effect:
-        """Build the effect with these amplitudes (clipped to their bounds).
-
-        Parameters
-        ----------
-        amplitudes : float or array, shape (k,)
-            One for every free parameter, in its nearly linear form.
-        """
+        """Build the effect with these amplitudes (clipped to their bounds)."""
         return Effect(self.name, **self.values(np.atleast_1d(np.asarray(amplitudes, float))))
 
     def refined(self) -> Candidate:
@@ -151,15 +122,7 @@ class Candidate:
 
 
 def candidates(bearing: Bearing, skip: frozenset[str] = frozenset()) -> tuple[Candidate, ...]:
-    """List every effect of the library (registered ones too) for a bearing.
-
-    Parameters
-    ----------
-    bearing : Bearing
-        For the number of pads.
-    skip : frozenset of str
-        Names to leave out.
-    """
+    """List every effect of the library (registered ones too) for a bearing."""
     out: list[Candidate] = []
     for kind in known_effects().values():
         if kind.name in skip or kind.missing(bearing):
@@ -180,13 +143,7 @@ def candidates(bearing: Bearing, skip: frozenset[str] = frozenset()) -> tuple[Ca
 
 
 def one_amplitude(bearing: Bearing) -> tuple[Candidate, ...]:
-    """Return the candidates with one amplitude each, generic terms left out: what a plan asks about.
-
-    Parameters
-    ----------
-    bearing : Bearing
-        As drawn.
-    """
+    """Return the candidates with one amplitude each, generic terms left out: what a plan asks about."""
     return tuple(c for c in candidates(bearing) if len(c.steps) == 1 and c.name not in TERMS)
 
 

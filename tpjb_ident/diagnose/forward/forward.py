@@ -38,16 +38,7 @@ class ForwardModel(Protocol):
 
 @dataclass
 class Forward:
-    """Predicts an observation vector; remembers what it has solved, and starts the next call from there.
-
-    Attributes
-    ----------
-    setup : Setup
-        Baseline.
-    layout : Layout
-    elements : tuple of Element
-        Of the observation vector: what to return, in which order.
-    """
+    """Predicts an observation vector; remembers what it has solved, and starts the next call from there."""
 
     setup: Setup
     layout: Layout
@@ -56,23 +47,7 @@ class Forward:
     _shares: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)
 
     def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
-        """Predict.
-
-        Parameters
-        ----------
-        effects : sequence of Effect
-        change : callable, optional
-            A further change of the `Setup` (a nuisance).
-
-        Returns
-        -------
-        (n,) ndarray
-
-        Raises
-        ------
-        NoEquilibriumError
-            Some operating point has none.
-        """
+        """Predict."""
         setup = apply_effects(self.setup, effects)
         if change is not None:
             setup = change(setup)

@@ -34,19 +34,7 @@ class NoEquilibriumError(TpjbError):
 
 @dataclass(frozen=True)
 class Solved:
-    """What a bearing alone does at one static point, before structure and instruments.
-
-    Attributes
-    ----------
-    h : (n, 2, 2) complex ndarray
-        [N/m]
-    position : (2,) ndarray
-        [m]
-    force : (2,) ndarray
-        Static load [N].
-    temperature, pad_load : (n_pads,) ndarray
-        [degC], [N]
-    """
+    """What a bearing alone does at one static point, before structure and instruments."""
 
     h: ComplexArray
     position: FloatArray
@@ -55,14 +43,7 @@ class Solved:
     pad_load: FloatArray
 
     def read(self, setup: Setup, lines: tuple[float, ...]) -> Reading:
-        """As the structure and the instruments of a set-up show it.
-
-        Parameters
-        ----------
-        setup : Setup
-        lines : tuple of float
-            Excitation frequencies [rad/s].
-        """
+        """As the structure and the instruments of a set-up show it."""
         instruments, omega = setup.instruments, np.array(lines)
         return Reading(
             instruments.shown_stiffness(with_structure(setup, self.h, omega), omega) if lines else self.h,
@@ -84,16 +65,7 @@ class Reading:
 
 @dataclass
 class Memory:
-    """Solved points of one bearing, and the equilibria from which others start.
-
-    Attributes
-    ----------
-    solved : dict
-        By set-up (instruments and structure apart, which change no equilibrium), then by static point, lines and
-        places of thermometers.
-    start : dict
-        Equilibrium per static point.
-    """
+    """Solved points of one bearing, and the equilibria from which others start."""
 
     solved: dict[Setup, dict[Key, Solved]] = field(default_factory=dict, repr=False)
     start: dict[StaticPoint, Equilibrium] = field(default_factory=dict, repr=False)
@@ -104,21 +76,7 @@ class Memory:
         return Memory({setup: dict(known) for setup, known in self.solved.items()}, dict(self.start))
 
     def ask(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]) -> Reading:
-        """Look a point up, or solve it.
-
-        Parameters
-        ----------
-        setup : Setup
-        point : (load [N], direction [rad], speed [rad/s])
-        lines : tuple of float
-            Excitation frequencies [rad/s]; none where a test is static.
-        sensors : tuple of float
-            Fraction of the arc at which every pad carries its thermometer.
-
-        Raises
-        ------
-        NoEquilibriumError
-        """
+        """Look a point up, or solve it."""
         if self._last is None or self._last[0] is not setup:
             # a set-up is some hundred numbers to be compared: once for all points of a prediction
             plain = setup.change(**_PLAIN)

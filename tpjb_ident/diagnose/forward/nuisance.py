@@ -30,24 +30,7 @@ STEP = 0.3
 
 @dataclass(frozen=True)
 class Nuisance:
-    """One thing that may be off.
-
-    Attributes
-    ----------
-    name : str
-        Stated tolerance that it belongs to.
-    sigma : float
-        One standard deviation, in `unit`.
-    unit : str
-    place : str
-        Which pad or probe; empty where there is one only.
-    change : callable, optional
-        ``change(setup, size) -> Setup``; without it the nuisance acts on the readings, by `column`.
-    column : (n,) ndarray, optional
-        Change of the observation vector per `sigma`.
-    twins : frozenset of str
-        Effects that do the same.
-    """
+    """One thing that may be off."""
 
     name: str
     sigma: float
@@ -60,14 +43,7 @@ class Nuisance:
 
 @dataclass(frozen=True)
 class Shift:
-    """A change of a `Setup` by nuisances of given sizes, for `Forward`.
-
-    Attributes
-    ----------
-    nuisances : tuple of Nuisance
-    size : tuple of float
-        In standard deviations.
-    """
+    """A change of a `Setup` by nuisances of given sizes, for `Forward`."""
 
     nuisances: tuple[Nuisance, ...]
     size: tuple[float, ...]
@@ -89,17 +65,7 @@ class Shift:
 def nuisances(
     elements: Sequence[Element], setup: Setup, known: Tolerances, by_pad: bool = True
 ) -> tuple[Nuisance, ...]:
-    """List what may be off for an observation vector.
-
-    Parameters
-    ----------
-    elements : sequence of Element
-    setup : Setup
-    known : Tolerances
-        A tolerance of zero leaves its nuisance out.
-    by_pad : bool
-        Clearance and pivot of every pad too.
-    """
+    """List what may be off for an observation vector."""
     pads = range(1, len(setup.bearing.pads) + 1) if by_pad else ()
     found = [
         _whole("viscosity", "1", _viscosity, known, "oil_viscosity"),
@@ -152,37 +118,14 @@ def _readings(elements: Sequence[Element], known: Tolerances) -> list[Nuisance]:
 def columns_of(
     forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], at: FloatArray, base: FloatArray
 ) -> FloatArray:
-    """Change of the observation vector per standard deviation of every nuisance, (n, m).
-
-    Parameters
-    ----------
-    forward : ForwardModel
-    effects : sequence of Effect
-        In the model.
-    known : sequence of Nuisance
-    at : (m,) ndarray
-        Where the derivative is taken, in standard deviations.
-    base : (n,) ndarray
-        What the model predicts there.
-    """
+    """Change of the observation vector per standard deviation of every nuisance, (n, m)."""
     return np.column_stack([column_of(forward, effects, known, at, base, i) for i in range(len(known))])
 
 
 def at_baseline(
     forward: ForwardModel, effects: Sequence[Effect], setup: Setup, known: Tolerances, base: FloatArray
 ) -> FloatArray:
-    """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m).
-
-    Parameters
-    ----------
-    forward : ForwardModel
-    effects : sequence of Effect
-    setup : Setup
-    known : Tolerances
-        Stated tolerances.
-    base : array, shape (n,)
-        Prediction of the model with nothing moved.
-    """
+    """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m)."""
     found = nuisances(forward.elements, setup, known, by_pad=False)
     return columns_of(forward, effects, found, np.zeros(len(found)), base)
 
@@ -191,21 +134,7 @@ def column_of(
     forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], at: FloatArray, base: FloatArray,
     index: int,
 ) -> FloatArray:  # fmt: skip
-    """One column of `columns_of`.
-
-    Parameters
-    ----------
-    forward : ForwardModel
-    effects : sequence of Effect
-    known : sequence of Nuisance
-        Everything that is free within a tolerance.
-    at : array, shape (m,)
-        Sizes of the nuisances, in standard deviations.
-    base : array, shape (n,)
-        Prediction of the model with nothing moved.
-    index : int
-        Which nuisance.
-    """
+    """One column of `columns_of`."""
     if known[index].column is not None:
         return np.asarray(known[index].column)
     # towards zero: there the model surely has an equilibrium
@@ -218,17 +147,7 @@ def column_of(
 def predict(
     forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], size: FloatArray
 ) -> FloatArray:
-    """Predict with effects and with nuisances of given sizes (in standard deviations), (n,).
-
-    Parameters
-    ----------
-    forward : ForwardModel
-    effects : sequence of Effect
-    known : sequence of Nuisance
-        Everything that is free within a tolerance.
-    size : array, shape (m,)
-        In standard deviations.
-    """
+    """Predict with effects and with nuisances of given sizes (in standard deviations), (n,)."""
     shift = Shift(tuple(known), tuple(map(float, size)))
     return forward(effects, shift if np.any(size) else None) + shift.readings
 

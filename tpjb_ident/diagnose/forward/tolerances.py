@@ -43,20 +43,7 @@ DEFAULTS: dict[str, tuple[float, str, str]] = {
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Everything that may be off without being a finding.
-
-    Attributes
-    ----------
-    stated : mapping of str to Stated
-        By the names of `DEFAULTS`.
-    probe_axes : tuple of float
-        Directions of the two probes [rad].
-    cell_gain : float
-        Relative, per load cell; the manifest's uncertainty where it states one.
-    centre : float
-        How far the polygon's centre may lie from the bearing's [m]: it is a choice where pads stand unequal. Without
-        a polygon, that of the probes' zero.
-    """
+    """Everything that may be off without being a finding."""
 
     stated: Mapping[str, Stated] = field(default_factory=lambda: dict(_defaults()))
     probe_axes: tuple[float, float] = (math.pi / 4, 3 * math.pi / 4)
@@ -68,19 +55,7 @@ class Tolerances:
         return self.stated[name].value
 
     def states(self, values: Mapping[str, str | float], source: str) -> Tolerances:
-        """Return a copy with other values: texts with units or SI numbers.
-
-        Parameters
-        ----------
-        values : mapping of str to str or float
-        source : str
-            ``"bearing file"``, ``"command line"``, ``"manifest"``.
-
-        Raises
-        ------
-        BadInputError
-            A name that is not known, or a value that is no such quantity.
-        """
+        """Return a copy with other values: texts with units or SI numbers."""
         table = dict(self.stated)
         for name, value in values.items():
             if name not in DEFAULTS:
@@ -98,13 +73,7 @@ class Tolerances:
         return Tolerances(table, self.probe_axes, self.cell_gain, self.centre)
 
     def layered(self, bearing: Bearing) -> Tolerances:
-        """Return a copy with what a bearing file states where the command line states nothing.
-
-        Parameters
-        ----------
-        bearing : Bearing
-            As drawn.
-        """
+        """Return a copy with what a bearing file states where the command line states nothing."""
         typed = {k: v.value for k, v in self.stated.items() if v.source == "command line"}
         return self.states(dict(bearing.tolerances), "bearing file").states(typed, "command line")
 

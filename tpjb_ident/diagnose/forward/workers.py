@@ -30,38 +30,17 @@ Answer = TypeVar("Answer")
 
 @dataclass(frozen=True)
 class Map:
-    """Maps a task over jobs, in this process or in workers.
-
-    Attributes
-    ----------
-    opened : Workers
-    number : int
-        Of what they share.
-    """
+    """Maps a task over jobs, in this process or in workers."""
 
     opened: Workers
     number: int
 
     def __call__(self, task: Callable[..., Any], jobs: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
-        """Yield ``task(forward, problem, argument, ..)`` for every job, in order.
-
-        Parameters
-        ----------
-        task : callable
-            Of a module.
-        jobs : sequence of tuple
-            Further arguments.
-        """
+        """Yield ``task(forward, problem, argument, ..)`` for every job, in order."""
         return in_order(self.opened, _run, [(self.number, task, *arguments) for arguments in jobs])
 
     def together(self, tasks: Sequence[Callable[[], Answer]]) -> list[Answer]:
-        """Do several things that each wait for workers now and then: while one waits, they work for another.
-
-        Parameters
-        ----------
-        tasks : sequence of callable
-            The workers must have begun; a fork from a process with threads can hang.
-        """
+        """Do several things that each wait for workers now and then: while one waits, they work for another."""
         if self.opened.count == 1 or len(tasks) < 2:
             return [task() for task in tasks]
         with ThreadPoolExecutor(len(tasks)) as threads:
@@ -70,16 +49,7 @@ class Map:
 
 @contextmanager
 def workers(forward: ForwardModel, problem: Any, count: int | None = None) -> Iterator[Map]:
-    """Open workers whose tasks get a `Forward` and what else they share as their first arguments.
-
-    Parameters
-    ----------
-    forward : Forward
-        Warmed up: its equilibria are the common start.
-    problem : object
-    count : int, optional
-        Processes; 1 runs everything here. Default: the cores this process may use.
-    """
+    """Open workers whose tasks get a `Forward` and what else they share as their first arguments."""
     number = next(_numbers)
     _shared[number] = (forward, problem)
     try:

@@ -34,19 +34,7 @@ CENTRAL = 0.05
 
 @dataclass(frozen=True)
 class Design:
-    """A test on the rig that could be run.
-
-    Attributes
-    ----------
-    words : str
-    layout : Layout
-    blind : frozenset of str
-        Effects that do not act in this test, such as a spring outside what the probes then see.
-    unsure : frozenset of str
-        Effects whose size this test changes by an amount that the model cannot tell: it is no test for them.
-    change : callable, optional
-        What the test does to the rig, after all effects: hotter oil, the other sense of rotation.
-    """
+    """A test on the rig that could be run."""
 
     words: str
     layout: Layout
@@ -55,12 +43,7 @@ class Design:
     change: Change | None = None
 
     def acting(self, effects: Sequence[Effect]) -> tuple[Effect, ...]:
-        """Effects that act in this test.
-
-        Parameters
-        ----------
-        effects : sequence of Effect
-        """
+        """Effects that act in this test."""
         return tuple(e for e in effects if e.name not in self.blind)
 
     def fits(self, *explanations: Sequence[Effect]) -> bool:
@@ -68,27 +51,11 @@ class Design:
         return not any(e.name in self.unsure for effects in explanations for e in effects)
 
     def planned(self, setup: Setup) -> Observations:
-        """Observation vector that the baseline predicts, with the noise to be expected.
-
-        Parameters
-        ----------
-        setup : Setup
-
-        Raises
-        ------
-        NoEquilibriumError
-        """
+        """Observation vector that the baseline predicts, with the noise to be expected."""
         return planned_observations(setup if self.change is None else self.change(setup), self.layout)
 
     def forward(self, setup: Setup, seen: Observations) -> Forward:
-        """The model of this test, for what `planned` lists.
-
-        Parameters
-        ----------
-        setup : Setup
-        seen : Observations
-            What `planned` gave.
-        """
+        """The model of this test, for what `planned` lists."""
         if self.change is None:
             return Forward(setup, self.layout, seen.elements)
         return ChangedForward(setup, self.layout, seen.elements, last=self.change)
@@ -107,14 +74,7 @@ class ChangedForward(Forward):
 
 
 def designs(setup: Setup, layout: Layout) -> tuple[Design, ...]:
-    """List tests on this rig that go beyond a campaign's own.
-
-    Parameters
-    ----------
-    setup : Setup
-    layout : Layout
-        What has been measured.
-    """
+    """List tests on this rig that go beyond a campaign's own."""
     at = _Measured.of(layout, len(setup.bearing.pads))
     return (
         *_other_lines(at), *_other_points(at), *_other_rigs(setup, at), *_static(at), *_dry(layout, at.pads)
@@ -232,12 +192,7 @@ def _static(at: _Measured) -> list[Design]:
 
 
 def grown(setup: Setup) -> Setup:
-    """A bearing at standstill that keeps the clearance of the running one.
-
-    Parameters
-    ----------
-    setup : Setup
-    """
+    """A bearing at standstill that keeps the clearance of the running one."""
     by = setup.clearance_change
     hot = setup.change_pads(lambda k, pad: replace(pad, assembled_clearance=pad.assembled_clearance + by))
     return hot.change(clearance_change=0.0)
@@ -257,22 +212,12 @@ def _dry(layout: Layout, pads: int) -> list[Design]:
 
 
 def reversible(setup: Setup) -> bool:
-    """Whether every pad would carry with the shaft turning the other way.
-
-    Parameters
-    ----------
-    setup : Setup
-    """
+    """Whether every pad would carry with the shaft turning the other way."""
     return all(abs(pad.pivot_offset - 0.5) <= CENTRAL for pad in setup.bearing.pads)
 
 
 def mirrored(setup: Setup) -> Setup:
-    """The set-up as a mirror shows it: its answers at a mirrored layout are those of the other sense of rotation.
-
-    Parameters
-    ----------
-    setup : Setup
-    """
+    """The set-up as a mirror shows it: its answers at a mirrored layout are those of the other sense of rotation."""
     angle, towards = setup.misalignment
     turned = setup.change_pads(
         lambda k, pad: replace(pad, pivot_angle=math.pi - pad.pivot_angle, pivot_offset=1.0 - pad.pivot_offset)

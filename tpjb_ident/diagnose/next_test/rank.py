@@ -40,14 +40,7 @@ MARGIN = 9.0
 
 @dataclass(frozen=True)
 class Separation:
-    """What a design would show.
-
-    Attributes
-    ----------
-    design : Design or Check
-    each : tuple of float
-        Distance of the predictions from that of every rival, in standard deviations.
-    """
+    """What a design would show."""
 
     design: Design | Check
     each: tuple[float, ...]
@@ -59,31 +52,14 @@ class Separation:
 
 
 def options_for(setup: Setup, layout: Layout) -> tuple[Design | Check, ...]:
-    """List all that could be done next: tests on the rig and checks beside it.
-
-    Parameters
-    ----------
-    setup : Setup
-    layout : Layout
-    """
+    """List all that could be done next: tests on the rig and checks beside it."""
     return (*designs(setup, layout), *CHECKS)
 
 
 def separated(
     setup: Setup, design: Design | Check, one: Sequence[Effect], rivals: Sequence[Sequence[Effect]], known: Tolerances
 ) -> Separation | None:
-    """What one design would show; None where it cannot be or the model has no equilibrium.
-
-    Parameters
-    ----------
-    setup : Setup
-        Baseline.
-    design : Design or Check
-    one : sequence of Effect
-    rivals : sequence of sequence of Effect
-        At least one.
-    known : Tolerances
-    """
+    """What one design would show; None where it cannot be or the model has no equilibrium."""
     if isinstance(design, Check):
         return Separation(design, tuple(design.separation(one, other) for other in rivals))
     if not design.fits(one, *rivals):
@@ -106,26 +82,12 @@ def _each(
 
 
 def ranked(tests: Sequence[Separation]) -> tuple[Separation, ...]:
-    """The furthest from the nearest rival first.
-
-    Parameters
-    ----------
-    tests : sequence of Separation
-        Tests, each with how far it separates the best explanation from its rivals.
-    """
+    """The furthest from the nearest rival first."""
     return tuple(sorted(tests, key=lambda s: -s.expected))
 
 
 def apart(seen: Observations, columns: FloatArray, difference: FloatArray) -> float:
-    """Whitened length of a difference of two predictions [standard deviations].
-
-    Parameters
-    ----------
-    seen : Observations
-    columns : (n, m) ndarray
-        Nuisances, per standard deviation.
-    difference : (n,) ndarray
-    """
+    """Whitened length of a difference of two predictions [standard deviations]."""
     return float(np.linalg.norm(np.linalg.solve(usual_factor(seen, columns), difference)))
 
 
@@ -133,52 +95,25 @@ def chance(separation: float) -> float:
     """Probability that chi-square of the wrong explanation exceeds the right one's by `MARGIN`.
 
     The difference is normal with mean d^2 and standard deviation 2 d, d being the separation.
-
-    Parameters
-    ----------
-    separation : float
-        Distance of two explanations in standard deviations.
     """
     return float(ndtr((separation**2 - MARGIN) / (2.0 * separation))) if separation > 0.0 else 0.0
 
 
 def suggested(tests: Sequence[Separation]) -> tuple[Separation, ...]:
-    """Return the best test, or the best two together where the best alone would not settle the matter.
-
-    Parameters
-    ----------
-    tests : sequence of Separation
-        As `ranked` gives them.
-    """
+    """Return the best test, or the best two together where the best alone would not settle the matter."""
     if len(tests) < 2 or tests[0].expected >= ENOUGH:
         return tuple(tests[:1])
     return max(itertools.combinations(tests, 2), key=together)
 
 
 def together(tests: Sequence[Separation], now: Sequence[float] = ()) -> float:
-    """Separation from the nearest rival by several tests at once, in standard deviations.
-
-    Parameters
-    ----------
-    tests : sequence of Separation
-        Errors that they share count in each.
-    now : sequence of float, optional
-        Distance from every rival that the data at hand have already.
-    """
+    """Separation from the nearest rival by several tests at once, in standard deviations."""
     rows = [t.each for t in tests] + ([tuple(now)] if now else [])
     return float(np.linalg.norm(rows, axis=0).min())
 
 
 def say(best: Sequence[Separation], one: str, *rivals: str) -> str:
-    """In words: what `suggested` gives, and what it is expected to tell.
-
-    Parameters
-    ----------
-    best : sequence of Separation
-        Tests that are suggested.
-    one : str
-        The best explanation.
-    """
+    """In words: what `suggested` gives, and what it is expected to tell."""
     other = f"{', '.join(rivals[:-1])} and {rivals[-1]}" if len(rivals) > 1 else rivals[0]
     words, expected = " and ".join(t.design.words for t in best), together(best)
     if expected < TELLING:
@@ -196,13 +131,6 @@ class Check:
 
     It reads that parameter whoever else is at work; explanations that differ in it are told apart by their difference
     over `sigma`.
-
-    Attributes
-    ----------
-    words : str
-    effect, parameter : str
-    sigma : float
-        Standard deviation of the reading, in the parameter's unit.
     """
 
     words: str
@@ -211,15 +139,7 @@ class Check:
     sigma: float
 
     def separation(self, one: Sequence[Effect], other: Sequence[Effect]) -> float:
-        """Distance of two explanations in standard deviations; 0 where neither has the effect.
-
-        Parameters
-        ----------
-        one : sequence of Effect
-            An explanation.
-        other : sequence of Effect
-            Its rival.
-        """
+        """Distance of two explanations in standard deviations; 0 where neither has the effect."""
         mine, theirs = self._sizes(one), self._sizes(other)
         neutral = next(p.neutral for p in kind_of(self.effect).parameters if p.name == self.parameter)
         places = mine.keys() | theirs.keys()

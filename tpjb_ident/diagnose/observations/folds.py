@@ -22,16 +22,7 @@ SECTORS = 5
 
 @dataclass(frozen=True)
 class Fold:
-    """Points that are left out together.
-
-    Attributes
-    ----------
-    name : str
-    members : (m,) ndarray of int
-        Elements.
-    beyond : bool
-        Whether a model must extrapolate to reach them.
-    """
+    """Points that are left out together."""
 
     name: str
     members: IntArray = field(repr=False)
@@ -39,12 +30,7 @@ class Fold:
 
 
 def folds(observations: Observations) -> tuple[Fold, ...]:
-    """Split all elements into blocks; every element is in one of them.
-
-    Parameters
-    ----------
-    observations : Observations
-    """
+    """Split all elements into blocks; every element is in one of them."""
     elements = observations.elements
     names, beyond = _dynamic_names(elements)
     sectors = _sectors(elements)
@@ -62,12 +48,7 @@ def folds(observations: Observations) -> tuple[Fold, ...]:
 
 
 def held_out(observations: Observations) -> BoolArray:
-    """Elements of the folds that ask a model to extrapolate; all of them where there are no such folds.
-
-    Parameters
-    ----------
-    observations : Observations
-    """
+    """Elements of the folds that ask a model to extrapolate; all of them where there are no such folds."""
     out = np.zeros(len(observations), dtype=bool)
     for fold in folds(observations):
         if fold.beyond:

@@ -18,19 +18,7 @@ AXIS = 0.1
 
 
 def observe_table(path: Path, reading_error: float | None = None, tolerance: Tolerance | None = None) -> Observations:
-    """Read a table of coefficients.
-
-    Parameters
-    ----------
-    path, reading_error
-        See `tpjb_ident.compare.coefficient_table.read_coefficients`.
-    tolerance : Tolerance, optional
-
-    Raises
-    ------
-    BadInputError
-        The table cannot be taken.
-    """
+    """Read a table of coefficients."""
     tolerance = tolerance or Tolerance()
     rows: list[tuple[Element, float, float, float]] = []
     tests: dict[tuple[float, float, float], list[float]] = {}

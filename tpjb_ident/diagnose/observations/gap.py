@@ -16,12 +16,6 @@ def residuals(observations: Observations, prediction: FloatArray) -> FloatArray:
 
     The centre from which positions are counted is a convention (the clearance polygon's, by some rule) and says
     nothing about the bearing: the shift that fits best is taken off.
-
-    Parameters
-    ----------
-    observations : Observations
-    prediction : array, shape (n,)
-        In the units of the observations.
     """
     z = (observations.value - prediction) / observations.total_sigma
     shifts = centre_shifts(observations.elements) / observations.total_sigma[:, None]
@@ -31,12 +25,7 @@ def residuals(observations: Observations, prediction: FloatArray) -> FloatArray:
 
 
 def centre_shifts(elements: Sequence[Element]) -> FloatArray:
-    """Positions and clearances seen from a centre moved by one metre along x and along y, (n, 2).
-
-    Parameters
-    ----------
-    elements : sequence of Element
-    """
+    """Positions and clearances seen from a centre moved by one metre along x and along y, (n, 2)."""
     out = np.zeros((len(elements), 2))
     for i, e in enumerate(elements):
         if e.observable in {"locus_x", "locus_y"}:
@@ -48,56 +37,26 @@ def centre_shifts(elements: Sequence[Element]) -> FloatArray:
 
 
 def gap(observations: Observations, prediction: FloatArray, chosen: BoolArray | None = None) -> float:
-    """Root mean square of `residuals`; NaN where nothing is chosen.
-
-    Parameters
-    ----------
-    observations : Observations
-    prediction : array, shape (n,)
-        In the units of the observations.
-    chosen : array of bool, shape (n,), optional
-        Elements that count; all by default.
-    """
+    """Root mean square of `residuals`; NaN where nothing is chosen."""
     z = residuals(observations, prediction)
     z = z if chosen is None else z[chosen]
     return float(np.sqrt(np.mean(z**2))) if len(z) else float("nan")
 
 
 def noise_square(observations: Observations) -> float:
-    """Square of the gap that measurement noise alone would leave under a perfect model.
-
-    Parameters
-    ----------
-    observations : Observations
-    """
+    """Square of the gap that measurement noise alone would leave under a perfect model."""
     return float(np.mean(np.diag(observations.covariance) / observations.total_sigma**2))
 
 
 def noise_floor(observations: Observations) -> float:
-    """Gap that measurement noise alone would leave under a perfect model.
-
-    Parameters
-    ----------
-    observations : Observations
-    """
+    """Gap that measurement noise alone would leave under a perfect model."""
     return math.sqrt(noise_square(observations))
 
 
 def gap_by_observable(
     observations: Observations, before: FloatArray, after: FloatArray, chosen: BoolArray
 ) -> dict[str, dict[str, float]]:
-    """Held-out gap before and after, per observable; observables without held-out points use all of theirs.
-
-    Parameters
-    ----------
-    observations : Observations
-    before : array, shape (n,)
-        Prediction of the baseline.
-    after : array, shape (n,)
-        Prediction with what was found.
-    chosen : array of bool, shape (n,)
-        Elements held out.
-    """
+    """Held-out gap before and after, per observable; observables without held-out points use all of theirs."""
     out: dict[str, dict[str, float]] = {}
     names = np.array([e.observable for e in observations.elements])
     for name in dict.fromkeys(names):
@@ -113,14 +72,7 @@ def gap_by_observable(
 
 
 def direct_scale(elements: Sequence[Element], value: FloatArray) -> FloatArray:
-    """Mean direct coefficient of every element's point and part (k or omega c); 1 outside ``h``, (n,).
-
-    Parameters
-    ----------
-    elements : sequence of Element
-    value : array, shape (n,)
-        Measured or predicted.
-    """
+    """Mean direct coefficient of every element's point and part (k or omega c); 1 outside ``h``, (n,)."""
     sums: dict[tuple[object, ...], list[float]] = {}
     for e, v in zip(elements, value, strict=True):
         if e.family == "h" and e.observable[1] == e.observable[2]:
@@ -130,14 +82,7 @@ def direct_scale(elements: Sequence[Element], value: FloatArray) -> FloatArray:
 
 
 def coordinate(elements: Sequence[Element], name: str) -> FloatArray:
-    """A coordinate of every element, spread over -1 .. 1; 0 where it has none or all are alike, (n,).
-
-    Parameters
-    ----------
-    elements : sequence of Element
-    name : str
-        Coordinate of the operating point.
-    """
+    """A coordinate of every element, spread over -1 .. 1; 0 where it has none or all are alike, (n,)."""
     values = np.array([e.place(name) for e in elements])
     known = values[np.isfinite(values)]
     if len(known) == 0 or np.ptp(known) <= 1e-12 * max(abs(known).max(), 1e-300):

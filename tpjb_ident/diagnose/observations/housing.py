@@ -30,14 +30,7 @@ STIFF = 1e13
 
 
 def with_housing(setup: Setup, campaign: Campaign) -> Setup:
-    """Tell a model the rig's housing mass and cell stiffness; what the campaign does not show stays as assumed.
-
-    Parameters
-    ----------
-    setup : Setup
-    campaign : Campaign
-        The campaign that is diagnosed.
-    """
+    """Tell a model the rig's housing mass and cell stiffness; what the campaign does not show stays as assumed."""
     instruments = setup.instruments
     if math.isfinite(campaign.housing_mass):
         instruments = replace(instruments, housing_mass=campaign.housing_mass)
@@ -51,16 +44,6 @@ def cell_stiffness(campaign: Campaign) -> tuple[float, float] | None:
     """Estimate the stiffness between housing and frame in X and Y [N/m].
 
     Accelerations are regressed on cell forces, -a / omega^2 = F / K, run by run; the median over runs counts.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        The campaign that is diagnosed.
-
-    Returns
-    -------
-    tuple of float or None
-        None without accelerometers or usable runs.
     """
     runs = sorted(campaign.of_kind("dynamic"), key=lambda run: -run.point.excitation)[:RUNS]
     if not any(c.quantity == "acceleration" for c in campaign.channels.values()):

@@ -7,17 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class DynamicTest:
-    """Dynamic tests at one static operating point.
-
-    Attributes
-    ----------
-    load, direction, speed : float
-        [N], [rad], [rad/s]
-    excitation : tuple of float
-        [rad/s]
-    pads : tuple of int
-        Pads with a temperature.
-    """
+    """Dynamic tests at one static operating point."""
 
     load: float
     direction: float
@@ -45,18 +35,7 @@ class DryTest:
 
 @dataclass(frozen=True)
 class Layout:
-    """All tests of a campaign, in the order of the observation vector.
-
-    Attributes
-    ----------
-    dynamic : tuple of DynamicTest
-    locus : tuple of LocusTest
-    dry : tuple of DryTest
-    push_load : float or None
-        Of the clearance sweep [N]; None without one.
-    temperature_position : tuple of float
-        Fraction of the arc at which every pad carries its sensor; pads beyond the tuple have theirs at 0.75.
-    """
+    """All tests of a campaign, in the order of the observation vector."""
 
     dynamic: tuple[DynamicTest, ...]
     locus: tuple[LocusTest, ...] = ()

@@ -19,19 +19,7 @@ HARMONICS = 3
 
 
 def moved_by_miss(locus: Locus, identification: Identification) -> list[FloatArray]:
-    """Change of every position with the load's size and direction.
-
-    Parameters
-    ----------
-    locus : Locus
-    identification : Identification
-        Gives the stiffness against more load.
-
-    Returns
-    -------
-    list of (2, 2) ndarray
-        d(x, y) / d(ln W, direction) [m], in the order of the locus.
-    """
+    """Change of every position with the load's size and direction."""
     out = []
     for p in locus.points:
         along = np.array([math.cos(p.point.static_load_direction), math.sin(p.point.static_load_direction)])

@@ -39,18 +39,7 @@ UNSEEN_DIFFERENCE = 0.005
 
 @dataclass(frozen=True)
 class Element:
-    """What one number of the observation vector is.
-
-    Attributes
-    ----------
-    family : str
-    observable : str
-        ``"kxx"``, ``"cyy"`` (that is omega c), ``"locus_x"``, ``"clearance"``, ..
-    block : str
-        Operating-point block it belongs to; blocks are held out whole.
-    where : tuple of (str, float)
-        Operating point, SI.
-    """
+    """What one number of the observation vector is."""
 
     family: str
     observable: str
@@ -58,32 +47,13 @@ class Element:
     where: tuple[tuple[str, float], ...]
 
     def place(self, name: str) -> float:
-        """Coordinate of the operating point; NaN where it has none.
-
-        Parameters
-        ----------
-        name : str
-            ``load``, ``direction``, ``speed``, ``excitation``, ..
-        """
+        """Coordinate of the operating point; NaN where it has none."""
         return dict(self.where).get(name, math.nan)
 
 
 @dataclass(frozen=True)
 class Observations:
-    """A campaign as one vector.
-
-    Attributes
-    ----------
-    layout : Layout
-        What was measured where: what a model must predict.
-    value : (n,) ndarray
-        SI; dry compliances as logarithms, loads as ratios to the set point.
-    covariance : (n, n) ndarray
-        Random part, from identification.
-    sigma : (n,) ndarray
-        Stated model tolerance of every element.
-    elements : tuple of Element
-    """
+    """A campaign as one vector."""
 
     layout: Layout
     value: FloatArray
@@ -136,17 +106,7 @@ def observe(
     polygon: ClearancePolygon | None = None,
     tolerance: Tolerance | None = None,
 ) -> Observations:
-    """Gather a campaign's results into one vector.
-
-    Parameters
-    ----------
-    identification : Identification
-    curves : sequence of PivotCurve
-    locus : Locus, optional
-    polygon : ClearancePolygon, optional
-    tolerance : Tolerance, optional
-        What the model is trusted to.
-    """
+    """Gather a campaign's results into one vector."""
     tolerance = tolerance or Tolerance()
     builder = _Builder()
     dynamic = _add_dynamic(builder, identification, locus, tolerance)

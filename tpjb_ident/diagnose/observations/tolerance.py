@@ -10,25 +10,6 @@ class Tolerance:
     """Stated model tolerances of `outputs.md`, one standard deviation: the sigma in which the gap is told.
 
     How much of it a campaign really needs is learnt (`search.assessment`); what is needed beyond it is a remainder.
-
-    Attributes
-    ----------
-    stiffness : float
-        Share of a point's mean direct coefficient, for k and omega c.
-    position : float
-        [m]
-    temperature : float
-        [K]
-    dry : float
-        Of a dry compliance, relative.
-    angle : float
-        Of a polygon side [rad].
-    load : float
-        Of the cells' mean reading against the set point, relative and [rad].
-    idle_temperature : float
-        Of the film on a pad that hardly carries [K]: two attitudes fit it, and programs choose differently.
-    load_miss, direction_miss : float
-        Scatter of the actual static load about its set point, relative and [rad].
     """
 
     stiffness: float = 0.015

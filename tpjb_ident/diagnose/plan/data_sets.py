@@ -33,17 +33,7 @@ FASTER = 1.5
 
 @dataclass(frozen=True)
 class DataSet:
-    """What one part of a campaign could tell.
-
-    Attributes
-    ----------
-    name : str
-        ``"A"`` to ``"E"``.
-    numbers : int
-        Length of its observation vector.
-    known, free : CampaignPlan
-        With calibration errors known, and free within their certificates.
-    """
+    """What one part of a campaign could tell."""
 
     name: str
     numbers: int
@@ -63,19 +53,7 @@ class DataSet:
 
 
 def data_sets(setup: Setup, layout: Layout) -> tuple[DataSet, ...]:
-    """Work out what every data set sees at typical sizes and mixes up at d' = 6, nuisances known and free.
-
-    Parameters
-    ----------
-    setup : Setup
-    layout : Layout
-        Everything that is planned.
-
-    Raises
-    ------
-    NoEquilibriumError
-        The baseline has none at some point of the layout, or at the second speed.
-    """
+    """Work out what every data set sees at typical sizes and mixes up at d' = 6, nuisances known and free."""
     faster = tuple(replace(t, speed=FASTER * t.speed) for t in layout.dynamic)
     chosen = one_amplitude(setup.bearing)
     seen = signatures(setup, replace(layout, dynamic=(*layout.dynamic, *faster)), chosen)
@@ -96,14 +74,7 @@ def _told(seen: Signatures, mine: BoolArray, chosen: Sequence[Candidate], free: 
 
 
 def masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArray]:
-    """Elements of every data set.
-
-    Parameters
-    ----------
-    elements : sequence of Element
-    planned : set of float
-        Shaft speeds of data sets A to D [rad/s].
-    """
+    """Elements of every data set."""
     families = np.array([e.family for e in elements])
     first = np.array([not np.isfinite(e.place("speed")) or e.place("speed") in planned for e in elements])
     line = np.array([e.place("excitation") for e in elements])

@@ -34,16 +34,7 @@ CONFUSABLE = 3.0
 
 @dataclass(frozen=True)
 class CampaignPlan:
-    """What a layout can tell.
-
-    Attributes
-    ----------
-    candidates : tuple of Candidate
-    detectable : (k,) ndarray
-        Whitened size of every candidate's typical step.
-    separation : (k, k) ndarray
-        d_AB at d' = 6 of A; NaN on the diagonal and where A has no effect at all.
-    """
+    """What a layout can tell."""
 
     candidates: tuple[Candidate, ...]
     detectable: FloatArray = field(repr=False)
@@ -120,22 +111,7 @@ class CampaignPlan:
 def plan(
     setup: Setup, layout: Layout, known: Tolerances | None = None, pool: Sequence[Candidate] | None = None
 ) -> CampaignPlan:
-    """Work out what a layout of tests could tell.
-
-    Parameters
-    ----------
-    setup : Setup
-    layout : Layout
-    known : Tolerances, optional
-        Stated tolerances; by default those of a good workshop.
-    pool : sequence of Candidate, optional
-        Effects that are asked about; by default all with one amplitude.
-
-    Raises
-    ------
-    NoEquilibriumError
-        The baseline has none at some point of the layout.
-    """
+    """Work out what a layout of tests could tell."""
     chosen = tuple(pool if pool is not None else one_amplitude(setup.bearing))
     seen = signatures(setup, layout, chosen, known)
     return separated(chosen, np.asarray(np.linalg.solve(seen.factor(), seen.columns)))
@@ -143,52 +119,21 @@ def plan(
 
 @dataclass(frozen=True)
 class Signatures:
-    """What every candidate does to the observation vector of a layout, beside what hides it.
-
-    Attributes
-    ----------
-    observations : Observations
-        Planned.
-    nuisances : (n, m) ndarray
-        Columns per standard deviation.
-    columns : (n, k) ndarray
-        Change by a typical size of every candidate.
-    """
+    """What every candidate does to the observation vector of a layout, beside what hides it."""
 
     observations: Observations
     nuisances: FloatArray = field(repr=False)
     columns: FloatArray = field(repr=False)
 
     def factor(self, free: bool = True) -> FloatArray:
-        """Cholesky factor of the covariance, with or without nuisances.
-
-        Parameters
-        ----------
-        free : bool
-            Whether nuisances are free within their tolerances.
-        """
+        """Cholesky factor of the covariance, with or without nuisances."""
         return usual_factor(self.observations, self.nuisances if free else self.nuisances[:, :0])
 
 
 def signatures(
     setup: Setup, layout: Layout, chosen: Sequence[Candidate], known: Tolerances | None = None
 ) -> Signatures:
-    """Work out the signature of every candidate on a layout.
-
-    Parameters
-    ----------
-    setup : Setup
-    layout : Layout
-    chosen : sequence of Candidate
-        Effects that are asked about.
-    known : Tolerances, optional
-        Stated tolerances.
-
-    Raises
-    ------
-    NoEquilibriumError
-        The baseline has none at some point of the layout.
-    """
+    """Work out the signature of every candidate on a layout."""
     observations = planned_observations(setup, layout)
     forward = Forward(setup, layout, observations.elements)
     base = forward()
@@ -213,15 +158,7 @@ def _signature(forward: Forward, base: FloatArray, candidate: Candidate) -> Floa
 
 
 def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:
-    """Sizes and separations of whitened signatures (n, k).
-
-    Parameters
-    ----------
-    chosen : sequence of Candidate
-        Effects that are asked about.
-    white : array, shape (n, k)
-        Their signatures, whitened.
-    """
+    """Sizes and separations of whitened signatures (n, k)."""
     size = np.linalg.norm(white, axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):  # a signature of nothing has no direction: NaN
         unit = white / size

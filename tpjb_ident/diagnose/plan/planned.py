@@ -20,18 +20,7 @@ STIFFNESS, POSITION, TEMPERATURE, DRY, ANGLE = 0.001, 0.1e-6, 0.05, 0.008, 3e-4
 
 
 def planned_observations(setup: Setup, layout: Layout) -> Observations:
-    """What the baseline predicts for a layout, with the covariance one may expect.
-
-    Parameters
-    ----------
-    setup : Setup
-    layout : Layout
-
-    Raises
-    ------
-    NoEquilibriumError
-        The baseline has none at some point of the layout.
-    """
+    """What the baseline predicts for a layout, with the covariance one may expect."""
     tolerance = Tolerance()
     elements = _elements(layout, [pad.pivot_angle for pad in setup.bearing.pads])
     value = Forward(setup, layout, elements)()
@@ -81,48 +70,16 @@ def _elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:
 def dynamic(
     loads: Sequence[float], lines: Sequence[float], speed: float, direction: float, pads: int
 ) -> tuple[DynamicTest, ...]:
-    """Dynamic tests at several loads, all lines at each; `pads` with a temperature sensor (0: none).
-
-    Parameters
-    ----------
-    loads : sequence of float
-        Static loads [N].
-    lines : sequence of float
-        Excitation frequencies [rad/s].
-    speed : float
-        Shaft speed [rad/s].
-    direction : float
-        Of the static load [rad].
-    pads : int
-        Pads 1 to this one have a thermometer.
-    """
+    """Dynamic tests at several loads, all lines at each; `pads` with a temperature sensor (0: none)."""
     sensors = tuple(range(1, pads + 1))
     return tuple(DynamicTest(float(w), direction, speed, tuple(map(float, lines)), sensors) for w in loads)
 
 
 def around(load: float, count: int, speed: float) -> tuple[LocusTest, ...]:
-    """Return a locus of evenly spread load directions.
-
-    Parameters
-    ----------
-    load : float
-        Static load [N].
-    count : int
-        Number of directions.
-    speed : float
-        Shaft speed [rad/s].
-    """
+    """Return a locus of evenly spread load directions."""
     return tuple(LocusTest(load, -math.pi / 2 + 2 * math.pi * k / count, speed) for k in range(count))
 
 
 def dry(pads: Sequence[int], loads: Sequence[float] = (1000.0, 2750.0, 4700.0)) -> tuple[DryTest, ...]:
-    """Dry tests on pads.
-
-    Parameters
-    ----------
-    pads : sequence of int
-        Pad numbers.
-    loads : sequence of float
-        Static loads [N].
-    """
+    """Dry tests on pads."""
     return tuple(DryTest(pad, tuple(loads)) for pad in pads)

@@ -36,15 +36,7 @@ FOUND = 0.05
 
 @dataclass(frozen=True)
 class Basis:
-    """What every assessment of a campaign shares; all in units of `total_sigma`.
-
-    Attributes
-    ----------
-    noise : (n, n) ndarray
-        Covariance of identification.
-    components : tuple of Component
-    folds : tuple of Fold
-    """
+    """What every assessment of a campaign shares; all in units of `total_sigma`."""
 
     noise: FloatArray = field(repr=False)
     components: tuple[Component, ...] = field(repr=False)
@@ -61,13 +53,7 @@ class Basis:
         return Basis(self.noise + np.eye(len(self.noise)), self.components, self.folds)
 
     def covariance(self, scales: FloatArray) -> FloatArray:
-        """Noise and model error at scales t_k, (n, n).
-
-        Parameters
-        ----------
-        scales : array, shape (c,)
-            Variance scale of every component.
-        """
+        """Noise and model error at scales t_k, (n, n)."""
         own = np.array(scales, float)
         for one, scale in zip(self.components, scales, strict=True):
             own[list(one.made_of)] += scale
@@ -91,17 +77,7 @@ class Basis:
 
 @dataclass(frozen=True)
 class Linear:
-    """A model, linear about where it was fitted; all in units of `total_sigma`.
-
-    Attributes
-    ----------
-    residual : (n,) ndarray
-        y - f + J (a0 - a00) + N n0: what amplitudes and nuisances, counted from their priors' means, must explain.
-    columns : (n, k) ndarray
-        J and N side by side.
-    width : (k,) ndarray
-        Standard deviations of their priors.
-    """
+    """A model, linear about where it was fitted; all in units of `total_sigma`."""
 
     residual: FloatArray = field(repr=False)
     columns: FloatArray = field(repr=False)
@@ -114,30 +90,14 @@ class Linear:
         return np.asarray(scaled @ scaled.T)
 
     def without(self, gone: Sequence[int]) -> Linear:
-        """Return the same without some columns.
-
-        Parameters
-        ----------
-        gone : sequence of int
-            Columns to be left out.
-        """
+        """Return the same without some columns."""
         kept = np.setdiff1d(np.arange(self.columns.shape[1]), np.asarray(gone, int))
         return Linear(self.residual, self.columns[:, kept], self.width[kept])
 
 
 @dataclass(frozen=True)
 class Assessment:
-    """What a model is worth.
-
-    Attributes
-    ----------
-    scales : (c,) ndarray
-        t_k.
-    evidence : float
-        log p(y) at these scales, their prior included [nats].
-    inverse : (n, n) ndarray
-        Of the whole covariance.
-    """
+    """What a model is worth."""
 
     scales: FloatArray
     evidence: float
@@ -169,13 +129,7 @@ class Assessment:
         return 0.5 * (log_det - float(error @ weighted[rows]) - len(rows) * math.log(2 * math.pi))
 
     def unseen(self, fold: Fold) -> FloatArray:
-        """Free numbers as all elements but a fold's tell them, (k,).
-
-        Parameters
-        ----------
-        fold : Fold
-            Elements that are held out together.
-        """
+        """Free numbers as all elements but a fold's tell them, (k,)."""
         weighted = self.inverse @ self.linear.residual
         rows = fold.members
         error = np.linalg.solve(self.inverse[np.ix_(rows, rows)], weighted[rows])
@@ -186,17 +140,7 @@ class Assessment:
 
 
 def assess(basis: Basis, linear: Linear, start: FloatArray | None = None, fixed: bool = False) -> Assessment:
-    """Assess a model; scales by Fisher scoring on their logarithms, damped where a step does not help.
-
-    Parameters
-    ----------
-    basis : Basis
-    linear : Linear
-    start : (c,) ndarray, optional
-        Scales to begin with.
-    fixed : bool
-        Leave the scales as they are.
-    """
+    """Assess a model; scales by Fisher scoring on their logarithms, damped where a step does not help."""
     logs = np.log(start) if start is not None else np.full(len(basis.components), math.log(0.1))
     # scatter beyond what is stated is rare
     if start is None:

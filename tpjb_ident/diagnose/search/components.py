@@ -30,23 +30,7 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Component:
-    """One way to be wrong.
-
-    Attributes
-    ----------
-    name : str
-        Kind of observable; ``"scatter"`` for measurements that scatter more than stated; ``"beyond"`` for a model that
-        is wrong everywhere by more than stated.
-    rows : (m,) ndarray of int
-    matrix : (m, m) ndarray
-        Covariance at the stated tolerance, in units of `total_sigma` of the elements.
-    lowest, highest : float
-        Of the log scale. No campaign shows a model to be better than a tenth of what is stated: programs that solve
-        the same equations differ by that much (`docs/diagnosis.md`). And no kind of observable by itself may be off by
-        more than is stated: the few numbers of a polygon would be discounted where they disagree.
-    made_of : tuple of int
-        Numbers of other components of which it is the sum.
-    """
+    """One way to be wrong."""
 
     name: str
     rows: IntArray = field(repr=False)
@@ -57,12 +41,7 @@ class Component:
 
 
 def components(observations: Observations) -> tuple[Component, ...]:
-    """Components of an observation vector, scaled by its `total_sigma`.
-
-    Parameters
-    ----------
-    observations : Observations
-    """
+    """Components of an observation vector, scaled by its `total_sigma`."""
     scale = observations.total_sigma
     everything = np.arange(len(observations))
     out = [Component("scatter", everything, observations.covariance / np.outer(scale, scale), NOTHING)]
@@ -100,14 +79,7 @@ USUAL = 0.2
 
 
 def usual_factor(observations: Observations, columns: FloatArray) -> FloatArray:
-    """Cholesky factor of the covariance to expect: identification, model error and nuisances, (n, n).
-
-    Parameters
-    ----------
-    observations : Observations
-    columns : (n, m) ndarray
-        Nuisances, per standard deviation.
-    """
+    """Cholesky factor of the covariance to expect: identification, model error and nuisances, (n, n)."""
     scale = observations.total_sigma
     share = observations.sigma / scale
     total = (observations.covariance + columns @ columns.T) / np.outer(scale, scale)

@@ -22,44 +22,22 @@ class Course:
     Pieces that rise where their ends rise (Fritsch & Carlson, SIAM J. Numer. Anal. 17 (1980) 238): a pad that comes out
     of contact lets K and C jump, at another amplitude for every load, and one polynomial through all of it is wrong
     everywhere.
-
-    Attributes
-    ----------
-    at : (m,) ndarray
-        Amplitudes, counted from the neutral one, which is among them; rising.
-    columns : (n, 2 m) ndarray
-        Changes of the prediction there, then its derivatives.
     """
 
     at: FloatArray
     columns: FloatArray
 
     def weights(self, amplitudes: FloatArray) -> FloatArray:
-        """Weights of the columns in the change at some amplitudes, (k, 2 m); straight lines beyond the ends.
-
-        Parameters
-        ----------
-        amplitudes : (k,) ndarray
-        """
+        """Weights of the columns in the change at some amplitudes, (k, 2 m); straight lines beyond the ends."""
         inside = self._inside(amplitudes)
         return self._pieces(inside, _VALUE) + (amplitudes - inside)[:, None] * self.slope_weights(inside)
 
     def slope_weights(self, amplitudes: FloatArray) -> FloatArray:
-        """Weights of the columns in the derivative at some amplitudes, (k, 2 m).
-
-        Parameters
-        ----------
-        amplitudes : (k,) ndarray
-        """
+        """Weights of the columns in the derivative at some amplitudes, (k, 2 m)."""
         return self._pieces(self._inside(amplitudes), _SLOPE)
 
     def slope(self, amplitude: float) -> FloatArray:
-        """Derivative at an amplitude, (n,).
-
-        Parameters
-        ----------
-        amplitude : float
-        """
+        """Derivative at an amplitude, (n,)."""
         return np.asarray(self.columns @ self.slope_weights(np.array([amplitude]))[0])
 
     @property
@@ -100,15 +78,7 @@ _SLOPE = np.array([[0.0, 0, 1, 0], [-6, 6, -4, -2], [6, -6, 3, 3], [0, 0, 0, 0]]
 
 
 def course_through(amplitudes: Sequence[float], changes: Sequence[FloatArray]) -> Course:
-    """Lay a course through what the model said.
-
-    Parameters
-    ----------
-    amplitudes : sequence of float
-        Counted from the neutral one, which is not among them; two or more.
-    changes : sequence of (n,) ndarray
-        Of the prediction.
-    """
+    """Lay a course through what the model said."""
     order = np.argsort([0.0, *amplitudes])
     at = np.array([0.0, *amplitudes])[order]
     values = np.array([np.zeros_like(changes[0]), *changes])[order]

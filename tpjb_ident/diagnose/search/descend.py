@@ -31,14 +31,7 @@ class Place:
     prediction: FloatArray
 
     def cost(self, problem: Problem, weight: FloatArray) -> float:
-        """Squared misfit under noise and model error, plus that of all priors.
-
-        Parameters
-        ----------
-        problem : Problem
-        weight : (n, n) ndarray
-            Inverse of the covariance of noise and model error, in units of `Problem.sigma`.
-        """
+        """Squared misfit under noise and model error, plus that of all priors."""
         z = problem.scaled(problem.observations.value - self.prediction)
         return float(z @ weight @ z + np.sum((self.start.free / self.start.width) ** 2))
 
@@ -53,17 +46,6 @@ def fit(forward: ForwardModel, problem: Problem, start: Start) -> Fit | None:
     residual tells.
 
     Derivatives are corrected along every step (Broyden, Math. Comp. 19 (1965) 577): a step costs one run of the model.
-
-    Parameters
-    ----------
-    forward : ForwardModel
-    problem : Problem
-    start : Start
-
-    Returns
-    -------
-    Fit or None
-        None where the model has no equilibrium near the start.
     """
     y = attempt(forward, problem, start)
     if y is None:
@@ -82,31 +64,14 @@ def fit(forward: ForwardModel, problem: Problem, start: Start) -> Fit | None:
 
 @dataclass(frozen=True)
 class Weighing:
-    """What a step is judged by.
-
-    Attributes
-    ----------
-    basis : Basis
-    scales : (c,) ndarray
-        Of the model's error.
-    slack : float
-        Share of their tolerances that nuisances have.
-    """
+    """What a step is judged by."""
 
     basis: Basis
     scales: FloatArray
     slack: float = 1.0
 
     def assess(self, problem: Problem, start: Start, y: FloatArray) -> Assessment:
-        """What a place is worth.
-
-        Parameters
-        ----------
-        problem : Problem
-        start : Start
-        y : (n,) ndarray
-            What the model predicts there.
-        """
+        """What a place is worth."""
         return assess(self.basis, linear(problem, start, y, self.slack), self.scales, fixed=True)
 
 
@@ -163,15 +128,7 @@ def _corrected(start: Start, change: FloatArray, step: FloatArray) -> FloatArray
 
 
 def attempt(forward: ForwardModel, problem: Problem, start: Start) -> FloatArray | None:
-    """Predict; None where the model has no equilibrium.
-
-    Parameters
-    ----------
-    forward : ForwardModel
-    problem : Problem
-    start : Start
-        Where all free numbers stand.
-    """
+    """Predict; None where the model has no equilibrium."""
     try:
         return predict(forward, build(start.candidates, start.amplitudes), problem.nuisances, start.nuisance)
     except NoEquilibriumError:
@@ -179,25 +136,7 @@ def attempt(forward: ForwardModel, problem: Problem, start: Start) -> FloatArray
 
 
 def slope(forward: ForwardModel, problem: Problem, start: Start, y: FloatArray, index: int, share: float) -> FloatArray:
-    """Change of the prediction per unit of one amplitude, by a one-sided difference that stays inside the bounds.
-
-    Parameters
-    ----------
-    forward : ForwardModel
-    problem : Problem
-    start : Start
-    y : (n,) ndarray
-        The prediction there.
-    index : int
-        Of the amplitude.
-    share : float
-        Step, in typical sizes.
-
-    Returns
-    -------
-    (n,) ndarray
-        Zero where the model has no equilibrium on either side.
-    """
+    """Change of the prediction per unit of one amplitude, by a one-sided difference that stays inside the bounds."""
     flat = np.concatenate(start.amplitudes)
     size = share * np.concatenate([c.steps for c in start.candidates])[index]
     for signed in (size, -size, 0.1 * size, -0.1 * size):

@@ -16,33 +16,13 @@ from tpjb_ident.diagnose.search.problem import Problem
 
 
 def build(candidates: Sequence[Candidate], amplitudes: Sequence[FloatArray]) -> tuple[Effect, ...]:
-    """Effects of candidates at amplitudes.
-
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-    amplitudes : sequence of (k_i,) ndarray
-        In the nearly linear forms.
-    """
+    """Effects of candidates at amplitudes."""
     return tuple(c.effect(a) for c, a in zip(candidates, amplitudes, strict=True))
 
 
 @dataclass(frozen=True)
 class Start:
-    """Where a model stands: where a fit begins, or a step leads.
-
-    Attributes
-    ----------
-    candidates : tuple of Candidate
-    amplitudes : tuple of (k_i,) ndarray
-        In the nearly linear forms.
-    jacobian : (n, k) ndarray
-        Per unit of every amplitude, as known from nearby; steps correct it.
-    nuisance : (m,) ndarray
-        Where nuisances stand while amplitudes move, in standard deviations.
-    columns : (n, m) ndarray
-        Per standard deviation of every nuisance.
-    """
+    """Where a model stands: where a fit begins, or a step leads."""
 
     candidates: tuple[Candidate, ...]
     amplitudes: tuple[FloatArray, ...]
@@ -62,13 +42,7 @@ class Start:
         return np.concatenate([*(c.width for c in self.candidates), np.ones(len(self.nuisance))])
 
     def split(self, flat: FloatArray) -> tuple[FloatArray, ...]:
-        """Amplitudes by candidate, inside their bounds.
-
-        Parameters
-        ----------
-        flat : (k,) ndarray
-            All of them, one after the other.
-        """
+        """Amplitudes by candidate, inside their bounds."""
         out, at = [], 0
         for c in self.candidates:
             low, high = c.limits
@@ -79,16 +53,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Fit(Start):
-    """Effects fitted together, nuisances beside them.
-
-    Attributes
-    ----------
-    prediction : (n,) ndarray
-        Where the model stands, readings included.
-    assessment : Assessment
-    settled : bool
-        Whether the derivatives were taken here, and propose no step.
-    """
+    """Effects fitted together, nuisances beside them."""
 
     prediction: FloatArray = field(repr=False)
     assessment: Assessment = field(repr=False)
@@ -143,30 +108,13 @@ class Fit(Start):
         return False
 
     def at(self, free: FloatArray) -> FloatArray:
-        """Prediction at other free numbers, to first order, (n,).
-
-        Parameters
-        ----------
-        free : (k + m,) ndarray
-            Amplitudes and nuisances, counted from their priors' means.
-        """
+        """Prediction at other free numbers, to first order, (n,)."""
         columns = np.column_stack([self.jacobian, self.columns])
         return self.prediction + columns @ (free - self.free)
 
 
 def linear(problem: Problem, start: Start, prediction: FloatArray, slack: float = 1.0) -> Linear:
-    """Linear model about a prediction.
-
-    Parameters
-    ----------
-    problem : Problem
-    start : Start
-        Where it stands, with derivatives.
-    prediction : (n,) ndarray
-        There.
-    slack : float
-        Share of their tolerances that nuisances have.
-    """
+    """Linear model about a prediction."""
     columns = problem.scaled(np.column_stack([start.jacobian, start.columns]))
     width = start.width.copy()
     width[start.jacobian.shape[1] :] *= slack
@@ -175,17 +123,6 @@ def linear(problem: Problem, start: Start, prediction: FloatArray, slack: float 
 
 
 def fitted(problem: Problem, start: Start, prediction: FloatArray, scales: FloatArray | None = None) -> Fit:
-    """A fit where a model stands, assessed.
-
-    Parameters
-    ----------
-    problem : Problem
-    start : Start
-        Where it stands, with derivatives.
-    prediction : (n,) ndarray
-        There.
-    scales : (c,) ndarray, optional
-        Of the model's error, to begin with.
-    """
+    """A fit where a model stands, assessed."""
     found = assess(problem.basis, linear(problem, start, prediction), scales)
     return Fit(start.candidates, start.amplitudes, start.jacobian, start.nuisance, start.columns, prediction, found)

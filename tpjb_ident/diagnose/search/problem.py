@@ -22,19 +22,7 @@ HARDLY = 0.10
 
 @dataclass(frozen=True)
 class Problem:
-    """A campaign beside a baseline.
-
-    Attributes
-    ----------
-    observations : Observations
-    base : (n,) ndarray
-        Prediction of the baseline.
-    nuisances : tuple of Nuisance
-    columns : (n, m) ndarray
-        What they do at the baseline, per standard deviation.
-    pool : tuple of Candidate
-        What may be added.
-    """
+    """A campaign beside a baseline."""
 
     observations: Observations
     base: FloatArray = field(repr=False)
@@ -64,36 +52,17 @@ class Problem:
         return held_out(self.observations)
 
     def scaled(self, vector: FloatArray) -> FloatArray:
-        """A vector (n,) or columns (n, k) in units of `sigma`.
-
-        Parameters
-        ----------
-        vector : array, shape (n,) or (n, k)
-            In the units of the observations.
-        """
+        """A vector (n,) or columns (n, k) in units of `sigma`."""
         return np.asarray(vector / (self.sigma if vector.ndim == 1 else self.sigma[:, None]))
 
     def twins(self, candidate: Candidate) -> list[int]:
-        """Nuisances that do what a candidate does.
-
-        Parameters
-        ----------
-        candidate : Candidate
-        """
+        """Nuisances that do what a candidate does."""
         names = {candidate.name, candidate.label}
         return [i for i, one in enumerate(self.nuisances) if names & one.twins]
 
 
 def loosened(observations: Observations, shares: FloatArray, tolerance: Tolerance) -> Observations:
-    """Trust no temperature of a pad that hardly carries in the baseline.
-
-    Parameters
-    ----------
-    observations : Observations
-    shares : (n,) ndarray
-        Share of the static load on the pad of every temperature element; NaN elsewhere.
-    tolerance : Tolerance
-    """
+    """Trust no temperature of a pad that hardly carries in the baseline."""
     idle = np.nan_to_num(shares, nan=1.0) < HARDLY
     noise = np.where(idle, tolerance.idle_temperature, 0.0)
     return replace(observations, covariance=observations.covariance + np.diag(noise**2))

@@ -40,19 +40,7 @@ FAR = 2
 
 @dataclass(frozen=True)
 class Proposals:
-    """Makes fits of models with candidates more.
-
-    Attributes
-    ----------
-    run : Map
-    problem : Problem
-    settings : DiagnoseSettings
-    drawn : Fit
-        The model as drawn, everything that may be off to first order.
-    first : dict of Candidate to (n, k) ndarray
-        Derivatives of every candidate there.
-    courses : dict of Candidate to Course
-    """
+    """Makes fits of models with candidates more."""
 
     run: Map
     problem: Problem
@@ -62,14 +50,7 @@ class Proposals:
     courses: Courses = field(repr=False)
 
     def extended(self, model: Fit, table: Columns) -> list[Fit]:
-        """Fits of a model with one candidate more, best first.
-
-        Parameters
-        ----------
-        model : Fit
-        table : mapping of Candidate to (n, k) ndarray
-            Derivatives of candidates.
-        """
+        """Fits of a model with one candidate more, best first."""
         free = self._free(model, table)
         ranked = self._promising(scores(self.problem, model, free, courses=self.courses))
         known = {s.candidates for s in ranked}
@@ -78,15 +59,7 @@ class Proposals:
         return self.fits(starts)
 
     def afresh(self, drawn: Fit, table: Columns) -> list[Fit]:
-        """Fits of one candidate more where everything else is as drawn; those too that close most by themselves.
-
-        Parameters
-        ----------
-        drawn : Fit
-            The drawing, or effects with everything else as drawn.
-        table : mapping of Candidate to (n, k) ndarray
-            Derivatives of candidates.
-        """
+        """Fits of one candidate more where everything else is as drawn; those too that close most by themselves."""
         free = self._free(drawn, table)
         every = scores(self.problem, drawn, free, courses=self.courses)
         ranked = self._promising(every)
@@ -112,13 +85,7 @@ class Proposals:
         return [s for s in chosen if s.gain > 0.0]
 
     def pairs(self, singles: Sequence[Fit]) -> list[Fit]:
-        """Fits of two candidates at once from the baseline: what a compromise between two would hide.
-
-        Parameters
-        ----------
-        singles : sequence of Fit
-            Of one candidate each.
-        """
+        """Fits of two candidates at once from the baseline: what a compromise between two would hide."""
         table = dict(self.first)
         for f in singles:  # the secant of a fit tells more than the derivative at the baseline
             (c,), (a,) = f.candidates, f.amplitudes
@@ -129,22 +96,12 @@ class Proposals:
         return self.fits([with_model(self.drawn, s, table) for s in ranked])
 
     def fits(self, starts: Sequence[Start]) -> list[Fit]:
-        """Fits from their starts, best first.
-
-        Parameters
-        ----------
-        starts : sequence of Start
-        """
+        """Fits from their starts, best first."""
         found = self.run(fit, [(start,) for start in starts])
         return sorted((f for f in found if f is not None), key=lambda f: -f.evidence)
 
     def refined(self, model: Fit) -> Fit:
-        """The same model with directions off their grid and derivatives of its own.
-
-        Parameters
-        ----------
-        model : Fit
-        """
+        """The same model with directions off their grid and derivatives of its own."""
         swapped = tuple(c.refined() for c in model.candidates)
         if swapped != model.candidates:
             parts, amplitudes = [], []
@@ -157,12 +114,7 @@ class Proposals:
         return settle(self.run, self.problem, model, ROUNDS_ON_THE_WAY)
 
     def renewed(self, model: Fit) -> dict[Candidate, FloatArray]:
-        """Derivatives at a model: new ones for the candidates that rank best by those of the baseline.
-
-        Parameters
-        ----------
-        model : Fit
-        """
+        """Derivatives at a model: new ones for the candidates that rank best by those of the baseline."""
         labels = {c.label for c in model.candidates}
         table = {c: v for c, v in self.first.items() if c.label not in labels}
         best = [
@@ -171,25 +123,13 @@ class Proposals:
         return table | columns(self.run, model, best)
 
     def as_drawn(self, model: Fit) -> Fit:
-        """The effects of a model, everything else as drawn.
-
-        Parameters
-        ----------
-        model : Fit
-        """
+        """The effects of a model, everything else as drawn."""
         start = replace(model.start, nuisance=np.zeros_like(model.nuisance))
         (y,) = self.run(attempt, [(start,)])
         return model if y is None else fitted(self.problem, start, y)
 
     def far(self, near: Sequence[Fit], afresh: Sequence[Fit]) -> list[Fit]:
-        """Fits afresh that close most of the gap, settled, where they come to be likelier than what leads.
-
-        Parameters
-        ----------
-        near : sequence of Fit
-            What leads.
-        afresh : sequence of Fit
-        """
+        """Fits afresh that close most of the gap, settled, where they come to be likelier than what leads."""
         least = max((f.evidence for f in near), default=-np.inf)
         left = [self.problem.scaled(self.problem.observations.value - f.prediction) for f in afresh]
         order = np.argsort([float(z @ z) for z in left])[:FAR]
@@ -198,12 +138,7 @@ class Proposals:
 
 
 def best_of(fits: Sequence[Fit]) -> list[Fit]:
-    """The better fit of every set of candidates, best first.
-
-    Parameters
-    ----------
-    fits : sequence of Fit
-    """
+    """The better fit of every set of candidates, best first."""
     kept: dict[str, Fit] = {}
     for f in sorted(fits, key=lambda f: -f.evidence):
         kept.setdefault(f.label, f)

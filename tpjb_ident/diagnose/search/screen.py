@@ -26,17 +26,7 @@ SLOW = frozenset({"pad_bending", "pad_conduction"})
 
 @dataclass(frozen=True)
 class Score:
-    """What some candidates could do to a model's residual.
-
-    Attributes
-    ----------
-    candidates : tuple of Candidate
-        One, or two at once.
-    gain : float
-        Rise of the log evidence that they promise.
-    amplitudes : tuple of (k,) ndarray
-        At which they promise it.
-    """
+    """What some candidates could do to a model's residual."""
 
     candidates: tuple[Candidate, ...]
     gain: float
@@ -49,17 +39,7 @@ Courses = Mapping[Candidate, Course]
 
 @dataclass(frozen=True)
 class Survey:
-    """What every candidate does beside a model, for itself.
-
-    Attributes
-    ----------
-    secants : mapping of Candidate to (n, k) ndarray
-        Change of the prediction per unit of every amplitude, over a step of a size that one would expect.
-    slopes : mapping of Candidate to (n, k) ndarray
-        The same at the model itself where the curvature is known.
-    courses : mapping of Candidate to Course
-        Of candidates of one amplitude.
-    """
+    """What every candidate does beside a model, for itself."""
 
     secants: Columns
     slopes: Columns
@@ -71,12 +51,6 @@ def survey(run: Map, model: Fit, pool: Sequence[Candidate]) -> Survey:
 
     A clearance that grows by a third of itself does not do three times what a ninth does: to first order a large
     effect explains little, and others would be fitted in its place.
-
-    Parameters
-    ----------
-    run : Map
-    model : Fit
-    pool : sequence of Candidate
     """
     # the longest ones begin: nobody waits for them at the end
     order = sorted(pool, key=lambda c: c.name not in SLOW)
@@ -121,16 +95,7 @@ def _course(
 
 
 def columns(run: Map, model: Fit, pool: Sequence[Candidate]) -> dict[Candidate, FloatArray]:
-    """Change of the prediction per unit of every amplitude of every candidate, at a model; (n, k) each.
-
-    Parameters
-    ----------
-    run : callable
-        Maps a task over jobs, in this process or in workers.
-    model : Fit
-    pool : sequence of Candidate
-        Candidates that are asked about.
-    """
+    """Change of the prediction per unit of every amplitude of every candidate, at a model; (n, k) each."""
     jobs = [(model.start, model.prediction, c, i) for c in pool for i in range(len(c.steps))]
     found = iter(run(_column, jobs))
     return {c: np.column_stack([next(found) for _ in c.steps]) for c in pool}
@@ -148,16 +113,7 @@ def _column(
 def scores(
     problem: Problem, model: Fit, table: Columns, pairs: bool = False, courses: Courses | None = None
 ) -> list[Score]:  # fmt: skip
-    """Score candidates, or all pairs of them, beside a model; best first.
-
-    Parameters
-    ----------
-    problem : Problem
-    model : Fit
-    table : mapping of Candidate to (n, k) ndarray
-    pairs : bool
-    courses : mapping of Candidate to Course, optional
-    """
+    """Score candidates, or all pairs of them, beside a model; best first."""
     levels = [_Level(problem, model, table, share, courses or {}) for share in SHARES]
     pool = list(table)
     chosen: list[tuple[Candidate, ...]] = [(c,) for c in pool]
@@ -173,13 +129,6 @@ def alone(problem: Problem, model: Fit, table: Columns, courses: Courses) -> lis
     In units of noise and stated tolerance, element by element. What a large effect does is known between the sizes that
     were asked for to some per cent only, and where a pad comes out of contact to less: correlated errors far below that
     would hold it against the effect, and nuisances, linear as they are, would take up what it does.
-
-    Parameters
-    ----------
-    problem : Problem
-    model : Fit
-    table : mapping of Candidate to (n, k) ndarray
-    courses : mapping of Candidate to Course
     """
     gap = problem.scaled(problem.observations.value - model.prediction)
     return sorted((_closing(problem, gap, c, table[c], courses.get(c)) for c in table), key=lambda s: -s.gain)
@@ -263,17 +212,7 @@ class _Level:
 
 
 def with_model(model: Fit, score: Score, table: Columns, courses: Courses | None = None) -> Start:
-    """Start of a fit of a model with what was scored.
-
-    Parameters
-    ----------
-    model : Fit
-    score : Score
-        What was scored beside the model.
-    table : mapping of Candidate to array
-        Derivatives by candidate, (n, k) each.
-    courses : mapping of Candidate to Course, optional
-    """
+    """Start of a fit of a model with what was scored."""
     parts = []
     for c, amplitudes in zip(score.candidates, score.amplitudes, strict=True):
         course = (courses or {}).get(c)
@@ -287,15 +226,6 @@ def instead(problem: Problem, model: Fit, table: Columns, beyond: float) -> list
     """Starts in which an effect takes over from what is off further than its tolerance allows and does the same.
 
     Oil that is three tolerances too thin has the evidence of an effect, and no residual that would ask for it.
-
-    Parameters
-    ----------
-    problem : Problem
-    model : Fit
-    table : mapping of Candidate to (n, k) ndarray
-        Derivatives by candidate.
-    beyond : float
-        In standard deviations.
     """
     size = model.assessment.free[model.jacobian.shape[1] :]
     out = []
@@ -314,28 +244,12 @@ def instead(problem: Problem, model: Fit, table: Columns, beyond: float) -> list
 
 
 def visible(problem: Problem, model: Fit, candidate: Candidate, column: FloatArray) -> float:
-    """Size of a typical step of a candidate beside a model, in standard deviations of everything else.
-
-    Parameters
-    ----------
-    problem : Problem
-    model : Fit
-    candidate : Candidate
-    column : array, shape (n, k)
-        Derivatives of the prediction for the candidate.
-    """
+    """Size of a typical step of a candidate beside a model, in standard deviations of everything else."""
     one = problem.scaled(column) @ candidate.steps
     return math.sqrt(max(float(one @ model.assessment.inverse @ one), 0.0))
 
 
 def without(model: Fit, gone: Sequence[int]) -> Linear:
-    """A model's linear form without some nuisances, by their numbers.
-
-    Parameters
-    ----------
-    model : Fit
-    gone : sequence of int
-        Numbers of the nuisances to be left out.
-    """
+    """A model's linear form without some nuisances, by their numbers."""
     count = model.jacobian.shape[1]
     return model.assessment.linear.without([count + i for i in gone])

@@ -25,27 +25,7 @@ WRONG = 0.05
 
 @dataclass(frozen=True)
 class Search:
-    """What the search found.
-
-    Attributes
-    ----------
-    baseline : Fit
-        The model with nothing added, everything that may be off at its likeliest.
-    model : Fit
-        The model with all that unseen points want; `baseline` if nothing.
-    effects : Fit
-        The model without generic terms, fitted again; `model` if it has none.
-    worth : tuple of Worth
-        Of every candidate of `model`.
-    less : tuple of Fit or None
-        `effects` without each of its own.
-    first : dict of Candidate to (n, k) ndarray
-        What every candidate does at the baseline, per unit of its amplitudes.
-    singles : tuple of Fit
-        Fits of one candidate each, best first.
-    rivals : tuple of tuple of Fit
-        Per candidate of `model`: fits in which another one takes its place, best first.
-    """
+    """What the search found."""
 
     baseline: Fit
     model: Fit
@@ -58,15 +38,7 @@ class Search:
 
 
 def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Progress | None = None) -> Search:
-    """Look for the effects and terms that unseen points want.
-
-    Parameters
-    ----------
-    run : Map
-    problem : Problem
-    settings : DiagnoseSettings
-    progress : callable, optional
-    """
+    """Look for the effects and terms that unseen points want."""
     say = progress or (lambda what, share: None)
     drawn = baseline_fit(problem)
     say("every effect of the library", 0.1)
@@ -108,11 +80,6 @@ def _selected(
 
 
 def baseline_fit(problem: Problem) -> Fit:
-    """The model with nothing added, nuisances to first order.
-
-    Parameters
-    ----------
-    problem : Problem
-    """
+    """The model with nothing added, nuisances to first order."""
     n, m = problem.columns.shape
     return fitted(problem, Start((), (), np.zeros((n, 0)), np.zeros(m), problem.columns), problem.base)

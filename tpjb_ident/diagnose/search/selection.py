@@ -37,16 +37,7 @@ RIVALS = 3
 
 @dataclass(frozen=True)
 class Selection:
-    """Steps of a search, and what they have at hand.
-
-    Attributes
-    ----------
-    run : Map
-    problem : Problem
-    settings : DiagnoseSettings
-    proposed : Proposals
-        Fits to choose among.
-    """
+    """Steps of a search, and what they have at hand."""
 
     run: Map
     problem: Problem
@@ -68,16 +59,7 @@ class Selection:
         return known if known.evidence > model.evidence + CLEARLY else model
 
     def forward(self, say: Progress, afar: bool = False) -> tuple[Fit, tuple[Fit, ...]]:
-        """Add what unseen points want, one at a time or two at once; drop what they do not want any more.
-
-        Parameters
-        ----------
-        say : callable
-            Called with a text and a share done.
-        afar : bool
-            Whether fits from the drawing that close most of the gap are settled too: a large effect changes what
-            everything else does, and its fit stops on the way until derivatives are its own.
-        """
+        """Add what unseen points want, one at a time or two at once; drop what they do not want any more."""
         model, table = self.baseline, self.proposed.first
         singles: tuple[Fit, ...] = ()
         count, again = 0, {""}
@@ -149,13 +131,7 @@ class Selection:
         return max(self.settings.alike, self.settings.spare * (found.evidence - model.evidence))
 
     def better(self, model: Fit, rivals: Sequence[Fit]) -> Fit | None:
-        """The likeliest rival that explains more than a model, or as much with fewer generic terms.
-
-        Parameters
-        ----------
-        model : Fit
-        rivals : sequence of Fit
-        """
+        """The likeliest rival that explains more than a model, or as much with fewer generic terms."""
         terms = sum(c.name in TERMS for c in model.candidates)
         least = model.evidence - self._spared(model, self.baseline)
         for r in sorted(rivals, key=lambda f: -f.evidence):
@@ -178,13 +154,7 @@ class Selection:
         return value.unseen > self.settings.wanted and value.beside > self.settings.exceeds
 
     def worth_in(self, model: Fit, index: int) -> Worth:
-        """What one candidate of a model is worth: the others are fitted again without it.
-
-        Parameters
-        ----------
-        model : Fit
-        index : int
-        """
+        """What one candidate of a model is worth: the others are fitted again without it."""
         known = self._known.get((id(model), index))
         if known is None:
             # the model is kept with the answer: its number must not be given to another one
@@ -204,13 +174,7 @@ class Selection:
         return value
 
     def without(self, model: Fit, index: int) -> Fit | None:
-        """A model without one of its candidates, the others fitted again.
-
-        Parameters
-        ----------
-        model : Fit
-        index : int
-        """
+        """A model without one of its candidates, the others fitted again."""
         known = self._less.get((id(model), index))
         if known is None:
             known = self._less[(id(model), index)] = model, self._without(model, index)
@@ -235,24 +199,14 @@ class Selection:
         return self.baseline
 
     def kept(self, model: Fit) -> Fit:
-        """The model itself, or less of it where its last derivatives take an effect's worth away.
-
-        Parameters
-        ----------
-        model : Fit
-        """
+        """The model itself, or less of it where its last derivatives take an effect's worth away."""
         model = self.backward(model)
         if len(model.candidates) == 1 and not self._enough(self.worth_in(model, 0)):
             return self.baseline
         return model
 
     def named(self, model: Fit) -> Fit:
-        """A model without its generic terms.
-
-        Parameters
-        ----------
-        model : Fit
-        """
+        """A model without its generic terms."""
         terms = [i for i, c in enumerate(model.candidates) if c.name in TERMS]
         if not terms:
             return model
@@ -263,12 +217,7 @@ class Selection:
         return settle(self.run, self.problem, model)
 
     def backward(self, model: Fit) -> Fit:
-        """Drop what unseen points do not want once the others are there.
-
-        Parameters
-        ----------
-        model : Fit
-        """
+        """Drop what unseen points do not want once the others are there."""
         while len(model.candidates) > 1:
             values = [self.worth_in(model, i) for i in range(len(model.candidates))]
             weak = [i for i, v in enumerate(values) if not self._enough(v)]
@@ -281,14 +230,7 @@ class Selection:
         return model
 
     def rivals(self, model: Fit, singles: Sequence[Fit]) -> tuple[tuple[Fit, ...], ...]:
-        """For every candidate of a model, fits in which another one takes its place.
-
-        Parameters
-        ----------
-        model : Fit
-        singles : sequence of Fit
-            Fits of one candidate each.
-        """
+        """For every candidate of a model, fits in which another one takes its place."""
         if len(model.candidates) == 1:
             return (tuple(f for f in singles if f.label != model.label),)
         out: list[tuple[Fit, ...]] = []

@@ -21,16 +21,7 @@ STEPS_BETWEEN = 4
 
 
 def settle(run: Map, problem: Problem, found: Fit, rounds: int = ROUNDS) -> Fit:
-    """Give a fit derivatives of its own, those of the nuisances too, and move all of them together.
-
-    Parameters
-    ----------
-    run : Map
-    problem : Problem
-    found : Fit
-    rounds : int
-        How often derivatives are taken.
-    """
+    """Give a fit derivatives of its own, those of the nuisances too, and move all of them together."""
     if found.settled:
         return found
     here = Place(found.start, found.prediction)

@@ -18,15 +18,7 @@ STAND_IN = 3.0
 
 @dataclass(frozen=True)
 class Worth:
-    """What an effect is worth in a model.
-
-    Attributes
-    ----------
-    unseen : float
-        Rise of the log score of folds that are left out in turn, nuisances that do the same set aside [nats].
-    beside : float
-        Rise of the log evidence beside all stated tolerances [nats].
-    """
+    """What an effect is worth in a model."""
 
     unseen: float
     beside: float
@@ -37,14 +29,6 @@ def worth(problem: Problem, model: Fit, less: Fit, candidate: Candidate) -> Wort
 
     Where the model without it needs something to be off by more than is stated, that stands in for the candidate, and
     predicts unseen points just as well: it is set aside, as are nuisances that are the candidate under another name.
-
-    Parameters
-    ----------
-    problem : Problem
-    model : Fit
-    less : Fit
-        The same model without the candidate.
-    candidate : Candidate
     """
     at = [f.assessment.free[f.jacobian.shape[1] :] for f in (model, less)]
     stand_in = np.flatnonzero((np.abs(at[1]) > STAND_IN) & (np.abs(at[1]) > np.abs(at[0]) + 1.0))

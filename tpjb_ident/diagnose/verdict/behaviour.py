@@ -36,25 +36,7 @@ SAME = 0.1
 
 @dataclass(frozen=True)
 class Behaviour:
-    """A term that describes what the library does not.
-
-    Attributes
-    ----------
-    kind : str
-        ``"series compliance"``, ``"parallel stiffness"``, ``"parallel damping"``, ``"clearance by pad"``,
-        ``"pivot law of a pad"``.
-    size : float
-        Stiffness [N/m], damping [N s/m], change of a pad's clearance [m], share of its pivot's stiffness.
-    unit : str
-    direction_deg : float or None
-        Of a term of one direction.
-    spread : float
-        Relative standard error of the size.
-    words : str
-    effect : str
-        Name under which `predict --effects` reads it.
-    parameters : dict of str to float
-    """
+    """A term that describes what the library does not."""
 
     kind: str
     size: float
@@ -67,15 +49,7 @@ class Behaviour:
 
 
 def behaviours(problem: Problem, found: Search, beyond: bool = False) -> tuple[Behaviour, ...]:
-    """Describe the generic terms of a search's model, and the pads that are further off than stated.
-
-    Parameters
-    ----------
-    problem : Problem
-    found : Search
-    beyond : bool
-        Whether what is left is more than noise and stated tolerances: only then a pad by itself tells something.
-    """
+    """Describe the generic terms of a search's model, and the pads that are further off than stated."""
     model = found.model
     out = []
     for candidate, amplitudes, at in zip(model.candidates, model.amplitudes, model.slices, strict=True):
@@ -154,13 +128,7 @@ class Drift:
 
 
 def drifts(problem: Problem, fitted: Fit) -> tuple[Drift, ...]:
-    """Look for drifts of the first amplitude of every effect of a fit, the most telling per effect.
-
-    Parameters
-    ----------
-    problem : Problem
-    fitted : Fit
-    """
+    """Look for drifts of the first amplitude of every effect of a fit, the most telling per effect."""
     out = []
     for candidate, at in zip(fitted.candidates, fitted.slices, strict=True):
         if candidate.name in TERMS or candidate.basis:

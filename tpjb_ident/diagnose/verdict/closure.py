@@ -14,17 +14,7 @@ from tpjb_ident.diagnose.search.problem import Problem
 
 @dataclass(frozen=True)
 class Closure:
-    """Root mean square of (measured - predicted) / sigma on unseen points, nuisances within their tolerances.
-
-    Attributes
-    ----------
-    before, after : float
-        Of the baseline and of the model.
-    closed : float
-        Share of the squared gap, noise deducted; NaN where there is nothing to close.
-    parts : tuple of float
-        What would open again of the squared gap without each of the effects.
-    """
+    """Root mean square of (measured - predicted) / sigma on unseen points, nuisances within their tolerances."""
 
     before: float
     after: float
@@ -33,13 +23,7 @@ class Closure:
 
 
 def unseen(problem: Problem, fitted: Fit) -> FloatArray:
-    """Every fold as all others tell it: amplitudes and nuisances without having seen it, (n,).
-
-    Parameters
-    ----------
-    problem : Problem
-    fitted : Fit
-    """
+    """Every fold as all others tell it: amplitudes and nuisances without having seen it, (n,)."""
     out = fitted.prediction.copy()
     for fold in problem.folds:
         out[fold.members] = fitted.at(fitted.assessment.unseen(fold))[fold.members]
@@ -47,15 +31,7 @@ def unseen(problem: Problem, fitted: Fit) -> FloatArray:
 
 
 def effects_unseen(problem: Problem, fitted: Fit, exact: FloatArray) -> FloatArray:
-    """The model with its effects alone, every fold with the amplitudes that all others tell.
-
-    Parameters
-    ----------
-    problem : Problem
-    fitted : Fit
-    exact : (n,) ndarray
-        What the model predicts with the effects at their fitted sizes and nothing else.
-    """
+    """The model with its effects alone, every fold with the amplitudes that all others tell."""
     count = fitted.jacobian.shape[1]
     out = exact.copy()
     for fold in problem.folds:
@@ -65,15 +41,7 @@ def effects_unseen(problem: Problem, fitted: Fit, exact: FloatArray) -> FloatArr
 
 
 def closure(problem: Problem, baseline: Fit, model: Fit, less: tuple[Fit | None, ...]) -> Closure:
-    """Measure what a model closes on unseen points.
-
-    Parameters
-    ----------
-    problem : Problem
-    baseline, model : Fit
-    less : tuple of Fit or None
-        The model without each of its effects.
-    """
+    """Measure what a model closes on unseen points."""
     before, after = (gap(problem.observations, unseen(problem, f)) for f in (baseline, model))
     floor = noise_square(problem.observations)
     room = before**2 - floor

@@ -34,22 +34,7 @@ from tpjb_ident.effect_words import Found
 
 @dataclass(frozen=True)
 class Judged:
-    """What the evidence says before it is put in words.
-
-    Attributes
-    ----------
-    name : str
-        The verdict.
-    named : Fit
-        The model with exactly the effects that are named; the baseline if none.
-    closed : Closure
-        By the effects of the search, generic terms left out.
-    left : Excess
-        What `named` leaves beyond the stated tolerances.
-    alike : tuple of tuple of str
-        Per effect that has rivals: its label, then theirs.
-    reasons : tuple of str
-    """
+    """What the evidence says before it is put in words."""
 
     name: VerdictName
     named: Fit = field(repr=False)
@@ -60,14 +45,7 @@ class Judged:
 
 
 def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Judged:
-    """Weigh a search: the dominant causes first, then what they leave.
-
-    Parameters
-    ----------
-    problem : Problem
-    found : Search
-    settings : DiagnoseSettings
-    """
+    """Weigh a search: the dominant causes first, then what they leave."""
     baseline, effects = found.baseline, found.effects
     before = excess(problem, baseline)
     # against the drawing: a baseline at its likeliest has tolerances exceeded in the place of an effect
@@ -135,16 +113,7 @@ def _alike(found: Search, settings: DiagnoseSettings) -> tuple[tuple[str, ...], 
 def decide(
     problem: Problem, found: Search, settings: DiagnoseSettings, exact: FloatArray | None = None
 ) -> Verdict:  # fmt: skip
-    """Turn a search into a verdict.
-
-    Parameters
-    ----------
-    problem : Problem
-    found : Search
-    settings : DiagnoseSettings
-    exact : (n,) ndarray, optional
-        What the model predicts with the effects of the search and nothing else; by default to first order.
-    """
+    """Turn a search into a verdict."""
     observations, held = problem.observations, problem.held
     judged = judge(problem, found, settings)
     named = judged.named
@@ -221,14 +190,7 @@ def _stands_in(problem: Problem, name: str, parameters: dict[str, Found]) -> str
 
 
 def parameters_of(fitted: Fit, index: int) -> dict[str, Found]:
-    """Parameters of one candidate of a fit with their 95 % intervals.
-
-    Parameters
-    ----------
-    fitted : Fit
-    index : int
-        Of the candidate.
-    """
+    """Parameters of one candidate of a fit with their 95 % intervals."""
     candidate, amplitudes = fitted.candidates[index], fitted.amplitudes[index]
     errors = fitted.errors[fitted.slices[index]]
     value = candidate.values(amplitudes)

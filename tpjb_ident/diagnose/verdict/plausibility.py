@@ -10,33 +10,14 @@ from model.effects import kind_of
 
 @dataclass(frozen=True)
 class Plausible:
-    """Range of a parameter that its source allows.
-
-    Attributes
-    ----------
-    low, high : float
-        SI.
-    source : str
-    """
+    """Range of a parameter that its source allows."""
 
     low: float
     high: float
     source: str
 
     def words(self, name: str, value: float, lo: float, hi: float) -> str:
-        """What to say of an amplitude with its interval; empty where it is plausible.
-
-        Parameters
-        ----------
-        name : str
-            Name of the amplitude, for the sentence.
-        value : float
-            As fitted.
-        lo : float
-            Lower end of its interval.
-        hi : float
-            Upper end of its interval.
-        """
+        """What to say of an amplitude with its interval; empty where it is plausible."""
         if lo <= self.high and hi >= self.low:
             return ""
         beyond = self.high if value > self.high else self.low
@@ -64,14 +45,7 @@ RANGES = {
 
 
 def plausible(name: str, parameter: str, pads: int) -> Plausible | None:
-    """Range of an effect's parameter; None where nothing bounds it (a direction, a generic term).
-
-    Parameters
-    ----------
-    name, parameter : str
-    pads : int
-        Of the bearing.
-    """
+    """Range of an effect's parameter; None where nothing bounds it (a direction, a generic term)."""
     kind = kind_of(name)
     known = next((p for p in kind.parameters_of(pads) if p.name == parameter), None)
     if (name, parameter) in RANGES:

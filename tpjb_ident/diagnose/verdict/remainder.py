@@ -21,16 +21,7 @@ TOLD = 0.05
 
 
 def localise(observations: Observations, prediction: FloatArray, most: int = 12) -> tuple[Disagreement, ...]:
-    """Split the squared gap by observable and region, largest share first.
-
-    Parameters
-    ----------
-    observations : Observations
-    prediction : (n,) ndarray
-        The baseline.
-    most : int
-        Rows at the most.
-    """
+    """Split the squared gap by observable and region, largest share first."""
     z = residuals(observations, prediction)
     total = float(np.sum(z**2))
     rows: list[Disagreement] = []
@@ -65,15 +56,7 @@ def _regions(observations: Observations, mine: BoolArray):  # type: ignore[no-un
 
 @dataclass(frozen=True)
 class Excess:
-    """What a model leaves beyond its stated tolerances.
-
-    Attributes
-    ----------
-    p : float
-        Of the most telling group of elements, all groups considered.
-    where : str
-        That group, in words.
-    """
+    """What a model leaves beyond its stated tolerances."""
 
     p: float
     where: str
@@ -83,11 +66,6 @@ def excess(problem: Problem, fitted: Fit) -> Excess:
     """Test every observable, every fold, and everything that may be off, against noise and stated tolerances.
 
     A posterior mean m of something with prior variance 1 and posterior variance v scatters with 1 - v.
-
-    Parameters
-    ----------
-    problem : Problem
-    fitted : Fit
     """
     # every kind of observable as wrong as stated, nothing beyond, no more scatter than stated
     stated = problem.basis.stated

@@ -16,15 +16,7 @@ VerdictName = Literal["consistent", "named", "ambiguous", "partly-explained", "u
 
 @dataclass(frozen=True)
 class FoundEffect:
-    """An effect that was added.
-
-    Attributes
-    ----------
-    name : str
-    parameters : dict of str to Found
-    stands_in : str
-        What to say where an amplitude is beyond what its source allows; empty otherwise.
-    """
+    """An effect that was added."""
 
     name: str
     parameters: dict[str, Found]
@@ -48,18 +40,7 @@ class FoundEffect:
 
 @dataclass(frozen=True)
 class RankedCandidate:
-    """An explanation that was fitted.
-
-    Attributes
-    ----------
-    name : str
-    score : float
-        Log evidence above the baseline's [nats].
-    heldout_gap : float
-        On points to which a model must extrapolate, tolerances used [sigma].
-    parameters : dict
-        By effect, with intervals.
-    """
+    """An explanation that was fitted."""
 
     name: str
     score: float
@@ -69,16 +50,7 @@ class RankedCandidate:
 
 @dataclass(frozen=True)
 class Disagreement:
-    """Where measurement and baseline part.
-
-    Attributes
-    ----------
-    observable, where : str
-    size_sigma : float
-        Root mean square there.
-    share : float
-        Of the whole squared gap.
-    """
+    """Where measurement and baseline part."""
 
     observable: str
     where: str
@@ -88,18 +60,7 @@ class Disagreement:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What is left on unseen points.
-
-    Attributes
-    ----------
-    sigma : float
-        Root mean square, everything that may be off at its likeliest.
-    share : float
-        Of the squared gap of the baseline.
-    where : str
-    p : float
-        Of the most telling part, against noise and stated tolerances.
-    """
+    """What is left on unseen points."""
 
     sigma: float
     share: float
@@ -109,17 +70,7 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Assumption:
-    """A tolerance or nuisance that took part.
-
-    Attributes
-    ----------
-    name : str
-    stated : float
-        One standard deviation.
-    fitted : float or list of float
-        What the fit made of it, pad by pad where there are several.
-    unit, source : str
-    """
+    """A tolerance or nuisance that took part."""
 
     name: str
     stated: float

@@ -21,56 +21,25 @@ Basis = Callable[[FloatArray], ComplexArray]
 
 
 def k_c(w: FloatArray) -> ComplexArray:
-    """Stiffness and damping.
-
-    Parameters
-    ----------
-    w : (n,) ndarray
-        Angular frequencies of the rows, in units of the band's middle.
-    """
+    """Stiffness and damping."""
     return np.stack([np.ones_like(w), 1j * w], axis=1)
 
 
 def k_c_m(w: FloatArray) -> ComplexArray:
-    """Stiffness, damping and mass.
-
-    Parameters
-    ----------
-    w : (n,) ndarray
-        Angular frequencies of the rows, in units of the band's middle.
-    """
+    """Stiffness, damping and mass."""
     return np.stack([np.ones_like(w), 1j * w, -(w**2)], axis=1)
 
 
 def complex_h(w: FloatArray) -> ComplexArray:
-    """One complex h for all rows: its real and its imaginary part.
-
-    Parameters
-    ----------
-    w : (n,) ndarray
-        Angular frequencies of the rows, in units of the band's middle.
-    """
+    """One complex h for all rows: its real and its imaginary part."""
     return np.stack([np.ones_like(w), 1j * np.ones_like(w)], axis=1)
 
 
 @dataclass(frozen=True)
 class RunSums:
-    """One run at one line, summed over its rows; q = 2 m columns of phi, the two displacements of each power together.
+    """One run at one line, summed over its rows.
 
-    Attributes
-    ----------
-    A : (q, q) complex ndarray
-        Sum of zeta* phi^T.
-    B : (2, q) complex ndarray
-        Sum of F zeta^H.
-    A0 : (q, 2) complex ndarray
-        Sum of zeta* D^T: what a change of h does to B.
-    Z : (q, q) complex ndarray
-        Sum of zeta* zeta^T, in the weight that the noise of one row has.
-    residual : callable
-        Covariance of the equation noise of one row, (2, 2), from Theta (2, q).
-    dof : float
-        Complex degrees of freedom of that.
+    Q = 2 m columns of phi, the two displacements of each power together.
     """
 
     A: ComplexArray
@@ -82,17 +51,7 @@ class RunSums:
 
 
 def line_sums(rows: LineRows, middle: float, basis: Basis, instrument: str) -> list[RunSums]:
-    """Sums of every run at one line.
-
-    Parameters
-    ----------
-    rows : LineRows
-    middle : float
-        Angular frequency in whose units the basis is taken [rad/s].
-    basis : callable
-    instrument : {"periods", "command", "given"}
-        Other periods, what the rows' command explains, or the command itself.
-    """
+    """Sums of every run at one line."""
     phi = _phi(rows, rows.D, middle, basis)
     if instrument == "periods":
         return [_repeated(rows.F[rows.run == r], phi[rows.run == r], rows.D[rows.run == r]) for r in range(rows.n_runs)]

@@ -30,26 +30,7 @@ ROUNDS = 3
 
 @dataclass(frozen=True)
 class BandPart:
-    """h in a part of the band, by the lines of that part alone; a model only says how h changes within it.
-
-    Attributes
-    ----------
-    omega : float
-        Mean of its lines [rad/s].
-    h : (2, 2) complex ndarray
-        [N/m]
-    covariance : (8, 8) ndarray
-        Random part, of Re and Im of h; parts share no line, so theirs have nothing in common.
-    dof : (8,) ndarray
-    moved : (n, 8) ndarray
-        Change in every draw of what lines share [N/m].
-    span : (float, float)
-        Lowest and highest of its lines [rad/s].
-    bracket : (8,) ndarray
-        Half the way between two estimates that truth lies between; zero where there is one [N/m].
-    off : (8,) ndarray
-        h of the part less that of the model [N/m].
-    """
+    """h in a part of the band, by the lines of that part alone; a model only says how h changes within it."""
 
     omega: float
     h: ComplexArray
@@ -63,29 +44,7 @@ class BandPart:
 
 @dataclass(frozen=True)
 class BandModel:
-    """One model over the lines of a band.
-
-    Attributes
-    ----------
-    model : {"K-C", "K-C-M"}
-    parameters : (p,) ndarray
-        kxx, kxy, kyx, kyy [N/m], cxx .. [N s/m], mxx .. [kg].
-    covariance : (p, p) ndarray
-        Random part.
-    dof : (p,) ndarray
-        Degrees of freedom of its variances.
-    systematic : (p, p) ndarray
-        What all lines share.
-    chi_square, spare, probability : float, int, float
-        Of the model against h in parts of the band, its real degrees of freedom, and how probable a larger one is.
-    misfit : float
-        Largest ||h_model - h|| / ||h|| over the parts of the band, noise taken off: what using the model costs.
-    band : (float, float)
-        Lowest and highest line [Hz].
-    n_lines : int
-    parts : tuple of BandPart
-        What it was held against, rising in frequency; empty where some could not be solved.
-    """
+    """One model over the lines of a band."""
 
     model: str
     parameters: FloatArray
@@ -112,25 +71,13 @@ class BandModel:
         return np.sqrt(inflation * np.diag(self.covariance))
 
     def half_width(self, level: float = 0.95) -> FloatArray:
-        """Half the interval of every parameter: Student's t of the random part and normal of the shared one.
-
-        Parameters
-        ----------
-        level : float
-            Probability content.
-        """
+        """Half the interval of every parameter: Student's t of the random part and normal of the shared one."""
         quantile = 0.5 + 0.5 * level
         random = stdtrit(self.dof, quantile) * self.standard_error
         return np.hypot(random, stdtrit(np.inf, quantile) * np.sqrt(np.diag(self.systematic)))
 
     def h(self, omega: FloatArray) -> ComplexArray:
-        """Dynamic stiffness of the model, (n, 2, 2) [N/m].
-
-        Parameters
-        ----------
-        omega : (n,) ndarray
-            [rad/s]
-        """
+        """Dynamic stiffness of the model, (n, 2, 2) [N/m]."""
         K, C, M = (*self.parameters.reshape(-1, 2, 2), np.zeros((2, 2)))[:3]
         w = np.asarray(omega, dtype=float)[:, None, None]
         return np.asarray(K - w**2 * M + 1j * w * C)
@@ -138,15 +85,7 @@ class BandModel:
 
 @dataclass(frozen=True)
 class Shared:
-    """What lines share, as draws.
-
-    Attributes
-    ----------
-    lines : (n_lines, n, 8) ndarray
-        Change of Re and Im of h at every line [N/m].
-    runs : (n, n_runs) ndarray
-        Relative change of every run's force.
-    """
+    """What lines share, as draws."""
 
     lines: FloatArray
     runs: FloatArray
@@ -163,17 +102,7 @@ class _Solution:
 
 
 def fit_band(rows: Sequence[LineRows], model: str, instrument: str, shared: Shared) -> BandModel | None:
-    """Fit one model to the lines of a band; None where they are too few.
-
-    Parameters
-    ----------
-    rows : sequence of LineRows
-        Of all lines, rising in frequency.
-    model : {"K-C", "K-C-M"}
-    instrument : {"periods", "command", "displacement", "force"}
-        What has no part in the displacements' noise; the last two are what H1 and H2 take.
-    shared : Shared
-    """
+    """Fit one model to the lines of a band; None where they are too few."""
     if instrument in ("displacement", "force"):
         rows = [replace(line, command=line.D if instrument == "displacement" else line.F) for line in rows]
         instrument = "given"
@@ -329,13 +258,7 @@ def _left(line: LineRows, theta: FloatArray, middle: float, basis: Basis) -> Lin
 
 
 def between(low: BandModel, high: BandModel) -> BandModel:
-    """The middle of two estimates between which the truth lies, with an interval over both.
-
-    Parameters
-    ----------
-    low, high : BandModel
-        By H1 and H2.
-    """
+    """The middle of two estimates between which the truth lies, with an interval over both."""
     half = 0.5 * (high.parameters - low.parameters)
     unjudged = float("nan")  # the bias of either looks like a misfit
     # a rectangle's standard deviation is half its width by the root of three
@@ -362,10 +285,5 @@ def _middle(low: BandPart, high: BandPart) -> BandPart:
 
 
 def supported(models: dict[str, BandModel]) -> str:
-    """The simplest model that the lines do not refuse; ``"raw H"`` when they refuse all.
-
-    Parameters
-    ----------
-    models : dict of str to BandModel
-    """
+    """The simplest model that the lines do not refuse; ``"raw H"`` when they refuse all."""
     return next((name for name, model in models.items() if not model.refused), "raw H")

@@ -38,18 +38,7 @@ LEAST = 6
 
 @dataclass(frozen=True)
 class BandGroup:
-    """Runs at one operating point, excited alike.
-
-    Attributes
-    ----------
-    point : OperatingPoint
-        Its excitation frequency is zero.
-    kind : str
-        ``"multisine"``, ``"sweep"``, ``"random"`` or ``"impact"``.
-    band : (float, float)
-        What all of the runs were excited over [Hz].
-    runs : tuple of rigdata.run.Run
-    """
+    """Runs at one operating point, excited alike."""
 
     point: OperatingPoint
     kind: str
@@ -59,21 +48,7 @@ class BandGroup:
 
 @dataclass(frozen=True)
 class BandSettings:
-    """Choices, as those for sines.
-
-    Attributes
-    ----------
-    mains : float
-        [Hz]; 0 for none.
-    delays : dict
-        Seconds by which a quantity's channels are recorded late, besides what the manifest says.
-    correct : bool
-        Bring every run to its set-point load where the campaign's loads tell the slope.
-    n_calibration, seed : int
-        Draws of what lines share, and their seed.
-    clearance : float or None
-        Assembled [m], for the amplitude check.
-    """
+    """Choices, as those for sines."""
 
     mains: float = 50.0
     delays: dict[str, float] = field(default_factory=dict)
@@ -85,18 +60,7 @@ class BandSettings:
 
 @dataclass(frozen=True)
 class BandPoint:
-    """One group of runs, transformed.
-
-    Attributes
-    ----------
-    group : BandGroup
-    spectra : list of RunSpectra
-    plan : LinePlan
-    baseline : Baseline
-        Of the rig without its bearing.
-    conditions : tuple of Condition
-        Of its reading, and of its accelerometers.
-    """
+    """One group of runs, transformed."""
 
     group: BandGroup
     spectra: list[RunSpectra]
@@ -115,15 +79,7 @@ class BandPoint:
         return np.array([s.mean_load for s in self.spectra])
 
     def rows(self, k: int, miss: LoadMiss | None = None, slope: ComplexArray | None = None) -> LineRows:
-        """Rows of line `k`, without the rig's own stiffness, and at the set load where the slope over load is known.
-
-        Parameters
-        ----------
-        k : int
-        miss : LoadMiss, optional
-        slope : (2, 2) complex ndarray, optional
-            dh/d(ln W) [N/m].
-        """
+        """Rows of line `k`, without the rig's own stiffness, and at the set load where the slope over load is known."""
         rows = line_rows(self.spectra, self.plan, k, self.group.kind in OPEN_ENDS)
         F = rows.F
         rig = self.baseline.at(rows.omega)
@@ -137,22 +93,7 @@ class BandPoint:
 def read_point(
     group: BandGroup, housing_mass: float, settings: BandSettings, baseline: Baseline
 ) -> tuple[BandPoint | None, list[LeftOut]]:
-    """Transform the runs of a group, and name those that cannot be used; None where there is no other.
-
-    Parameters
-    ----------
-    group : BandGroup
-    housing_mass : float
-        [kg]
-    settings : BandSettings
-    baseline : Baseline
-        Of the rig without its bearing.
-
-    Raises
-    ------
-    BadInputError
-        The records are too short for their band, or do not belong together.
-    """
+    """Transform the runs of a group, and name those that cannot be used; None where there is no other."""
     spectra: list[RunSpectra] = []
     left = []
     chosen = _with_clocks(group, _spectra_settings(group, settings))
@@ -201,27 +142,12 @@ def _alike(spectra: Sequence[RunSpectra]) -> Sequence[RunSpectra]:
 
 
 def is_broadband(run: Run) -> bool:
-    """Whether a run is excited over a band, not by a sine.
-
-    Parameters
-    ----------
-    run : rigdata.run.Run
-    """
+    """Whether a run is excited over a band, not by a sine."""
     return getattr(run, "excitation_kind", SINE) != SINE
 
 
 def band_groups(runs: tuple[Run, ...]) -> list[BandGroup]:
-    """Group broadband runs by operating point and kind of excitation, sorted.
-
-    Parameters
-    ----------
-    runs : tuple of rigdata.run.Run
-
-    Raises
-    ------
-    RigDataError
-        The bands of runs that belong together have nothing in common.
-    """
+    """Group broadband runs by operating point and kind of excitation, sorted."""
     groups: dict[tuple[object, ...], list[Run]] = {}
     for run in runs:
         p = run.point

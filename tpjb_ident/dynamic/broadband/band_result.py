@@ -29,20 +29,7 @@ KEY_COLUMNS = (*STATIC_COLUMNS, "excitation")
 
 @dataclass(frozen=True)
 class BandLine:
-    """One line of the band.
-
-    Attributes
-    ----------
-    frequency : float
-        [Hz]
-    by_method : dict of str to DynamicStiffness
-    method : str
-        The one that counts.
-    coherence : (2,) ndarray
-        Of the force along X and Y with the displacements.
-    n_rows : int
-        Periods or bins that it was averaged from, over all runs.
-    """
+    """One line of the band."""
 
     frequency: float
     by_method: dict[str, DynamicStiffness] = field(repr=False)
@@ -58,28 +45,7 @@ class BandLine:
 
 @dataclass(frozen=True)
 class BandResult:
-    """Dynamic stiffness over a band at one operating point.
-
-    Attributes
-    ----------
-    point : OperatingPoint
-    kind : str
-        Of the excitation, as the manifest states it.
-    lines : tuple of BandLine
-        Rising in frequency.
-    models : dict of str to BandModel
-        By name, ``"K-C"`` and ``"K-C-M"``.
-    supported : str
-        The simplest model that the lines do not refuse, ``"raw H"`` if they refuse both.
-    quality : tuple of Condition
-    runs : tuple of str
-    period : float or None
-        Of the excitation [s].
-    resolution : float
-        Width of a line [Hz].
-    points : tuple of PointResult
-        K and C in parts of the band, as of sines at their middles; none where the lines do not give them.
-    """
+    """Dynamic stiffness over a band at one operating point."""
 
     point: OperatingPoint
     kind: str
@@ -108,13 +74,7 @@ class BandResult:
         return self.lines[0].method if self.lines else "none"
 
     def half_width(self, level: float = 0.95) -> FloatArray:
-        """Half the interval of Re and Im of the four entries, (n, 8) [N/m].
-
-        Parameters
-        ----------
-        level : float
-            Probability content.
-        """
+        """Half the interval of Re and Im of the four entries, (n, 8) [N/m]."""
         return np.array([line.stiffness.half_width(level) for line in self.lines]).reshape(-1, 8)
 
     def key(self) -> dict[str, Any]:
@@ -125,13 +85,7 @@ class BandResult:
 
 
 def frf_frame(results: Sequence[BandResult], every_method: bool = False) -> pd.DataFrame:
-    """One row per line, by the method that counts (``frf.csv``) or by every method (``frf_estimators.csv``).
-
-    Parameters
-    ----------
-    results : sequence of BandResult
-    every_method : bool, optional
-    """
+    """One row per line, by the method that counts (``frf.csv``) or by every method (``frf_estimators.csv``)."""
     import pandas as pd
 
     rows = []
@@ -167,12 +121,7 @@ def _line_row(result: BandResult, line: BandLine, method: str, est: DynamicStiff
 
 
 def models_frame(results: Sequence[BandResult]) -> pd.DataFrame:
-    """One row per operating point and model: ``frf_models.csv``.
-
-    Parameters
-    ----------
-    results : sequence of BandResult
-    """
+    """One row per operating point and model: ``frf_models.csv``."""
     import pandas as pd
 
     return pd.DataFrame([_model_row(result, model) for result in results for model in result.models.values()])
@@ -215,16 +164,6 @@ def band_points(
 
     The lines of a part alone tell its h; K-C-M only says how h changes within the part. So the points of a band are as
     independent of one another as runs with sines, whether or not a model over the whole band holds.
-
-    Parameters
-    ----------
-    point : BandPoint
-    result : BandResult
-        Its lines and models.
-    miss : LoadMiss
-        How far the runs' static loads were off.
-    clearance : float or None
-        Assembled [m].
     """
     models = [model for model in result.models.values() if model.parts]
     if not models:

@@ -35,15 +35,7 @@ class ClockRate:
 
 
 def common_rates(seen: Sequence[dict[str, ClockRate]], reach: float) -> dict[str, ClockRate]:
-    """Differences that runs share, by quantity; those that are clear, and matter.
-
-    Parameters
-    ----------
-    seen : sequence of dict of str to ClockRate
-        Of every run.
-    reach : float
-        Phase at the top of the band over the longest record [rad] per unit of difference.
-    """
+    """Differences that runs share, by quantity; those that are clear, and matter."""
     found = {}
     for quantity in sorted({q for one in seen for q in one}):
         known = [one[quantity] for one in seen if quantity in one and np.isfinite(one[quantity].error)]
@@ -58,14 +50,7 @@ def common_rates(seen: Sequence[dict[str, ClockRate]], reach: float) -> dict[str
 
 
 def with_one_clock(samples: Samples, clocks: dict[str, ClockRate]) -> Samples:
-    """The record as if one clock had sampled all of it.
-
-    Parameters
-    ----------
-    samples : Samples
-    clocks : dict of str to ClockRate
-        By quantity.
-    """
+    """The record as if one clock had sampled all of it."""
     values = dict(samples.values)
     for quantity in set(clocks) & set(values):
         at = np.asarray(np.arange(samples.length) / (1 + clocks[quantity].rate), dtype=float)
@@ -75,16 +60,7 @@ def with_one_clock(samples: Samples, clocks: dict[str, ClockRate]) -> Samples:
 
 
 def clock_rates(samples: Samples, band: tuple[float, float], lines: tuple[Disturbance, ...]) -> dict[str, ClockRate]:
-    """Rates of the clocks of force and acceleration against the probes', as one run shows them.
-
-    Parameters
-    ----------
-    samples : Samples
-    band : (float, float)
-        [Hz]
-    lines : tuple of Disturbance
-        Those that are in the record.
-    """
+    """Rates of the clocks of force and acceleration against the probes', as one run shows them."""
     present = [q for q in ("force", "acceleration") if q in samples.values]
     return {q: _clock_rate(samples, q, band, lines) for q in present}
 

@@ -27,17 +27,7 @@ LEFT_OUT_OF_PERIOD = 0.6
 
 @dataclass(frozen=True)
 class Disturbance:
-    """One line.
-
-    Attributes
-    ----------
-    name : str
-        ``"1X"``, ``"mains"``, ...
-    frequency : float
-        Where it was found [Hz].
-    order : int
-        Multiple of the shaft's angle; 0 where it does not turn with the shaft.
-    """
+    """One line."""
 
     name: str
     frequency: float
@@ -45,18 +35,7 @@ class Disturbance:
 
 
 def find_disturbances(samples: Samples, speed: float, mains: float, top: float) -> tuple[Disturbance, ...]:
-    """Shaft harmonics and mains up to above the band, at the frequencies at which the record shows them.
-
-    Parameters
-    ----------
-    samples : Samples
-    speed : float
-        Shaft speed [Hz]; 0 where it stands.
-    mains : float
-        [Hz]; 0 for none.
-    top : float
-        Highest frequency of the band [Hz].
-    """
+    """Shaft harmonics and mains up to above the band, at the frequencies at which the record shows them."""
     reach = min(0.45 * samples.rate, 1.5 * top)
     found = []
     if speed > 0:
@@ -95,16 +74,7 @@ def _shown(samples: Samples, nominal: float, wander: float) -> float:
 
 
 def without_disturbances(samples: Samples, lines: tuple[Disturbance, ...], period: int | None = None) -> Samples:
-    """The record without the lines and without its mean.
-
-    Parameters
-    ----------
-    samples : Samples
-    lines : tuple of Disturbance
-    period : int, optional
-        Samples of a period of the excitation: what repeats with it is none of theirs. The record must then hold whole
-        periods.
-    """
+    """The record without the lines and without its mean."""
     centred = {q: rows - rows.mean(axis=1, keepdims=True) for q, rows in samples.values.items()}
     if not lines:
         return replace(samples, values=centred)
@@ -146,18 +116,7 @@ def _without_periodic(rows: FloatArray, period: int) -> FloatArray:
 def bins_taken(
     frequencies: FloatArray, lines: tuple[Disturbance, ...], seconds: float, width: float = LEFT_OUT
 ) -> BoolArray:
-    """Bins that a line may have spoiled, (n,).
-
-    Parameters
-    ----------
-    frequencies : (n,) ndarray
-        Of the bins [Hz].
-    lines : tuple of Disturbance
-    seconds : float
-        Length of the transform [s].
-    width : float
-        Bins to either side.
-    """
+    """Bins that a line may have spoiled, (n,)."""
     taken = np.zeros(len(frequencies), dtype=bool)
     for line in lines:
         wander = SHAFT_WANDER * line.order if line.order else MAINS_WANDER

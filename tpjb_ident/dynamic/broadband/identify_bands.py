@@ -46,16 +46,7 @@ LOW_COHERENCE = 0.9
 
 @dataclass(frozen=True)
 class IdentifiedBands:
-    """What a campaign's broadband runs give.
-
-    Attributes
-    ----------
-    results : tuple of BandResult
-    changes : (n, 8 P) ndarray
-        What n draws of systematic errors do to all P points of the results, in their order [N/m].
-    conditions : tuple of Condition
-        Of the campaign: runs that take no part, points that lost all of theirs, calibrations that are not stated.
-    """
+    """What a campaign's broadband runs give."""
 
     results: tuple[BandResult, ...]
     changes: FloatArray = field(repr=False)
@@ -65,24 +56,7 @@ class IdentifiedBands:
 def identify_bands(
     campaign: Campaign, settings: BandSettings, progress: Progress, baseline: Baseline | None = None
 ) -> IdentifiedBands:
-    """Identify every operating point of a campaign that was excited over a band.
-
-    Parameters
-    ----------
-    campaign : rigdata.campaign.Campaign
-    settings : BandSettings
-    progress : callable
-        Called as progress(text, done, total).
-    baseline : Baseline, optional
-        Of the rig without its bearing.
-
-    Raises
-    ------
-    rigdata.problem.RigDataError
-        None of the records can be used.
-    BadInputError
-        Records are too short for their band.
-    """
+    """Identify every operating point of a campaign that was excited over a band."""
     runs = tuple(run for run in campaign.of_kind("dynamic") if is_broadband(run))
     seen = list(_observed(runs, progress))
     checked = campaign_verdicts(campaign, seen)

@@ -26,20 +26,7 @@ ROUNDING = 1e-24
 
 @dataclass(frozen=True)
 class LineEstimates:
-    """What the methods say at one line.
-
-    Attributes
-    ----------
-    omega : float
-        [rad/s]
-    method : str
-        The one that counts: ``"periods"``, ``"iv"`` or ``"hv"``.
-    fits : dict of str to LineFit
-        By method, ``"h1"``, ``"h2"`` and ``"hv"`` among them.
-    coherence : (2,) ndarray
-        Of the force along X and Y with the displacements.
-    n_rows : int
-    """
+    """What the methods say at one line."""
 
     omega: float
     method: str
@@ -74,14 +61,7 @@ def _vector(fit: LineFit) -> FloatArray:
 
 
 def estimate_line(rows: LineRows, classic: bool = True) -> LineEstimates:
-    """Estimate h at one line by every method that applies.
-
-    Parameters
-    ----------
-    rows : LineRows
-    classic : bool, optional
-        Whether H1, H2 and Hv are wanted beside a better one.
-    """
+    """Estimate h at one line by every method that applies."""
     order = 0 if rows.repeated else H_ORDER
     fits = {}
     if rows.repeated and rows.n_runs > 1:
@@ -116,11 +96,6 @@ def periods_fit(rows: LineRows) -> LineFit:
     The mean over a run's periods has the noise of one divided by their number, and its covariance is that of the
     repeats (Pintelon and Schoukens, System Identification, 2nd ed. 2012, chapters 2 and 8). From two runs H = F D^-1;
     from more, generalised total least squares with that covariance.
-
-    Parameters
-    ----------
-    rows : LineRows
-        Periods of two runs or more, two periods each at least.
     """
     if rows.n_runs < 2 or min(np.bincount(rows.run)) < 2:
         return no_fit(rows.n_runs)
@@ -171,34 +146,17 @@ def _strength(D: ComplexArray, spreads: ComplexArray, counts: FloatArray) -> flo
 
 
 def h1_fit(rows: LineRows) -> LineFit:
-    """Least squares of force on displacement: noise on the displacement pulls it towards zero.
-
-    Parameters
-    ----------
-    rows : LineRows
-    """
+    """Least squares of force on displacement: noise on the displacement pulls it towards zero."""
     return local_fit(rows, order=_order(rows))
 
 
 def h2_fit(rows: LineRows) -> LineFit:
-    """The force as instrument: noise on the force pushes it away from zero.
-
-    Parameters
-    ----------
-    rows : LineRows
-    """
+    """The force as instrument: noise on the force pushes it away from zero."""
     return local_fit(rows, rows.F, order=_order(rows))
 
 
 def hv_fit(rows: LineRows, first: LineFit) -> LineFit:
-    """Total least squares, with the leverage and noise of H1 behind its interval.
-
-    Parameters
-    ----------
-    rows : LineRows
-    first : LineFit
-        H1 of these rows.
-    """
+    """Total least squares, with the leverage and noise of H1 behind its interval."""
     if not first.found:
         return first
     flat = without_slopes(rows, first)
@@ -210,14 +168,7 @@ def hv_fit(rows: LineRows, first: LineFit) -> LineFit:
 
 
 def coherence(rows: LineRows, fit: LineFit) -> FloatArray:
-    """Multiple coherence of the force along X and Y with the displacements, (2,), free of the few rows' bias.
-
-    Parameters
-    ----------
-    rows : LineRows
-    fit : LineFit
-        Any of these rows, for how h changes over them.
-    """
+    """Multiple coherence of the force along X and Y with the displacements, (2,), free of the few rows' bias."""
     flat = without_slopes(rows, fit)
     basis = np.linalg.qr(flat.D)[0]
     left = flat.F - basis @ (basis.conj().T @ flat.F)
@@ -229,12 +180,7 @@ def coherence(rows: LineRows, fit: LineFit) -> FloatArray:
 
 
 def spectra(rows: LineRows) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """S_FF, S_FD and S_DD summed over the rows, (2, 2) each.
-
-    Parameters
-    ----------
-    rows : LineRows
-    """
+    """S_FF, S_FD and S_DD summed over the rows, (2, 2) each."""
     D, F = rows.D, rows.F
     return (
         np.einsum("ni,nk->ik", F, F.conj()),

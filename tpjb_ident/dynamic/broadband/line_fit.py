@@ -16,17 +16,7 @@ from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
 
 @dataclass(frozen=True)
 class RunsApart:
-    """How far every run's force is from what h gives, along that force.
-
-    Attributes
-    ----------
-    left : (n_runs,) complex ndarray
-        Residual force times the conjugate force that h gives, summed over rows and axes [N^2].
-    force : (n_runs, 2, 2) complex ndarray
-        Sum of f f^H over the rows, f the force that h gives [N^2].
-    variance : (n_runs,) ndarray
-        Of `left`, by the line's noise [N^4].
-    """
+    """How far every run's force is from what h gives, along that force."""
 
     left: ComplexArray
     force: ComplexArray
@@ -44,29 +34,7 @@ def _nothing_apart() -> RunsApart:
 
 @dataclass(frozen=True)
 class LineFit:
-    """Estimate of h at one line.
-
-    Attributes
-    ----------
-    h : (2, 2) complex ndarray
-        [N/m]; NaN where it could not be found.
-    leverage : (n_runs, 2, 2) complex ndarray
-        Sum of g g^H over the rows of each run [1/m^2].
-    noise : (n_runs, 2, 2) complex ndarray
-        Covariance of the equation noise in one row of each run [N^2].
-    dof : (n_runs,) ndarray
-        Complex degrees of freedom behind each.
-    condition : float
-        Condition number of the displacement directions.
-    slopes : (k, 2, 2) complex ndarray
-        Change of h over the bins of the line, by powers of their place, where that was fitted.
-    strength : float
-        By how much the excitation stands above the noise in the weaker direction of motion, as an F ratio of what
-        explains the displacements; infinite where nothing is explained by anything.
-    share : (n_runs, 2, 2) complex ndarray
-        Sum of D g^T over the rows of each run: what h takes of that run. They sum to the unit matrix.
-    apart : RunsApart
-    """
+    """Estimate of h at one line."""
 
     h: ComplexArray
     leverage: ComplexArray = field(repr=False)
@@ -84,23 +52,11 @@ class LineFit:
         return bool(np.isfinite(self.h).all() and np.isfinite(self.noise).all() and (self.dof > 0).all())
 
     def covariance(self, noise: ComplexArray | None = None) -> FloatArray:
-        """Random covariance (8, 8) of [Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...] [N^2/m^2].
-
-        Parameters
-        ----------
-        noise : (n_runs, 2, 2) complex ndarray, optional
-            In place of the line's own.
-        """
+        """Random covariance (8, 8) of [Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...] [N^2/m^2]."""
         return np.asarray(np.sum(self.by_run(noise), axis=0))
 
     def by_run(self, noise: ComplexArray | None = None) -> FloatArray:
-        """What every run's noise adds to the covariance, (n_runs, 8, 8) [N^2/m^2].
-
-        Parameters
-        ----------
-        noise : (n_runs, 2, 2) complex ndarray, optional
-            In place of the line's own.
-        """
+        """What every run's noise adds to the covariance, (n_runs, 8, 8) [N^2/m^2]."""
         sigma = self.noise if noise is None else noise
         return np.array([_real_covariance(outer_matrix(s, a)) for s, a in zip(sigma, self.leverage)])
 
@@ -112,14 +68,7 @@ class LineFit:
 
 
 def by_runs(D: ComplexArray, g: ComplexArray, run: IntArray, n_runs: int) -> tuple[ComplexArray, ComplexArray]:
-    """Leverage and share of every run, (n_runs, 2, 2) each, from the rows' displacements and leverages (n, 2).
-
-    Parameters
-    ----------
-    D, g : (n, 2) complex ndarray
-    run : (n,) ndarray of int
-    n_runs : int
-    """
+    """Leverage and share of every run, (n_runs, 2, 2) each, from the rows' displacements and leverages (n, 2)."""
     leverage = np.empty((n_runs, 2, 2), dtype=complex)
     share = np.empty((n_runs, 2, 2), dtype=complex)
     for r in range(n_runs):
@@ -130,16 +79,7 @@ def by_runs(D: ComplexArray, g: ComplexArray, run: IntArray, n_runs: int) -> tup
 
 
 def runs_apart(given: ComplexArray, left: ComplexArray, noise: ComplexArray, run: IntArray) -> RunsApart:
-    """How far every run's force is from what h gives.
-
-    Parameters
-    ----------
-    given, left : (n, 2) complex ndarray
-        Force of the rows by h, and what it leaves [N].
-    noise : (n_runs, 2, 2) complex ndarray
-        Of one row [N^2].
-    run : (n,) ndarray of int
-    """
+    """How far every run's force is from what h gives."""
     rows = [(given[run == r], left[run == r]) for r in range(len(noise))]
     return RunsApart(
         np.array([np.sum(f.conj() * rest) for f, rest in rows]),
@@ -149,23 +89,13 @@ def runs_apart(given: ComplexArray, left: ComplexArray, noise: ComplexArray, run
 
 
 def no_fit(n_runs: int) -> LineFit:
-    """Answer where there is none.
-
-    Parameters
-    ----------
-    n_runs : int
-    """
+    """Answer where there is none."""
     gap = np.full((n_runs, 2, 2), np.nan + 0j)
     return LineFit(np.full((2, 2), np.nan + 0j), gap, gap, np.zeros(n_runs), np.inf, np.empty((0, 2, 2), complex), 0.0)
 
 
 def outer_matrix(a: ComplexArray, b: ComplexArray) -> ComplexArray:
-    """Kronecker product of two square matrices, for small ones some times quicker than numpy's.
-
-    Parameters
-    ----------
-    a, b : (n, n) and (m, m) ndarray
-    """
+    """Kronecker product of two square matrices, for small ones some times quicker than numpy's."""
     return (a[:, None, :, None] * b[None, :, None, :]).reshape(len(a) * len(b), -1)
 
 
@@ -176,14 +106,7 @@ def _real_covariance(gamma: ComplexArray) -> FloatArray:
 
 
 def satterthwaite(variances: FloatArray, dof: FloatArray) -> FloatArray:
-    """Effective degrees of freedom of sums of variances over the first axis (Satterthwaite 1946).
-
-    Parameters
-    ----------
-    variances : (k, ...) ndarray
-    dof : (k, ...) ndarray
-        Of each.
-    """
+    """Effective degrees of freedom of sums of variances over the first axis (Satterthwaite 1946)."""
     total = variances.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):  # no variance at all is known exactly
         found = total**2 / (variances**2 / dof).sum(axis=0)

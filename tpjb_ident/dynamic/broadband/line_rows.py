@@ -25,16 +25,7 @@ LEAST_LINES = 3
 
 @dataclass(frozen=True)
 class LinePlan:
-    """Bins that belong to each line; no bin belongs to two, so that lines of a record err apart from each other.
-
-    Attributes
-    ----------
-    bins : tuple of (k,) ndarray of int
-    frequencies : (n_lines,) ndarray
-        [Hz]
-    half_width : float
-        Half the width of a line [Hz]; 0 for single bins.
-    """
+    """Bins that belong to each line; no bin belongs to two, so that lines of a record err apart from each other."""
 
     bins: tuple[IntArray, ...]
     frequencies: FloatArray
@@ -43,29 +34,7 @@ class LinePlan:
 
 @dataclass(frozen=True)
 class LineRows:
-    """Rows of all runs at one line.
-
-    Attributes
-    ----------
-    omega : float
-        [rad/s]
-    D, F : (n, 2) complex ndarray
-        Displacement [m] and oil force [N].
-    A : (n, 2) complex ndarray
-        Housing acceleration [m/s^2]; zero where not measured.
-    command : (n, 2) complex ndarray or None
-        What the actuators were told, along X and Y, in units of its own.
-    run : (n,) ndarray of int
-        Place of the run that a row belongs to.
-    place : (n,) ndarray
-        Distance of the row's frequency from the line, -1 to 1 over the bins that count as one line; 0 for periods.
-    repeated : bool
-        Whether the rows of a run are repeats of one excitation.
-    ends : bool
-        Whether a record may begin and end in motion: what that leaks into the bins is then fitted along.
-    step : float
-        Of angular frequency to a row whose place is 1 [rad/s].
-    """
+    """Rows of all runs at one line."""
 
     omega: float
     D: ComplexArray
@@ -84,22 +53,11 @@ class LineRows:
         return int(self.run.max()) + 1 if len(self.run) else 0
 
     def with_force(self, F: ComplexArray) -> LineRows:
-        """The same rows with another force (n, 2) [N].
-
-        Parameters
-        ----------
-        F : (n, 2) complex ndarray
-        """
+        """The same rows with another force (n, 2) [N]."""
         return replace(self, F=F)
 
     def one_run(self, r: int) -> LineRows:
-        """Rows of one run alone.
-
-        Parameters
-        ----------
-        r : int
-            Its place.
-        """
+        """Rows of one run alone."""
         mine = self.run == r
         command = None if self.command is None else self.command[mine]
         zero = np.zeros(int(mine.sum()), dtype=int)
@@ -115,17 +73,7 @@ class LineRows:
 
 
 def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
-    """Lines of runs that have the same bins.
-
-    Parameters
-    ----------
-    spectra : sequence of RunSpectra
-
-    Raises
-    ------
-    BadInputError
-        The records are too short for the band.
-    """
+    """Lines of runs that have the same bins."""
     frequencies = spectra[0].frequencies
     free = ~np.any([s.taken for s in spectra], axis=0)
     if spectra[0].period is not None:
@@ -148,17 +96,7 @@ def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
 
 
 def line_rows(spectra: Sequence[RunSpectra], plan: LinePlan, k: int, ends: bool) -> LineRows:
-    """Rows of one line from all runs.
-
-    Parameters
-    ----------
-    spectra : sequence of RunSpectra
-    plan : LinePlan
-    k : int
-        Number of the line.
-    ends : bool
-        Whether records may begin and end in motion.
-    """
+    """Rows of one line from all runs."""
     bins = plan.bins[k]
     counts = [len(s.D) * len(bins) for s in spectra]
     place = np.zeros(len(bins)) if not plan.half_width else _place(spectra[0].frequencies[bins], plan, k)

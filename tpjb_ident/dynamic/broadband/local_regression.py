@@ -23,16 +23,7 @@ ENDS_ORDER = 2
 
 
 def local_fit(rows: LineRows, instrument: ComplexArray | None = None, order: int = H_ORDER) -> LineFit:
-    """Regress force on displacement over the bins of one line.
-
-    Parameters
-    ----------
-    rows : LineRows
-    instrument : (n, 2) complex ndarray, optional
-        What knows nothing of the displacements' noise; default the displacements themselves (H1), the force gives H2.
-    order : int
-        Highest power of h over the bins.
-    """
+    """Regress force on displacement over the bins of one line."""
     powers = rows.place[:, None] ** np.arange(order + 1)
     ends = ends_columns(rows)
     d_scale, f_scale = _size(rows.D), _size(rows.F)
@@ -61,14 +52,7 @@ def local_fit(rows: LineRows, instrument: ComplexArray | None = None, order: int
 
 
 def without_slopes(rows: LineRows, fit: LineFit) -> LineRows:
-    """The rows as if h were the line's own at every bin, and without what the records' ends leak into them.
-
-    Parameters
-    ----------
-    rows : LineRows
-    fit : LineFit
-        Of these rows.
-    """
+    """The rows as if h were the line's own at every bin, and without what the records' ends leak into them."""
     F = rows.F.copy()
     for s, slope in enumerate(fit.slopes, 1):
         F -= (rows.place**s)[:, None] * (rows.D @ slope.T)
@@ -89,12 +73,7 @@ def _size(values: ComplexArray) -> float:
 
 
 def ends_columns(rows: LineRows) -> ComplexArray:
-    """Columns for the ends of every run's record, (n, n_runs (ENDS_ORDER + 1)); none where they are at rest.
-
-    Parameters
-    ----------
-    rows : LineRows
-    """
+    """Columns for the ends of every run's record, (n, n_runs (ENDS_ORDER + 1)); none where they are at rest."""
     if not rows.ends:
         return np.empty((len(rows.D), 0), dtype=complex)
     powers = rows.place[:, None] ** np.arange(ENDS_ORDER + 1)
@@ -102,12 +81,7 @@ def ends_columns(rows: LineRows) -> ComplexArray:
 
 
 def remainder(columns: ComplexArray) -> ComplexArray:
-    """Projection on what the columns do not span, (n, n).
-
-    Parameters
-    ----------
-    columns : (n, k) complex ndarray
-    """
+    """Projection on what the columns do not span, (n, n)."""
     q = np.linalg.qr(columns)[0]
     return np.asarray(np.eye(len(q)) - q @ q.conj().T)
 

@@ -23,31 +23,14 @@ MAX_SLIP = 0.01
 
 @dataclass(frozen=True)
 class Period:
-    """Length of a period.
-
-    Attributes
-    ----------
-    samples : float
-        It need not be a whole number.
-    share : float
-        Of the power in the band that repeats.
-    """
+    """Length of a period."""
 
     samples: float
     share: float
 
 
 def find_period(samples: Samples, band: tuple[float, float], disturbed: BoolArray) -> Period | None:
-    """Period of what excites the band, None where it does not repeat.
-
-    Parameters
-    ----------
-    samples : Samples
-    band : (float, float)
-        [Hz]
-    disturbed : (n // 2 + 1,) ndarray of bool
-        Bins of the whole record that hold lines of shaft and mains.
-    """
+    """Period of what excites the band, None where it does not repeat."""
     least, most = int(2 * samples.rate / band[0]), samples.length // MIN_PERIODS
     best = _first_peak(_correlation(samples, band, disturbed), least // 2, most + 1)
     if best is None:
@@ -137,16 +120,7 @@ def _repeating_share(samples: Samples, period: float, band: tuple[float, float],
 
 
 def resampled(samples: Samples, period: float, top: float) -> Samples:
-    """The record cut to whole periods of a whole number of samples each.
-
-    Parameters
-    ----------
-    samples : Samples
-    period : float
-        [samples]
-    top : float
-        Highest frequency that matters [Hz].
-    """
+    """The record cut to whole periods of a whole number of samples each."""
     q = round(period)
     count = int((samples.length + 1e-6 * period) // period)
     slip = 2 * np.pi * top / samples.rate * abs(period - q) * count

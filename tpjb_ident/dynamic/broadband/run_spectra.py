@@ -36,29 +36,7 @@ OPEN_ENDS = ("multisine", "random", "sweep")
 
 @dataclass(frozen=True)
 class RunSpectra:
-    """Phasors of one run over the band.
-
-    Attributes
-    ----------
-    phasors : RunPhasors
-        Windows are periods, or there is one, the whole record; excitation lines are the bins of the band.
-    D, F, A : (n_windows, n_bins, 2) complex ndarray
-        Displacement [m], oil force [N], housing acceleration [m/s^2] (zero where not measured).
-    command : (n_windows, n_bins, 2) complex ndarray or None
-    frequencies : (n_bins,) ndarray
-        [Hz]
-    taken : (n_bins,) ndarray of bool
-        Bins that lines of shaft or mains may have spoiled.
-    disturbances : tuple of Disturbance
-    period : float or None
-        [s]; None where nothing repeats.
-    mean_load, position : (2,) ndarray
-        Mean cell force [N], and mean displacement from the probes' zero [m].
-    temperatures : dict of int to float
-        Mean per pad [K].
-    start : float
-        Standard deviation of the cells' start against the probes' [s], where their clocks differ.
-    """
+    """Phasors of one run over the band."""
 
     phasors: RunPhasors
     D: ComplexArray
@@ -82,21 +60,7 @@ class RunSpectra:
 
 @dataclass(frozen=True)
 class SpectraSettings:
-    """How runs become spectra.
-
-    Attributes
-    ----------
-    band : (float, float)
-        [Hz]
-    seconds : float or None
-        How much of a record is taken, so that all runs of a point have the same bins; None for all.
-    mains : float
-        [Hz]
-    delays : dict
-        Seconds by which a quantity's channels are recorded late, besides what the manifest says.
-    clocks : dict of str to ClockRate
-        By how much a quantity's clock is faster than the probes'.
-    """
+    """How runs become spectra."""
 
     band: tuple[float, float]
     seconds: float | None
@@ -106,13 +70,7 @@ class SpectraSettings:
 
 
 def run_clocks(run: Run, settings: SpectraSettings) -> dict[str, ClockRate]:
-    """What one run shows of the rates of its clocks.
-
-    Parameters
-    ----------
-    run : rigdata.run.Run
-    settings : SpectraSettings
-    """
+    """What one run shows of the rates of its clocks."""
     with run.kept_open():
         samples = read_samples(run, settings.seconds)
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.mains, settings.band[1])
@@ -120,20 +78,7 @@ def run_clocks(run: Run, settings: SpectraSettings) -> dict[str, ClockRate]:
 
 
 def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> RunSpectra:
-    """Read one run and transform it.
-
-    Parameters
-    ----------
-    run : rigdata.run.Run
-    housing_mass : float
-        [kg]
-    settings : SpectraSettings
-
-    Raises
-    ------
-    RigDataError
-        The file cannot give what the manifest promises, or a multi-sine does not repeat.
-    """
+    """Read one run and transform it."""
     with run.kept_open():
         slower, told = look_at_readings(run)
         samples = read_samples(run, settings.seconds)

@@ -24,20 +24,7 @@ TAPS, KAISER = 24, 9.0
 
 @dataclass(frozen=True)
 class Samples:
-    """One run in memory, SI.
-
-    Attributes
-    ----------
-    rate : float
-        [Hz]
-    values : dict of str to (2, n) ndarray
-        X and Y by quantity; acceleration only where it is measured.
-    command : (2, n) ndarray or None
-        Along X and Y, in units of its own.
-    angle : (n,) ndarray or None
-        Of the shaft, by its tachometer or keyphasor [rad].
-    conditions : tuple of Condition
-    """
+    """One run in memory, SI."""
 
     rate: float
     values: dict[str, FloatArray]
@@ -52,19 +39,7 @@ class Samples:
 
 
 def read_samples(run: Run, seconds: float | None = None) -> Samples:
-    """Read a run from its beginning.
-
-    Parameters
-    ----------
-    run : rigdata.run.Run
-    seconds : float, optional
-        How much of it; default all.
-
-    Raises
-    ------
-    RigDataError
-        The file cannot give what the manifest promises, samples are not evenly spaced, or too many are missing.
-    """
+    """Read a run from its beginning."""
     rate = run.sample_rate
     n = run.length if seconds is None else min(run.length, round(seconds * rate))
     present = {c.quantity for c in run.channels.values()}
@@ -145,14 +120,7 @@ def _bridged_speed(values: FloatArray) -> tuple[FloatArray, int]:
 
 
 def interpolated(rows: FloatArray, at: FloatArray) -> FloatArray:
-    """Rows (k, n) at the places `at` [samples].
-
-    Parameters
-    ----------
-    rows : (k, n) ndarray
-    at : (m,) ndarray
-        Beyond the ends the last sample is repeated.
-    """
+    """Rows (k, n) at the places `at` [samples]."""
     base = np.floor(at).astype(int)
     share = at - base
     out = np.zeros((len(rows), len(at)))

@@ -39,16 +39,7 @@ TOO_MUCH = 0.05
 
 @dataclass(frozen=True)
 class RunScatter:
-    """How runs differ.
-
-    Attributes
-    ----------
-    size : float
-        Standard deviation of their gains, widened for the few runs that tell it; 0 where none is clear.
-    draws : (n, n_runs) ndarray
-        Standard normal numbers, one per run.
-    conditions : tuple of Condition
-    """
+    """How runs differ."""
 
     size: float
     draws: FloatArray
@@ -60,12 +51,7 @@ class RunScatter:
         return self.size * self.draws
 
     def changes(self, fit: LineFit) -> FloatArray:
-        """Change of the eight entries of h in every draw, (n, 8) [N/m].
-
-        Parameters
-        ----------
-        fit : LineFit
-        """
+        """Change of the eight entries of h in every draw, (n, 8) [N/m]."""
         if not self.size:
             return np.zeros((len(self.draws), 8))
         moved = np.einsum("nr,rik->nik", self.gains, fit.h @ fit.share).reshape(-1, 4)
@@ -74,15 +60,7 @@ class RunScatter:
 
 @dataclass(frozen=True)
 class SharedSources:
-    """Draws of a campaign.
-
-    Attributes
-    ----------
-    gains : GainDraws
-    others : SystematicSources
-    load : (n, 2, 4) ndarray
-        Standard normal numbers for how K and C follow the load.
-    """
+    """Draws of a campaign."""
 
     gains: GainDraws
     others: SystematicSources
@@ -95,20 +73,7 @@ class SharedSources:
     def changes(
         self, rows: LineRows, spectra: list[RunSpectra], est: DynamicStiffness, miss: LoadMiss, corrected: bool
     ) -> FloatArray:
-        """Change of the eight entries of h in every draw, (n, 8) [N/m].
-
-        Parameters
-        ----------
-        rows : LineRows
-        spectra : list of RunSpectra
-            Of its runs.
-        est : DynamicStiffness
-            At this line.
-        miss : LoadMiss
-            Of the runs' static loads.
-        corrected : bool
-            Whether their sizes were put right.
-        """
+        """Change of the eight entries of h in every draw, (n, 8) [N/m]."""
         data = _as_point_data(rows, spectra)
         plain = replace(est, weights=np.ones((len(rows.D), 2)))
         total = apparent_change(data, plain, self.gains)
@@ -133,15 +98,7 @@ class SharedSources:
 
 
 def shared_sources(campaign: Campaign, n: int, seed: int) -> SharedSources:
-    """Draw the sources of a campaign.
-
-    Parameters
-    ----------
-    campaign : rigdata.campaign.Campaign
-    n : int
-        Draws, in pairs of opposite sign.
-    seed : int
-    """
+    """Draw the sources of a campaign."""
     return SharedSources(
         gain_draws(campaign.channels, n, seed),
         systematic_sources(campaign, n, seed + 1),
@@ -157,17 +114,7 @@ def _as_point_data(rows: LineRows, spectra: list[RunSpectra]) -> PointData:
 
 
 def slope_over_load(loads: list[float], h: list[ComplexArray], which: int) -> ComplexArray | None:
-    """dh/d(ln W) (n_lines, 2, 2) of one of several loads, between its neighbours; None where there is one load.
-
-    Parameters
-    ----------
-    loads : list of float
-        [N]
-    h : list of (n_lines, 2, 2) complex ndarray
-        At each load, at the same frequencies.
-    which : int
-        Place of the load.
-    """
+    """dh/d(ln W) (n_lines, 2, 2) of one of several loads, between its neighbours; None where there is one load."""
     order = list(np.argsort(loads))
     at = order.index(which)
     low, high = max(at - 1, 0), min(at + 1, len(order) - 1)
@@ -184,13 +131,6 @@ def run_scatter(fits: Sequence[LineFit], n: int) -> RunScatter:
     part of every run's gain, so what is left shows only some of it, and that with few degrees of freedom: both are
     worked out from the runs' own shares in h. Two runs are needed for h itself: only from the third on anything is
     known of it.
-
-    Parameters
-    ----------
-    fits : sequence of LineFit
-        Of the lines that count.
-    n : int
-        Draws.
     """
     n_runs = len(fits[0].dof) if fits else 0
     draws = paired_draws(np.random.default_rng(n_runs), n, max(n_runs, 1))

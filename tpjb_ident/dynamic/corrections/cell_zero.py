@@ -25,17 +25,7 @@ MIN_RUNS = 4
 
 @dataclass(frozen=True)
 class CellZero:
-    """What the cells read at no load.
-
-    Attributes
-    ----------
-    force : complex
-        X + i Y [N]; zero where nothing tells one.
-    error : float
-        Its standard error [N].
-    stated : float
-        What the manifest allows [N]; 0 where it says nothing.
-    """
+    """What the cells read at no load."""
 
     force: complex = 0.0
     error: float = 0.0
@@ -56,18 +46,7 @@ class CellZero:
 
 
 def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0) -> CellZero:
-    """Zero of the cells from all runs.
-
-    Parameters
-    ----------
-    means : (n,) complex ndarray
-        Mean cell force of every run, X + i Y [N]; NaN where unknown.
-    set_points : (n,) complex ndarray
-        Static load as set [N].
-    stated : float
-        Standard uncertainty of the cells' zero by the manifest [N]; an intercept beyond three of it is a load that is
-        really off, and stays.
-    """
+    """Zero of the cells from all runs."""
     good = np.isfinite(means) & (np.abs(set_points) > 0)
     y, x = means[good], set_points[good]
     if len(y) < MIN_RUNS or (np.ptp(np.abs(x)) < MIN_RANGE * np.abs(x).max() and _one_direction(x)):
@@ -94,11 +73,6 @@ def _one_direction(set_points: ComplexArray) -> bool:
 
 
 def cell_zero_uncertainty(campaign: Campaign) -> float:
-    """Standard uncertainty of the cells' zero by the manifest [N]; 0 where it says nothing.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    """
+    """Standard uncertainty of the cells' zero by the manifest [N]; 0 where it says nothing."""
     cells = [c for c in campaign.channels.values() if c.quantity == "force"]
     return float(max((getattr(c, "zero_uncertainty", 0.0) for c in cells), default=0.0))

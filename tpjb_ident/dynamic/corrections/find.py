@@ -39,19 +39,7 @@ from tpjb_ident.dynamic.runs.point_source import PointSource
 
 @dataclass(frozen=True)
 class Correction:
-    """Corrections of one operating point.
-
-    Attributes
-    ----------
-    miss : LoadMiss
-        How far each run's static load was off.
-    slope : (2, 2) complex ndarray or None
-        dH/d(ln W), where the campaign tells it.
-    turn : Turn or None
-        dH/d(direction of the load), where the runs tell it.
-    mains : MainsFit or None
-    conditions : tuple of Condition
-    """
+    """Corrections of one operating point."""
 
     miss: LoadMiss
     slope: ComplexArray | None
@@ -60,22 +48,12 @@ class Correction:
     conditions: tuple[Condition, ...]
 
     def apply(self, data: PointData) -> PointData:
-        """The point's windows as they would be at the set point and without mains.
-
-        Parameters
-        ----------
-        data : PointData
-        """
+        """The point's windows as they would be at the set point and without mains."""
         cleaned = data if self.mains is None else without_mains(data, self.mains)
         return _at_set_point(cleaned, self.miss, self.slope, self.turn)
 
     def widened(self, est: DynamicStiffness) -> DynamicStiffness:
-        """The estimate with what the corrections leave uncertain.
-
-        Parameters
-        ----------
-        est : DynamicStiffness
-        """
+        """The estimate with what the corrections leave uncertain."""
         wide = self._load_known(est)
         return wide if self.mains is None else with_mains_uncertainty(wide, self.mains)
 
@@ -85,12 +63,7 @@ class Correction:
         return replace(wide, covariance=wide.covariance + more + (0.0 if self.turn is None else self.turn.left))
 
     def budget(self, est: DynamicStiffness) -> dict[str, FloatArray]:
-        """Random covariance (8, 8) of `widened` by source, from the estimate before it [N^2/m^2].
-
-        Parameters
-        ----------
-        est : DynamicStiffness
-        """
+        """Random covariance (8, 8) of `widened` by source, from the estimate before it [N^2/m^2]."""
         loaded = self._load_known(est).covariance
         parts = {"random": est.covariance, "load miss": loaded - est.covariance}
         if self.mains is not None:
@@ -111,22 +84,7 @@ def find_corrections(
     zero_uncertainty: float = 0.0,
     mains_forces: Sequence[ComplexArray | None] = (),
 ) -> list[Correction]:
-    """Work out the corrections of all points of a campaign.
-
-    Parameters
-    ----------
-    points : list of PointSource
-    mains_lines : sequence
-        Displacement at the mains line of every dynamic run, as of `mains_line`.
-    probe_axes : (m,) ndarray
-        Axes of the displacement probes [rad].
-    first : list of DynamicStiffness
-        Estimates without corrections, one per point.
-    zero_uncertainty : float
-        Of the cells' zero by the manifest [N]; 0 where it says nothing.
-    mains_forces : sequence
-        Oil force at the mains line of every dynamic run, as of `mains_force`.
-    """
+    """Work out the corrections of all points of a campaign."""
     zero = campaign_zero(points, zero_uncertainty)
     misses, common = load_misses(points, zero.force)
     slopes = load_slopes(points, first)

@@ -41,23 +41,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class RunRatios:
-    """Force per displacement of a point's runs, one robust mean over each run's windows.
-
-    Attributes
-    ----------
-    shape : (n_runs, 2) complex ndarray
-        Displacement of unit length.
-    force : (n_runs, 2) complex ndarray
-        Oil force that goes with it [N/m].
-    sideways : (n_runs,) ndarray
-        How far the static load's direction was off [rad].
-    load : float
-        Set point [N].
-    direct : (float, float)
-        Mean direct stiffness and omega times damping [N/m].
-    trusted : bool
-        Whether the forces may serve: mains on the excitation line spoil them.
-    """
+    """Force per displacement of a point's runs, one robust mean over each run's windows."""
 
     shape: ComplexArray
     force: ComplexArray
@@ -69,17 +53,7 @@ class RunRatios:
 
 @dataclass(frozen=True)
 class Turn:
-    """dH/d(direction) at one point.
-
-    Attributes
-    ----------
-    slope : (2, 2) complex ndarray
-        [N/m per rad]
-    left : (8, 8) ndarray
-        Covariance that its own uncertainty leaves on H [(N/m)^2].
-    doubt : (8, 8) ndarray
-        Covariance of the slope itself [(N/m per rad)^2].
-    """
+    """dH/d(direction) at one point."""
 
     slope: ComplexArray
     left: FloatArray = field(repr=False)
@@ -87,16 +61,7 @@ class Turn:
 
 
 def run_ratios(data: PointData, miss: LoadMiss, first: DynamicStiffness, trusted: bool = True) -> RunRatios | None:
-    """What a point's runs say; None where they cannot say anything of the direction.
-
-    Parameters
-    ----------
-    data : PointData
-    miss : LoadMiss
-    first : DynamicStiffness
-        A first estimate, for the size of the direct coefficients.
-    trusted : bool
-    """
+    """What a point's runs say; None where they cannot say anything of the direction."""
     if len(data.runs) < 3 or data.point.static_load <= 0 or not np.isfinite(first.direct).all():
         return None
     if np.abs(miss.sideways).max() > MAX_SIDEWAYS:
@@ -125,18 +90,7 @@ def _ratio(displacement: ComplexArray, force: ComplexArray) -> tuple[ComplexArra
 
 
 def direction_slopes(families: Iterable[tuple[float, ...]], ratios: Sequence[RunRatios | None]) -> list[Turn | None]:
-    """dH/d(direction) at every point of a campaign.
-
-    Parameters
-    ----------
-    families : iterable of tuple
-        Direction and speed of every point: those alike are fitted together.
-    ratios : sequence of RunRatios or None
-
-    Returns
-    -------
-    list of Turn or None
-    """
+    """dH/d(direction) at every point of a campaign."""
     members: dict[tuple[float, ...], list[int]] = {}
     for i, (family, ratio) in enumerate(zip(families, ratios, strict=True)):
         if ratio is not None:
@@ -215,14 +169,6 @@ def common_turn(h: ComplexArray, turn: Turn | None, angle: float) -> FloatArray:
     """Covariance (8, 8) of H when the direction of all loads is known to `angle` [rad] only [N^2/m^2].
 
     Where the runs do not tell how H turns with the load, it is taken to turn with it as a whole: J H - H J.
-
-    Parameters
-    ----------
-    h : (2, 2) complex ndarray
-        [N/m]
-    turn : Turn or None
-    angle : float
-        Standard error [rad].
     """
     quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
     slope = quarter @ h - h @ quarter if turn is None else turn.slope
@@ -231,14 +177,7 @@ def common_turn(h: ComplexArray, turn: Turn | None, angle: float) -> FloatArray:
 
 
 def turned_back(data: PointData, miss: LoadMiss, turn: Turn | None) -> ComplexArray:
-    """Force (n, 2) that a point's windows have because their loads point aside [N].
-
-    Parameters
-    ----------
-    data : PointData
-    miss : LoadMiss
-    turn : Turn or None
-    """
+    """Force (n, 2) that a point's windows have because their loads point aside [N]."""
     if turn is None:
         return np.zeros_like(data.F)
     return np.asarray(miss.sideways[data.run_index][:, None] * (data.D @ turn.slope.T))

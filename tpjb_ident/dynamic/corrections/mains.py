@@ -37,18 +37,7 @@ _PRIOR_DOF = 8.0
 
 @dataclass(frozen=True)
 class Pickup:
-    """Mains pick-up of the displacement probes, known but for angles.
-
-    Attributes
-    ----------
-    patterns : (m, 2) complex ndarray
-        Each turns by an angle of its own in every run; X, Y [m]. One pattern where the probes keep
-        their phases to one another (cabling), one per probe where they do not.
-    size : (probes,) ndarray
-        Amplitude per probe [m].
-    runs : int
-        How many runs it was seen in.
-    """
+    """Mains pick-up of the displacement probes, known but for angles."""
 
     patterns: ComplexArray
     size: FloatArray
@@ -56,15 +45,7 @@ class Pickup:
 
 
 def mains_pickup(lines: Sequence[ComplexArray | None], axes: FloatArray) -> Pickup | None:
-    """Size of the mains line in every probe, from runs where nothing else sits on it.
-
-    Parameters
-    ----------
-    lines : sequence
-        What `mains_line` says of every run.
-    axes : (m,) ndarray
-        Probe axes [rad].
-    """
+    """Size of the mains line in every probe, from runs where nothing else sits on it."""
     along = directions(axes)
     seen = [along @ line for line in lines if line is not None]
     if len(seen) < MIN_RUNS:
@@ -81,20 +62,7 @@ def mains_pickup(lines: Sequence[ComplexArray | None], axes: FloatArray) -> Pick
 
 @dataclass(frozen=True)
 class MainsFit:
-    """Pick-up of every run of a point, found together with H.
-
-    Attributes
-    ----------
-    pickup : (n_runs, 2) complex ndarray
-        X and Y share of the measured displacement at the best minimum [m].
-    shift : (8,) ndarray
-        From the best minimum to the mean of all minima, each by its probability [N/m].
-    covariance : (8, 8) ndarray
-        What not knowing the angles leaves in H [N^2/m^2].
-    dof : float
-    chi_square : float
-        Of the best minimum against the scatter between runs that the campaign shows elsewhere.
-    """
+    """Pick-up of every run of a point, found together with H."""
 
     pickup: ComplexArray
     shift: FloatArray
@@ -104,20 +72,7 @@ class MainsFit:
 
 
 def fit_mains(data: PointData, pickup: Pickup, scatter: float) -> MainsFit | None:
-    """Find the pick-up's angles of all runs of a point.
-
-    Parameters
-    ----------
-    data : PointData
-    pickup : Pickup
-    scatter : float
-        Standard deviation of a run's force residual relative to its force, as other points show it.
-
-    Returns
-    -------
-    MainsFit or None
-        None when there are too few runs for it.
-    """
+    """Find the pick-up's angles of all runs of a point."""
     means = _direction_means(data)
     if means is None:
         return None
@@ -165,24 +120,12 @@ def _direction_means(data: PointData) -> tuple[ComplexArray, ComplexArray] | Non
 
 
 def without_mains(data: PointData, fit: MainsFit) -> PointData:
-    """The point's windows with the pick-up taken out of the displacements.
-
-    Parameters
-    ----------
-    data : PointData
-    fit : MainsFit
-    """
+    """The point's windows with the pick-up taken out of the displacements."""
     return replace(data, D=data.D - fit.pickup[data.run_index])
 
 
 def with_mains_uncertainty(est: DynamicStiffness, fit: MainsFit) -> DynamicStiffness:
-    """Move an estimate to the mean over the possible angles, and add what they leave uncertain.
-
-    Parameters
-    ----------
-    est : DynamicStiffness
-    fit : MainsFit
-    """
+    """Move an estimate to the mean over the possible angles, and add what they leave uncertain."""
     if not np.isfinite(est.h).all():
         return est
     total = est.covariance + fit.covariance
@@ -191,13 +134,7 @@ def with_mains_uncertainty(est: DynamicStiffness, fit: MainsFit) -> DynamicStiff
 
 
 def corrected_condition(pickup: Pickup, fit: MainsFit) -> Condition:
-    """What was done about it.
-
-    Parameters
-    ----------
-    pickup : Pickup
-    fit : MainsFit
-    """
+    """What was done about it."""
     size = ", ".join(f"{1e6 * s:.3g} um" for s in pickup.size)
     return Condition(
         MAINS_CORRECTED,
@@ -207,14 +144,7 @@ def corrected_condition(pickup: Pickup, fit: MainsFit) -> Condition:
 
 
 def relative_scatter(points: Iterable[PointData], first: list[DynamicStiffness]) -> float:
-    """Typical force residual of a run's mean, relative to its force, where no mains disturbs.
-
-    Parameters
-    ----------
-    points : iterable of PointData
-    first : list of DynamicStiffness
-        Estimates of the same points.
-    """
+    """Typical force residual of a run's mean, relative to its force, where no mains disturbs."""
     sizes = []
     for data, est in zip(points, first):
         struck = any(MAINS_ON_LINE in run.conditions for run in data.runs)
@@ -230,27 +160,13 @@ def relative_scatter(points: Iterable[PointData], first: list[DynamicStiffness])
 
 
 def force_pickup(lines: Iterable[ComplexArray | None]) -> FloatArray:
-    """Usual size of the mains line in the oil force, X and Y (2,) [N], from runs where nothing else sits on it.
-
-    Parameters
-    ----------
-    lines : iterable of (2,) complex ndarray or None
-        Oil force at every run's mains line [N]; None where something else sits on it.
-    """
+    """Usual size of the mains line in the oil force, X and Y (2,) [N], from runs where nothing else sits on it."""
     seen = [np.abs(line) for line in lines if line is not None]
     return np.median(seen, axis=0) if seen else np.zeros(2)
 
 
 def force_pickup_spread(data: PointData, size: FloatArray) -> FloatArray:
-    """Covariance (8, 8) that mains in the cells leaves in H: its phase is another one in every run [N^2/m^2].
-
-    Parameters
-    ----------
-    data : PointData
-        With mains on the excitation line.
-    size : (2,) ndarray
-        As of `force_pickup`.
-    """
+    """Covariance (8, 8) that mains in the cells leaves in H: its phase is another one in every run [N^2/m^2]."""
     means = _direction_means(data)
     if means is None:
         return np.zeros((8, 8))

@@ -17,19 +17,7 @@ _SEED = 5060
 
 @dataclass(frozen=True)
 class Minimum:
-    """One local minimum.
-
-    Attributes
-    ----------
-    cost : float
-        Chi-square.
-    x : (n,) ndarray
-        Unknowns.
-    covariance : (8, 8) ndarray
-        Of the entries of H [N^2/m^2].
-    log_volume : float
-        Logarithm of the root of the determinant of all unknowns' covariance: how broad the minimum is.
-    """
+    """One local minimum."""
 
     cost: float
     x: FloatArray
@@ -39,17 +27,7 @@ class Minimum:
 
 @dataclass(frozen=True)
 class MainsEquations:
-    """F_g = H (D_g - sum_k patterns_k exp(i angle_gk)), for H (8 real numbers) and the angles.
-
-    Attributes
-    ----------
-    D, F : (g, 2) complex ndarray
-        Direction means [m], [N].
-    patterns : (m, 2) complex ndarray
-        [m]
-    sigma : (g,) ndarray
-        Of a run's force residual [N].
-    """
+    """F_g = H (D_g - sum_k patterns_k exp(i angle_gk)), for H (8 real numbers) and the angles."""
 
     D: ComplexArray
     F: ComplexArray
@@ -62,54 +40,24 @@ class MainsEquations:
         return float(np.linalg.norm(self.F) / np.linalg.norm(self.D))
 
     def h(self, x: FloatArray) -> ComplexArray:
-        """H of the unknowns, (2, 2) [N/m].
-
-        Parameters
-        ----------
-        x : (8 + g m,) ndarray
-            Entries of H over `scale`, then the angles [rad].
-        """
+        """H of the unknowns, (2, 2) [N/m]."""
         return np.asarray((x[:4] + 1j * x[4:8]).reshape(2, 2) * self.scale, dtype=complex)
 
     def entries(self, x: FloatArray) -> FloatArray:
-        """The eight real entries of H [N/m].
-
-        Parameters
-        ----------
-        x : (8 + g m,) ndarray
-            Entries of H over `scale`, then the angles [rad].
-        """
+        """The eight real entries of H [N/m]."""
         return x[:8] * self.scale
 
     def vectors(self, x: FloatArray) -> ComplexArray:
-        """Disturbance of every run in X, Y, (g, 2) [m].
-
-        Parameters
-        ----------
-        x : (8 + g m,) ndarray
-            Entries of H over `scale`, then the angles [rad].
-        """
+        """Disturbance of every run in X, Y, (g, 2) [m]."""
         return np.asarray(np.exp(1j * x[8:].reshape(len(self.D), -1)) @ self.patterns)
 
     def residual(self, x: FloatArray) -> FloatArray:
-        """Weighted residuals, (4 g,).
-
-        Parameters
-        ----------
-        x : (8 + g m,) ndarray
-            Entries of H over `scale`, then the angles [rad].
-        """
+        """Weighted residuals, (4 g,)."""
         r = (self.F - (self.D - self.vectors(x)) @ self.h(x).T) / self.sigma[:, None]
         return np.sqrt(2.0) * np.concatenate([r.real.ravel(), r.imag.ravel()])
 
     def jacobian(self, x: FloatArray) -> FloatArray:
-        """D residual / d x, (4 g, 8 + g m).
-
-        Parameters
-        ----------
-        x : (8 + g m,) ndarray
-            Entries of H over `scale`, then the angles [rad].
-        """
+        """D residual / d x, (4 g, 8 + g m)."""
         g, m = len(self.D), len(self.patterns)
         h, clean = self.h(x), self.D - self.vectors(x)
         slope = np.zeros((g, 2, 8 + g * m), dtype=complex)
@@ -127,13 +75,7 @@ class MainsEquations:
         return np.sqrt(2.0) * np.concatenate([flat.real, flat.imag])
 
     def start(self, h: ComplexArray) -> FloatArray:
-        """Unknowns for a given H: the angles are those of what H leaves of the displacements.
-
-        Parameters
-        ----------
-        h : (2, 2) complex ndarray
-            [N/m]
-        """
+        """Unknowns for a given H: the angles are those of what H leaves of the displacements."""
         scaled = h.ravel() / self.scale
         return np.concatenate([scaled.real, scaled.imag, self._angles(h).ravel()])
 

@@ -39,19 +39,7 @@ CONTRADICTS_TURN = 0.5
 
 @dataclass(frozen=True)
 class LoadMiss:
-    """Relative deviation of each run's static load from its set point.
-
-    Attributes
-    ----------
-    size : (n_runs,) ndarray
-        (W - W_set) / W_set along the load direction, relative to the campaign.
-    sideways : (n_runs,) ndarray
-        The same across it [rad].
-    uncertainty : float
-        Standard error of the campaign's ratio, which is common to all sizes.
-    turn_uncertainty : float
-        Standard error of the campaign's direction, common to all `sideways` [rad].
-    """
+    """Relative deviation of each run's static load from its set point."""
 
     size: FloatArray
     sideways: FloatArray
@@ -72,14 +60,7 @@ class Loaded(Protocol):
 
 
 def load_ratio(data: Loaded, zero: complex = 0.0) -> ComplexArray:
-    """Measured mean load (less the cells' zero) over set point for every run: size and direction, complex.
-
-    Parameters
-    ----------
-    data : Loaded
-    zero : complex, optional
-        What the cells show without load, X + i Y [N].
-    """
+    """Measured mean load (less the cells' zero) over set point for every run: size and direction, complex."""
     loads = data.mean_loads
     set_point = _set_point(data)
     if data.point.static_load <= 0:
@@ -92,14 +73,7 @@ def _set_point(data: Loaded) -> complex:
 
 
 def campaign_zero(points: Sequence[Loaded], stated: float = 0.0) -> CellZero:
-    """Zero of the cells from all runs of a campaign; see `cell_zero`.
-
-    Parameters
-    ----------
-    points : sequence of Loaded
-    stated : float
-        Standard uncertainty of the zero by the manifest [N].
-    """
+    """Zero of the cells from all runs of a campaign; see `cell_zero`."""
     loads = [data.mean_loads for data in points]
     means = np.concatenate([each[:, 0] + 1j * each[:, 1] for each in loads] or [np.empty(0)])
     set_points = np.concatenate([np.full(len(each), _set_point(d)) for each, d in zip(loads, points)] or [np.empty(0)])
@@ -111,12 +85,6 @@ def load_misses(points: Sequence[Loaded], zero: complex = 0.0) -> tuple[list[Loa
 
     The ratio is the mean over the runs without outliers; what it is uncertain by, all misses are. Cells that show
     no static force have no ratio: it is zero then.
-
-    Parameters
-    ----------
-    points : sequence of Loaded
-    zero : complex, optional
-        What the cells show without load, X + i Y [N].
     """
     ratios = [load_ratio(data, zero) for data in points]
     known = np.concatenate(ratios)
@@ -144,12 +112,6 @@ def load_slopes(points: Sequence[Loaded], first: list[DynamicStiffness]) -> list
 
     Stiffness and damping slopes are found at the excitation that was run at several loads and
     carried over to the others at the same load, direction and speed.
-
-    Parameters
-    ----------
-    points : sequence of Loaded
-    first : list of DynamicStiffness
-        Estimates without corrections, one per point.
     """
     families: dict[tuple[float, ...], list[int]] = {}
     for i, data in enumerate(points):
@@ -205,15 +167,7 @@ def _borrowed(i: int, points: Sequence[Loaded], slopes: list[ComplexArray | None
 
 
 def to_set_point(data: PointData, miss: LoadMiss, slope: ComplexArray | None) -> PointData:
-    """The point's windows with forces as they would be at the set point.
-
-    Parameters
-    ----------
-    data : PointData
-    miss : LoadMiss
-    slope : (2, 2) complex ndarray or None
-        dH/d(ln W) [N/m]; None where not known.
-    """
+    """The point's windows with forces as they would be at the set point."""
     if slope is None or np.abs(miss.size).max(initial=0.0) > MAX_MISS:
         return data
     change = miss.size[data.run_index][:, None] * (data.D @ slope.T)
@@ -221,15 +175,7 @@ def to_set_point(data: PointData, miss: LoadMiss, slope: ComplexArray | None) ->
 
 
 def widened(est: DynamicStiffness, miss: LoadMiss, slope: ComplexArray | None) -> DynamicStiffness:
-    """Add what is not known of the miss, or what a known one may have done where the slope is not known.
-
-    Parameters
-    ----------
-    est : DynamicStiffness
-    miss : LoadMiss
-    slope : (2, 2) complex ndarray or None
-        dH/d(ln W) [N/m]; None where not known.
-    """
+    """Add what is not known of the miss, or what a known one may have done where the slope is not known."""
     if not np.isfinite(est.h).all():
         return est
     if slope is None:
@@ -240,14 +186,7 @@ def widened(est: DynamicStiffness, miss: LoadMiss, slope: ComplexArray | None) -
 
 
 def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
-    """Point out loads that are off by more than scatter.
-
-    Parameters
-    ----------
-    miss : LoadMiss
-    common : complex
-        The campaign's own ratio of measured to set load.
-    """
+    """Point out loads that are off by more than scatter."""
     found = []
     worst = float(np.abs(miss.size).max(initial=0.0))
     if worst > MAX_MISS:

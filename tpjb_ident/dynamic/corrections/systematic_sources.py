@@ -27,13 +27,6 @@ class GainDraws:
 
     A channel's gain error is one number for the whole campaign, so it moves all points together: the draws are shared,
     and the covariance over all points carries the correlation.
-
-    Attributes
-    ----------
-    displacement, force, acceleration : (n, 2, 2) ndarray
-        What a true vector (X, Y) is multiplied by in a draw; the unit matrix when nothing is known.
-    unstated : tuple of str
-        Displacement and force channels without a stated uncertainty.
     """
 
     displacement: FloatArray
@@ -50,15 +43,7 @@ class GainDraws:
 
 
 def gain_draws(channels: Mapping[str, Any], n: int, seed: int) -> GainDraws:
-    """Draw Gaussian gain errors for every displacement, force and acceleration channel.
-
-    Parameters
-    ----------
-    channels : mapping of str to rigdata.calibration.Channel
-    n : int
-        Draws; they come in pairs of opposite sign, so that their mean is zero.
-    seed : int
-    """
+    """Draw Gaussian gain errors for every displacement, force and acceleration channel."""
     rng = np.random.default_rng(seed)
     matrices, unstated = {}, []
     for quantity in ("displacement", "force", "acceleration"):
@@ -88,12 +73,6 @@ def apparent_change(data: PointData, stiffness: DynamicStiffness, draws: GainDra
 
     The inertia force is a small part of F; its share of H is found by regression of the housing
     acceleration on the displacements, so each draw takes a few 2x2 products instead of a new fit.
-
-    Parameters
-    ----------
-    data : PointData
-    stiffness : DynamicStiffness
-    draws : GainDraws
     """
     h = stiffness.h
     if not np.isfinite(h).all():
@@ -112,17 +91,7 @@ def apparent_change(data: PointData, stiffness: DynamicStiffness, draws: GainDra
 
 @dataclass(frozen=True)
 class SystematicSources:
-    """Draws of what the manifest states.
-
-    Attributes
-    ----------
-    axes : dict of str to (m,) ndarray
-        Stated axes of the channels of each quantity [rad].
-    turns, delays : dict of str to (n, m) ndarray
-        Drawn errors of axes [rad] and delays [s]; empty where none is stated.
-    mass : (n,) ndarray
-        Drawn relative errors of the housing's mass; empty where none is stated.
-    """
+    """Draws of what the manifest states."""
 
     axes: dict[str, FloatArray]
     turns: dict[str, FloatArray]
@@ -130,13 +99,7 @@ class SystematicSources:
     mass: FloatArray
 
     def changes(self, data: PointData, stiffness: DynamicStiffness) -> dict[str, FloatArray]:
-        """Change of the eight entries of H in every draw [N/m], (n, 8), by source.
-
-        Parameters
-        ----------
-        data : PointData
-        stiffness : DynamicStiffness
-        """
+        """Change of the eight entries of H in every draw [N/m], (n, 8), by source."""
         found = {}
         if self.turns:
             found["axis"] = apparent_change(data, stiffness, self._draws(self._turned))
@@ -172,13 +135,6 @@ def systematic_sources(campaign: Campaign, n: int, seed: int) -> SystematicSourc
     """Draw axes, delays and mass within what the manifest states, in pairs of opposite sign.
 
     Channels of one clock, or of one quantity where no clock is stated, share one device and so the error of its delay.
-
-    Parameters
-    ----------
-    campaign : rigdata.campaign.Campaign
-    n : int
-        Draws.
-    seed : int
     """
     chosen = {q: [c for c in campaign.channels.values() if c.quantity == q and c.axis is not None] for q in _QUANTITIES}
     rng = np.random.default_rng(seed)
@@ -200,15 +156,6 @@ def systematic_sources(campaign: Campaign, n: int, seed: int) -> SystematicSourc
 
 
 def paired_draws(rng: np.random.Generator, n: int, *shape: int) -> FloatArray:
-    """Standard normal draws in pairs of opposite sign, so that they have no mean, (n, *shape).
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    n : int
-        Draws, an even number.
-    *shape : int
-        Of each.
-    """
+    """Standard normal draws in pairs of opposite sign, so that they have no mean, (n, *shape)."""
     half = rng.standard_normal((max(n // 2, 1), *shape))
     return np.concatenate([half, -half])

@@ -42,20 +42,7 @@ MIN_OTHERS = 4
 
 @dataclass(frozen=True)
 class Repeats:
-    """Direction means and the noise of a single window, from good windows only.
-
-    Attributes
-    ----------
-    means : DirectionMeans
-    noise : (4, 4) complex ndarray
-        Covariance of one window's (X, Y, Fx, Fy) about its direction.
-    spare : float
-        Effective windows beyond one per direction.
-    weights : (n,) ndarray
-        Final window weights.
-    wandering : int
-        Directions whose drive phase is not locked; their windows were turned to one phase.
-    """
+    """Direction means and the noise of a single window, from good windows only."""
 
     means: DirectionMeans
     noise: ComplexArray
@@ -66,17 +53,7 @@ class Repeats:
 
 @dataclass(frozen=True)
 class EivFit:
-    """Result of the fit in the table's scale.
-
-    Attributes
-    ----------
-    h : (2, 2) complex ndarray
-    covariance : (8, 8) ndarray
-    dof : (8,) ndarray
-    chi_square : float
-    attenuation : (2,) ndarray
-        Share that a regression of single windows would lose, weaker displacement direction first.
-    """
+    """Result of the fit in the table's scale."""
 
     h: ComplexArray
     covariance: FloatArray
@@ -86,22 +63,7 @@ class EivFit:
 
 
 def repeats(table: PhasorTable, weights: FloatArray, rounds: int = 2) -> Repeats | None:
-    """Average each direction's good windows and pool their noise.
-
-    Parameters
-    ----------
-    table : PhasorTable
-    weights : (n,) ndarray
-        Window weights of the robust joint fit. They start the search; the final weights come from
-        each window's own distance to its direction mean in (X, Y, Fx, Fy).
-    rounds : int
-        Reweighting rounds.
-
-    Returns
-    -------
-    Repeats or None
-        None when the good repeats are too few for a noise covariance.
-    """
+    """Average each direction's good windows and pool their noise."""
     good = (weights > 0.2).astype(float)
     z, wandering = aligned(np.concatenate([table.D, table.F], axis=1), table.direction, good)
     state = _pooled(z, table, good, 1.0)
@@ -147,14 +109,7 @@ def _pooled(
 
 
 def eiv_fit(repeats: Repeats, directions_differ: bool = False) -> EivFit:
-    """Errors-in-variables fit of the direction means with their direction effects.
-
-    Parameters
-    ----------
-    repeats : Repeats
-    directions_differ : bool
-        See `PhasorTable`.
-    """
+    """Errors-in-variables fit of the direction means with their direction effects."""
     means, noise = repeats.means, repeats.noise
     h = _closed_form(means, noise)
     window_noise = _residual_noise(h, noise)
@@ -238,19 +193,6 @@ def aligned(z: ComplexArray, direction: IntArray, weights: FloatArray) -> tuple[
 
     Repeats are repeats of one phasor only while the actuators' generator is locked to the recorder. Where it is not,
     each window's phasors turn by a common angle, which F = H D does not see, but an average does.
-
-    Parameters
-    ----------
-    z : (n, m) complex ndarray
-        All measured phasors of every window.
-    direction : (n,) ndarray of int
-    weights : (n,) ndarray
-        Windows that count; the others are turned along.
-
-    Returns
-    -------
-    (n, m) complex ndarray, int
-        Turned windows, and how many directions needed it.
     """
     result, wandering = z, 0
     for d in range(int(direction.max()) + 1):
@@ -279,12 +221,6 @@ def readmitted(table: PhasorTable, weights: FloatArray) -> FloatArray:
     run whose windows agree with one another is taken back unless it lies further from what the other runs predict than
     their own disagreement explains. With fewer than four others nobody can say which run is wrong: then all count, and
     the interval shows the discord.
-
-    Parameters
-    ----------
-    table : PhasorTable
-    weights : (n,) ndarray
-        Of the robust joint fit.
     """
     size = np.bincount(table.direction, minlength=table.n_directions)
     share = np.bincount(table.direction, weights=weights > 0.2, minlength=table.n_directions) / size

@@ -84,23 +84,7 @@ def estimate_dynamic_stiffness(
 def estimate_table(
     table: PhasorTable, omega: float, method: str, rlm_settings: RlmSettings | None = None
 ) -> DynamicStiffness:
-    """As `estimate_dynamic_stiffness`, for a table that is already checked and scaled.
-
-    Parameters
-    ----------
-    table : PhasorTable
-    omega : float
-        [rad/s]
-    method : str
-        One of `METHODS`.
-    rlm_settings : RlmSettings, optional
-        For ``"rlm"``.
-
-    Raises
-    ------
-    ArgumentError
-        Unknown method; the nearest known one is named.
-    """
+    """As `estimate_dynamic_stiffness`, for a table that is already checked and scaled."""
     if method not in METHODS:
         raise ArgumentError(unknown_name("method", method, METHODS))
     name = f"rlm:{(rlm_settings or RlmSettings()).norm}" if method == "rlm" else method

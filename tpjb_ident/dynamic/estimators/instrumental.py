@@ -19,16 +19,7 @@ from tpjb_ident.errors import ArgumentError
 
 @dataclass(frozen=True)
 class InstrumentalFit:
-    """Result in the table's scale.
-
-    Attributes
-    ----------
-    h : (2, 2) complex ndarray
-    explained : PhasorTable
-        The table with the displacements as the references explain them: the effective regressors.
-    weights : (n,) ndarray
-    conditions : tuple of Condition
-    """
+    """Result in the table's scale."""
 
     h: ComplexArray
     explained: PhasorTable
@@ -37,18 +28,7 @@ class InstrumentalFit:
 
 
 def instrumental_fit(table: PhasorTable) -> InstrumentalFit:
-    """Robust instrumental-variables estimate.
-
-    Parameters
-    ----------
-    table : PhasorTable
-        With `reference`.
-
-    Raises
-    ------
-    ArgumentError
-        The table has no reference.
-    """
+    """Robust instrumental-variables estimate."""
     if table.reference is None:
         raise ArgumentError('method "iv" needs reference phasors (n, 2), for instance the actuators\' command')
     # The fit follows any change of components; what plain least squares leaves of F has little in common with D, and

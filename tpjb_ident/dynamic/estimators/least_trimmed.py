@@ -25,13 +25,7 @@ _SMALL_CORE = 0.38
 
 
 class Regression:
-    """Y = X B' of one table of windows, for any weights.
-
-    Parameters
-    ----------
-    X : (n, 2) complex ndarray
-    Y : (n, q) complex ndarray
-    """
+    """Y = X B' of one table of windows, for any weights."""
 
     def __init__(self, X: ComplexArray, Y: ComplexArray) -> None:
         self.X, self.Y = X, Y
@@ -47,12 +41,7 @@ class Regression:
         self.metric += METRIC_FLOOR * float(np.trace(self.metric).real) / self.q * np.eye(self.q)
 
     def fit(self, weights: FloatArray) -> ComplexArray:
-        """Weighted least squares, (..., n) -> (..., q, 2), by Cramer's rule; a singular system gives large numbers.
-
-        Parameters
-        ----------
-        weights : (..., n) ndarray
-        """
+        """Weighted least squares, (..., n) -> (..., q, 2), by Cramer's rule; a singular system gives large numbers."""
         sums = weights @ self._terms
         a, d = sums[..., 0], sums[..., 1]
         b = sums[..., 2] + 1j * sums[..., 3]
@@ -67,23 +56,11 @@ class Regression:
         return B
 
     def residual(self, B: ComplexArray) -> ComplexArray:
-        """Y - X B', (n, q).
-
-        Parameters
-        ----------
-        B : (q, 2) complex ndarray
-            Coefficients.
-        """
+        """Y - X B', (n, q)."""
         return np.asarray(self.Y - self.X @ B.T)
 
     def terms(self, B: ComplexArray) -> FloatArray:
-        """`products` of the residual, (..., q^2, n).
-
-        Parameters
-        ----------
-        B : (..., q, 2) complex ndarray
-            Coefficients.
-        """
+        """`products` of the residual, (..., q^2, n)."""
         return products(self._y - B @ self._x)
 
 
@@ -94,13 +71,7 @@ def _pairs(q: int) -> tuple[IntArray, IntArray]:
 
 
 def products(rows: ComplexArray) -> FloatArray:
-    """Terms of r r^H as reals, (..., q, n) -> (..., q^2, n): |r_a|^2, then Re and Im of conj(r_a) r_b for a < b.
-
-    Parameters
-    ----------
-    rows : (..., q, n) complex ndarray
-        Residuals.
-    """
+    """Terms of r r^H as reals, (..., q, n) -> (..., q^2, n): |r_a|^2, then Re and Im of conj(r_a) r_b for a < b."""
     q = rows.shape[-2]
     first, second = _pairs(q)
     pairs = rows[..., first, :].conj() * rows[..., second, :]
@@ -113,16 +84,7 @@ def products(rows: ComplexArray) -> FloatArray:
 
 
 def scatter(terms: FloatArray, weights: FloatArray, q: int) -> ComplexArray:
-    """Weighted mean of r r^H, (..., q, q), from `products`.
-
-    Parameters
-    ----------
-    terms : (..., q^2, n) ndarray
-        Of `products`.
-    weights : (..., n) ndarray
-    q : int
-        Components of a residual.
-    """
+    """Weighted mean of r r^H, (..., q, q), from `products`."""
     sums = (terms @ weights[..., None])[..., 0] / weights.sum(axis=-1)[..., None]
     first, second = _pairs(q)
     result = np.zeros((*sums.shape[:-1], q, q), dtype=complex)
@@ -134,15 +96,7 @@ def scatter(terms: FloatArray, weights: FloatArray, q: int) -> ComplexArray:
 
 
 def distance2(terms: FloatArray, inner: ComplexArray) -> FloatArray:
-    """2 r^H S^-1 r of every window, (..., n), from `products` and the scatter S.
-
-    Parameters
-    ----------
-    terms : (..., q^2, n) ndarray
-        Of `products`.
-    inner : (..., q, q) complex ndarray
-        Scatter S.
-    """
+    """2 r^H S^-1 r of every window, (..., n), from `products` and the scatter S."""
     inverse = np.linalg.inv(inner)
     q = inner.shape[-1]
     first, second = _pairs(q)
@@ -154,16 +108,7 @@ def distance2(terms: FloatArray, inner: ComplexArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Start:
-    """A robust first answer.
-
-    Attributes
-    ----------
-    coefficients : (q, 2) complex ndarray
-    scatter : (q, q) complex ndarray
-        Residual covariance of the windows that belong together.
-    exact : bool
-        More than half of the windows fit without residual; `scatter` is then no covariance.
-    """
+    """A robust first answer."""
 
     coefficients: ComplexArray
     scatter: ComplexArray
@@ -177,13 +122,6 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Star
     share a disturbance that no H explains, give themselves away: a smaller core that is several times tighter
     and has windows in every direction is the better start. (A core in a few directions only would be two runs
     fitted exactly, so it does not count.)
-
-    Parameters
-    ----------
-    regression : Regression
-    direction : (n,) ndarray of int
-        Starts are drawn from windows of different directions where possible.
-    seed : int
     """
     seeds = _first_fits(regression, _start_pairs(direction, seed))
     B, exact = _concentrated(regression, seeds, 0.5)
@@ -202,15 +140,7 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Star
 
 
 def evenly_chosen(direction: IntArray, most: int) -> IntArray:
-    """Indices of at most about `most` windows, the same share of every direction, spread over its time.
-
-    Parameters
-    ----------
-    direction : (n,) ndarray of int
-        Label of every window.
-    most : int
-        Windows.
-    """
+    """Indices of at most about `most` windows, the same share of every direction, spread over its time."""
     n = len(direction)
     if n <= most:
         return np.arange(n)

@@ -28,21 +28,7 @@ _MAX_ITERATIONS = 200
 
 @dataclass(frozen=True)
 class RobustFit:
-    """Y = X B' with robust weights.
-
-    Attributes
-    ----------
-    coefficients : (q, p) complex ndarray
-        B: y = B x per window.
-    scatter : (q, q) complex ndarray
-        Residual covariance E[r r^H] of the good windows.
-    weights : (n,) ndarray
-        In [0, 1].
-    distance2 : (n,) ndarray
-        2 r^H scatter^-1 r: chi-square with 2 q degrees of freedom for a good window.
-    iterations : int
-    conditions : tuple of Condition
-    """
+    """Y = X B' with robust weights."""
 
     coefficients: ComplexArray
     scatter: ComplexArray
@@ -53,19 +39,7 @@ class RobustFit:
 
 
 def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1, tolerance: float = 1e-12) -> RobustFit:
-    """Robust multivariate complex regression of Y on X.
-
-    Parameters
-    ----------
-    X : (n, 2) complex ndarray
-    Y : (n, q) complex ndarray
-    direction : (n,) ndarray of int
-        Starts are drawn from windows of different directions where possible.
-    seed : int
-        Of the drawing of starts.
-    tolerance : float
-        Relative change of the coefficients at which the M-steps end.
-    """
+    """Robust multivariate complex regression of Y on X."""
     n, q = len(Y), Y.shape[1]
     if n < max(MIN_WINDOWS, 2 * (q + 1) + 2):
         return _least_squares_only(X, Y)

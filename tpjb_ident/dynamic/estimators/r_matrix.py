@@ -112,55 +112,20 @@ def _shared_block(R: ComplexArray, f: ComplexArray) -> tuple[ComplexArray, Compl
 
 
 def real_rows(R: ComplexArray, f: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Write a complex system as a real one twice the size, for solvers that know real numbers only.
-
-    Parameters
-    ----------
-    R : (m, p) complex ndarray
-    f : (m,) complex ndarray
-
-    Returns
-    -------
-    (2 m, 2 p) ndarray, (2 m,) ndarray
-        Rows: real parts, then imaginary parts; unknowns: Re h, then Im h.
-    """
+    """Write a complex system as a real one twice the size, for solvers that know real numbers only."""
     real = np.block([[R.real, -R.imag], [R.imag, R.real]])
     return real, np.concatenate([f.real, f.imag])
 
 
 def ols_fit(D: ComplexArray, F: ComplexArray) -> ComplexArray:
-    """Solve F = H D in the least-squares sense.
-
-    Parameters
-    ----------
-    D, F : (n, 2) complex ndarray
-
-    Returns
-    -------
-    (2, 2) complex ndarray
-        H; both force equations share the displacements, so Eq. (15) falls into two problems of two unknowns.
-    """
+    """Solve F = H D in the least-squares sense."""
     return np.asarray(np.linalg.lstsq(D, F, rcond=None)[0], dtype=complex).T
 
 
 def phasor_table(
     D: ArrayLike, F: ArrayLike, direction: ArrayLike | None = None, reference: ArrayLike | None = None
 ) -> PhasorTable:
-    """Build Eq. (15) from the windows, and check, scale and label them.
-
-    Parameters
-    ----------
-    D, F : (n, 2) complex array
-        [m], [N]; rows with a NaN are left out.
-    direction : (n,) array of labels, optional
-        Anything hashable; without it every window is a direction of its own.
-    reference : (n, 2) complex array, optional
-
-    Raises
-    ------
-    ArgumentError
-        Shapes that do not fit together.
-    """
+    """Build Eq. (15) from the windows, and check, scale and label them."""
     displacement, force = _shared_block(*r_matrix(D, F))
     n = len(displacement)
     labels = np.arange(n) if direction is None else np.asarray(direction).ravel()
@@ -197,13 +162,7 @@ def _scale(phasors: ComplexArray) -> float:
 
 
 def displacement_condition(D: ComplexArray, weights: FloatArray | None = None) -> float:
-    """Condition number of the displacement directions: largest over smallest singular value of D.
-
-    Parameters
-    ----------
-    D : (n, 2) complex ndarray
-    weights : (n,) ndarray, optional
-    """
+    """Condition number of the displacement directions: largest over smallest singular value of D."""
     rows = D if weights is None else D * np.sqrt(weights)[:, None]
     if len(rows) < 2:
         return np.inf

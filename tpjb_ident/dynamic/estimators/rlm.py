@@ -54,18 +54,7 @@ class Norm:
 
 @dataclass(frozen=True)
 class RlmSolution:
-    """One real robust regression: what statsmodels' ``RLM(...).fit(conv="coefs")`` tells of it.
-
-    Attributes
-    ----------
-    params : (p,) ndarray
-    covariance : (p, p) ndarray
-        H1, scaled.
-    weights : (m,) ndarray
-    scale : float
-    iterations : int
-    conditions : tuple of Condition
-    """
+    """One real robust regression: what statsmodels' ``RLM(...).fit(conv="coefs")`` tells of it."""
 
     params: FloatArray
     covariance: FloatArray
@@ -81,21 +70,7 @@ class ComplexInputError(TpjbError, TypeError):
 
 @dataclass(frozen=True)
 class RlmSettings:
-    """How statsmodels is to be run.
-
-    Attributes
-    ----------
-    norm : str
-        Key of `NORMS`.
-    scale : str
-        ``"mad"`` (statsmodels' own, constant 0.67448975...), ``"mass"`` (R's MASS::rlm, 0.6745),
-        ``"huber"`` (Huber's proposal 2).
-    max_iterations : int
-    tolerance : float
-        On the largest change of a coefficient, the system being of order one.
-    library : bool
-        Whether statsmodels itself is run whatever the norm: where its own numbers are promised.
-    """
+    """How statsmodels is to be run."""
 
     norm: str = "huber"
     scale: str = "mad"
@@ -105,21 +80,7 @@ class RlmSettings:
 
 
 def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | None = None) -> RlmSolution:
-    """Run statsmodels' RLM on a real system, guarded.
-
-    Parameters
-    ----------
-    design : (m, p) real ndarray
-    response : (m,) real ndarray
-    settings : RlmSettings, optional
-
-    Raises
-    ------
-    ComplexInputError
-        Design or response is complex.
-    ValueError
-        Unknown norm or scale (the nearest known one is named).
-    """
+    """Run statsmodels' RLM on a real system, guarded."""
     settings = settings or RlmSettings()
     if np.iscomplexobj(design) or np.iscomplexobj(response):
         raise ComplexInputError(
@@ -181,17 +142,7 @@ def _mass_scale(model: Any, residual: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class RlmFit:
-    """H from two real robust regressions, one per force axis.
-
-    Attributes
-    ----------
-    h : (2, 2) complex ndarray
-    covariance : (8, 8) ndarray
-    dof : (8,) ndarray
-    weights : (n, 2) ndarray
-        Smaller of the weights of a window's real and imaginary row, per force axis.
-    conditions : tuple of Condition
-    """
+    """H from two real robust regressions, one per force axis."""
 
     h: ComplexArray
     covariance: FloatArray
@@ -201,14 +152,7 @@ class RlmFit:
 
 
 def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = None) -> RlmFit:
-    """Solve Eq. (15) axis by axis with statsmodels.
-
-    Parameters
-    ----------
-    D, F : (n, 2) complex ndarray
-        Of order one.
-    settings : RlmSettings, optional
-    """
+    """Solve Eq. (15) axis by axis with statsmodels."""
     n = len(D)
     h = np.zeros((2, 2), dtype=complex)
     covariance = np.zeros((8, 8))
@@ -232,24 +176,6 @@ def robust_fit(
 
     Every identification computes these two beside its own estimate; to import statsmodels and what it draws in took as
     long as to read all records. A test holds the two equal to the last bit.
-
-    Parameters
-    ----------
-    design : (m, p) real ndarray
-    response : (m,) real ndarray
-    norm : str
-        Out of `OWN_NORMS`.
-    max_iterations : int
-    tolerance : float
-        On the largest change of a coefficient.
-
-    Returns
-    -------
-    RobustFit
-
-    Notes
-    -----
-    P. J. Huber, Robust Statistics, Wiley, 1981; statsmodels 0.15, ``robust.robust_linear_model``.
     """
     chosen = OWN_NORMS[norm]
     inverse = np.linalg.pinv(design)

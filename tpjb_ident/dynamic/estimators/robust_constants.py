@@ -20,42 +20,18 @@ _BEGIN, _END = 0.99, 0.9999
 
 
 def bisquare_weight(u: FloatArray, c: float) -> FloatArray:
-    """Tukey's weight psi(u) / u.
-
-    Parameters
-    ----------
-    u : (n,) ndarray
-        Residuals over their scale.
-    c : float
-        Residual from which the weight is zero.
-    """
+    """Tukey's weight psi(u) / u."""
     return np.asarray(np.maximum(1 - (u / c) ** 2, 0.0) ** 2)
 
 
 def half_shrinkage(dimension: int, share: float) -> float:
-    """Variance of the innermost `share` of a chi(dimension) population, relative to all of it.
-
-    Parameters
-    ----------
-    dimension : int
-        Real dimensions.
-    share : float
-        0 to 1.
-    """
+    """Variance of the innermost `share` of a chi(dimension) population, relative to all of it."""
     return float(chdtr(dimension + 2, _quantile(share, dimension)) / share)
 
 
 @functools.cache
 def efficiency_constant(dimension: int, efficiency: float = 0.95) -> float:
-    """Constant c at which the bisquare location/regression estimate has this Gaussian efficiency.
-
-    Parameters
-    ----------
-    dimension : int
-        Real dimensions.
-    efficiency : float, optional
-        0 to 1.
-    """
+    """Constant c at which the bisquare location/regression estimate has this Gaussian efficiency."""
 
     def moment(k: int, c: float) -> float:
         """E[u^2k; u < c]: the chi-square's recursion x^k p_d(x) ~ p_(d + 2 k)(x)."""
@@ -74,20 +50,7 @@ def efficiency_constant(dimension: int, efficiency: float = 0.95) -> float:
 
 @functools.cache
 def trimming_limits(dimension: int) -> tuple[float, float, float]:
-    """Squared distances where a window starts to lose weight and where it has none.
-
-    Parameters
-    ----------
-    dimension : int
-        Real dimensions.
-
-    Returns
-    -------
-    lower, upper : float
-        Limits of u^2, chi-square with `dimension` degrees of freedom.
-    shrinkage : float
-        E[w u^2] / (dimension E[w]): what a weighted covariance comes out too small by.
-    """
+    """Squared distances where a window starts to lose weight and where it has none."""
     lower, upper = _quantile(_BEGIN, dimension), _quantile(_END, dimension)
 
     nodes, width = np.polynomial.legendre.leggauss(40)
@@ -110,16 +73,6 @@ def _density(x: FloatArray, dimension: int) -> FloatArray:
 
 
 def trimming_weight(u2: FloatArray, lower: float, upper: float) -> FloatArray:
-    """One up to `lower`, falling smoothly to zero at `upper` (no window tips the answer by a hair).
-
-    Parameters
-    ----------
-    u2 : (n,) ndarray
-        Squared distances.
-    lower : float
-        Where weight begins to fall.
-    upper : float
-        Where none is left.
-    """
+    """One up to `lower`, falling smoothly to zero at `upper` (no window tips the answer by a hair)."""
     v = np.clip((u2 - lower) / (upper - lower), 0.0, 1.0)
     return np.asarray((1 - v) ** 2 * (1 + 2 * v))

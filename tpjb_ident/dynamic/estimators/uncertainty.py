@@ -26,14 +26,7 @@ CLEAR = 1e-3
 
 @dataclass(frozen=True)
 class DirectionMeans:
-    """What the directions say, each averaged over its good windows.
-
-    Attributes
-    ----------
-    D, F : (g, 2) complex ndarray
-    count : (g,) ndarray
-        Effective number of windows behind each.
-    """
+    """What the directions say, each averaged over its good windows."""
 
     D: ComplexArray
     F: ComplexArray
@@ -44,18 +37,7 @@ class DirectionMeans:
 
 
 def complex_to_real_covariance(hermitian: ComplexArray, pseudo: ComplexArray | None = None) -> FloatArray:
-    """Covariance of [Re h, Im h] from E[e e^H] and E[e e^T].
-
-    Parameters
-    ----------
-    hermitian : (m, m) complex ndarray
-    pseudo : (m, m) complex ndarray, optional
-        Zero for circular errors.
-
-    Returns
-    -------
-    (2 m, 2 m) ndarray
-    """
+    """Covariance of [Re h, Im h] from E[e e^H] and E[e e^T]."""
     P = np.zeros_like(hermitian) if pseudo is None else pseudo
     real = 0.5 * np.block(
         [
@@ -67,37 +49,12 @@ def complex_to_real_covariance(hermitian: ComplexArray, pseudo: ComplexArray | N
 
 
 def information(D: ComplexArray, D_star: ComplexArray, inverse: ComplexArray) -> ComplexArray:
-    """Sum over directions of V_g^-1 (x) conj(D*_g) D_g^T, for h ordered xx, xy, yx, yy.
-
-    Parameters
-    ----------
-    D, D_star : (g, 2) complex ndarray
-        Regressors and (for errors in variables) their estimated true values.
-    inverse : (g, 2, 2) complex ndarray
-        V_g^-1.
-    """
+    """Sum over directions of V_g^-1 (x) conj(D*_g) D_g^T, for h ordered xx, xy, yx, yy."""
     return np.einsum("gac,gb,gd->abcd", inverse, D_star.conj(), D).reshape(4, 4)
 
 
 def direction_effect(residual: ComplexArray, means: DirectionMeans, noise: ComplexArray) -> tuple[ComplexArray, float]:
-    """Between-direction covariance per unit |D|^2, by moments, never negative.
-
-    Parameters
-    ----------
-    residual : (g, 2) complex ndarray
-        F - H D of the direction means, H from a fit weighted by `count`.
-    means : DirectionMeans
-    noise : (2, 2) complex ndarray
-        Covariance of one window's F - H D.
-
-    Returns
-    -------
-    T : (2, 2) complex ndarray
-        Zero unless the chi-square is beyond doubt (weights fitted to noise cost efficiency).
-        The residual of direction g has covariance noise / count_g + T |D_g|^2.
-    chi_square : float
-        Reduced chi-square of the residuals against repeat noise alone; NaN without spare directions.
-    """
+    """Between-direction covariance per unit |D|^2, by moments, never negative."""
     g = len(means)
     if g <= 2:
         return np.zeros((2, 2), dtype=complex), np.nan
@@ -119,36 +76,14 @@ def direction_effect(residual: ComplexArray, means: DirectionMeans, noise: Compl
 
 
 def direction_covariances(means: DirectionMeans, noise: ComplexArray, T: ComplexArray) -> ComplexArray:
-    """V_g = noise / count_g + T |D_g|^2, shape (g, 2, 2).
-
-    Parameters
-    ----------
-    means : DirectionMeans
-    noise : (2, 2) complex ndarray
-        Covariance of one window's residual.
-    T : (2, 2) complex ndarray
-        By which directions differ, over |D|^2.
-    """
+    """V_g = noise / count_g + T |D_g|^2, shape (g, 2, 2)."""
     power = np.einsum("ga,ga->g", means.D, means.D.conj()).real
     return noise / means.count[:, None, None] + T * power[:, None, None]
 
 
 @dataclass(frozen=True)
 class DirectionShares:
-    """What every direction contributes to the estimating equations of h, and what their repeats say.
-
-    Attributes
-    ----------
-    score : (g, 4) complex ndarray
-        To the equations.
-    parts : (g, 4, 4) complex ndarray
-        To their matrix.
-    repeat : (4, 4) complex ndarray
-        E[e e^H] of h from repeat noise alone.
-    dof_repeat : float
-    pooled : (8, 8) ndarray or None
-        Covariance of H by `pooled_effect`, which stands beside the jackknife where the directions are few.
-    """
+    """What every direction contributes to the estimating equations of h, and what their repeats say."""
 
     score: ComplexArray
     parts: ComplexArray
@@ -164,19 +99,6 @@ def spread_of(shares: DirectionShares, chi_square: float, known_effect: bool = F
     more than another. So its share is not modelled but taken from the directions themselves
     (delete-one jackknife, i.e. cluster-robust with its small-sample correction), as far as the
     chi-square of the direction means says that there is any.
-
-    Parameters
-    ----------
-    shares : DirectionShares
-    chi_square : float
-        Reduced chi-square of the direction means against repeat noise.
-    known_effect : bool
-        That directions differ is known from elsewhere; then this point's own chi-square is not asked.
-
-    Returns
-    -------
-    covariance : (8, 8) ndarray
-    dof : (8,) ndarray
     """
     score, parts, pooled, dof_repeat = shares.score, shares.parts, shares.pooled, shares.dof_repeat
     known = _positive(complex_to_real_covariance(shares.repeat))
@@ -216,19 +138,7 @@ def _positive(covariance: FloatArray) -> FloatArray:
 
 
 def pooled_effect(residual: ComplexArray, means: DirectionMeans) -> FloatArray:
-    """Covariance of H from one relative variance of the directions' residuals, pooled over directions and axes.
-
-    Parameters
-    ----------
-    residual : (g, 2) complex ndarray
-        F - H D of the direction means, g > 2.
-    means : DirectionMeans
-
-    Returns
-    -------
-    (8, 8) ndarray
-        What errors of that share of each direction's force do to a regression of the means.
-    """
+    """Covariance of H from one relative variance of the directions' residuals, pooled over directions and axes."""
     power = np.einsum("ga,ga->g", means.F, means.F.conj()).real
     share = float((np.abs(residual) ** 2 / power[:, None]).sum() / (2 * (len(means) - 2)))
     weighted = means.D.conj() * means.count[:, None]
@@ -238,16 +148,7 @@ def pooled_effect(residual: ComplexArray, means: DirectionMeans) -> FloatArray:
 
 
 def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_between: FloatArray) -> FloatArray:
-    """Welch-Satterthwaite degrees of freedom of variances made of two parts.
-
-    Parameters
-    ----------
-    total, repeat : (8,) ndarray
-        Whole variance, and what repeat noise alone would give.
-    dof_repeat : float
-    dof_between : (8,) ndarray
-        Degrees of freedom behind either part.
-    """
+    """Welch-Satterthwaite degrees of freedom of variances made of two parts."""
     between = np.maximum(total - repeat, 0.0)
     spread = repeat**2 / max(dof_repeat, 1.0) + between**2 / dof_between
     with np.errstate(divide="ignore", invalid="ignore"):  # no spread at all: the next line says what then
@@ -258,20 +159,7 @@ def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_betw
 def homoscedastic(
     D: ComplexArray, residual: ComplexArray, weights: FloatArray, correction: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Covariance and dof of a (weighted) regression without repeats: residuals are all there is.
-
-    Parameters
-    ----------
-    D, residual : (n, 2) complex ndarray
-    weights : (n,) ndarray
-        Robust weights; their sum is the effective number of windows.
-    correction : float
-        Factor on the variance (efficiency of the estimator).
-
-    Returns
-    -------
-    (8, 8) ndarray, (8,) ndarray
-    """
+    """Covariance and dof of a (weighted) regression without repeats: residuals are all there is."""
     spare = max(float(weights.sum()) - 2.0, 1e-12)
     scatter = (weights[:, None] * residual).T @ residual.conj() / spare
     inverse = np.linalg.inv((weights[:, None] * D.conj()).T @ D)
@@ -283,21 +171,7 @@ def homoscedastic(
 def with_repeats(
     table: PhasorTable, h: ComplexArray, weights: FloatArray, correction: float = 1.0
 ) -> tuple[FloatArray, FloatArray, float] | None:
-    """Covariance, dof and chi-square of a weighted regression whose directions have repeats.
-
-    Parameters
-    ----------
-    table : PhasorTable
-    h : (2, 2) complex ndarray
-    weights : (n,) ndarray
-    correction : float
-        Factor on the repeat noise (efficiency of the estimator).
-
-    Returns
-    -------
-    tuple or None
-        None when there are fewer than four spare repeats: the residuals alone must do then.
-    """
+    """Covariance, dof and chi-square of a weighted regression whose directions have repeats."""
     g = table.n_directions
     one_hot = np.zeros((g, len(table)))
     one_hot[table.direction, np.arange(len(table))] = weights

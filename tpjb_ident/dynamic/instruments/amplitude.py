@@ -27,19 +27,7 @@ FAR = 4.0
 
 @dataclass(frozen=True)
 class ZeroAmplitude:
-    """How H changes with the square of the motion at one point.
-
-    Attributes
-    ----------
-    change : (2, 2) complex ndarray
-        G: by which H is larger at the runs' mean square motion than at none [N/m].
-    square : (n_runs,) ndarray
-        Square of every run's motion over its mean.
-    left : (8, 8) ndarray
-        Covariance that the uncertainty of G leaves on H [(N/m)^2].
-    share : float
-        Size of the change over that of H.
-    """
+    """How H changes with the square of the motion at one point."""
 
     change: ComplexArray
     square: FloatArray
@@ -47,23 +35,12 @@ class ZeroAmplitude:
     share: float
 
     def apply(self, data: PointData) -> PointData:
-        """The point's windows with forces as for the smallest motions.
-
-        Parameters
-        ----------
-        data : PointData
-        """
+        """The point's windows with forces as for the smallest motions."""
         more = self.square[data.run_index][:, None] * (data.D @ self.change.T)
         return replace(data, F=data.F - more)
 
     def uncertain(self, h: ComplexArray) -> float:
-        """Half the width of the 95 % interval of what is left of the change, as a share of H.
-
-        Parameters
-        ----------
-        h : (2, 2) complex ndarray
-            [N/m]
-        """
+        """Half the width of the 95 % interval of what is left of the change, as a share of H."""
         return float(1.96 * np.sqrt(np.diag(self.left).max()) / (np.linalg.norm(h) / np.sqrt(2)))
 
     def conditions(self) -> tuple[Condition, ...]:
@@ -74,16 +51,7 @@ class ZeroAmplitude:
 
 @dataclass(frozen=True)
 class AmplitudeSlope:
-    """Relative change of the dynamic stiffness when the amplitude doubles.
-
-    Attributes
-    ----------
-    stiffening : float
-        In phase with h; positive when the bearing gets stiffer.
-    standard_error : float
-    runs : int
-        Runs that tell it.
-    """
+    """Relative change of the dynamic stiffness when the amplitude doubles."""
 
     stiffening: float
     standard_error: float
@@ -110,21 +78,7 @@ class AmplitudeSlope:
 
 
 def amplitude_slope(data: PointData, h: ComplexArray, weights: FloatArray) -> AmplitudeSlope | None:
-    """Slope of h over the logarithm of the amplitude, from directions run at several amplitudes.
-
-    Parameters
-    ----------
-    data : PointData
-    h : (2, 2) complex ndarray
-        Fit of all runs together.
-    weights : (n,) ndarray
-        Window weights.
-
-    Returns
-    -------
-    AmplitudeSlope or None
-        None where no direction was run at clearly different amplitudes.
-    """
+    """Slope of h over the logarithm of the amplitude, from directions run at several amplitudes."""
     groups: dict[float, list[tuple[float, float]]] = {}
     for i, run in enumerate(data.runs):
         mine = (data.run_index == i) & (weights > 0) & np.isfinite(data.D).all(axis=1)
@@ -158,14 +112,6 @@ def zero_amplitude(data: PointData, h: ComplexArray, expected: float) -> ZeroAmp
     together by a regression of the runs' means; the windows' forces are then brought to zero amplitude, as static loads
     to their set point. The film's second harmonic says beforehand how large G can be: that keeps it small where the
     runs tell little.
-
-    Parameters
-    ----------
-    data : PointData
-    h : (2, 2) complex ndarray
-        Estimate of all runs together [N/m].
-    expected : float
-        Change of H that the film's second harmonic lets expect [share of H]; 0 where it shows none.
     """
     weights = _beside_repeats(data)
     slope = amplitude_slope(data, h, weights)

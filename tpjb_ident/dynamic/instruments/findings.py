@@ -21,38 +21,18 @@ START = 1 / np.sqrt(12)
 
 @dataclass(frozen=True)
 class InstrumentFindings:
-    """Clocks, and accelerometers against cells.
-
-    Attributes
-    ----------
-    clocks : ClockRates
-    balances : dict of float to Balance
-        By excitation frequency, as `frequency_key` rounds it.
-    start : float
-        Standard deviation of the cells' start against the probes' [s], where clocks differ and nothing else tells.
-    """
+    """Clocks, and accelerometers against cells."""
 
     clocks: ClockRates = field(default_factory=ClockRates)
     balances: dict[float, Balance] = field(default_factory=dict)
     start: float = 0.0
 
     def conditions(self, data: PointData) -> tuple[Condition, ...]:
-        """What to say of one point.
-
-        Parameters
-        ----------
-        data : PointData
-        """
+        """What to say of one point."""
         return (*self.clocks.conditions(), *self._balance(data).conditions)
 
     def spreads(self, data: PointData, est: DynamicStiffness) -> dict[str, FloatArray]:
-        """Covariance (8, 8) by source that the findings add to one point [N^2/m^2]; only what is not zero.
-
-        Parameters
-        ----------
-        data : PointData
-        est : DynamicStiffness
-        """
+        """Covariance (8, 8) by source that the findings add to one point [N^2/m^2]; only what is not zero."""
         found = {}
         balance = self._balance(data)
         if balance.phase:
@@ -72,14 +52,7 @@ class InstrumentFindings:
 def look_at_instruments(
     sources: list[PointSource], delays_stated: bool = False
 ) -> tuple[InstrumentFindings, list[PointSource]]:
-    """Findings, and the sources as they are to be read from then on: with one clock.
-
-    Parameters
-    ----------
-    sources : list of PointSource
-    delays_stated : bool
-        Whether the manifest states delays or their uncertainty: then the start of the clocks is known to that.
-    """
+    """Findings, and the sources as they are to be read from then on: with one clock."""
     clocks = clock_rates(rate_samples(source.load()) for source in sources)
     read = [replace(source, clocks=clocks) for source in sources] if clocks.force else sources
     verdicts = balances([run for source in read for run in balance_runs(source.load())])
@@ -90,12 +63,6 @@ def look_at_instruments(
 
 
 def film_change_at(source: PointSource, est: DynamicStiffness) -> FilmChange:
-    """What the film's own harmonics say at one point.
-
-    Parameters
-    ----------
-    source : PointSource
-    est : DynamicStiffness
-    """
+    """What the film's own harmonics say at one point."""
     pairs = [digest.harmonics[line] for digest, (_, line) in zip(source.digests, source.members) if digest.harmonics]
     return film_change([pair for pair in pairs if pair is not None], est)

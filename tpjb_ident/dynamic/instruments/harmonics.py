@@ -44,30 +44,14 @@ AS_DEVIATION = 1 / 1.6
 
 @dataclass(frozen=True)
 class FilmChange:
-    """What the second harmonics say of a point.
-
-    Attributes
-    ----------
-    share : float
-        By which h is off through the amplitude of the excitation; zero where the film answers as a linear one.
-    hidden : float
-        How large a share could stay unseen.
-    """
+    """What the second harmonics say of a point."""
 
     share: float = 0.0
     hidden: float = np.inf
 
 
 def film_change(harmonics: Sequence[tuple[LineMean, LineMean]], est: DynamicStiffness) -> FilmChange:
-    """Share by which h is off through the amplitude of the excitation, by the records' second harmonics.
-
-    Parameters
-    ----------
-    harmonics : sequence of (LineMean, LineMean)
-        Of every run: the excitation and its second harmonic.
-    est : DynamicStiffness
-        Its K and C stand for twice the frequency too; the harmonic displacement is small.
-    """
+    """Share by which h is off through the amplitude of the excitation, by the records' second harmonics."""
     if not np.isfinite(est.h).all():
         return FilmChange()
     doubled = est.h.real + 2j * est.h.imag
@@ -115,14 +99,7 @@ def _quadratic_share(kept: Sequence[tuple[LineMean, LineMean]], doubled: Complex
 
 
 def change_spread(change: float, est: DynamicStiffness) -> FloatArray:
-    """Covariance (8, 8) of H when its entries may be off by a common share.
-
-    Parameters
-    ----------
-    change : float
-        Share of H by which its entries may be off.
-    est : DynamicStiffness
-    """
+    """Covariance (8, 8) of H when its entries may be off by a common share."""
     shift = AS_DEVIATION * change * np.abs(est.vector)
     return np.diag(shift**2)
 
@@ -133,18 +110,6 @@ def change_conditions(
     """What to say of a point.
 
     A large motion alone is no fault where the harmonics show that the film answers it as a linear one.
-
-    Parameters
-    ----------
-    change : FilmChange
-    uncertain : float
-        What remains of it after the extrapolation to zero amplitude, if there is one [share of h].
-    est : DynamicStiffness
-        With all its uncertainties.
-    amplitude : float
-        [m]
-    clearance : float or None
-        [m]
     """
     if uncertain > REFUSED:
         told = (

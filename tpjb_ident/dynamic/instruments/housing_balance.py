@@ -43,23 +43,7 @@ FAR = 4.0
 
 @dataclass(frozen=True)
 class BalanceRun:
-    """Means of one run at its excitation line.
-
-    Attributes
-    ----------
-    frequency : float
-        [Hz]
-    cells, acceleration : (2,) complex ndarray
-        [N], [m/s^2]
-    inertia : float
-        |m a| over |F_oil|.
-    mass : float
-        Of the housing [kg].
-    variance : float
-        Of a component of one window's acceleration about the run's mean [(m/s^2)^2].
-    windows : int
-        Behind the means.
-    """
+    """Means of one run at its excitation line."""
 
     frequency: float
     cells: ComplexArray
@@ -72,40 +56,21 @@ class BalanceRun:
 
 @dataclass(frozen=True)
 class Balance:
-    """Verdict on one excitation frequency.
-
-    Attributes
-    ----------
-    phase : float
-        By which the accelerometers are ahead of the cells [rad]; zero where it is not clear of its error.
-    conditions : tuple of Condition
-    doubt : float
-        Standard error of the phase that this frequency alone shows [rad].
-    """
+    """Verdict on one excitation frequency."""
 
     phase: float = 0.0
     conditions: tuple[Condition, ...] = ()
     doubt: float = np.inf
 
     def spread(self, est: DynamicStiffness) -> FloatArray:
-        """Covariance (8, 8) of H if the cells are late by that phase: one standard deviation [N^2/m^2].
-
-        Parameters
-        ----------
-        est : DynamicStiffness
-        """
+        """Covariance (8, 8) of H if the cells are late by that phase: one standard deviation [N^2/m^2]."""
         moved = 1j * self.phase * est.h
         shift = np.concatenate([moved.real.ravel(), moved.imag.ravel()])
         return np.outer(shift, shift)
 
 
 def balance_runs(data: PointData) -> list[BalanceRun]:
-    """Means of a point's runs; empty where the rig has no accelerometers.
-
-    Parameters
-    ----------
-    data : PointData
-    """
+    """Means of a point's runs; empty where the rig has no accelerometers."""
     if data.runs[0].acceleration is None:
         return []
     found = []
@@ -136,13 +101,7 @@ def _ordinary(z: ComplexArray) -> BoolArray:
 
 
 def balances(runs: Sequence[BalanceRun]) -> dict[float, Balance]:
-    """A verdict for every excitation frequency, rounded to 0.01 Hz, that enough runs were excited at.
-
-    Parameters
-    ----------
-    runs : sequence of int
-        Places.
-    """
+    """A verdict for every excitation frequency, rounded to 0.01 Hz, that enough runs were excited at."""
     groups: dict[float, list[BalanceRun]] = {}
     for run in runs:
         groups.setdefault(frequency_key(run.frequency), []).append(run)
@@ -164,13 +123,7 @@ def _shared_lag(verdicts: Sequence[tuple[float, Balance]]) -> float:
 
 
 def frequency_key(frequency: float) -> float:
-    """Under which a frequency is found again.
-
-    Parameters
-    ----------
-    frequency : float
-        [rad/s]
-    """
+    """Under which a frequency is found again."""
     return round(frequency, 2)
 
 

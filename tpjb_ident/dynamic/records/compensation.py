@@ -38,17 +38,7 @@ CLIPPED = 0.05
 
 @dataclass(frozen=True)
 class SlowerChannel:
-    """How a channel was filled up.
-
-    Attributes
-    ----------
-    rate : float
-        At which it was sampled [Hz].
-    export_rate : float
-        At which it was written [Hz].
-    held : bool
-        Steps in place of straight lines.
-    """
+    """How a channel was filled up."""
 
     rate: float
     export_rate: float
@@ -58,11 +48,6 @@ class SlowerChannel:
         """What the filling does to a sine of `frequency` (n,) [Hz]: sinc^2 for lines, sinc and half a step for steps.
 
         Where the rates divide evenly the sums over the samples of a period take the place of the integrals.
-
-        Parameters
-        ----------
-        frequency : float
-            [rad/s]
         """
         f = np.asarray(frequency, dtype=float)
         ratio = self.export_rate / self.rate
@@ -76,19 +61,7 @@ class SlowerChannel:
 
 
 def compensated(result: RunPhasors, run: MeasuredRun, slower: Mapping[str, SlowerChannel]) -> RunPhasors:
-    """The run's phasors as channels without filters and delays would have given them.
-
-    Parameters
-    ----------
-    result : RunPhasors
-    run : rigdata.run.Run
-    slower : mapping of str to SlowerChannel
-
-    Raises
-    ------
-    RigDataError
-        A table of a channel's response does not reach the excitation.
-    """
+    """The run's phasors as channels without filters and delays would have given them."""
     frequencies, driven = result.lines.frequencies, len(result.lines.excitation)
 
     def undone(quantity: str, phasors: ComplexArray) -> ComplexArray:
@@ -132,13 +105,6 @@ def slower_channel(readings: FloatArray, export_rate: float) -> SlowerChannel | 
     Logger programs write groups of different rates into one table by interpolation. A sine comes out of that smaller
     (and late, where values are held), by a factor that the two rates alone determine: it is taken out of the phasors as
     a filter is. What gives such a channel away is that its bends (or steps) come in a strict rhythm.
-
-    Parameters
-    ----------
-    readings : (n,) ndarray
-        As the file holds them.
-    export_rate : float
-        [Hz]
     """
     values = readings[:RHYTHM_LOOK]
     if len(values) < 200 or not np.isfinite(values).all():
@@ -193,16 +159,6 @@ def look_at_readings(run: MeasuredRun) -> tuple[dict[str, SlowerChannel], tuple[
 
     What a single channel's device did is lost once two channels are turned into a vector: that it was driven into its
     limits, or sampled slower than the others.
-
-    Parameters
-    ----------
-    run : rigdata.run.Run
-        What only looks like one is not judged.
-
-    Raises
-    ------
-    RigDataError
-        A channel is clipped: its phasors are those of another signal.
     """
     if not isinstance(run, Run):
         return {}, ()

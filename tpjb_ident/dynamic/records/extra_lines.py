@@ -29,14 +29,7 @@ LOBE = 4.0
 
 
 def unexpected_lines(run: MeasuredRun, result: RunPhasors) -> tuple[tuple[float, ...], tuple[Condition, ...]]:
-    """Frequencies of lines beside the known ones [Hz], and what to say about them.
-
-    Parameters
-    ----------
-    run : MeasuredRun
-    result : RunPhasors
-        First fit, with the known lines.
-    """
+    """Frequencies of lines beside the known ones [Hz], and what to say about them."""
     n = min(run.length, LOOK)
     known = result.lines.frequencies
     found: list[float] = []
@@ -68,17 +61,7 @@ def unexpected_lines(run: MeasuredRun, result: RunPhasors) -> tuple[tuple[float,
 
 
 class _KnownLines:
-    """Known lines on an even grid, and the peaks that they leave.
-
-    Parameters
-    ----------
-    length : int
-        Samples.
-    rate : float
-        [Hz].
-    frequencies : (m,) ndarray
-        [Hz].
-    """
+    """Known lines on an even grid, and the peaks that they leave."""
 
     def __init__(self, length: int, rate: float, frequencies: FloatArray) -> None:
         self.rate, self.frequencies = rate, frequencies

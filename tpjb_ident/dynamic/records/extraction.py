@@ -26,18 +26,7 @@ MAX_JITTER = 0.02
 def extract(
     run: MeasuredRun, housing_mass: float, settings: PhasorSettings, lines: LineSet, follow: ShaftCourse | None = None
 ) -> RunPhasors:
-    """Fit all windows of a run.
-
-    Parameters
-    ----------
-    run : MeasuredRun
-    housing_mass : float
-        [kg]
-    settings : PhasorSettings
-    lines : LineSet
-    follow : ShaftCourse, optional
-        Shaft speed over the run: 1X and its harmonics then take each window's own.
-    """
+    """Fit all windows of a run."""
     length, count = plan_windows(run.length, run.sample_rate, lines, settings.windows)
     present = {c.quantity for c in run.channels.values()}
     quantities = tuple(q for q in QUANTITIES if q in present or q != "acceleration")
@@ -132,17 +121,7 @@ class _Work:
 
 @dataclass(frozen=True)
 class _Times:
-    """Times of some windows.
-
-    Attributes
-    ----------
-    start : (n,) ndarray
-        Of every window [s].
-    stamps : (n, length) ndarray or None
-        Of every sample, where they are not on an even grid.
-    uneven : (m,) ndarray of int
-        Windows that are to be fitted by their stamps.
-    """
+    """Times of some windows."""
 
     start: FloatArray
     stamps: FloatArray | None

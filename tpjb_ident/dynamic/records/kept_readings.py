@@ -29,14 +29,7 @@ SHORT = 2**17
 
 
 class ShortRecord:
-    """Stands for a run, or for its beginning; reads every vector and the speed once.
-
-    Parameters
-    ----------
-    run : MeasuredRun
-    length : int, optional
-        Samples from the start that it stands for; default all.
-    """
+    """Stands for a run, or for its beginning; reads every vector and the speed once."""
 
     def __init__(self, run: MeasuredRun, length: int | None = None) -> None:
         self._run = run
@@ -73,17 +66,7 @@ class ShortRecord:
 
 
 class KeptReadings:
-    """A run's reader that keeps the first samples of all channels.
-
-    Parameters
-    ----------
-    reader : RunReader
-        Reads the file; what is not answered here is asked there.
-    channels : sequence of str
-        Names of the channels to keep.
-    samples : int
-        From the start of the record.
-    """
+    """A run's reader that keeps the first samples of all channels."""
 
     def __init__(self, reader: Any, channels: Sequence[str], samples: int = SHORT) -> None:
         self._reader, self._channels = reader, tuple(channels)
@@ -123,14 +106,7 @@ class KeptReadings:
 
 
 class Beginning:
-    """A run's reader that ends after the first samples.
-
-    Parameters
-    ----------
-    reader : KeptReadings
-    samples : int
-        How many; those kept at most.
-    """
+    """A run's reader that ends after the first samples."""
 
     def __init__(self, reader: KeptReadings, samples: int) -> None:
         self._reader, self._length = reader, min(samples, reader.samples)
@@ -144,13 +120,7 @@ class Beginning:
 
 
 def with_kept_beginning(run: Run) -> Run:
-    """The run with its beginning kept; runs that are not read from a file stay as they are.
-
-    Parameters
-    ----------
-    run : rigdata.run.Run
-        Or what stands for one.
-    """
+    """The run with its beginning kept; runs that are not read from a file stay as they are."""
     if not isinstance(run, Run):
         return run
     names = [name for name, channel in run.channels.items() if channel.quantity != "time"]
@@ -158,12 +128,7 @@ def with_kept_beginning(run: Run) -> Run:
 
 
 def beginning_of(run: Run) -> Run | None:
-    """The first seconds of a run whose readings are kept, as a run of its own; None where they are not.
-
-    Parameters
-    ----------
-    run : rigdata.run.Run
-    """
+    """The first seconds of a run whose readings are kept, as a run of its own; None where they are not."""
     reader = getattr(run, "reader", None)
     if not isinstance(reader, KeptReadings):
         return None

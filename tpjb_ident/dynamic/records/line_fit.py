@@ -28,19 +28,7 @@ _ROUNDS = 12
 
 @dataclass(frozen=True)
 class RobustLines:
-    """A fit, and which samples it rests on.
-
-    Attributes
-    ----------
-    coefficients : (q, n_columns) ndarray
-        Of every channel; NaN where too few samples are left.
-    scale : (q,) ndarray
-        Robust standard deviation of the residuals.
-    kept : (n,) ndarray of bool
-        Samples neither missing nor glitched, of all channels together.
-    lost : float
-        Share of the samples left out; of the missing ones alone where they are too many, 1 where most are glitches.
-    """
+    """A fit, and which samples it rests on."""
 
     coefficients: FloatArray
     scale: FloatArray
@@ -49,18 +37,7 @@ class RobustLines:
 
 
 def beside(outlying: BoolArray) -> IntArray:
-    """Samples that are outlying, or next to such a one: a glitch's flanks lie below the limit.
-
-    Parameters
-    ----------
-    outlying : (q, n) ndarray of bool
-        Of every channel.
-
-    Returns
-    -------
-    (m,) ndarray of int
-        Places along n.
-    """
+    """Samples that are outlying, or next to such a one: a glitch's flanks lie below the limit."""
     return np.flatnonzero(np.convolve(outlying.any(axis=0), np.ones(2 * GLITCH_MARGIN + 1), mode="same") > 0)
 
 
@@ -69,15 +46,6 @@ def fit_without_glitches(design: FloatArray, values: FloatArray, usual: FloatArr
 
     Least absolute deviations (by reweighting) stand a quarter of the samples being wrong; bisquare
     steps with no more than the run's usual scale sharpen that into a clear verdict per sample.
-
-    Parameters
-    ----------
-    design : (n, n_columns) ndarray
-        As of `line_design`.
-    values : (n, q) ndarray
-        Channels that lose a sample together; NaN where missing.
-    usual : (q,) ndarray
-        Residual scale that others like them have; infinite where not known.
     """
     present = np.asarray(np.isfinite(values).all(axis=1))
     q = values.shape[1]

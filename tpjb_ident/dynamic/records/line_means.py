@@ -12,17 +12,7 @@ from tpjb_ident.dynamic.records.run_data import RunPhasors
 
 @dataclass(frozen=True)
 class LineMean:
-    """One line of a run.
-
-    Attributes
-    ----------
-    displacement, force : (2,) complex ndarray
-        Medians over the windows [m], oil force [N].
-    displacement_error, force_error : float
-        Standard errors of their components.
-    shared : bool
-        Whether mains stand on the line too.
-    """
+    """One line of a run."""
 
     displacement: ComplexArray
     force: ComplexArray
@@ -32,12 +22,7 @@ class LineMean:
 
 
 def second_harmonics(run: RunPhasors) -> tuple[tuple[LineMean, LineMean] | None, ...]:
-    """Every excitation line of a run with its second harmonic; None where it is not fitted, or the shaft's.
-
-    Parameters
-    ----------
-    run : RunPhasors
-    """
+    """Every excitation line of a run with its second harmonic; None where it is not fitted, or the shaft's."""
     lines = (run.lines.excitation + run.lines.nuisance)[: run.displacement.phasors.shape[1]]
     found: list[tuple[LineMean, LineMean] | None] = []
     for i, driven in enumerate(run.lines.excitation):
@@ -67,23 +52,13 @@ def _error(z: ComplexArray) -> float:
 
 
 def mains_line(run: RunPhasors) -> ComplexArray | None:
-    """Typical displacement phasor (2,) at a run's mains line [m]; None where something else sits on it.
-
-    Parameters
-    ----------
-    run : RunPhasors
-    """
+    """Typical displacement phasor (2,) at a run's mains line [m]; None where something else sits on it."""
     place = _place(run)
     return None if place is None else _typical_phasor(run.displacement.phasors[:, place])
 
 
 def mains_force(run: RunPhasors) -> ComplexArray | None:
-    """The same of the oil force [N].
-
-    Parameters
-    ----------
-    run : RunPhasors
-    """
+    """The same of the oil force [N]."""
     place = _place(run)
     return None if place is None else _typical_phasor(run.oil_force(place))
 
@@ -107,10 +82,5 @@ def _shared(run: RunPhasors, index: int) -> bool:
 
 
 def complex_median(z: ComplexArray) -> ComplexArray:
-    """Median of real and imaginary parts over the first axis.
-
-    Parameters
-    ----------
-    z : (n, ...) complex ndarray
-    """
+    """Median of real and imaginary parts over the first axis."""
     return np.asarray(np.median(z.real, axis=0) + 1j * np.median(z.imag, axis=0))

@@ -29,15 +29,7 @@ MAX_WINDOW_SLIP = 0.005
 
 @dataclass(frozen=True)
 class Tuning:
-    """What to do better in a second fit.
-
-    Attributes
-    ----------
-    lines : LineSet
-    follow : ShaftCourse or None
-        Shaft speed over the run, to be followed window by window.
-    conditions : tuple of Condition
-    """
+    """What to do better in a second fit."""
 
     lines: LineSet
     follow: ShaftCourse | None
@@ -48,17 +40,6 @@ def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
     """The fit as it would be with slightly other frequencies, without reading the run again.
 
     Over a window a line that is off by df turns by pi df T on average; the rest is where its phase is counted from.
-
-    Parameters
-    ----------
-    result : RunPhasors
-    lines : LineSet
-        The same lines at other frequencies.
-
-    Returns
-    -------
-    RunPhasors or None
-        None where a line is off by too much, or is another one.
     """
     names = [[line.name for line in each.excitation + each.nuisance] for each in (result.lines, lines)]
     if names[0] != names[1]:
@@ -71,22 +52,7 @@ def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
 
 
 def frequency_slip(phasors: ComplexArray, start: FloatArray, noise: float) -> float:
-    """Frequency error that the phase advance of window phasors shows [Hz].
-
-    Parameters
-    ----------
-    phasors : (n, 2) complex ndarray
-        One line, referred to the start of the run.
-    start : (n,) ndarray
-        [s]
-    noise : float
-        Standard error of a phasor component; a line weaker than ten times this tells nothing.
-
-    Returns
-    -------
-    float
-        0.0 where nothing can be told.
-    """
+    """Frequency error that the phase advance of window phasors shows [Hz]."""
     good = np.isfinite(phasors).all(axis=1)
     if good.sum() < 3:
         return 0.0
@@ -104,19 +70,7 @@ def frequency_slip(phasors: ComplexArray, start: FloatArray, noise: float) -> fl
 def tuned(
     run: MeasuredRun, result: RunPhasors, driven: tuple[float, ...], speed: float, settings: PhasorSettings
 ) -> Tuning | None:
-    """Compare a first fit with what it assumed; None where it was good enough.
-
-    Parameters
-    ----------
-    run : MeasuredRun
-    result : RunPhasors
-        The first fit.
-    driven : tuple of float
-        Excitation frequencies as set [Hz].
-    speed : float
-        Shaft speed assumed [Hz].
-    settings : PhasorSettings
-    """
+    """Compare a first fit with what it assumed; None where it was good enough."""
     exact, off_set_point = _excitations(result, driven, run.sample_rate)
     slip = _shaft_slip(result, run.sample_rate)
     span = result.start[-1] - result.start[0] + result.length
@@ -196,22 +150,6 @@ def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, flo
 
     Runout and unbalance draw the same 1X from window to window; between the middles of two windows its phase
     advances by what the shaft is ahead of the frequency fitted.
-
-    Parameters
-    ----------
-    result : RunPhasors
-        A fit with one speed for all windows.
-    rate : float
-        Sample rate [Hz].
-
-    Returns
-    -------
-    speeds : (n,) ndarray
-        [Hz]; NaN where a window gave no phasor.
-    doubt : float
-        Standard error of one of them [Hz].
-    None
-        Where 1X is too weak, or on another line.
     """
     index = _shaft_line(result)
     if index is None or len(result.start) < 3:

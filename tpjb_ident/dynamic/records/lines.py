@@ -19,18 +19,7 @@ from tpjb_ident.errors import BadInputError
 
 @dataclass(frozen=True)
 class Line:
-    """One sinusoid at a known frequency.
-
-    Attributes
-    ----------
-    name : str
-        ``"excitation"``, ``"1X"``, ``"mains"``...
-    frequency : float
-        [Hz].
-    wander : float
-        How far the true frequency may be from the stated one [Hz]; two lines closer than their
-        joint wander cannot be told apart whatever the window.
-    """
+    """One sinusoid at a known frequency."""
 
     name: str
     frequency: float
@@ -39,18 +28,7 @@ class Line:
 
 @dataclass(frozen=True)
 class LineSet:
-    """Excitation lines first, then what disturbs them.
-
-    Attributes
-    ----------
-    excitation : tuple of Line
-    nuisance : tuple of Line
-        Distinct from the excitation lines and from one another.
-    conditions : tuple of Condition
-        ``"mains on excitation line"`` and the like.
-    speed : float
-        Shaft speed that they were made for [Hz].
-    """
+    """Excitation lines first, then what disturbs them."""
 
     excitation: tuple[Line, ...]
     nuisance: tuple[Line, ...]
@@ -63,13 +41,7 @@ class LineSet:
         return np.array([line.frequency for line in self.excitation + self.nuisance])
 
     def at_speed(self, speed: float) -> LineSet:
-        """The same lines with 1X, 2X.. at another shaft speed [Hz].
-
-        Parameters
-        ----------
-        speed : float
-            [Hz]
-        """
+        """The same lines with 1X, 2X.. at another shaft speed [Hz]."""
         moved = tuple(
             replace(line, frequency=speed * int(line.name[:-1])) if re.fullmatch(r"\d+X", line.name) else line
             for line in self.nuisance
@@ -79,20 +51,7 @@ class LineSet:
 
 @dataclass(frozen=True)
 class LineSettings:
-    """Which disturbing lines to expect.
-
-    Attributes
-    ----------
-    mains : float
-        [Hz]; 0 for none.
-    mains_wander, speed_wander : float
-        How far mains and shaft speed may be from their nominal values [Hz].
-    shaft_harmonics, drive_harmonics, mains_harmonics : int
-        Highest harmonic of each that is fitted.
-    named_harmonics : int
-        Highest harmonic of the shaft that is named where it stands on the excitation; elsewhere it is fitted only if
-        the record shows it.
-    """
+    """Which disturbing lines to expect."""
 
     mains: float = 50.0
     mains_wander: float = 0.15
@@ -110,25 +69,7 @@ def known_lines(
     settings: LineSettings | None = None,
     extra: tuple[float, ...] = (),
 ) -> LineSet:
-    """Collect the lines of one run; those that coincide are merged and reported.
-
-    Parameters
-    ----------
-    excitation : tuple of float
-        Excitation frequencies present in the record [Hz].
-    speed : float
-        Shaft speed [Hz]; 0 when it stands still.
-    rate : float
-        Sample rate [Hz]; lines above 0.45 of it are left out (the anti-alias filter has them).
-    settings : LineSettings, optional
-    extra : tuple of float
-        Other lines that were found in the record [Hz].
-
-    Raises
-    ------
-    BadInputError
-        No excitation frequency, or one outside (0, 0.45 rate).
-    """
+    """Collect the lines of one run; those that coincide are merged and reported."""
     settings = settings or LineSettings()
     top = 0.45 * rate
     if not excitation or not all(0.0 < f < top for f in excitation):

@@ -27,14 +27,7 @@ APART = 1.0
 
 
 def mains_frequency(campaign: Campaign, usual: float) -> float:
-    """Frequency of the mains [Hz].
-
-    Parameters
-    ----------
-    campaign : rigdata.campaign.Campaign
-    usual : float
-        What is taken where nothing tells [Hz].
-    """
+    """Frequency of the mains [Hz]."""
     stated = getattr(campaign, "mains", None)
     if stated is not None:
         return float(stated)

@@ -27,15 +27,6 @@ class WaveBlocks:
     exp(i omega (t_b + tau)) = exp(i omega t_b) exp(i omega tau): over a short block every window of an even grid sees
     the same few waves in tau, turned by one factor per block. The waves of one block stay in a core's first cache,
     where those of a long window do not, which makes projection and synthesis several times quicker.
-
-    Parameters
-    ----------
-    length : int
-        Samples per window.
-    rate : float
-        [Hz].
-    frequencies : (m,) ndarray
-        [Hz].
     """
 
     def __init__(self, length: int, rate: float, frequencies: FloatArray) -> None:
@@ -52,12 +43,7 @@ class WaveBlocks:
         self._place, self._slope = (starts - half) / half, 1 / half
 
     def project(self, rows: FloatArray) -> FloatArray:
-        """Inner products with every column, (k, length) -> (k, 2 m + 2).
-
-        Parameters
-        ----------
-        rows : (k, length) ndarray
-        """
+        """Inner products with every column, (k, length) -> (k, 2 m + 2)."""
         parts = np.empty((len(rows), len(self._turn), self._waves.shape[1]))
         main = rows[:, : self.full * BLOCK].reshape(len(rows), self.full, BLOCK)
         np.matmul(main, self._waves, out=parts[:, : self.full])
@@ -71,15 +57,7 @@ class WaveBlocks:
         return sums
 
     def subtract(self, rows: FloatArray, coefficients: FloatArray) -> None:
-        """Take the sum of all columns, times their (k, 2 m + 2) coefficients, off (k, length) rows in place.
-
-        Parameters
-        ----------
-        rows : (k, length) ndarray
-            Changed in place.
-        coefficients : (k, 2 m + 2) ndarray
-            As of `line_design`.
-        """
+        """Take the sum of all columns, times their (k, 2 m + 2) coefficients, off (k, length) rows in place."""
         lines = (coefficients[:, 0:-2:2] + 1j * coefficients[:, 1:-2:2])[:, None, :] * self._turn
         local = np.empty((len(rows), len(self._turn), self._waves.shape[1]))
         local[:, :, 0:-2:2], local[:, :, 1:-2:2] = lines.real, lines.imag
@@ -93,19 +71,7 @@ class WaveBlocks:
 
 @dataclass(frozen=True)
 class PhasorBlock:
-    """Phasors of one vector quantity in some windows of one run.
-
-    Attributes
-    ----------
-    phasors : (n_windows, n_lines, 2) complex ndarray
-        X and Y at every line, SI; NaN where a window gave none.
-    mean : (n_windows, 2) ndarray
-        Mean of the quantity, SI.
-    noise : (n_windows, 2) ndarray
-        Robust standard deviation of what the lines leave.
-    lost : (n_windows,) ndarray
-        Share of the samples left out (glitches, missing values).
-    """
+    """Phasors of one vector quantity in some windows of one run."""
 
     phasors: ComplexArray
     mean: FloatArray
@@ -114,17 +80,7 @@ class PhasorBlock:
 
 
 class LineFitter:
-    """Joint fit of lines on equal windows of an even grid: one pseudo-inverse for all of them.
-
-    Parameters
-    ----------
-    length : int
-        Samples per window.
-    rate : float
-        [Hz].
-    frequencies : (n_lines,) ndarray
-        [Hz].
-    """
+    """Joint fit of lines on equal windows of an even grid: one pseudo-inverse for all of them."""
 
     def __init__(self, length: int, rate: float, frequencies: FloatArray) -> None:
         self.length, self.rate = length, rate
@@ -137,17 +93,7 @@ class LineFitter:
         self._stride = max(1, length // 512)
 
     def fit(self, rows: FloatArray, start: FloatArray, usual: FloatArray | None = None) -> PhasorBlock:
-        """Fit windows of a vector record.
-
-        Parameters
-        ----------
-        rows : (2, n_windows, length) ndarray
-            SI samples, X and Y; NaN where missing.
-        start : (n_windows,) ndarray
-            Time of each window's first sample [s] after the start of the run.
-        usual : (2,) ndarray, optional
-            Residual scale that windows of the run have; default the median of those given.
-        """
+        """Fit windows of a vector record."""
         n = rows.shape[1]
         stack = rows.reshape(2 * n, self.length)
         offset = _mean_of_present(stack[:, :: self._stride])
@@ -191,19 +137,6 @@ class LineFitter:
         """Leave the few outlying samples out of a long window's fit until no verdict changes; None where it cannot.
 
         Their rows are taken off the normal equations: no need to go through all samples again.
-
-        Parameters
-        ----------
-        residual : (2, length) ndarray
-            Of the fit to all samples.
-        coefficients : (2, n_columns) ndarray
-        scale, usual : (2,) ndarray
-            Residual scale of this window, and of the run's.
-
-        Returns
-        -------
-        (2, n_columns) ndarray, (2,) ndarray, float
-            As of `_refit`.
         """
         if self._blocks is None or not (scale <= SCALE_LIMIT * usual).all():
             return None
@@ -240,13 +173,7 @@ def _by_window(values: FloatArray) -> FloatArray:
 
 
 def usual_scale(scale: FloatArray) -> FloatArray:
-    """Median over the windows with a scale, X and Y; infinite where none has.
-
-    Parameters
-    ----------
-    scale : (n_windows, 2) ndarray
-        SI.
-    """
+    """Median over the windows with a scale, X and Y; infinite where none has."""
     known = scale[np.isfinite(scale).all(axis=1)]
     return np.median(known, axis=0) if len(known) else np.full(2, np.inf)
 
@@ -264,19 +191,7 @@ def _to_run_origin(local: ComplexArray, frequencies: FloatArray, start: FloatArr
 
 
 def fit_uneven(values: FloatArray, time: FloatArray, frequencies: FloatArray, origin: float) -> PhasorBlock:
-    """Fit one window with its own time stamps (jitter, gaps).
-
-    Parameters
-    ----------
-    values : (n, 2) ndarray
-        SI; NaN where missing.
-    time : (n,) ndarray
-        [s].
-    frequencies : (n_lines,) ndarray
-        [Hz].
-    origin : float
-        Time of the start of the run [s].
-    """
+    """Fit one window with its own time stamps (jitter, gaps)."""
     offset = _mean_of_present(values.T)[:, 0]
     local_time = time - time[0]
     coefficients, scale, lost = _refit(line_design(local_time, frequencies), values - offset, np.full(2, np.inf))

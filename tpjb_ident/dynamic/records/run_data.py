@@ -49,37 +49,13 @@ class MeasuredRun(Protocol):
         """Nominal sample rate [Hz]."""
 
     def vector(self, quantity: str, start: int | None = None, stop: int | None = None) -> VectorRecord:
-        """X and Y of a quantity, SI.
-
-        Parameters
-        ----------
-        quantity : str
-            ``"displacement"``, ``"force"`` or ``"acceleration"``.
-        start : int or None, optional
-            First sample.
-        stop : int or None, optional
-            Sample after the last.
-        """
+        """X and Y of a quantity, SI."""
 
     def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
-        """Shaft speed by the tachometer [rad/s]; None where there is none.
-
-        Parameters
-        ----------
-        start : int or None, optional
-            First sample; default the first of all.
-        stop : int or None, optional
-            Sample after the last; default the end.
-        """
+        """Shaft speed by the tachometer [rad/s]; None where there is none."""
 
     def row_reader(self, quantities: Sequence[str]) -> RowReader:
-        """Reader of several quantities at once.
-
-        Parameters
-        ----------
-        quantities : sequence of str
-            With X and Y.
-        """
+        """Reader of several quantities at once."""
 
     def kept_open(self) -> AbstractContextManager[None]:
         """Keep the file open while the block runs."""
@@ -87,19 +63,7 @@ class MeasuredRun(Protocol):
 
 @dataclass(frozen=True)
 class PhasorSettings:
-    """How phasors are extracted.
-
-    Attributes
-    ----------
-    lines : LineSettings
-    windows : WindowSettings
-    delays : dict
-        Seconds by which a quantity's channels are recorded late, where that is known.
-    excitation_lines : tuple of float
-        Excitation frequencies [Hz] for records that hold several; empty takes the run's own.
-    find_lines : bool
-        Look for lines that nobody mentioned and fit them along.
-    """
+    """How phasors are extracted."""
 
     lines: LineSettings = field(default_factory=LineSettings)
     windows: WindowSettings = field(default_factory=WindowSettings)
@@ -110,31 +74,7 @@ class PhasorSettings:
 
 @dataclass(frozen=True)
 class RunPhasors:
-    """What is kept of a run.
-
-    Attributes
-    ----------
-    run : str
-    point : OperatingPoint
-        Set points of the run.
-    direction : float or None
-        Direction of the excitation [rad].
-    lines : LineSet
-        As fitted; excitation lines first.
-    start : (n,) ndarray
-        Start of every window [s].
-    length : float
-        Of a window [s].
-    displacement, cell_force, acceleration : PhasorBlock
-        `acceleration` is None where the rig has none.
-    housing_mass : float
-    speeds : (n,) ndarray
-        Shaft speed in every window by the tachometer [Hz]; NaN where there is none.
-    conditions : tuple of Condition
-    shaft_phase : (n_lines,) complex ndarray
-        Unit phasor of what turns with the shaft at every excitation line that stands on 1X, 2X or 3X; NaN elsewhere,
-        and where it is not known.
-    """
+    """What is kept of a run."""
 
     run: str
     point: OperatingPoint
@@ -157,36 +97,18 @@ class RunPhasors:
         return {quantity: block for quantity, block in found.items() if block is not None}
 
     def changed(self, change: Callable[[str, ComplexArray], ComplexArray]) -> RunPhasors:
-        """The run with other phasors.
-
-        Parameters
-        ----------
-        change : callable
-            (quantity, phasors (n, n_lines, 2)) -> phasors.
-        """
+        """The run with other phasors."""
         new = {q: replace(block, phasors=change(q, block.phasors)) for q, block in self.blocks.items()}
         acceleration = new.get("acceleration")
         return replace(self, displacement=new["displacement"], cell_force=new["force"], acceleration=acceleration)
 
     def advanced(self, delays: Mapping[str, float]) -> RunPhasors:
-        """The run without delays of whole quantities.
-
-        Parameters
-        ----------
-        delays : mapping of str to float
-            Lateness by quantity [s].
-        """
+        """The run without delays of whole quantities."""
         ahead = {q: np.exp(2j * np.pi * self.lines.frequencies * delay) for q, delay in delays.items() if delay}
         return self.changed(lambda q, z: z * ahead[q][None, :, None] if q in ahead else z) if ahead else self
 
     def oil_force(self, line: int = 0) -> ComplexArray:
-        """Oil-force phasors at one line, shape (n, 2) [N].
-
-        Parameters
-        ----------
-        line : int, optional
-            Place among the excitation lines.
-        """
+        """Oil-force phasors at one line, shape (n, 2) [N]."""
         a = None if self.acceleration is None else self.acceleration.phasors[:, line]
         return oil_force(self.cell_force.phasors[:, line], a, 0.0 if a is None else self.housing_mass)
 
@@ -196,25 +118,6 @@ def oil_force(cell_force: ComplexArray, housing_acceleration: ComplexArray | Non
 
     Housing balance: F_oil = F_cell + m_h a_h, with F_cell the force with which the housing pushes the cells and a_h the
     absolute acceleration of the housing.
-
-    Parameters
-    ----------
-    cell_force : (..., 2) complex ndarray
-        Load-cell force in X, Y [N].
-    housing_acceleration : (..., 2) complex ndarray or None
-        [m/s^2]; None when the rig has no accelerometers, then the cell force stands uncorrected.
-    housing_mass : float
-        Mass between oil film and load cells [kg].
-
-    Returns
-    -------
-    (..., 2) complex ndarray
-        [N].
-
-    Raises
-    ------
-    BadInputError
-        The mass is not a finite number >= 0.
     """
     if not (np.isfinite(housing_mass) and housing_mass >= 0):
         raise BadInputError(f"housing mass must be finite and not negative, got {housing_mass} kg")

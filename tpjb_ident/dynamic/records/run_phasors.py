@@ -22,22 +22,7 @@ from tpjb_ident.dynamic.records.windows import RecordTooShortError
 
 
 def run_phasors(run: MeasuredRun, housing_mass: float, settings: PhasorSettings | None = None) -> RunPhasors:
-    """Extract the phasors of one run.
-
-    Parameters
-    ----------
-    run : MeasuredRun
-    housing_mass : float
-        [kg]
-    settings : PhasorSettings, optional
-
-    Raises
-    ------
-    RecordTooShortError
-        The record cannot resolve its lines.
-    rigdata.problem.RigDataError
-        The file cannot give what the manifest promises.
-    """
+    """Extract the phasors of one run."""
     settings = settings or PhasorSettings()
     kind = getattr(run, "excitation_kind", "sine")
     if kind != "sine":

@@ -26,37 +26,18 @@ LOOK = 2**17
 
 @dataclass(frozen=True)
 class ShaftCourse:
-    """Shaft speed over a run, whatever windows it was found in: a second fit may cut the run otherwise.
-
-    Attributes
-    ----------
-    time : (n,) ndarray
-        Middle of the windows in which it was found [s].
-    speed : (n,) ndarray
-        [Hz]; finite.
-    """
+    """Shaft speed over a run, whatever windows it was found in: a second fit may cut the run otherwise."""
 
     time: FloatArray
     speed: FloatArray
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Speed at `time` (m,) [s], [Hz].
-
-        Parameters
-        ----------
-        time : (n,) ndarray
-            [s]
-        """
+        """Speed at `time` (m,) [s], [Hz]."""
         return np.interp(time, self.time, self.speed)
 
 
 def shaft_speed(run: MeasuredRun) -> tuple[float, tuple[Condition, ...]]:
-    """Shaft speed of a run [Hz]: the tachometer's, or the set point where it gives nothing usable.
-
-    Parameters
-    ----------
-    run : MeasuredRun
-    """
+    """Shaft speed of a run [Hz]: the tachometer's, or the set point where it gives nothing usable."""
     nominal = run.point.shaft_speed_hz
     record = run.speed(0, FIRST_LOOK)
     if record is None:
@@ -71,16 +52,7 @@ def shaft_speed(run: MeasuredRun) -> tuple[float, tuple[Condition, ...]]:
 
 
 def window_speeds(speed: FloatArray | None, count: int, nominal: float) -> FloatArray:
-    """Mean speed in `count` equal windows [Hz]; NaN where the tachometer gives nothing usable.
-
-    Parameters
-    ----------
-    speed : (n,) ndarray or None
-        Samples of the tachometer [rad/s], n a multiple of `count`.
-    count : int
-    nominal : float
-        Set point [Hz].
-    """
+    """Mean speed in `count` equal windows [Hz]; NaN where the tachometer gives nothing usable."""
     if speed is None:
         return np.full(count, np.nan)
     # the mean of a window with a missing value is NaN, which is what it shall be
@@ -90,13 +62,7 @@ def window_speeds(speed: FloatArray | None, count: int, nominal: float) -> Float
 
 
 def shaft_order(frequency: float, speed: float) -> int:
-    """Harmonic of the shaft that an excitation stands on; 0 where it stands on none.
-
-    Parameters
-    ----------
-    frequency, speed : float
-        Of the excitation and of the shaft [Hz].
-    """
+    """Harmonic of the shaft that an excitation stands on; 0 where it stands on none."""
     settings = LineSettings()
     n = round(frequency / speed) if speed > 0 else 0
     near = 0 < n <= settings.named_harmonics and abs(frequency - n * speed) <= n * settings.speed_wander
@@ -108,12 +74,6 @@ def shaft_phases(run: MeasuredRun, phasors: RunPhasors) -> ComplexArray:
 
     What turns with the shaft (runout of the probes, unbalance in the cells) then has the drive's frequency, and its
     phasor is the same in all runs of a point but for this phase.
-
-    Parameters
-    ----------
-    run : MeasuredRun
-    phasors : RunPhasors
-        Of the run, with its nuisance lines.
     """
     found = np.full(len(phasors.lines.excitation), np.nan + 0j)
     for i, line in enumerate(phasors.lines.excitation):

@@ -19,19 +19,7 @@ from tpjb_ident.errors import TpjbError
 
 @dataclass(frozen=True)
 class WindowSettings:
-    """How long windows are to be.
-
-    Attributes
-    ----------
-    length : float or None
-        Fixed length [s]; None chooses it.
-    target_count : int
-        Windows per run to aim at when the record is long.
-    max_inflation : float
-        Largest variance inflation of an excitation line that is accepted.
-    min_cycles : float
-        Least number of excitation cycles in a window.
-    """
+    """How long windows are to be."""
 
     length: float | None = None
     target_count: int = 20
@@ -57,25 +45,7 @@ class RecordTooShortError(TpjbError):
 def line_design(
     time: FloatArray, frequencies: FloatArray, drift_order: int = 1, growing: FloatArray | None = None
 ) -> FloatArray:
-    """Columns of the joint least-squares problem.
-
-    Parameters
-    ----------
-    time : (n,) ndarray
-        [s], any origin.
-    frequencies : (n_lines,) ndarray
-        [Hz].
-    drift_order : int
-        Polynomial order of the slow drift (0: mean only).
-    growing : (m,) ndarray, optional
-        Lines whose amplitude may change along the record [Hz]: the first order of a frequency that is slightly wrong.
-
-    Returns
-    -------
-    (n, 2 n_lines + drift_order + 1 + 2 m) ndarray
-        cos and -sin of every line, then Legendre polynomials over the window: a line's two
-        coefficients are Re and Im of its phasor in the exp(+i omega t) convention.
-    """
+    """Columns of the joint least-squares problem."""
     phase = 2 * np.pi * np.multiply.outer(time, frequencies)
     middle, half = 0.5 * (time[0] + time[-1]), 0.5 * (time[-1] - time[0]) or 1.0
     slow = np.polynomial.legendre.legvander((time - middle) / half, drift_order)
@@ -90,17 +60,7 @@ def line_design(
 
 
 def variance_inflation(frequencies: FloatArray, n_driven: int, length: float, rate: float) -> float:
-    """Worst variance of an excitation phasor against a fit of that line alone.
-
-    Parameters
-    ----------
-    frequencies : (n_lines,) ndarray
-        [Hz], excitation lines first.
-    n_driven : int
-        Number of excitation lines.
-    length, rate : float
-        Window [s] and sample rate [Hz].
-    """
+    """Worst variance of an excitation phasor against a fit of that line alone."""
     n = round(length * rate)
     if n <= 2 * len(frequencies) + 2:
         return math.inf
@@ -118,15 +78,7 @@ def variance_inflation(frequencies: FloatArray, n_driven: int, length: float, ra
 
 
 def shortest_window(lines: LineSet, rate: float, settings: WindowSettings) -> float:
-    """Shortest window [s] that keeps the excitation lines within the accepted inflation.
-
-    Parameters
-    ----------
-    lines : LineSet
-    rate : float
-        [Hz]
-    settings : WindowSettings
-    """
+    """Shortest window [s] that keeps the excitation lines within the accepted inflation."""
     frequencies = lines.frequencies
     n_driven = len(lines.excitation)
     start = settings.min_cycles / min(line.frequency for line in lines.excitation)
@@ -143,26 +95,7 @@ def shortest_window(lines: LineSet, rate: float, settings: WindowSettings) -> fl
 
 
 def plan_windows(n_samples: int, rate: float, lines: LineSet, settings: WindowSettings) -> tuple[int, int]:
-    """Choose window length and count for one run.
-
-    Parameters
-    ----------
-    n_samples : int
-    rate : float
-        [Hz]
-    lines : LineSet
-    settings : WindowSettings
-
-    Returns
-    -------
-    length, count : int
-        Samples per window, windows in the run (end to end, no overlap: repeats stay independent).
-
-    Raises
-    ------
-    RecordTooShortError
-        The record is shorter than the shortest window that tells the lines apart.
-    """
+    """Choose window length and count for one run."""
     shortest = shortest_window(lines, rate, settings)
     available = n_samples / rate
     # Very long records are cut into more windows, not into windows that fill the memory.

@@ -27,25 +27,7 @@ MODELS = {"K-C": 8, "K-C-M": 12}
 
 @dataclass(frozen=True)
 class FrequencyFit:
-    """One model over the frequencies of one load.
-
-    Attributes
-    ----------
-    model : {"K-C", "K-C-M"}
-    K, C, M : (2, 2) ndarray
-        [N/m], [N s/m], [kg]; M is zero for K-C.
-    covariance : (p, p) ndarray
-        Of [kxx, kxy, kyx, kyy, cxx, .., (mxx, ..)], not inflated by chi-square.
-    chi_square : float
-    dof : int
-    n_frequencies : int
-    omega_range : tuple of float
-        Lowest and highest frequency [rad/s]; outside it the fit is extrapolation.
-    misfit : float
-        Largest ||h_model - h|| / ||h|| over the frequencies: what using the model costs.
-    noise_dof : tuple of float
-        Degrees of freedom behind the covariance of every point.
-    """
+    """One model over the frequencies of one load."""
 
     model: str
     K: FloatArray
@@ -76,13 +58,7 @@ class FrequencyFit:
         return np.sqrt(np.diag(self.covariance) * inflation)
 
     def h(self, omega: float | FloatArray) -> np.ndarray:
-        """Dynamic stiffness of the model, (2, 2) or (n, 2, 2) complex [N/m].
-
-        Parameters
-        ----------
-        omega : float or (n,) ndarray
-            [rad/s]
-        """
+        """Dynamic stiffness of the model, (2, 2) or (n, 2, 2) complex [N/m]."""
         w = np.asarray(omega, dtype=float)[..., None, None]
         return np.asarray(self.K - w**2 * self.M + 1j * w * self.C)
 
@@ -94,13 +70,6 @@ def chance_of(chi_square: float, dof: int, noise_dof: tuple[float, ...]) -> floa
     chi-square is huge. Each share is a chi-square over a mean square of its own; the sum is drawn, with a fixed seed.
     A 2x2 complex covariance of nu degrees of freedom, inverted, is too large by nu / (nu - 4) on average: as a single
     variance of nu / 2 is.
-
-    Parameters
-    ----------
-    chi_square : float
-    dof : int
-    noise_dof : tuple of float
-        Of every point; infinite where its covariance is known.
     """
     plain = float(chdtrc(dof, chi_square)) if dof > 0 else np.nan
     finite = np.array([nu for nu in noise_dof if np.isfinite(nu) and nu < LARGE_DOF])
@@ -118,19 +87,7 @@ def chance_of(chi_square: float, dof: int, noise_dof: tuple[float, ...]) -> floa
 
 
 def fit_over_frequency(estimates: list[DynamicStiffness], model: str) -> FrequencyFit:
-    """Fit one model to the dynamic stiffnesses of one load.
-
-    Parameters
-    ----------
-    estimates : list of DynamicStiffness
-        At different frequencies.
-    model : {"K-C", "K-C-M"}
-
-    Raises
-    ------
-    ArgumentError
-        Unknown model, or fewer frequencies than it needs (1 for K-C, 2 for K-C-M).
-    """
+    """Fit one model to the dynamic stiffnesses of one load."""
     if model not in MODELS:
         raise ArgumentError(unknown_name("model", model, MODELS))
     usable = [e for e in estimates if np.isfinite(e.h).all() and np.isfinite(e.covariance).all()]
@@ -183,16 +140,7 @@ def _design(omega: float, model: str) -> FloatArray:
 
 @dataclass(frozen=True)
 class LoadFits:
-    """All models of one load, direction and speed.
-
-    Attributes
-    ----------
-    points : tuple of PointResult
-        The frequencies behind it.
-    fits : dict of str to FrequencyFit
-    supported : str
-        The simplest model that the data do not refuse; ``"raw H"`` when they refuse all.
-    """
+    """All models of one load, direction and speed."""
 
     points: tuple[PointResult, ...] = field(repr=False)
     fits: dict[str, FrequencyFit]
@@ -203,10 +151,6 @@ def fits_per_load(points: tuple[PointResult, ...]) -> list[LoadFits]:
     """Fit every load that was run at two excitation frequencies or more.
 
     Points with mains on the excitation line take part: their intervals say what they are worth.
-
-    Parameters
-    ----------
-    points : tuple of PointResult
     """
     groups: dict[tuple[float, ...], list[PointResult]] = {}
     for p in points:

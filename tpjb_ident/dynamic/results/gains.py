@@ -34,17 +34,7 @@ RUN_GAIN_OFF = "run-gain-off"
 
 @dataclass(frozen=True)
 class Pairs:
-    """The two probes and the two cells of a rig.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Probes, then cells.
-    probe_plane, cell_plane : (2, 2) ndarray
-        From two readings to X and Y.
-    centre : tuple of float or None
-        What each probe reads at the bearing's centre [m].
-    """
+    """The two probes and the two cells of a rig."""
 
     names: tuple[str, ...]
     probe_plane: FloatArray
@@ -54,16 +44,7 @@ class Pairs:
 
 @dataclass(frozen=True)
 class SweptProbe:
-    """One probe in one clearance sweep.
-
-    Attributes
-    ----------
-    run, name : str
-    half_travel : float
-        Half of the way between its 1 and 99 % quantiles [m]; NaN where it has too few readings.
-    centre : float or None
-        What it reads at the bearing's centre [m]; None where the load does not go around.
-    """
+    """One probe in one clearance sweep."""
 
     run: str
     name: str
@@ -72,12 +53,7 @@ class SweptProbe:
 
 
 def swept_probes(campaign: Campaign) -> tuple[SweptProbe, ...]:
-    """Every probe in every clearance sweep that can be read.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    """
+    """Every probe in every clearance sweep that can be read."""
     return tuple(probe for run in campaign.of_kind("clearance") for probe in _of_sweep(run))
 
 
@@ -126,14 +102,6 @@ def with_probe_doubts(
     - the shaft does not leave the clearance between one operating point and another;
     - a film stiffens as it is loaded, so that the load W moved the shaft by more than W / K, which the clearance must
       hold.
-
-    Parameters
-    ----------
-    sweeps : sequence of SweptProbe
-        The campaign's probes in its clearance sweeps.
-    points : sequence of PointResult
-    clearance : float or None
-        Assembled clearance of the drawing [m]; None says nothing.
     """
     if clearance is None or not clearance > 0:
         return tuple(points)
@@ -180,14 +148,7 @@ def _stiffness(points: Sequence[PointResult], clearance: float) -> list[str]:
 
 
 def channel_pairs(campaign: Campaign, sweeps: Sequence[SweptProbe] = ()) -> Pairs | None:
-    """Probes and cells of a campaign; None where it has not two of each in different directions.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    sweeps : sequence of SweptProbe
-        Its probes in the clearance sweeps.
-    """
+    """Probes and cells of a campaign; None where it has not two of each in different directions."""
     of = {q: [c for c in campaign.channels.values() if c.quantity == q] for q in ("displacement", "force")}
     if any(len(channels) != 2 for channels in of.values()):
         return None
@@ -210,13 +171,6 @@ def gain_doubts(data: PointData, pairs: Pairs | None) -> tuple[Condition, ...]:
     """A condition that names the runs of a point in which one channel has a gain of its own; none where there is none.
 
     The search is that of `tpjb check`, `tpjb_ident.check.one_gain`; here it works on the phasors of all windows.
-
-    Parameters
-    ----------
-    data : PointData
-        Its windows as measured, nothing corrected.
-    pairs : Pairs or None
-        None says nothing.
     """
     if pairs is None:
         return ()

@@ -164,12 +164,7 @@ class Identification(Presented):
 
 
 def point_columns(p: PointResult) -> dict[str, float]:
-    """Key of a point.
-
-    Parameters
-    ----------
-    p : PointResult
-    """
+    """Key of a point."""
     point = p.point
     values = (point.static_load, point.static_load_direction_deg, point.shaft_speed_hz, point.excitation_hz)
     return dict(zip(POINT_COLUMNS, values))
@@ -242,19 +237,7 @@ def _fit_row(group: LoadFits, fit: FrequencyFit) -> dict[str, Any]:
 
 
 def coefficient_columns(est: DynamicStiffness) -> dict[str, float]:
-    """K and C with their intervals under the names of ``coefficients.csv``.
-
-    Parameters
-    ----------
-    est : DynamicStiffness
-
-    Returns
-    -------
-    dict
-        For every coefficient the value, ``_lo``, ``_hi`` (95 %, random and calibration together), ``_se`` (random
-        standard error) and ``_se_systematic`` (calibration), and half the width of the 95 % interval of either part,
-        ``_random95`` and ``_systematic95``.
-    """
+    """K and C with their intervals under the names of ``coefficients.csv``."""
     half, random, se = est.half_width(0.95), est.half_width(0.95, systematic=False), est.standard_error
     systematic = np.zeros(8) if est.systematic is None else np.sqrt(np.diag(est.systematic))
     row: dict[str, float] = {}
@@ -273,14 +256,7 @@ def coefficient_columns(est: DynamicStiffness) -> dict[str, float]:
 
 
 def with_systematic(est: DynamicStiffness, parts: Mapping[str, FloatArray]) -> DynamicStiffness:
-    """The estimate with the sum of some systematic covariances (8, 8).
-
-    Parameters
-    ----------
-    est : DynamicStiffness
-    parts : mapping of str to (8, 8) ndarray
-        By source [N^2/m^2].
-    """
+    """The estimate with the sum of some systematic covariances (8, 8)."""
     return replace(est, systematic=np.sum(list(parts.values()), axis=0) if parts else np.zeros((8, 8)))
 
 

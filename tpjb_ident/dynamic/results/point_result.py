@@ -16,19 +16,7 @@ from tpjb_ident.dynamic.runs.left_out import LISTED, LeftOut
 
 @dataclass(frozen=True)
 class WindowVerdict:
-    """One window that lost its weight.
-
-    Attributes
-    ----------
-    run : str
-    time : float
-        Start of the window in its run [s].
-    weight : float
-    direction : float
-        Excitation direction [rad]; NaN where the manifest gives none.
-    reason : str
-        What gave it away.
-    """
+    """One window that lost its weight."""
 
     run: str
     time: float
@@ -120,28 +108,12 @@ class PointResult:
 def named_at_points(
     points: Sequence[PointResult], left: Sequence[LeftOut], any_excitation: bool
 ) -> tuple[PointResult, ...]:
-    """The points, each saying which of its runs were left out.
-
-    Parameters
-    ----------
-    points : sequence of PointResult
-    left : sequence of LeftOut
-    any_excitation : bool
-        Whether a record holds several excitation lines, so that it belongs to all points of its load.
-    """
+    """The points, each saying which of its runs were left out."""
     return tuple(_named(point, [one.run for one in left if _same(one, point, any_excitation)]) for point in points)
 
 
 def lost_points(points: Sequence[PointResult], left: Sequence[LeftOut], any_excitation: bool) -> tuple[Condition, ...]:
-    """Name the operating points that have no run left.
-
-    Parameters
-    ----------
-    points : sequence of PointResult
-    left : sequence of LeftOut
-    any_excitation : bool
-        Whether a record holds several excitation lines.
-    """
+    """Name the operating points that have no run left."""
     lost = [one for one in left if not any(_same(one, point, any_excitation) for point in points)]
     places = dict.fromkeys(f"{one.point.static_load / 1e3:g} kN, {one.point.excitation_hz:g} Hz" for one in lost)
     if not places:

@@ -21,19 +21,7 @@ KNOWN_SCATTERS = 1.5
 
 
 def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatArray) -> float:
-    """Multiple coherence of the forces with the displacements, smaller axis.
-
-    Parameters
-    ----------
-    D, F : (n, 2) complex ndarray
-    h : (2, 2) complex ndarray
-    weights : (n,) ndarray
-
-    Returns
-    -------
-    float
-        1 - (unexplained power) / (power), in the good windows; NaN without an answer.
-    """
+    """Multiple coherence of the forces with the displacements, smaller axis."""
     good = np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1) & (weights > 0)
     if not good.any() or not np.isfinite(h).all():
         return float("nan")
@@ -44,14 +32,7 @@ def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatA
 
 
 def amplitude(data: PointData, weights: FloatArray) -> float:
-    """Largest displacement amplitude (major half-axis of the orbit) of any run's mean phasor [m].
-
-    Parameters
-    ----------
-    data : PointData
-    weights : (n,) ndarray
-        Of the windows.
-    """
+    """Largest displacement amplitude (major half-axis of the orbit) of any run's mean phasor [m]."""
     largest = 0.0
     for i in range(len(data.runs)):
         mine = (data.run_index == i) & (weights > 0) & np.isfinite(data.D).all(axis=1)
@@ -63,16 +44,7 @@ def amplitude(data: PointData, weights: FloatArray) -> float:
 
 
 def rejected_windows(data: PointData, h: ComplexArray, weights: FloatArray) -> tuple[WindowVerdict, ...]:
-    """Windows without weight, each with the reason that shows in its own numbers.
-
-    Parameters
-    ----------
-    data : PointData
-    h : (2, 2) complex ndarray
-        Dynamic stiffness [N/m].
-    weights : (n,) ndarray
-        Of the windows.
-    """
+    """Windows without weight, each with the reason that shows in its own numbers."""
     found = []
     answered = bool(np.isfinite(h).all())
     for i in np.flatnonzero(weights < REJECTED_WEIGHT):
@@ -109,14 +81,7 @@ def _shift(z: ComplexArray, repeats: ComplexArray) -> float:
 
 
 def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> tuple[Condition, ...]:
-    """Conditions that the point's figures give rise to.
-
-    Parameters
-    ----------
-    data : PointData
-    stiffness : DynamicStiffness
-    coherence : float
-    """
+    """Conditions that the point's figures give rise to."""
     found = []
     if not coherence >= MIN_COHERENCE and np.isfinite(stiffness.h).all():
         found.append(Condition("low-coherence", f"coherence {coherence:.3f} < {MIN_COHERENCE}"))
@@ -148,12 +113,7 @@ def _missing(data: PointData) -> list[Condition]:
 
 
 def feeds_motion(stiffness: DynamicStiffness) -> tuple[Condition, ...]:
-    """Say where the dissipative part of H (its skew-Hermitian part) is negative beyond doubt.
-
-    Parameters
-    ----------
-    stiffness : DynamicStiffness
-    """
+    """Say where the dissipative part of H (its skew-Hermitian part) is negative beyond doubt."""
     h = stiffness.h
     if not np.isfinite(h).all():
         return ()
@@ -169,12 +129,6 @@ def directional_pattern(data: PointData, weights: FloatArray) -> Condition | Non
 
     A binomial test per run: more rejected windows than chance gives once in a thousand, in a run
     with at least three of them.
-
-    Parameters
-    ----------
-    data : PointData
-    weights : (n,) ndarray
-        Of the windows.
     """
     from scipy.special import bdtrc
 
@@ -195,17 +149,7 @@ def directional_pattern(data: PointData, weights: FloatArray) -> Condition | Non
 
 
 def disagreeing_runs(data: PointData, h: ComplexArray, weights: FloatArray, known: float = 0.0) -> Condition | None:
-    """Runs whose mean forces H does not explain: noise averages out of means, other faults do not.
-
-    Parameters
-    ----------
-    data : PointData
-    h : (2, 2) complex ndarray
-    weights : (n,) ndarray
-        Window weights.
-    known : float, optional
-        Force of another phase in every run that the intervals allow for [N].
-    """
+    """Runs whose mean forces H does not explain: noise averages out of means, other faults do not."""
     if len(data.runs) < 3 or not np.isfinite(h).all():
         return None
     good = data.whole & (weights > 0)

@@ -22,27 +22,13 @@ from tpjb_ident.dynamic.runs.point_data import PointData, gather
 
 @dataclass(frozen=True)
 class Baseline:
-    """Dynamic stiffness of the rig alone, over the frequencies at which it was measured.
-
-    Attributes
-    ----------
-    estimates : tuple of DynamicStiffness
-        Rising in frequency; empty where the campaign has no baseline.
-    conditions : tuple of Condition
-        Of the baseline as a whole.
-    """
+    """Dynamic stiffness of the rig alone, over the frequencies at which it was measured."""
 
     estimates: tuple[DynamicStiffness, ...] = ()
     conditions: tuple[Condition, ...] = field(default=())
 
     def at(self, omega: float) -> tuple[ComplexArray, FloatArray] | None:
-        """H (2, 2) and its covariance (8, 8) at `omega` [rad/s], linear between frequencies; None outside them.
-
-        Parameters
-        ----------
-        omega : float
-            Angular frequency of excitation [rad/s].
-        """
+        """H (2, 2) and its covariance (8, 8) at `omega` [rad/s], linear between frequencies; None outside them."""
         known = np.array([est.omega for est in self.estimates])
         if not len(known) or not 0.98 * known[0] <= omega <= 1.02 * known[-1]:
             return None
@@ -54,29 +40,12 @@ class Baseline:
         return (1 - t) * low.h + t * high.h, (1 - t) ** 2 * low.covariance + t**2 * high.covariance
 
     def taken_off(self, data: PointData) -> PointData:
-        """The point's windows with the film's force alone.
-
-        Parameters
-        ----------
-        data : PointData
-            Windows of the point; force as the cells tell it.
-
-        Returns
-        -------
-        PointData
-            A new one.
-        """
+        """The point's windows with the film's force alone."""
         found = self.at(data.omega)
         return data if found is None else replace(data, F=data.F - data.D @ found[0].T)
 
     def missing(self, data: PointData) -> tuple[Condition, ...]:
-        """Say where a campaign has a baseline, but not at a point's frequency.
-
-        Parameters
-        ----------
-        data : PointData
-            Windows of the point.
-        """
+        """Say where a campaign has a baseline, but not at a point's frequency."""
         if not self.estimates or self.at(data.omega) is not None:
             return ()
         low, high = (est.omega / (2 * np.pi) for est in (self.estimates[0], self.estimates[-1]))
@@ -84,32 +53,13 @@ class Baseline:
         return (Condition("baseline-missing", told),)
 
     def spread(self, data: PointData) -> dict[str, FloatArray]:
-        """Covariance (8, 8) that the baseline's own errors leave in H [N^2/m^2], by source.
-
-        Parameters
-        ----------
-        data : PointData
-            Windows of the point.
-        """
+        """Covariance (8, 8) that the baseline's own errors leave in H [N^2/m^2], by source."""
         found = self.at(data.omega)
         return {} if found is None else {"baseline": found[1]}
 
 
 def measured_baseline(campaign: Campaign, settings: PhasorSettings, method: str) -> Baseline:
-    """Baseline of a campaign from its runs of that kind.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    settings : PhasorSettings
-    method : str
-        Estimator, as for the points.
-
-    Raises
-    ------
-    rigdata.problem.RigDataError, RecordTooShortError
-        A baseline run cannot be used: without it every coefficient would hold the rig's own stiffness.
-    """
+    """Baseline of a campaign from its runs of that kind."""
     runs = campaign.of_kind("baseline")
     if not runs:
         return Baseline()

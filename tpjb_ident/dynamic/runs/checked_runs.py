@@ -16,18 +16,7 @@ CONTRADICTED, DOUBTFUL = "records-contradicted", "records-doubtful"
 
 
 def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
-    """Judge all finished runs beside each other; those with an error of their own are left out.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    finished : FinishedRuns
-
-    Raises
-    ------
-    rigdata.problem.RigDataError
-        None of the runs can be used.
-    """
+    """Judge all finished runs beside each other; those with an error of their own are left out."""
     seen = [one for digest in finished.digests for one in digest.seen]
     if not seen:  # runs that are no files
         return Verdicts()
@@ -39,13 +28,7 @@ def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
 
 
 def campaign_verdicts(campaign: Campaign, seen: Sequence[Observation]) -> Verdicts:
-    """What the checks say of dynamic runs beside each other, by run.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    seen : sequence of Observation
-    """
+    """What the checks say of dynamic runs beside each other, by run."""
     found = verdicts([one.report for one in judged(campaign, seen)])
     # without accelerometers the inertia stays in the force: that is told, and no reason to refuse
     optional = {f"channel {c.name}" for c in campaign.channels.values() if c.quantity == "acceleration"}
@@ -56,14 +39,7 @@ def campaign_verdicts(campaign: Campaign, seen: Sequence[Observation]) -> Verdic
 
 
 def check_conditions(found: Verdicts, runs: Iterable[str]) -> tuple[Condition, ...]:
-    """What the checks say of one point.
-
-    Parameters
-    ----------
-    found : Verdicts
-    runs : iterable of str
-        Of the point.
-    """
+    """What the checks say of one point."""
     members = list(runs)
     groups = ((CONTRADICTED, found.shared), (DOUBTFUL, found.doubtful))
     told = ((name, [p for run in members for p in by_run.get(run, ())]) for name, by_run in groups)

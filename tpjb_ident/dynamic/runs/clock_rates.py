@@ -25,13 +25,7 @@ MIN_WINDOWS = 4
 
 @dataclass(frozen=True)
 class RateSamples:
-    """Rate differences that single runs show.
-
-    Attributes
-    ----------
-    force, acceleration : (n, 3) ndarray
-        Difference to the probes' clock (relative), its standard error, and the phase it comes to over the run [rad].
-    """
+    """Rate differences that single runs show."""
 
     force: FloatArray
     acceleration: FloatArray
@@ -39,26 +33,14 @@ class RateSamples:
 
 @dataclass(frozen=True)
 class ClockRates:
-    """How much faster than the probes' clock those of cells and accelerometers run (relative); 0 where they do not.
-
-    Attributes
-    ----------
-    force, acceleration : float
-    error : float
-        Standard error of `force`.
-    """
+    """How much faster than the probes' clock those of cells and accelerometers run (relative); 0 where they do not."""
 
     force: float = 0.0
     acceleration: float = 0.0
     error: float = 0.0
 
     def apply(self, data: PointData) -> PointData:
-        """The point's windows as if all channels had been recorded by one clock that was started with all others.
-
-        Parameters
-        ----------
-        data : PointData
-        """
+        """The point's windows as if all channels had been recorded by one clock that was started with all others."""
         if not (self.force or self.acceleration):
             return data
         omega = 2 * np.pi * np.array([r.lines.excitation[i].frequency for r, i in zip(data.runs, data.lines)])
@@ -69,12 +51,7 @@ class ClockRates:
         return replace(data, F=cells + data.mass * A, A=A)
 
     def doubt(self, data: PointData) -> float:
-        """Standard deviation of the cells' lag [s] that the error of the rate leaves, in the middle of the windows.
-
-        Parameters
-        ----------
-        data : PointData
-        """
+        """Standard deviation of the cells' lag [s] that the error of the rate leaves, in the middle of the windows."""
         if not self.force:
             return 0.0
         return self.error * float(np.mean(np.concatenate([run.start + 0.5 * run.length for run in data.runs])))
@@ -94,12 +71,7 @@ class ClockRates:
 
 
 def rate_samples(data: PointData) -> RateSamples:
-    """What the runs of one point show of the clocks.
-
-    Parameters
-    ----------
-    data : PointData
-    """
+    """What the runs of one point show of the clocks."""
     cells = data.F - data.mass * data.A
     found: dict[str, list[FloatArray]] = {"force": [], "acceleration": []}
     for i, (run, line) in enumerate(zip(data.runs, data.lines)):
@@ -134,12 +106,7 @@ def _drift(z: ComplexArray, d: ComplexArray, start: FloatArray) -> tuple[float, 
 
 
 def clock_rates(samples: Iterable[RateSamples]) -> ClockRates:
-    """Differences that the runs of a campaign share; zero where none is clear.
-
-    Parameters
-    ----------
-    samples : iterable of RateSamples
-    """
+    """Differences that the runs of a campaign share; zero where none is clear."""
     every = list(samples)
     force = np.concatenate([s.force for s in every] or [np.empty((0, 3))])
     acceleration = np.concatenate([s.acceleration for s in every] or [np.empty((0, 3))])

@@ -33,30 +33,7 @@ _OWN = "this process"
 
 @dataclass(frozen=True)
 class RunDigest:
-    """What is known of a run without its windows.
-
-    Attributes
-    ----------
-    run : str
-    point : OperatingPoint
-    excitations : tuple of float
-        Frequencies as fitted [Hz].
-    conditions : tuple of Condition
-    mean_load : (2,) ndarray
-        [N]
-    mains : (2,) complex ndarray or None
-        Displacement at the mains line, where it stands apart [m].
-    temperatures : dict of int to float
-        Mean per pad [K].
-    harmonics : tuple of (LineMean, LineMean) or None
-        Every excitation line with its second harmonic.
-    sample_rate : float
-        [Hz]
-    mains_force : (2,) complex ndarray or None
-        Oil force at the mains line, where it stands apart [N].
-    seen : tuple of Observation
-        What the checks need of the run, one for every excitation.
-    """
+    """What is known of a run without its windows."""
 
     run: str
     point: OperatingPoint
@@ -72,14 +49,7 @@ class RunDigest:
 
 
 def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:
-    """Sum up a finished run that was recorded at `sample_rate` [Hz].
-
-    Parameters
-    ----------
-    result : RunResult
-    sample_rate : float, optional
-        [Hz]
-    """
+    """Sum up a finished run that was recorded at `sample_rate` [Hz]."""
     phasors = result.phasors
     return RunDigest(
         phasors.run,
@@ -108,20 +78,7 @@ def _bytes(phasors: RunPhasors) -> int:
 
 
 class FinishedRuns:
-    """Puts finished runs away and gives them back.
-
-    Parameters
-    ----------
-    runs : sequence of rigdata.campaign.Run
-    housing_mass : float
-        [kg]
-    again : callable
-        Makes the result of a run once more, where it was lost: another command into the same folder clears the store.
-    store : RunStore, optional
-        What it holds is not put anywhere else.
-    room : int, optional
-        Bytes that stay in memory; default `ROOM`.
-    """
+    """Puts finished runs away and gives them back."""
 
     def __init__(
         self,
@@ -175,14 +132,7 @@ class FinishedRuns:
         return tuple(self._left[i] for i in sorted(self._left))
 
     def leave_out(self, index: int, why: LeftOut) -> None:
-        """Note that a run takes no part.
-
-        Parameters
-        ----------
-        index : int
-            Place of the run.
-        why : LeftOut
-        """
+        """Note that a run takes no part."""
         self._left[index] = why
         self._digests.pop(index, None)
         self._memory.pop(index, None)
@@ -199,30 +149,14 @@ class FinishedRuns:
                 self.leave_out(i, LeftOut(run.id, run.point, RigDataError(problem)))
 
     def leave_out_unusable(self, errors: Mapping[str, Problem]) -> None:
-        """Leave out runs in which the checks found an error of their own.
-
-        Parameters
-        ----------
-        errors : mapping of str to Problem
-            By run.
-        """
+        """Leave out runs in which the checks found an error of their own."""
         for i in self.places:
             run = self._runs[i]
             if run.id in errors:
                 self.leave_out(i, LeftOut(run.id, run.point, RigDataError(errors[run.id])))
 
     def put(self, index: int, result: RunResult | None, mark: str = "") -> None:
-        """Put a finished run away.
-
-        Parameters
-        ----------
-        index : int
-            Of the run.
-        result : RunResult or None
-            None where the store had it already.
-        mark : str
-            Fingerprint under which the store keeps it; "" if it does not.
-        """
+        """Put a finished run away."""
         run = self._runs[index]
         if result is None and self._store is not None:
             result = self._store.load(run, mark, self._mass)
@@ -240,13 +174,7 @@ class FinishedRuns:
             self._own().keep(_OWN, replace(result, phasors=phasors))
 
     def take(self, index: int) -> RunPhasors:
-        """Phasors of a run's excitation lines.
-
-        Parameters
-        ----------
-        index : int
-            Place of the run.
-        """
+        """Phasors of a run's excitation lines."""
         if index in self._memory:
             return self._memory[index]
         run, mark = self._runs[index], self._marks.get(index, "")

@@ -20,16 +20,7 @@ LISTED = 6
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A dynamic run that takes no part.
-
-    Attributes
-    ----------
-    run : str
-    point : OperatingPoint
-        Its set points.
-    error : Exception
-        Why, as `RigDataError` or `RecordTooShortError`.
-    """
+    """A dynamic run that takes no part."""
 
     run: str
     point: OperatingPoint
@@ -42,14 +33,7 @@ class LeftOut:
 
 
 def named_runs(left: Sequence[LeftOut], of: int) -> tuple[Condition, ...]:
-    """What the campaign has to say: which of its `of` dynamic runs take no part, and why.
-
-    Parameters
-    ----------
-    left : sequence of LeftOut
-    of : int
-        Dynamic runs of the campaign.
-    """
+    """What the campaign has to say: which of its `of` dynamic runs take no part, and why."""
     if not left:
         return ()
     listed = "; ".join(f"{one.run} ({one.reason})" for one in left[:LISTED])

@@ -18,23 +18,7 @@ TEMPERATURE_SAMPLES = 2**17
 
 @dataclass(frozen=True)
 class PointData:
-    """Windows of all runs at one operating point and one excitation line.
-
-    Attributes
-    ----------
-    point : OperatingPoint
-    runs : tuple of RunPhasors
-    lines : tuple of int
-        Which line of each run is meant.
-    D, F, A : (n, 2) complex ndarray
-        Displacement [m], oil force [N], housing acceleration [m/s^2] (zero where not measured).
-    run_index : (n,) ndarray of int
-        Windows of one run are repeats of one excitation.
-    found : float
-        Excitation frequency that the runs show, where it is not the set one [rad/s]; else 0.
-    shaft : (n_runs,) complex ndarray or None
-        Unit phasor of the shaft in every run, where the excitation turns with it and the runs tell the two apart.
-    """
+    """Windows of all runs at one operating point and one excitation line."""
 
     point: OperatingPoint
     runs: tuple[RunPhasors, ...]
@@ -73,35 +57,19 @@ class PointData:
 
 
 def finite_mean(rows: FloatArray) -> FloatArray:
-    """Mean of the complete rows, (2,); NaN where there is none.
-
-    Parameters
-    ----------
-    rows : (n, 2) ndarray
-    """
+    """Mean of the complete rows, (2,); NaN where there is none."""
     good = rows[np.isfinite(rows).all(axis=1)]
     return good.mean(axis=0) if len(good) else np.full(2, np.nan)
 
 
 def gather(runs: list[RunPhasors]) -> list[PointData]:
-    """Group runs by operating point; a record with several excitation lines feeds several points.
-
-    Parameters
-    ----------
-    runs : list of RunPhasors
-    """
+    """Group runs by operating point; a record with several excitation lines feeds several points."""
     lines = [(run.point, tuple(line.frequency for line in run.lines.excitation)) for run in runs]
     return [point_data(point, [(runs[k], i) for k, i in members]) for point, members in group(lines)]
 
 
 def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[OperatingPoint, list[tuple[int, int]]]]:
-    """Operating points in order, each with the places of its runs and which line of the run is meant.
-
-    Parameters
-    ----------
-    runs : list of (OperatingPoint, tuple of float)
-        Set points and excitation frequencies as fitted [Hz] of every run.
-    """
+    """Operating points in order, each with the places of its runs and which line of the run is meant."""
     groups: dict[tuple[float, ...], tuple[OperatingPoint, list[tuple[int, int]]]] = {}
     for k, (stated, frequencies) in enumerate(runs):
         for i, frequency in enumerate(frequencies):
@@ -117,15 +85,7 @@ def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[Op
 
 
 def point_of(stated: OperatingPoint, frequency: float) -> OperatingPoint:
-    """Operating point of one line; the set point's frequency where the line belongs to it.
-
-    Parameters
-    ----------
-    stated : OperatingPoint
-        Of the run.
-    frequency : float
-        Of the line [Hz].
-    """
+    """Operating point of one line; the set point's frequency where the line belongs to it."""
     nominal = stated.excitation_hz
     if abs(frequency - nominal) <= 0.02 * max(nominal, 1e-9):
         return stated
@@ -134,14 +94,7 @@ def point_of(stated: OperatingPoint, frequency: float) -> OperatingPoint:
 
 
 def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> PointData:
-    """Windows of a point's runs, each with the line that is meant.
-
-    Parameters
-    ----------
-    point : OperatingPoint
-    members : list of (RunPhasors, int)
-        Runs, and the line of each that is meant.
-    """
+    """Windows of a point's runs, each with the line that is meant."""
     runs = tuple(run for run, _ in members)
     lines = tuple(i for _, i in members)
     D = [run.displacement.phasors[:, i] for run, i in zip(runs, lines)]
@@ -161,12 +114,7 @@ def _found(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> floa
 
 
 def mean_temperatures(run: Run) -> dict[int, float]:
-    """Mean temperature per pad over a run [K]; pads with several sensors give their mean.
-
-    Parameters
-    ----------
-    run : Run
-    """
+    """Mean temperature per pad over a run [K]; pads with several sensors give their mean."""
     found: dict[int, list[float]] = {}
     for sensor in run.temperatures():
         if sensor.pad is None:
@@ -179,12 +127,6 @@ def mean_temperatures(run: Run) -> dict[int, float]:
 
 
 def pad_means(runs: Sequence[dict[int, float]]) -> dict[int, float]:
-    """Mean temperature by pad over the runs that have it [K].
-
-    Parameters
-    ----------
-    runs : sequence of dict
-        Temperature by pad number, per run.
-    """
+    """Mean temperature by pad over the runs that have it [K]."""
     pads = sorted({pad for run in runs for pad in run})
     return {pad: float(np.mean([run[pad] for run in runs if pad in run])) for pad in pads}

@@ -18,20 +18,7 @@ from tpjb_ident.dynamic.runs.synchronous import without_shaft
 
 @dataclass(frozen=True)
 class PointSource:
-    """An operating point, and where its windows are.
-
-    Attributes
-    ----------
-    point : OperatingPoint
-    members : tuple of (int, int)
-        Place among the finished runs, and line, of every run.
-    digests : tuple of RunDigest
-    finished : FinishedRuns
-    clocks : ClockRates
-        By which the channels' clocks differ, once that is known.
-    baseline : Baseline
-        Of the rig without its bearing, where the campaign measured it.
-    """
+    """An operating point, and where its windows are."""
 
     point: OperatingPoint
     members: tuple[tuple[int, int], ...]
@@ -64,23 +51,12 @@ class PointSource:
         return np.array([digest.mean_load for digest in self.digests])
 
     def found(self, condition: str) -> bool:
-        """Whether one of the runs carries a condition of this name.
-
-        Parameters
-        ----------
-        condition : str
-            Its name.
-        """
+        """Whether one of the runs carries a condition of this name."""
         return any(condition in digest.conditions for digest in self.digests)
 
 
 def point_sources(finished: FinishedRuns) -> list[PointSource]:
-    """Operating points of all runs kept.
-
-    Parameters
-    ----------
-    finished : FinishedRuns
-    """
+    """Operating points of all runs kept."""
     digests, places = finished.digests, finished.places
     return [
         PointSource(point, tuple((places[k], i) for k, i in members), tuple(digests[k] for k, _ in members), finished)

@@ -46,24 +46,6 @@ def all_runs(
     """Phasors and temperatures of every dynamic run, put away kept that the caller closes.
 
     A run that cannot be used is left out, and `FinishedRuns` names it.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    settings : PhasorSettings
-    progress : callable
-        Called as progress(text, done, total).
-    workers : Workers, optional
-        Who reads the runs; the numbers are the same.
-    store : RunStore, optional
-        Where finished runs are kept, and taken from if nothing has changed since.
-
-    Raises
-    ------
-    RecordTooShortError, rigdata.problem.RigDataError
-        Of the first run, in order, where none can be used.
-    LostJobsError
-        Workers were lost again and again.
     """
     runs = campaign.of_kind("dynamic")
     mass = campaign.housing_mass
@@ -102,15 +84,6 @@ def unless_known(
 
     The fingerprint is "" where the record changed while it was read: such a result must not be kept. Where nothing
     is kept anywhere (`known` is None) it is not asked for.
-
-    Parameters
-    ----------
-    run : Run
-    housing_mass : float
-        [kg]
-    settings : PhasorSettings
-    known : str or None
-        Fingerprint of a kept result; None where nothing is kept.
     """
     try:
         return _unless_known(run, housing_mass, settings, known)
@@ -151,15 +124,7 @@ def _anywhere(run: Run) -> Any:
 
 
 def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResult:
-    """Phasors and temperatures of one run.
-
-    Parameters
-    ----------
-    run : Run
-    housing_mass : float
-        [kg]
-    settings : PhasorSettings
-    """
+    """Phasors and temperatures of one run."""
     with run.kept_open():
         kept = with_kept_beginning(run)
         try:

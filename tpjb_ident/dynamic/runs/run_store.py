@@ -41,16 +41,7 @@ _PARTS = ("phasors", "mean", "noise", "lost")
 
 @dataclass(frozen=True)
 class RunResult:
-    """Phasors and temperatures of a run.
-
-    Attributes
-    ----------
-    phasors : RunPhasors
-    temperatures : dict of int to float
-        Mean per pad [K].
-    seen : tuple of Observation
-        What the checks need of it, one for every excitation; none of what is not read from a file.
-    """
+    """Phasors and temperatures of a run."""
 
     phasors: RunPhasors
     temperatures: dict[int, float]
@@ -58,14 +49,9 @@ class RunResult:
 
 
 def fingerprint(run: Run, housing_mass: float, settings: PhasorSettings) -> str:
-    """SHA-256 of everything that a run's phasors depend on; "" where the run has no file of its own, or none any more.
+    """SHA-256 of everything that a run's phasors depend on.
 
-    Parameters
-    ----------
-    run : rigdata.campaign.Run
-    housing_mass : float
-        [kg]
-    settings : PhasorSettings
+    "" where the run has no file of its own, or none any more.
     """
     reader = getattr(run, "reader", None)
     if reader is None:
@@ -81,13 +67,7 @@ def fingerprint(run: Run, housing_mass: float, settings: PhasorSettings) -> str:
 
 
 class RunStore:
-    """A folder of finished runs.
-
-    Parameters
-    ----------
-    folder : Path
-        Made when the first run is kept.
-    """
+    """A folder of finished runs."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -96,12 +76,7 @@ class RunStore:
         return self.folder / f"{hashlib.sha256(run_id.encode()).hexdigest()[:32]}.npz"
 
     def known(self, run_id: str) -> str:
-        """Fingerprint under which a run is kept, "" if it is not.
-
-        Parameters
-        ----------
-        run_id : str
-        """
+        """Fingerprint under which a run is kept, "" if it is not."""
         found = self._read(run_id)
         return "" if found is None else str(found[0]["fingerprint"])
 
@@ -116,14 +91,7 @@ class RunStore:
         return (meta, arrays) if isinstance(meta, dict) and meta.get("run") == run_id else None
 
     def keep(self, mark: str, result: RunResult) -> None:
-        """Keep a finished run under its fingerprint `mark`.
-
-        Parameters
-        ----------
-        mark : str
-            Fingerprint.
-        result : RunResult
-        """
+        """Keep a finished run under its fingerprint `mark`."""
         phasors = result.phasors
         arrays: dict[str, Any] = {"start": phasors.start, "speeds": phasors.speeds, "shaft_phase": phasors.shaft_phase}
         for name in _BLOCKS:
@@ -145,16 +113,7 @@ class RunStore:
             write_atomic(self._file(phasors.run), lambda path: np.savez(path, meta=text, **arrays))
 
     def load(self, run: Run, mark: str, housing_mass: float) -> RunResult | None:
-        """Give a kept run back; None if it is not there, or not under this fingerprint.
-
-        Parameters
-        ----------
-        run : rigdata.campaign.Run
-        mark : str
-            Its fingerprint as computed now.
-        housing_mass : float
-            [kg]
-        """
+        """Give a kept run back; None if it is not there, or not under this fingerprint."""
         found = self._read(run.id)
         if not mark or found is None or found[0]["fingerprint"] != mark:
             return None
@@ -216,23 +175,12 @@ def _unpacked_lines(stored: dict[str, Any]) -> LineSet:
 
 
 def of_run(seen: Observation, run: Run) -> Observation:
-    """The same observation, of `run` in place of the one that was looked at: what that kept in memory may go.
-
-    Parameters
-    ----------
-    seen : Observation
-    run : rigdata.run.Run
-    """
+    """The same observation, of `run` in place of the one that was looked at: what that kept in memory may go."""
     return replace(seen, run=run, report=Reporter(run, list(seen.report.found), set(seen.report.doubts)))
 
 
 def packed(seen: Observation) -> dict[str, Any]:
-    """What JSON can hold; samples are left out, dynamic runs have none.
-
-    Parameters
-    ----------
-    seen : Observation
-    """
+    """What JSON can hold; samples are left out, dynamic runs have none."""
     lines = None if seen.lines is None else {name: _plain(value) for name, value in vars(seen.lines).items()}
     return {
         "excitation": seen.run.point.excitation,
@@ -248,13 +196,7 @@ def packed(seen: Observation) -> dict[str, Any]:
 
 
 def unpacked(stored: Mapping[str, Any], run: Run) -> Observation:
-    """What `packed` made, of `run` at the excitation that was looked at.
-
-    Parameters
-    ----------
-    stored : mapping
-    run : rigdata.run.Run
-    """
+    """What `packed` made, of `run` at the excitation that was looked at."""
     if stored["excitation"] != run.point.excitation:
         run = replace(run, point=replace(run.point, excitation=stored["excitation"]))
     channels = tuple(run.channels[name] for name in stored["channels"])

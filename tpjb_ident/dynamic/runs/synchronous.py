@@ -26,13 +26,7 @@ ILL_CONDITIONED = 30.0
 
 
 def without_shaft(data: PointData) -> PointData:
-    """The point with what turns with the shaft taken off, where the runs tell it; else its runs say what would.
-
-    Parameters
-    ----------
-    data : PointData
-        Unchanged where its excitation does not stand on a line of the shaft.
-    """
+    """The point with what turns with the shaft taken off, where the runs tell it; else its runs say what would."""
     first = data.runs[0].lines
     n = shaft_order(first.excitation[data.lines[0]].frequency, first.speed)
     name = f"{n}X on excitation line"
@@ -60,11 +54,6 @@ def freed(data: PointData) -> PointData:
     """Combinations of the runs, window by window, in which what turns with the shaft cancels.
 
     They are orthonormal, so the noise of their windows is that of the runs' own; there is one less of them than runs.
-
-    Parameters
-    ----------
-    data : PointData
-        As of `without_shaft`; unchanged where nothing was fitted.
     """
     if data.shaft is None:
         return data

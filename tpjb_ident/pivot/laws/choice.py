@@ -28,18 +28,7 @@ HOPELESS = 25.0  # below the pad's best log-evidence: no prior makes up for that
 
 
 def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> tuple[FloatArray, ...]:
-    """Posterior shares of all fits of every pad.
-
-    Parameters
-    ----------
-    fits : sequence (pads) of sequence (n fits of that pad) of LawFit
-        All candidates; a law may stand with and without contact loss.
-
-    Returns
-    -------
-    tuple (pads) of (n,) ndarray
-        Shares that sum to one.
-    """
+    """Posterior shares of all fits of every pad."""
     names = sorted({fit.name for pad in fits for fit in pad})
     prior = {name: SPLINE_PRIOR if name == "spline" else 1.0 for name in names}
     prior = {name: PSEUDO_PADS * value / sum(prior.values()) for name, value in prior.items()}
@@ -73,36 +62,14 @@ def _pad_weights(pad: Sequence[LawFit], share: dict[str, float]) -> FloatArray:
 
 
 def keep_likely(fits: Sequence[LawFit], weights: FloatArray) -> tuple[tuple[LawFit, ...], FloatArray]:
-    """The fits worth keeping, most likely first, with shares that sum to one.
-
-    Parameters
-    ----------
-    fits : sequence of LawFit
-    weights : (n,) ndarray
-        Shares of the fits.
-    """
+    """The fits worth keeping, most likely first, with shares that sum to one."""
     order = [k for k in np.argsort(-weights, kind="stable") if weights[k] >= SMALLEST_WEIGHT]
     kept = weights[order]
     return tuple(fits[k] for k in order), np.asarray(kept / kept.sum())
 
 
 def shared_priors(fits: Sequence[Sequence[LawFit]], weights: Sequence[FloatArray], pad: int) -> dict[str, ShapePrior]:
-    """Prior of each law's shape on one pad, from all other pads.
-
-    Parameters
-    ----------
-    fits : sequence (pads) of sequence of LawFit
-        Fitted with the laws' own priors.
-    weights : sequence (pads) of (n,) ndarray
-        Posterior shares of these fits.
-    pad : int
-        Index of the pad for which the prior is.
-
-    Returns
-    -------
-    dict of str to ShapePrior
-        By the law's name; laws without shape, and laws that no other pad likes, are not in it.
-    """
+    """Prior of each law's shape on one pad, from all other pads."""
     found = {}
     for law in {fit.name: fit.law for fit in fits[pad] if fit.law.parameters and fit.name != "spline"}.values():
         own = law.prior_precision
@@ -140,18 +107,6 @@ def with_shared_shape(
     sphere, which is simpler, and the curve comes out 3 % wrong at its lower end. So every law is fitted a second time
     with the shape that the other pads show, give or take what pads of one make may differ by, and both fits count
     alike: a pad of its own kind loses nothing but a factor of two in evidence.
-
-    Parameters
-    ----------
-    fits, weights
-        As in `shared_priors`.
-    refit : sequence (pads) of callable
-        ``refit[pad](fit, prior)`` fits the same law to the same data with another prior of its shape.
-
-    Returns
-    -------
-    list (pads) of list of LawFit
-        In the order given; evidences are means over both priors.
     """
     out = []
     for pad, candidates in enumerate(fits):

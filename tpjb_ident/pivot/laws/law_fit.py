@@ -25,21 +25,7 @@ CONVERGED = 3e-3  # change of the misfit (chi-square) that no longer matters
 
 @dataclass(frozen=True)
 class FitData:
-    """What a law is fitted to.
-
-    Attributes
-    ----------
-    load, deflection : (m,) ndarray
-        Along the pad direction [N], [m]; the deflection counts from an unknown zero.
-    branch : (m,) ndarray
-        +1 loading, -1 unloading.
-    whitener : (m, m) ndarray
-        Inverse Cholesky factor of the covariance of the deflections [1/m].
-    reference_load : float
-        W_r of the laws [N].
-    friction : (float, float)
-        Prior mean and standard deviation of the share held back by friction.
-    """
+    """What a law is fitted to."""
 
     load: FloatArray
     deflection: FloatArray
@@ -51,25 +37,7 @@ class FitData:
 
 @dataclass(frozen=True)
 class LawFit:
-    """A law with its parameters and their covariance.
-
-    Attributes
-    ----------
-    law : Law
-        The shape.
-    reference_load : float
-        W_r [N].
-    contact : bool
-        Whether a contact loss a exp(-F / F0) was fitted.
-    theta : (p,) ndarray
-        x0 [m], mu, ln s, shape parameters, and with contact a [m], ln F0.
-    covariance : (p, p) ndarray
-        Of `theta`.
-    log_evidence : float
-        Logarithm of the marginal likelihood (Laplace), up to a constant common to all laws.
-    chi_square, freedom : float, int
-        Whitened misfit and its degrees of freedom.
-    """
+    """A law with its parameters and their covariance."""
 
     law: Law
     reference_load: float
@@ -97,46 +65,22 @@ class LawFit:
         return self.theta[SCALE + 1 : SCALE + 1 + len(self.law.parameters)]
 
     def deflection(self, load: FloatArray) -> FloatArray:
-        """Deflection (n,) [m] of the pivot alone at pad loads (n,) [N].
-
-        Parameters
-        ----------
-        load : array_like
-            [N], not negative.
-        """
+        """Deflection (n,) [m] of the pivot alone at pad loads (n,) [N]."""
         u = np.maximum(load, 0.0) / self.reference_load
         return np.asarray(np.exp(self.theta[SCALE]) * self.reference_load * self.law.phi(u, self.shape)[0])
 
     def compliance(self, load: FloatArray) -> FloatArray:
-        """Tangent compliance d delta / dW (n,) [m/N].
-
-        Parameters
-        ----------
-        load : (n,) ndarray
-            [N]
-        """
+        """Tangent compliance d delta / dW (n,) [m/N]."""
         u = np.maximum(load, 0.0) / self.reference_load
         return np.asarray(np.exp(self.theta[SCALE]) * self.law.psi(u, self.shape)[0])
 
     def log_compliance_gradient(self, load: FloatArray) -> FloatArray:
-        """Derivative (n, p) of ln(compliance) with respect to `theta`.
-
-        Parameters
-        ----------
-        load : (n,) ndarray
-            [N]
-        """
+        """Derivative (n, p) of ln(compliance) with respect to `theta`."""
         value, shape = self.law.psi(np.maximum(load, 0.0) / self.reference_load, self.shape)
         return self._gradient(value, shape)
 
     def log_deflection_gradient(self, load: FloatArray) -> FloatArray:
-        """Derivative (n, p) of ln(deflection) with respect to `theta`.
-
-        Parameters
-        ----------
-        load : (n,) ndarray
-            [N]
-        """
+        """Derivative (n, p) of ln(deflection) with respect to `theta`."""
         value, shape = self.law.phi(np.maximum(load, 0.0) / self.reference_load, self.shape)
         return self._gradient(value, shape)
 
@@ -147,40 +91,18 @@ class LawFit:
         return gradient
 
     def missing_compliance(self, load: FloatArray) -> FloatArray:
-        """What incomplete contact adds to the measured compliance (n,) [m/N].
-
-        Parameters
-        ----------
-        load : (n,) ndarray
-            [N]
-        """
+        """What incomplete contact adds to the measured compliance (n,) [m/N]."""
         if not self.contact:
             return np.zeros_like(load)
         gap, load_0 = self.theta[-2], np.exp(self.theta[-1])
         return np.asarray(gap / load_0 * np.exp(-load / load_0))
 
     def reading(self, load: FloatArray, branch: FloatArray) -> FloatArray:
-        """Expected displacement reading (n,) [m] at applied loads (n,) [N], contact loss included.
-
-        Parameters
-        ----------
-        load : (n,) ndarray
-            [N]
-        branch : (n,) ndarray
-            +1 loading, -1 unloading.
-        """
+        """Expected displacement reading (n,) [m] at applied loads (n,) [N], contact loss included."""
         return self.reading_gradient(load, branch)[0]
 
     def reading_gradient(self, load: FloatArray, branch: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Expected reading (n,) [m] and its derivative (n, p) with respect to `theta`.
-
-        Parameters
-        ----------
-        load : (n,) ndarray
-            [N]
-        branch : (n,) ndarray
-            +1 loading, -1 unloading.
-        """
+        """Expected reading (n,) [m] and its derivative (n, p) with respect to `theta`."""
         return _predict(self.law, self.theta, self.contact, load, branch, self.reference_load)
 
 
@@ -255,25 +177,7 @@ def _prior(law: Law, contact: bool, data: FitData, known: ShapePrior | None) -> 
 def fit_law(
     law: Law, contact: bool, data: FitData, known: ShapePrior | None = None, start: FloatArray | None = None
 ) -> LawFit:
-    """Fit one law by its posterior mode.
-
-    Parameters
-    ----------
-    law : Law
-        The shape.
-    contact : bool
-        Whether to fit a contact loss beside it.
-    data : FitData
-        Blocks and their covariance.
-    known : ShapePrior, optional
-        What is known of the shape beforehand; default: what the law itself says is plausible.
-    start : (p,) ndarray, optional
-        Parameters to start from.
-
-    Returns
-    -------
-    LawFit
-    """
+    """Fit one law by its posterior mode."""
     prior = _prior(law, contact, data, known)
     theta = _start(prior, contact, data) if start is None else np.clip(start, prior.low, prior.high)
     unit = np.ones(len(theta))

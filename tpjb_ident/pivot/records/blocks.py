@@ -22,23 +22,7 @@ MOST_BLOCKS = 220  # the covariance is a full matrix: keep it small
 
 @dataclass(frozen=True)
 class Blocks:
-    """Averages over m pieces of record, in order of time.
-
-    Attributes
-    ----------
-    time, duration : (m,) ndarray
-        Middle and length [s].
-    load, displacement : (m, 2) ndarray
-        Mean vectors in the bearing frame [N], [m].
-    load_spread : (m,) ndarray
-        Standard deviation of the mean load that comes from sample noise [N].
-    rate : (m,) ndarray
-        Rate of change of the load's magnitude [N/s]; zero on holds.
-    hold : (m,) ndarray of int
-        Number of the hold, from 0; -1 on ramps.
-    branch : (m,) ndarray of int
-        +1 while the load goes up or after it went up, -1 down.
-    """
+    """Averages over m pieces of record, in order of time."""
 
     time: FloatArray
     duration: FloatArray
@@ -53,30 +37,13 @@ class Blocks:
         return len(self.time)
 
     def take(self, keep: BoolArray) -> Blocks:
-        """The blocks where `keep` (m,) is true.
-
-        Parameters
-        ----------
-        keep : (m,) ndarray of bool
-        """
+        """The blocks where `keep` (m,) is true."""
         return Blocks(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True)
 class Samples:
-    """One dry record on one time base, missing values and glitches left out.
-
-    Attributes
-    ----------
-    time : (n,) ndarray
-        Seconds.
-    load, displacement : (n, 2) ndarray
-        Bearing frame [N], [m].
-    along : (n,) ndarray
-        Load along the pad direction [N].
-    lost : float
-        Share of the samples that was left out.
-    """
+    """One dry record on one time base, missing values and glitches left out."""
 
     time: FloatArray
     load: FloatArray
@@ -86,21 +53,7 @@ class Samples:
 
 
 def cut_blocks(samples: Samples, holds: tuple[Hold, ...], length: float) -> Blocks:
-    """Average a record piece by piece.
-
-    Parameters
-    ----------
-    samples : Samples
-        The record.
-    holds : tuple of Hold
-        Where the load stands still; every hold gets pieces of its own.
-    length : float
-        Length of a piece on a hold [s]; half of it on ramps. Stretched for long records.
-
-    Returns
-    -------
-    Blocks
-    """
+    """Average a record piece by piece."""
     span = float(samples.time[-1] - samples.time[0])
     held = sum(hold.duration for hold in holds)
     length = length * max(1.0, (held + 2.0 * (span - held)) / length / MOST_BLOCKS)

@@ -31,29 +31,7 @@ UNDITHERED = 0.3  # share of samples that differ from the one before, below whic
 
 @dataclass(frozen=True)
 class DryRecord:
-    """One dry run of one pad.
-
-    Attributes
-    ----------
-    run : Run
-        Where it came from.
-    pad : int
-        Number, from 1.
-    angle : float
-        Direction of the pad [rad].
-    holds : tuple of Hold
-        Empty for a continuous ramp.
-    blocks : Blocks
-        Averages in the bearing frame.
-    projection : Projection
-        The same on the pad's axes.
-    lost : float
-        Share of samples left out.
-    quantisation : float
-        Standard deviation [m] of what the converter's steps add to a whole hold; zero where noise smears them.
-    pickup : PickupSignature or None
-        Mains line in every probe and cell; None where the record is too short to show it.
-    """
+    """One dry run of one pad."""
 
     run: Run
     pad: int
@@ -67,26 +45,7 @@ class DryRecord:
 
 
 def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> DryRecord:
-    """Read one dry run.
-
-    Parameters
-    ----------
-    run : Run
-        Of kind ``dry_pivot``.
-    pad_angles : (n_pads,) ndarray
-        Directions of the pads [rad], pad #1 first.
-    settings : PivotSettings
-        Block length, longest glitch.
-
-    Returns
-    -------
-    DryRecord
-
-    Raises
-    ------
-    RigDataError
-        When the run names no pad or one that the bearing lacks, or holds too little to work with.
-    """
+    """Read one dry run."""
     if run.pad is None or not 1 <= run.pad <= len(pad_angles):
         raise refusal(
             run, "pad", f"names pad {run.pad}, the bearing has pads 1 to {len(pad_angles)}", "Correct the manifest"
@@ -134,12 +93,7 @@ def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: BoolArray) -> Pic
 
 
 def axial_channels(run: Run) -> dict[str, Channel]:
-    """Probes and cells of a run, by name.
-
-    Parameters
-    ----------
-    run : Run
-    """
+    """Probes and cells of a run, by name."""
     return {n: c for n, c in run.channels.items() if c.quantity in ("force", "displacement") and c.axis is not None}
 
 
@@ -156,30 +110,12 @@ def _quantisation(samples: Samples) -> float:
 
 
 def refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
-    """Error that names the run, the place, the trouble and the cure.
-
-    Parameters
-    ----------
-    run : Run
-    place : str
-        Channel or key.
-    what : str
-        What is wrong.
-    cure : str
-        What to do.
-    """
+    """Error that names the run, the place, the trouble and the cure."""
     return RigDataError(Problem("error", run.file, place, f"run {run.id} {what}", cure, run=run.id))
 
 
 def noise_within_holds(records: Sequence[DryRecord], drift_rate: float) -> NoiseModel:
-    """Noise from what happens within holds alone: every hold's level is free, so a bad step does no harm.
-
-    Parameters
-    ----------
-    records : sequence of DryRecord
-    drift_rate : float
-        Centre of the prior of the drift rate [m/s].
-    """
+    """Noise from what happens within holds alone: every hold's level is free, so a bad step does no harm."""
     series: list[NoiseSeries] = []
     for record in _with_holds(records):
         used = record.blocks.hold >= 0
@@ -204,21 +140,7 @@ def _with_holds(records: Sequence[DryRecord]) -> Sequence[DryRecord]:
 
 
 def noise_about_curve(records: Sequence[DryRecord], good: Sequence[BoolArray], drift_rate: float) -> NoiseModel:
-    """Noise about any smooth load-deflection curve: sees the slow part of 1/f noise as well.
-
-    Parameters
-    ----------
-    records : sequence of DryRecord
-        One campaign.
-    good : sequence of (m,) ndarray of bool
-        Blocks to use of each record.
-    drift_rate : float
-        Centre of the prior [m/s].
-
-    Returns
-    -------
-    NoiseModel
-    """
+    """Noise about any smooth load-deflection curve: sees the slow part of 1/f noise as well."""
     series = []
     for record, mask in zip(records, good, strict=True):
         if _any_hold(records) and not record.holds:

@@ -31,17 +31,7 @@ CLEARER = 25.0  # by which a mistake undone must lower it
 
 @dataclass(frozen=True)
 class PickupSignature:
-    """Mains line in every channel of a run.
-
-    Attributes
-    ----------
-    channels : tuple of str
-        Names.
-    size : (n,) complex ndarray
-        Amplitude and phase per channel, in its own unit.
-    noise : (n,) ndarray
-        Root mean square of what noise adds to each.
-    """
+    """Mains line in every channel of a run."""
 
     channels: tuple[str, ...]
     size: ComplexArray
@@ -50,37 +40,14 @@ class PickupSignature:
 
 @dataclass(frozen=True)
 class Mistake:
-    """What a signature says of a run.
-
-    Attributes
-    ----------
-    what : str
-        In words, as ``X1A and X1B are exchanged``.
-    agree : int
-        Other runs whose signature fits once the mistake is undone.
-    """
+    """What a signature says of a run."""
 
     what: str
     agree: int
 
 
 def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: float) -> PickupSignature | None:
-    """Mains line in the channels of one run.
-
-    Parameters
-    ----------
-    values : mapping of str to (n,) ndarray
-        Channels, sampled together.
-    good : (n,) ndarray of bool
-        Samples that are neither missing nor glitches.
-    rate : float
-        [Hz]
-
-    Returns
-    -------
-    PickupSignature or None
-        None for short or slow records.
-    """
+    """Mains line in the channels of one run."""
     n = len(good)
     if n < SHORTEST * rate or rate < 2.2 * max(MAINS_FREQUENCIES) or good.sum() < 0.5 * n:
         return None
@@ -108,19 +75,7 @@ def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: floa
 
 
 def mistakes(pickups: Sequence[PickupSignature | None], pairs: Sequence[tuple[str, str]]) -> list[Mistake | None]:
-    """What the signatures say of every run: nothing, or a mistake that most other runs confirm.
-
-    Parameters
-    ----------
-    pickups : sequence of PickupSignature or None
-        One per run, all with the same channels.
-    pairs : sequence of (str, str)
-        Channels that could have been exchanged.
-
-    Returns
-    -------
-    list of Mistake or None
-    """
+    """What the signatures say of every run: nothing, or a mistake that most other runs confirm."""
     out: list[Mistake | None] = []
     for number, mine in enumerate(pickups):
         others = [p for k, p in enumerate(pickups) if k != number and p is not None]

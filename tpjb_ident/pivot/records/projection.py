@@ -19,15 +19,7 @@ from tpjb_ident.slow_records.noise import NoiseModel
 
 @dataclass(frozen=True)
 class PadDirection:
-    """A direction fitted to vectors.
-
-    Attributes
-    ----------
-    angle : float
-        Counter-clockwise from the pad's direction [rad].
-    se : float
-        Standard error [rad]; infinite where the vectors have no length.
-    """
+    """A direction fitted to vectors."""
 
     angle: float
     se: float
@@ -38,15 +30,7 @@ class PadDirection:
 
 @dataclass(frozen=True)
 class Projection:
-    """Blocks on the axes of a pad: along (outward positive) and across (counter-clockwise positive).
-
-    Attributes
-    ----------
-    load, across_load : (m,) ndarray
-        [N].
-    deflection, across : (m,) ndarray
-        [m], from the probes' own zero.
-    """
+    """Blocks on the axes of a pad: along (outward positive) and across (counter-clockwise positive)."""
 
     load: FloatArray
     across_load: FloatArray
@@ -55,31 +39,13 @@ class Projection:
 
 
 def pad_axes(angle: float) -> FloatArray:
-    """Rows: unit vectors along and across a pad direction [rad], (2, 2).
-
-    Parameters
-    ----------
-    angle : float
-        [rad]
-    """
+    """Rows: unit vectors along and across a pad direction [rad], (2, 2)."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, s], [-s, c]])
 
 
 def project(blocks: Blocks, angle: float) -> Projection:
-    """Project loads and displacements on a pad direction.
-
-    Parameters
-    ----------
-    blocks : Blocks
-        Averages in the bearing frame.
-    angle : float
-        PadDirection of the pad [rad].
-
-    Returns
-    -------
-    Projection
-    """
+    """Project loads and displacements on a pad direction."""
     axes = pad_axes(angle)
     load = blocks.load @ axes.T
     displacement = blocks.displacement @ axes.T
@@ -87,13 +53,7 @@ def project(blocks: Blocks, angle: float) -> Projection:
 
 
 def load_direction(projection: Projection, blocks: Blocks) -> PadDirection:
-    """PadDirection in which the load grows, relative to the pad.
-
-    Parameters
-    ----------
-    projection : Projection
-    blocks : Blocks
-    """
+    """PadDirection in which the load grows, relative to the pad."""
     vectors = np.column_stack([projection.load, projection.across_load])
     size = np.hypot(*vectors.T)
     # neighbouring blocks share one hold: their scatter about the line is counted hold by hold
@@ -105,12 +65,6 @@ def displacement_direction(projection: Projection, blocks: Blocks, noise: NoiseM
     """PadDirection in which the shaft moves as the load grows, relative to the pad.
 
     Both components carry the same noise, correlated and drifting as `noise` says.
-
-    Parameters
-    ----------
-    projection : Projection
-    blocks : Blocks
-    noise : NoiseModel
     """
     vectors = np.column_stack([projection.deflection, projection.across])
     size = np.hypot(projection.load, projection.across_load)

@@ -28,37 +28,17 @@ SLACK = 0.1
 
 @dataclass(frozen=True)
 class Structure:
-    """A compliance that explains the directions of all dry tests.
-
-    Attributes
-    ----------
-    compliance : float
-        Difference of its principal values [m/N].
-    direction : float
-        Of the softer one [rad], within -90 .. 90 degrees.
-    """
+    """A compliance that explains the directions of all dry tests."""
 
     compliance: float
     direction: float
 
     def across(self, angle: float) -> float:
-        """What it moves a shaft across a pad at an angle [rad], per newton [m/N].
-
-        Parameters
-        ----------
-        angle : float
-            Angle of the pad [rad].
-        """
+        """What it moves a shaft across a pad at an angle [rad], per newton [m/N]."""
         return -0.5 * self.compliance * math.sin(2.0 * (angle - self.direction))
 
     def along(self, angle: float) -> float:
-        """What it moves at least along the pad [m/N].
-
-        Parameters
-        ----------
-        angle : float
-            Angle of the pad [rad].
-        """
+        """What it moves at least along the pad [m/N]."""
         return self.compliance * math.cos(angle - self.direction) ** 2
 
     def __str__(self) -> str:
@@ -75,31 +55,7 @@ def check_directions(
     pad_angles: FloatArray,
     structure: Structure | None = None,
 ) -> tuple[PadDirection, PadDirection]:
-    """Directions of load and displacement, or a refusal.
-
-    Parameters
-    ----------
-    record : DryRecord
-        One run.
-    noise : NoiseModel
-        Of the displacement channels.
-    settings : PivotSettings
-        Limits of both angles.
-    pad_angles : (n_pads,) ndarray
-        Of all pads [rad]: the error says which of them a record fits better.
-    structure : Structure, optional
-        What explains displacements that point elsewhere, see `structure_of`.
-
-    Returns
-    -------
-    load, displacement : PadDirection
-        Relative to the pad.
-
-    Raises
-    ------
-    RigDataError
-        When either points elsewhere by more than its limit and its uncertainty.
-    """
+    """Directions of load and displacement, or a refusal."""
     load = load_direction(record.projection, record.blocks)
     displacement = displacement_direction(record.projection, record.blocks, noise)
     for quantity, found, limit in (
@@ -115,15 +71,9 @@ def check_directions(
 
 
 def structure_of(records: Sequence[DryRecord], noise: NoiseModel, settings: PivotSettings) -> Structure | None:
-    """One compliance that explains displacements beyond their limit; None where none is beyond, or none explains them.
+    """One compliance that explains displacements beyond their limit.
 
-    Parameters
-    ----------
-    records : sequence of DryRecord
-        One campaign.
-    noise : NoiseModel
-        Of the displacement channels.
-    settings : PivotSettings
+    None where none is beyond, or none explains them.
     """
     moved = [displacement_direction(r.projection, r.blocks, noise) for r in records]
     loads = [load_direction(r.projection, r.blocks) for r in records]
@@ -171,16 +121,6 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
     mirrored position does not: with the probes' zero constant within a campaign, the first readings of all
     runs must lie around one centre, each toward its own pad, and none further to the side than a pad's flat
     is wide.
-
-    Parameters
-    ----------
-    records : sequence of DryRecord
-        One campaign; at least three pads, otherwise nothing can be said.
-
-    Returns
-    -------
-    list of Problem
-        One per run that stands elsewhere.
     """
     if len({record.pad for record in records}) < 3:
         return []
@@ -204,17 +144,9 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
 
 
 def check_pickup(records: Sequence[DryRecord]) -> list[Problem]:
-    """Runs whose mains pick-up is that of exchanged or reversed channels, while the other runs agree with each other.
+    """Runs whose mains pick-up is that of exchanged or reversed channels.
 
-    Parameters
-    ----------
-    records : sequence of DryRecord
-        One campaign; at least three runs, otherwise nothing can be said.
-
-    Returns
-    -------
-    list of Problem
-        One per such run. None where the channels' pick-up is no signature: phases that change from run to run.
+    While the other runs agree with each other.
     """
     pairs: dict[str, list[str]] = {}
     for name, channel in (axial_channels(records[0].run) if records else {}).items():
@@ -261,22 +193,6 @@ def structure_behind(
 
     two numbers for all pads. Exchanged channels make a similar pattern, but one that no spring can: a spring of this
     size along its own direction would move the shaft further along some pads than it moved.
-
-    Parameters
-    ----------
-    angles : sequence of float
-        Directions of the pads that were pushed [rad], one per record.
-    slopes : sequence of float
-        Growth of the displacement along each pad with the load [m/N].
-    moved : sequence of PadDirection
-        Directions of the displacements from their pads.
-    limit : float
-        Angle that a displacement may still be off once the structure is allowed for [rad].
-
-    Returns
-    -------
-    Structure or None
-        None where too few pads were pushed, a shaft moved away from its pad, or the pattern is not that of a spring.
     """
     phi, along = np.asarray(angles, float), np.asarray(slopes, float)
     if len(set(np.round(phi, 6))) < FEWEST or np.any(along <= 0.0):

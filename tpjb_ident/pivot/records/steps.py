@@ -20,17 +20,7 @@ MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
 
 @dataclass(frozen=True)
 class Hold:
-    """One stretch of constant load.
-
-    Attributes
-    ----------
-    start, stop : float
-        From the settling of the load to the last moment before it moves on [s].
-    level : float
-        Median load [N].
-    branch : int
-        +1 when the load came up to this hold, -1 when it came down.
-    """
+    """One stretch of constant load."""
 
     start: float
     stop: float
@@ -54,20 +44,7 @@ class _Bins:
 
 
 def find_holds(time: FloatArray, load: FloatArray) -> tuple[Hold, ...]:
-    """Find the holds of a load programme.
-
-    Parameters
-    ----------
-    time : (n,) ndarray
-        Seconds, increasing; jitter and gaps are allowed.
-    load : (n,) ndarray
-        Load along the pad direction [N], glitches already left out.
-
-    Returns
-    -------
-    tuple of Hold
-        In order of time; empty when the load never stands still.
-    """
+    """Find the holds of a load programme."""
     bins = _bin(time, load)
     if len(bins.time) < 8:
         return ()

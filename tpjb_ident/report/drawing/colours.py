@@ -47,12 +47,6 @@ SEQUENTIAL = LinearSegmentedColormap.from_list("tpjb-sequential", ["#f6f7f8", "#
 
 
 def style_of_pad(pad: int) -> tuple[str, Any, str]:
-    """Colour, line style and marker of a pad (from 1).
-
-    Parameters
-    ----------
-    pad : int
-        Number from 1.
-    """
+    """Colour, line style and marker of a pad (from 1)."""
     colour, dashes, marker = PAD_STYLE[(pad - 1) % len(PAD_STYLE)]
     return LIGHT[colour], dashes, marker

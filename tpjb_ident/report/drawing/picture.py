@@ -38,16 +38,7 @@ class Picture(Figure):
 def new_picture(
     x_label: str, y_label: str, *, title: str | None = None, width: float = WIDTH, height: float = HEIGHT
 ) -> tuple[Picture, Axes]:
-    """Make a picture with one empty panel.
-
-    Parameters
-    ----------
-    x_label, y_label : str
-        With units.
-    title : str, optional
-    width, height : float
-        Inches.
-    """
+    """Make a picture with one empty panel."""
     figure, ((axes,),) = new_pictures(1, 1, title=title, width=width, height=height)
     label(axes, x_label, y_label)
     return figure, axes
@@ -56,22 +47,7 @@ def new_picture(
 def new_pictures(
     rows: int, columns: int, *, title: str | None = None, width: float = WIDTH, height: float = HEIGHT
 ) -> tuple[Picture, list[list[Axes]]]:
-    """Make a picture with rows times columns of empty panels, each with its own margins.
-
-    Parameters
-    ----------
-    rows, columns : int
-    title : str, optional
-        Of the whole picture.
-    width, height : float
-        Of one panel with its labels [inches].
-
-    Returns
-    -------
-    figure : Picture
-    axes : list (rows) of list (columns) of Axes
-        Top row first.
-    """
+    """Make a picture with rows times columns of empty panels, each with its own margins."""
     head = 1.6 * LINE if title else 0.0
     size = (columns * width, rows * height + head)
     figure = Picture(figsize=size, facecolor="white")
@@ -110,18 +86,7 @@ def _fractions(figure: Figure, box: tuple[float, float, float, float]) -> tuple[
 
 
 def label(axes: Axes, x_label: str, y_label: str, heading: str | None = None) -> None:
-    """Label both axes; a heading stands above the panel, which gives way.
-
-    Parameters
-    ----------
-    axes : Axes
-    x_label : str
-        With its unit.
-    y_label : str
-        With its unit.
-    heading : str, optional
-        Above the panel.
-    """
+    """Label both axes; a heading stands above the panel, which gives way."""
     axes.set_xlabel(x_label, fontsize=FONT_SIZE, color=LIGHT["ink"])
     axes.set_ylabel(y_label, fontsize=FONT_SIZE, color=LIGHT["ink"])
     if heading:
@@ -130,20 +95,7 @@ def label(axes: Axes, x_label: str, y_label: str, heading: str | None = None) ->
 
 
 def shrink(axes: Axes, *, left: float = 0.0, right: float = 0.0, top: float = 0.0, bottom: float = 0.0) -> None:
-    """Take inches off the sides of a panel: room for names, a colour bar or a legend.
-
-    Parameters
-    ----------
-    axes : Axes
-    left : float, optional
-        Inches.
-    right : float, optional
-        Inches.
-    top : float, optional
-        Inches.
-    bottom : float, optional
-        Inches.
-    """
+    """Take inches off the sides of a panel: room for names, a colour bar or a legend."""
     box = axes.get_position()
     width, height = _size(axes)
     axes.set_position((
@@ -155,18 +107,7 @@ def shrink(axes: Axes, *, left: float = 0.0, right: float = 0.0, top: float = 0.
 def add_legend(
     axes: Axes, columns: int | None = None, handles: Sequence[Any] | None = None, across: bool = False
 ) -> Legend | None:
-    """Put a frameless legend above the panel, which makes room for it; nothing if nothing is labelled.
-
-    Parameters
-    ----------
-    axes : Axes
-    columns : int, optional
-        Default: as many as the width holds.
-    handles : sequence, optional
-        Default: everything that is labelled.
-    across : bool
-        Centred on the whole picture: for a panel that gave much room to names.
-    """
+    """Put a frameless legend above the panel, which makes room for it; nothing if nothing is labelled."""
     drawn = list(axes.get_legend_handles_labels()[0] if handles is None else handles)
     if not drawn:
         return None
@@ -208,16 +149,7 @@ def _columns(names: Sequence[str], room: float) -> int:
 
 
 def add_colour_bar(axes: Axes, image: Any, text: str) -> None:
-    """Put a colour bar right of a panel, which makes room for it.
-
-    Parameters
-    ----------
-    axes : Axes
-    image : object
-        What was drawn in colours.
-    text : str
-        What the colours mean, with the unit.
-    """
+    """Put a colour bar right of a panel, which makes room for it."""
     shrink(axes, right=0.75)
     figure, box = axes.figure, axes.get_position()
     width = _size(axes)[0]
@@ -229,14 +161,7 @@ def add_colour_bar(axes: Axes, image: Any, text: str) -> None:
 
 
 def mark_extrapolated(axes: Axes, start: float) -> None:
-    """Shade everything right of `start` (in the panel's units) and say why.
-
-    Parameters
-    ----------
-    axes : Axes
-    start : float
-        In the panel's units.
-    """
+    """Shade everything right of `start` (in the panel's units) and say why."""
     end = axes.get_xlim()[1]
     if end > start:
         axes.axvspan(start, end, color=LIGHT["rule"], alpha=0.35, linewidth=0, zorder=0)

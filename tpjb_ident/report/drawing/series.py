@@ -20,28 +20,14 @@ CROSS = ("kxy", "kyx", "cxy", "cyx")
 
 
 def as_table(source: Identification | pd.DataFrame) -> pd.DataFrame:
-    """Table of coefficients of whatever was given.
-
-    Parameters
-    ----------
-    source : Identification or DataFrame
-        A result or its table.
-    """
+    """Table of coefficients of whatever was given."""
     from tpjb_ident.dynamic.results.identification import Identification
 
     return source.to_frame() if isinstance(source, Identification) else source
 
 
 def longest_series(table: pd.DataFrame, axis: str) -> pd.DataFrame | None:
-    """Rows of the longest series over load (at one frequency) or over frequency (at one load); None if none varies.
-
-    Parameters
-    ----------
-    table : DataFrame
-        As coefficients.csv or comparison.csv.
-    axis : str
-        "load" or "frequency".
-    """
+    """Rows of the longest series over load (at one frequency) or over frequency (at one load); None if none varies."""
     column = AXES[axis][0]
     fixed = ["excitation_Hz" if axis == "load" else "static_load_N", *STATIC_COLUMNS[1:]]
     best, length = None, 1
@@ -52,15 +38,7 @@ def longest_series(table: pd.DataFrame, axis: str) -> pd.DataFrame | None:
 
 
 def where(series: pd.DataFrame, axis: str) -> str:
-    """What is constant along a series, in words.
-
-    Parameters
-    ----------
-    series : DataFrame
-        As `longest_series` gives it.
-    axis : str
-        "load" or "frequency".
-    """
+    """What is constant along a series, in words."""
     first = series.iloc[0]
     fixed = f"{first.excitation_Hz:g} Hz excitation" if axis == "load" else f"{first.static_load_N / 1e3:g} kN"
     return f"{fixed}, {first.shaft_speed_Hz:g} Hz shaft speed"

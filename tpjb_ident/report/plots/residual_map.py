@@ -29,20 +29,7 @@ LINEAR = 2.0  # within two standard deviations the colour hardly changes: that i
 
 
 def residual_frame(source: Diagnosis | Comparison | pd.DataFrame) -> pd.DataFrame:
-    """(measured - predicted) / sigma of every coefficient.
-
-    Parameters
-    ----------
-    source : Diagnosis, Comparison or DataFrame
-        A diagnosis gives two models (``before``: the baseline, ``after``: with the effects that were found), sigma as
-        in its gap. A comparison, or its table, gives one model per pivot law; sigma is that of the measurement alone.
-        A table with the columns ``model``, ``entry``, ``static_load_N``, ``excitation_Hz``, ``z`` is taken as it is.
-
-    Returns
-    -------
-    DataFrame
-        Columns as above.
-    """
+    """(measured - predicted) / sigma of every coefficient."""
     import pandas as pd
 
     if isinstance(source, pd.DataFrame):

@@ -1,0 +1,76 @@
+"""Size of the house by room: thousand tokens of code and lines, which may only fall.
+
+Tokens are names, operators, numbers and strings without docstrings: what a reader takes in, however it is laid out.
+A room that shrank lowers its figures here; one that must grow takes them from another room and says so in the commit.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import tokenize
+from collections import Counter
+
+from tests.structure.sources import parsed, texts
+
+#: Thousand tokens and lines of each room.
+LIMITS = {
+    "measurement": (111.9, 13_500),
+    "model": (91.7, 12_000),
+    "rigdata": (64.0, 8_950),
+    "diagnose": (43.7, 5_320),
+    "cli": (27.0, 3_880),
+    "report": (27.0, 3_560),
+    "pivot": (20.9, 2_820),
+    "compare": (8.5, 1_290),
+    "top level": (6.9, 1_370),
+    "clearance": (9.5, 1_250),
+    "runtime": (5.7, 1_010),
+    "watch": (6.7, 850),
+    "export": (4.6, 790),
+    "view": (6.2, 650),
+}
+MEASUREMENT = ("dynamic", "check", "slow_records", "phasors", "estimate", "terms", "results")
+COUNTED = (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)
+Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def room(path: str) -> str:
+    """Room of a file, as the table names it."""
+    parts = path.split("/")
+    if parts[0] != "tpjb_ident":
+        return parts[0]
+    if len(parts) == 2:
+        return "top level"
+    return "measurement" if parts[1] in MEASUREMENT else parts[1]
+
+
+def tokens(text: str) -> int:
+    """Count the tokens of a source without its docstrings, comments and layout."""
+    docstrings = set()
+    for node in ast.walk(parsed(text)):
+        if isinstance(node, Documented) and ast.get_docstring(node, clean=False) is not None:
+            docstrings.add((node.body[0].lineno, node.body[0].col_offset))
+    count = 0
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type in COUNTED and not (token.type == tokenize.STRING and token.start in docstrings):
+            count += 1
+    return count
+
+
+def test_docstrings_and_comments_are_no_tokens():
+    assert tokens('"""Text."""\n\n\ndef f(a):  # why\n    """Say."""\n    return a + 1\n') == 10
+
+
+def test_rooms_do_not_grow():
+    sizes, lines = Counter(), Counter()
+    for path, text in texts().items():
+        sizes[room(path)] += tokens(text)
+        lines[room(path)] += len(text.splitlines())
+    assert set(sizes) == set(LIMITS)
+    grown = [
+        f"{name}: {sizes[name]} tokens, {lines[name]} lines; {most} thousand and {longest} are its limits"
+        for name, (most, longest) in LIMITS.items()
+        if sizes[name] > 1000 * most or lines[name] > longest
+    ]
+    assert grown == []
