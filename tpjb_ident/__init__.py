@@ -38,9 +38,9 @@ _HOMES = {
     "write_pivots": "tpjb_ident.pivot",
     "measure_locus": "tpjb_ident.clearance.locus",
     "measure_clearance": "tpjb_ident.clearance.measure",
-    "diagnose": "tpjb_ident.diagnose",
-    "plan": "tpjb_ident.diagnose.from_python",
-    "export": "tpjb_ident.export",
+    "diagnose": "tpjb_ident.diagnosis.from_python",
+    "plan": "tpjb_ident.diagnosis.from_python",
+    "export": "tpjb_ident.exports.write",
     "Bearing": "model.bearing",
     "BearingError": "model.bearing",
     "load_bearing": "model.bearing_file",
@@ -56,8 +56,8 @@ _HOMES = {
     "plots": "tpjb_ident.report.plots",
 }
 
-#: Names of packages; the first two can be called.
-_PACKAGES = {"diagnose", "export", "plots"}
+#: Names of packages.
+_PACKAGES = {"plots"}
 #: Arguments that are looked at before a function is called: the path of a campaign or a bearing does as well.
 _CHECKED = {
     "identify": "campaign", "fit_pivots": "campaign", "measure_locus": "campaign", "measure_clearance": "campaign",

@@ -53,7 +53,7 @@ def _comparison(given: Any, name: str) -> Any:
 
 
 def _bearing(given: Any, name: str) -> Any:
-    return shown_by("diagnose.from_python", "as_bearing")(given)
+    return shown_by("diagnosis.from_python", "as_bearing")(given)
 
 
 #: What arguments of these names may be.

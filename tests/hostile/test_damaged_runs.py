@@ -206,7 +206,7 @@ def test_without_a_usable_sweep_positions_have_no_centre_and_the_command_says_so
 def test_what_a_diagnosis_measures_goes_on_without_damaged_runs_and_names_them(spoilt):
     from model.bearing_file import parse_bearing
     from rigdata.campaign import load_campaign
-    from tpjb_ident.diagnose.campaign import measure_campaign
+    from tpjb_ident.diagnosis.campaign import measure_campaign
 
     bad = [RUN, "p-4-up", "l-01000-02", "c-1"]
     source = load_campaign(spoilt("probe zero", *bad))

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from model.effects import kind_of, known_effects
-from tpjb_ident.diagnose.verdict.verdict import Assumption
+from tpjb_ident.diagnosis.verdict.verdict import Assumption
 from tpjb_ident.effect_words import WORDS, amount, finding, label_in_words
 from tpjb_ident.report.diagnosis_page import _row
 from tpjb_ident.report.diagnosis_words import in_words, place

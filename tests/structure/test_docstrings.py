@@ -30,7 +30,7 @@ EXTENSION_POINTS = {
         "tpjb_ident/dynamic/estimators/r_matrix.py:PhasorTable",
         "tpjb_ident/dynamic/estimators/rlm.py:Norm",
     ),
-    "an export": tuple(f"tpjb_ident/export/*.py:{n}" for n in ("write_*", "StaticPoint", "Export", "Format")),
+    "an export": tuple(f"tpjb_ident/exports/*.py:{n}" for n in ("write_*", "StaticPoint", "Export", "Format")),
     "workers": ("tpjb_ident/runtime/executors.py:Workers",),
     "a motion of the virtual rig": ("rigdata/virtual_rig/motion.py:Motion",),
     "a plot": ("tpjb_ident/report/plots/*.py:=",),
@@ -46,7 +46,7 @@ EXTENSION_POINTS = {
     ),
 }
 #: Functions that fill a contract which a class tells once: `EffectKind`, `Format`.
-CONTRACTS = ("model/effects/", "tpjb_ident/export/")
+CONTRACTS = ("model/effects/", "tpjb_ident/exports/")
 SECTION = re.compile(r"^(Parameters|Attributes|Returns|Yields|Raises|Notes|References|Examples?)\n-{4,}$", re.MULTILINE)
 Documented = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 

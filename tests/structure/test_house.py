@@ -30,13 +30,13 @@ MAY_IMPORT = {
     "pivot": {"rigdata", "runtime", "slow_records"},
     "clearance": {"rigdata", "runtime", "slow_records", "pivot"},
     "dynamic": {"rigdata", "runtime", "check"},
-    "export": {"dynamic", "runtime"},
+    "exports": {"dynamic", "runtime"},
     "compare": {"rigdata", "model", "dynamic", "pivot", "clearance", "runtime"},
-    "diagnose": {"rigdata", "model", "dynamic", "pivot", "clearance", "compare", "runtime"},
+    "diagnosis": {"rigdata", "model", "dynamic", "pivot", "clearance", "compare", "runtime"},
     "watch": {"rigdata", "check", "dynamic", "pivot", "clearance", "runtime"},
-    "report": {"rigdata", "dynamic", "pivot", "clearance", "compare", "diagnose", "runtime", "watch"},
+    "report": {"rigdata", "dynamic", "pivot", "clearance", "compare", "diagnosis", "runtime", "watch"},
     "view": {"rigdata", "runtime"},
-    "cli": {"rigdata", "model", "check", "dynamic", "pivot", "clearance", "compare", "diagnose", "report", "export",
+    "cli": {"rigdata", "model", "check", "dynamic", "pivot", "clearance", "compare", "diagnosis", "report", "exports",
             "view", "watch", "runtime"},
 }  # fmt: skip
 #: The one way back: a campaign is checked with the line fit and the oil force of identification, and with nothing else.

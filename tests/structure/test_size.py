@@ -18,7 +18,7 @@ LIMITS = {
     "measurement": (111.9, 13_500),
     "model": (91.7, 12_000),
     "rigdata": (64.0, 8_950),
-    "diagnose": (43.7, 5_320),
+    "diagnosis": (43.7, 5_320),
     "cli": (27.0, 3_880),
     "report": (27.0, 3_560),
     "pivot": (20.9, 2_820),
@@ -27,7 +27,7 @@ LIMITS = {
     "clearance": (9.5, 1_250),
     "runtime": (5.7, 1_010),
     "watch": (6.7, 850),
-    "export": (4.6, 790),
+    "exports": (4.6, 790),
     "view": (6.2, 650),
 }
 MEASUREMENT = ("dynamic", "check", "slow_records", "phasors", "estimate", "terms", "results")

@@ -14,7 +14,7 @@ import pytest
 from tests.structure.sources import OURS, ROOT, SOURCES, Spoken, imports_and_calls, texts
 
 #: The guard only looks whether the `model` found is ours.
-MAY_IMPORT_MODEL = ("compare", "diagnose", "cli", "model_guard.py")
+MAY_IMPORT_MODEL = ("compare", "diagnosis", "cli", "model_guard.py")
 
 
 @functools.cache

@@ -360,10 +360,10 @@ _COMMAND_MODULES = (
     "tpjb_ident.dynamic.identify",
     "tpjb_ident.pivot",
     "tpjb_ident.compare",
-    "tpjb_ident.diagnose",
+    "tpjb_ident.diagnosis",
     "tpjb_ident.runtime.executors",
     "tpjb_ident.clearance.locus",
-    "tpjb_ident.export",
+    "tpjb_ident.exports",
     "rigdata.survey.draft",
 )
 

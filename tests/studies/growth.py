@@ -26,9 +26,9 @@ from model.effects.registry import known_effects
 from rigdata.operating_point import OperatingPoint
 from tests.studies.archive_cluster import write_records
 from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
-from tpjb_ident.diagnose.campaign import diagnose_table
-from tpjb_ident.diagnose.forward.candidates import candidates
-from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.campaign import diagnose_table
+from tpjb_ident.diagnosis.forward.candidates import candidates
+from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.runs.run_jobs import all_runs
 from tpjb_ident.dynamic.settings import IdentifySettings

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from tpjb_ident.diagnose.diagnose import before_and_after, median_deviations
+from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
 from tpjb_ident.effect_words import UNITS, WORDS, finding, label_in_words
 from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_rows, place, verdict_sentences
 from tpjb_ident.report.figure import Panel, panel
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
     from rigdata.campaign import Campaign
     from tpjb_ident.compare.coefficient_table import TableSource
-    from tpjb_ident.diagnose.campaign import CampaignDiagnosis
-    from tpjb_ident.diagnose.diagnose import Diagnosis
-    from tpjb_ident.diagnose.verdict.verdict import Assumption, Verdict
+    from tpjb_ident.diagnosis.campaign import CampaignDiagnosis
+    from tpjb_ident.diagnosis.diagnose import Diagnosis
+    from tpjb_ident.diagnosis.verdict.verdict import Assumption, Verdict
 
 #: The gaps of a verdict in words; each is another question.
 GAPS = {

@@ -10,7 +10,7 @@ from tpjb_ident.effect_words import UNITS, WORDS, amount, finding, label_in_word
 from tpjb_ident.rounding import MINUS, percent
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnose.verdict.verdict import Verdict
+    from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
 #: Observables of a diagnosis in words.
 OBSERVABLES = {

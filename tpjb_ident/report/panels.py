@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
-    from tpjb_ident.diagnose.plan.plan import CampaignPlan
+    from tpjb_ident.diagnosis.plan.plan import CampaignPlan
     from tpjb_ident.pivot import PivotCurve
 
 OVER: tuple[Literal["load", "frequency"], ...] = ("load", "frequency")

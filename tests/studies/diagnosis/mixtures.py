@@ -32,21 +32,21 @@ from model.setup import Setup
 from tests.studies.diagnosis.emulated import emulate
 from tests.studies.diagnosis.tables import tables
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.diagnose.diagnose import ACCURACY, MESH, pose
-from tpjb_ident.diagnose.forward.candidates import TERMS, Candidate
-from tpjb_ident.diagnose.forward.forward import Forward, ForwardModel, NoEquilibriumError
-from tpjb_ident.diagnose.forward.nuisance import predict
-from tpjb_ident.diagnose.forward.workers import workers
-from tpjb_ident.diagnose.observations.gap import coordinate, direct_scale
-from tpjb_ident.diagnose.observations.layout import Layout
-from tpjb_ident.diagnose.observations.observe import Observations
-from tpjb_ident.diagnose.plan.planned import around, dry, dynamic, planned_observations
-from tpjb_ident.diagnose.search.problem import Problem
-from tpjb_ident.diagnose.search.screen import visible
-from tpjb_ident.diagnose.search.search import Search, baseline_fit, search
-from tpjb_ident.diagnose.search.settings import DiagnoseSettings
-from tpjb_ident.diagnose.verdict.decide import decide
-from tpjb_ident.diagnose.verdict.verdict import Verdict
+from tpjb_ident.diagnosis.diagnose import ACCURACY, MESH, pose
+from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
+from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel, NoEquilibriumError
+from tpjb_ident.diagnosis.forward.nuisance import predict
+from tpjb_ident.diagnosis.forward.workers import workers
+from tpjb_ident.diagnosis.observations.gap import coordinate, direct_scale
+from tpjb_ident.diagnosis.observations.layout import Layout
+from tpjb_ident.diagnosis.observations.observe import Observations
+from tpjb_ident.diagnosis.plan.planned import around, dry, dynamic, planned_observations
+from tpjb_ident.diagnosis.search.problem import Problem
+from tpjb_ident.diagnosis.search.screen import visible
+from tpjb_ident.diagnosis.search.search import Search, baseline_fit, search
+from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.verdict.decide import decide
+from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
 HERE, BEARINGS = Path(__file__).parent, Path(__file__).parents[3] / "model" / "bearings"
 HZ, DOWN = 2 * math.pi, -math.pi / 2

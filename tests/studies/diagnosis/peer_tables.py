@@ -29,9 +29,9 @@ import pandas as pd
 from model.effects import Effect
 from tests.studies.bench_ross import SPEED, bearing, peer_case
 from tpjb_ident.arrays import ComplexArray
-from tpjb_ident.diagnose.campaign import Baseline, diagnose_table
-from tpjb_ident.diagnose.forward.tolerances import Tolerances
-from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.campaign import Baseline, diagnose_table
+from tpjb_ident.diagnosis.forward.tolerances import Tolerances
+from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 
 HZ = 2 * math.pi
 PIVOTS, NOISE, MESH = 1e9, 0.005, (40, 20)

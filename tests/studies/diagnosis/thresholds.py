@@ -21,11 +21,11 @@ import numpy as np
 
 from tests.studies.diagnosis.mixtures import KINDS, SKIPPED, Bench, bench, draw, hidden, said
 from tests.studies.diagnosis.tables import standing
-from tpjb_ident.diagnose.forward.workers import workers
-from tpjb_ident.diagnose.search.problem import Problem
-from tpjb_ident.diagnose.search.search import Search, search
-from tpjb_ident.diagnose.search.settings import DiagnoseSettings
-from tpjb_ident.diagnose.verdict.decide import decide
+from tpjb_ident.diagnosis.forward.workers import workers
+from tpjb_ident.diagnosis.search.problem import Problem
+from tpjb_ident.diagnosis.search.search import Search, search
+from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.verdict.decide import decide
 
 #: Constants that a search asks, and those that only the verdict asks; `alike` and `spare` act together in a search.
 SEARCHED, DECIDED = ("wanted", "exceeds", "alike", "spare"), ("most", "alarm")

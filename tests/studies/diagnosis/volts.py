@@ -41,7 +41,7 @@ from tpjb_ident.compare.rig_from_model import (
     erring_instruments,
     truth_of,
 )
-from tpjb_ident.diagnose.forward.nuisance import Nuisance, Shift
+from tpjb_ident.diagnosis.forward.nuisance import Nuisance, Shift
 
 #: Slow to simulate.
 SKIPPED = frozenset({"pad_conduction", "pivot_friction"})

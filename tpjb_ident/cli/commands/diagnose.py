@@ -35,9 +35,9 @@ from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
     from tpjb_ident.compare.static_tests import StaticTests
-    from tpjb_ident.diagnose.campaign import Baseline, CampaignDiagnosis
-    from tpjb_ident.diagnose.search.settings import DiagnoseSettings
-    from tpjb_ident.diagnose.verdict.verdict import Verdict
+    from tpjb_ident.diagnosis.campaign import Baseline, CampaignDiagnosis
+    from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
+    from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
     Ahead = Callable[[], StaticTests | None] | None
 
@@ -87,7 +87,7 @@ def diagnose(
     model = model_settings("kirk", thermal, effects)
     files = {f.name: sha256(f) for f in (effects, library, start if isinstance(start, Path) else None) if f}
     from tpjb_ident.compare.measured_pivots import refuse_counted_twice
-    from tpjb_ident.diagnose.campaign import Baseline
+    from tpjb_ident.diagnosis.campaign import Baseline
 
     refuse_counted_twice(start, model.effects, effects)
     baseline = Baseline(start, thermal, model.effects)
@@ -113,8 +113,8 @@ def diagnose(
 
 
 def _settings(model_tolerance: float | None, stated: list[str], workers: int | None) -> DiagnoseSettings:
-    from tpjb_ident.diagnose.forward.tolerances import Tolerances
-    from tpjb_ident.diagnose.search.settings import DiagnoseSettings
+    from tpjb_ident.diagnosis.forward.tolerances import Tolerances
+    from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 
     typed: dict[str, str | float] = {}
     for one in stated:
@@ -146,7 +146,7 @@ def _diagnosed(
     data: Data, baseline: Baseline, settings: DiagnoseSettings, show: Progress, ahead: Ahead
 ) -> CampaignDiagnosis:
     from tpjb_ident.compare.coefficient_table import TableSource
-    from tpjb_ident.diagnose.campaign import diagnose_campaign, diagnose_table
+    from tpjb_ident.diagnosis.campaign import diagnose_campaign, diagnose_table
 
     if isinstance(data.source, TableSource):
         return diagnose_table(data.path, data.bearing, baseline, settings, data.reading_error, show)
@@ -169,7 +169,7 @@ def _write_verdict(folder: Path, baseline: Baseline, verdict: Verdict) -> None:
 
 def _show_verdict(name: str, result: CampaignDiagnosis, then: str) -> None:
     """Print the verdict, the effects with their intervals, and the gap, in the units that people read."""
-    from tpjb_ident.diagnose.diagnose import before_and_after, median_deviations
+    from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
     from tpjb_ident.report.diagnosis_words import parameter_rows, verdict_sentences
 
     verdict = result.diagnosis.verdict

@@ -13,7 +13,7 @@ from tpjb_ident.cli.common.options import Method, Norm, Out, one_of, out_folder
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import note_line, print_line, progress
 from tpjb_ident.errors import NotTrustedError
-from tpjb_ident.export.formats import FORMATS, export_format
+from tpjb_ident.exports.formats import FORMATS, export_format
 from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
@@ -21,7 +21,7 @@ from tpjb_ident.runtime.provenance import sha256
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tpjb_ident.export.points import Chosen
+    from tpjb_ident.exports.points import Chosen
 
 Source = Annotated[
     Path,
@@ -48,8 +48,8 @@ def export(
     excitation frequency). Where the form holds no intervals and flags, bearing_coefficients_intervals.csv
     beside it does. Points that are not to be trusted stay behind (exit code 3).
     """
-    from tpjb_ident.export.write import export as write_export
-    from tpjb_ident.export.write import result_table
+    from tpjb_ident.exports.write import export as write_export
+    from tpjb_ident.exports.write import result_table
 
     form = export_format(to)
     frame, name, inputs = _coefficients(source, method, norm)
@@ -79,7 +79,7 @@ def _refuse_doubtful(chosen: Chosen, forced: bool) -> None:
 
 
 def _coefficients(source: Path, method: str, norm: str | None) -> tuple[pd.DataFrame, str, dict[str, str]]:
-    from tpjb_ident.export.write import read_result_table, result_table
+    from tpjb_ident.exports.write import read_result_table, result_table
 
     path = result_table(source)
     if path is not None:

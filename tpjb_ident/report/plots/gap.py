@@ -12,8 +12,8 @@ from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.drawing.picture import CHARACTER, LEFT, add_legend, new_picture, shrink
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnose.diagnose import Diagnosis
-    from tpjb_ident.diagnose.verdict.verdict import Verdict
+    from tpjb_ident.diagnosis.diagnose import Diagnosis
+    from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
 
 def gap(

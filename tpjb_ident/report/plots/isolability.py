@@ -15,7 +15,7 @@ from tpjb_ident.report.drawing.colours import LIGHT, SEQUENTIAL
 from tpjb_ident.report.drawing.picture import CHARACTER, FONT_SIZE, add_colour_bar, label, new_pictures, shrink
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnose.plan.plan import CampaignPlan
+    from tpjb_ident.diagnosis.plan.plan import CampaignPlan
 
 CELL = 0.3  # [inches]
 TALL = 2.0  # the colour bar needs it [inches]
@@ -34,7 +34,7 @@ def isolability(
     Parameters
     ----------
     plan : CampaignPlan or (k, k) array_like
-        As `tpjb_ident.diagnose.plan.plan.plan` makes it, or its matrix.
+        As `tpjb_ident.diagnosis.plan.plan.plan` makes it, or its matrix.
     names : sequence of str, optional
         Of the k effects; default: the plan's own.
     title : str, optional

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.compare.comparison import Comparison
-    from tpjb_ident.diagnose.diagnose import Diagnosis
+    from tpjb_ident.diagnosis.diagnose import Diagnosis
 
 ENTRIES = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
 COLUMNS = ("model", "entry", "static_load_N", "excitation_Hz", "z")
@@ -46,7 +46,7 @@ def residual_frame(source: Diagnosis | Comparison | pd.DataFrame) -> pd.DataFram
 def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
     import pandas as pd
 
-    from tpjb_ident.diagnose.observations.gap import residuals
+    from tpjb_ident.diagnosis.observations.gap import residuals
 
     rows = []
     for model, prediction in (("before", diagnosis.problem.base), ("after", diagnosis.after)):

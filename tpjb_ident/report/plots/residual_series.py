@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.compare.comparison import Comparison
-    from tpjb_ident.diagnose.diagnose import Diagnosis
+    from tpjb_ident.diagnosis.diagnose import Diagnosis
 
 STYLE = (("blue", "o"), ("red", "s"), ("green", "^"), ("purple", "D"))
 DASHES: tuple[Any, ...] = ((0, (4, 2)), "-", (0, (1, 1.5)), (0, (3, 1, 1, 1)))

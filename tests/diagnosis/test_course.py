@@ -1,0 +1,95 @@
+"""What one amplitude does over its whole range, and fits that start far from the answer."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from model.bearing_file import load_bearing
+from model.effects import Effect
+from model.pivots import pivot_laws
+from model.setup import Mesh, Setup
+from tpjb_ident.diagnosis.diagnose import pose
+from tpjb_ident.diagnosis.forward.forward import Forward
+from tpjb_ident.diagnosis.observations.layout import Layout
+from tpjb_ident.diagnosis.plan.planned import around, dry, dynamic, planned_observations
+from tpjb_ident.diagnosis.search.course import course_through
+from tpjb_ident.diagnosis.search.descend import fit
+from tpjb_ident.diagnosis.search.fit import Start
+from tpjb_ident.diagnosis.search.search import baseline_fit
+from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
+
+NODES = (0.8, -0.8, 1.6, -1.6, 3.0, -3.0)
+SPEED = 2 * math.pi * 22
+
+
+def course(function):
+    return course_through(NODES, [np.atleast_1d(function(x) - function(0.0)) for x in NODES])
+
+
+def values(known, at):
+    return known.weights(np.asarray(at)) @ known.columns.T
+
+
+def test_course_passes_through_what_was_asked():
+    known = course(lambda x: np.array([np.sin(x), np.exp(-x)]))
+    told = values(known, NODES)
+    assert told == pytest.approx(np.array([[np.sin(x), np.exp(-x) - 1] for x in NODES]), abs=1e-12)
+
+
+def test_course_follows_a_smooth_one_between():
+    known = course(np.tanh)
+    x = np.linspace(-2.5, 2.5, 41)
+    assert values(known, x)[:, 0] == pytest.approx(np.tanh(x), abs=0.02)
+
+
+def test_a_jump_is_not_overshot():
+    known = course(lambda x: np.where(x > 1.0, 5.0, 0.0))
+    told = values(known, np.linspace(-3.0, 3.0, 241))
+    assert told.min() >= -1e-9
+    assert told.max() <= 5.0 + 1e-9
+
+
+def test_course_goes_on_straight_beyond_its_ends():
+    known = course(lambda x: x**2)
+    a, b, c = values(known, [3.0, 3.5, 4.0])[:, 0]
+    assert c - b == pytest.approx(b - a)
+    assert values(known, [-3.5])[0, 0] == pytest.approx(b)
+
+
+def test_slopes_are_those_of_the_course():
+    known = course(lambda x: np.array([x**3, np.cos(x)]))
+    x, step = np.array([-2.0, -0.3, 0.5, 2.2]), 1e-6
+    numeric = (values(known, x + step) - values(known, x - step)) / (2 * step)
+    assert known.slope_weights(x) @ known.columns.T == pytest.approx(numeric, abs=1e-6)
+    assert known.slope(0.5) == pytest.approx(numeric[2], abs=1e-6)
+
+
+def test_neutral_slope_is_a_parabolas():
+    assert course(lambda x: 2.0 * x + x**2).neutral_slope == pytest.approx([2.0])
+    one_sided = course_through((0.8, 1.6), [np.array([0.8 * 2 + 0.64]), np.array([1.6 * 2 + 2.56])])
+    assert one_sided.neutral_slope == pytest.approx([2.0])
+
+
+@pytest.mark.slow  # seconds: the bearing model itself
+@pytest.mark.parametrize("start", [1e-6, 5e-6, 1.9e-5])
+def test_a_fit_finds_its_way_past_pads_that_come_out_of_contact(start):
+    """Upper pads leave the shaft at another clearance for every load: K and C jump on the way."""
+    bearing = load_bearing(Path(__file__).parents[2] / "model" / "bearings" / "rocker.toml")
+    setup = Setup(bearing, pivot_laws("kirk", bearing), mesh=Mesh(48, 4), accuracy=1e-5)
+    loads = dynamic(np.arange(2500.0, 8751.0, 1250.0), [2 * math.pi * 25], SPEED, -math.pi / 2, 5)
+    lines = dynamic([5000.0], [2 * math.pi * f for f in (10.0, 20.0, 30.0, 40.0, 50.0)], SPEED, -math.pi / 2, 5)
+    layout = Layout((*loads, *lines), around(5000.0, 5, SPEED), dry(range(1, 6)), 200.0)
+    planned = planned_observations(setup, layout)
+    forward = Forward(setup, planned.layout, planned.elements)
+    hidden = forward.fresh()([Effect("thermal_growth", clearance_change=1.1e-5)])
+    noise = np.sqrt(np.diag(planned.covariance)) * np.random.default_rng(7).standard_normal(len(planned))
+    problem = pose(replace(planned, value=hidden + noise), forward, DiagnoseSettings(workers=1))
+    growth = next(c for c in problem.pool if c.name == "thermal_growth")
+    nothing = baseline_fit(problem)
+    slope = (forward.fresh()([growth.effect(1e-7)]) - problem.base) / 1e-7
+    begin = Start((growth,), (np.array([start]),), slope[:, None], nothing.nuisance, nothing.columns)
+    found = fit(forward.fresh(), problem, begin)
+    assert found.amplitudes[0][0] == pytest.approx(1.1e-5, abs=3e-7)

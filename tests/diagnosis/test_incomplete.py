@@ -1,0 +1,50 @@
+"""What a campaign lacks must not pass for physics: no clearance sweep, two directions only, mains on the excitation."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tpjb_ident.diagnosis.campaign import unknown_centre
+from tpjb_ident.diagnosis.observations.observe import UNSEEN_DIFFERENCE, _struck_by_mains, observe
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+
+
+def point(*quality: str, load: float = 5000.0):
+    h = np.array([[1e8 + 2e7j, 1e6], [-1e6, 3e8 + 4e7j]])
+    return SimpleNamespace(
+        point=SimpleNamespace(
+            static_load=load,
+            static_load_direction=-1.5,
+            shaft_speed=138.0,
+            excitation=157.0,
+            excitation_hz=25.0,
+        ),
+        stiffness=DynamicStiffness(h, 157.0, np.eye(8) * 1e10, np.full(8, 20.0), "mm-eiv", np.ones((6, 2))),
+        temperatures={},
+        quality=quality,
+    )
+
+
+def test_without_a_polygon_the_centre_may_lie_anywhere_near_the_probes_zero():
+    near = SimpleNamespace(points=[SimpleNamespace(position=np.array([3e-5, 4e-5]))])
+    far = SimpleNamespace(points=[SimpleNamespace(position=np.array([3e-3, 4e-3]))])
+    assert unknown_centre(near) == pytest.approx(1e-3)
+    assert unknown_centre(far) == pytest.approx(15e-3)
+
+
+def test_a_point_struck_by_mains_is_left_out_unless_it_was_corrected():
+    assert _struck_by_mains(point("mains on excitation line"))
+    assert not _struck_by_mains(point("mains on excitation line", "mains corrected"))
+    seen = observe(SimpleNamespace(points=(point(), point("mains on excitation line", load=6000.0))))
+    assert {e.place("load") for e in seen.elements} == {5000.0}
+    only = observe(SimpleNamespace(points=(point("mains on excitation line"),)))
+    assert len(only.elements) == 8  # nothing better is there
+
+
+def test_two_directions_widen_the_covariance_by_what_runs_differ_by():
+    plain, two = (observe(SimpleNamespace(points=(point(*q),))) for q in ((), ("no-spare-direction",)))
+    more = np.diag(two.covariance - plain.covariance)
+    np.testing.assert_allclose(more, (UNSEEN_DIFFERENCE * np.repeat([2e8, 3e7], 4)) ** 2, rtol=1e-6)

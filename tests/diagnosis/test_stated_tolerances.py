@@ -1,0 +1,58 @@
+"""What may be off is stated: in the bearing file, on the command line, by default; each with its source."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from model.bearing_file import load_bearing
+from model.pivots import pivot_laws
+from model.setup import Setup
+from tpjb_ident.diagnosis.forward.nuisance import Shift, nuisances
+from tpjb_ident.diagnosis.forward.tolerances import DEFAULTS, Tolerances
+from tpjb_ident.errors import BadInputError
+
+ROCKER = Path(__file__).parents[2] / "model" / "bearings" / "rocker.toml"
+
+
+def bearing_with(lines: str):
+    return load_bearing(ROCKER.read_text(encoding="utf-8") + "\n[tolerances]\n" + lines + "\n")
+
+
+def test_the_command_line_wins_over_the_bearing_file_and_that_over_defaults():
+    typed = Tolerances().states({"viscosity": "4 %"}, "command line")
+    found = typed.layered(bearing_with('viscosity = "2 %"\nclearance_scatter = "3 um"'))
+    assert (found["viscosity"], found.stated["viscosity"].source) == (pytest.approx(0.04), "command line")
+    assert (found["clearance_scatter"], found.stated["clearance_scatter"].source) == (3e-6, "bearing file")
+    assert (found["film_heat"], found.stated["film_heat"].source) == (DEFAULTS["film_heat"][0], "default")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [("viscosty", "4 %", "viscosity"), ("viscosity", "4 um", "ratio"), ("viscosity", "-4 %", "zero or more")],
+)
+def test_a_tolerance_that_cannot_be_is_refused(name, value, said):
+    with pytest.raises(BadInputError, match=said):
+        Tolerances().states({name: value}, "command line")
+
+
+def test_a_tolerance_of_nothing_leaves_its_nuisance_out():
+    bearing = load_bearing(ROCKER)
+    setup = Setup(bearing, pivot_laws("kirk", bearing))
+    some = {n.name for n in nuisances((), setup, Tolerances())}
+    less = {n.name for n in nuisances((), setup, Tolerances().states({"film_heat": 0.0}, "command line"))}
+    assert some - less == {"film_heat"}
+
+
+def test_nuisances_change_what_they_say():
+    bearing = load_bearing(ROCKER)
+    setup = Setup(bearing, pivot_laws("kirk", bearing))
+    known = nuisances((), setup, Tolerances())
+    size = tuple(
+        2.0 if n.name in {"viscosity", "clearance_scatter"} and n.place in {"", "pad 3"} else 0.0 for n in known
+    )
+    bent = Shift(known, size)(setup).bearing
+    assert bent.oil.viscosity_40 == pytest.approx(bearing.oil.viscosity_40 * math.exp(0.1))
+    shifts = [b.assembled_clearance - a.assembled_clearance for a, b in zip(bearing.pads, bent.pads, strict=True)]
+    assert np.allclose(shifts, [0.0, 0.0, 4e-6, 0.0, 0.0], atol=1e-12)

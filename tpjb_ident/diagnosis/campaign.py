@@ -1,0 +1,230 @@
+"""From a campaign to a diagnosis: identify, measure the static tests, observe, diagnose."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from tpjb_ident.compare.comparison import ComparisonError
+from tpjb_ident.compare.measured_pivots import measured_laws
+from tpjb_ident.compare.static_tests import measure_static
+from tpjb_ident.diagnosis.diagnose import Diagnosis, before_and_after, diagnose, median_deviations
+from tpjb_ident.diagnosis.forward.forward import SENSOR
+from tpjb_ident.diagnosis.forward.tolerances import Stated, Tolerances
+from tpjb_ident.diagnosis.observations.from_table import observe_table
+from tpjb_ident.diagnosis.observations.housing import with_housing
+from tpjb_ident.diagnosis.observations.observe import observe
+from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
+from tpjb_ident.dynamic.identify import identify
+from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.errors import BadInputError
+from tpjb_ident.presentation import Presented, shown_by
+
+from model.effects import Effect, apply_effects  # isort: skip
+from model.pivots import NAMED_LAWS, pivot_laws  # isort: skip
+from model.instruments import Instruments  # isort: skip
+from model.setup import Setup  # isort: skip
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    import pandas as pd
+
+    from model.bearing import Bearing
+    from rigdata.campaign import Campaign
+    from tpjb_ident.clearance.locus import Locus
+    from tpjb_ident.clearance.measure import ClearancePolygon
+    from tpjb_ident.compare.static_tests import StaticTests
+    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.pivot import PivotCurve
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Where a diagnosis starts from."""
+
+    pivots: Any = "kirk"
+    thermal: str = "adiabatic"
+    effects: tuple[Effect, ...] = ()
+
+    @property
+    def from_measured(self) -> bool:
+        """Whether the pivots were measured: what is found on them counts from there."""
+        return not isinstance(self.pivots, float) and self.pivots not in NAMED_LAWS
+
+
+@dataclass(frozen=True, repr=False)
+class CampaignDiagnosis(Presented):
+    """A diagnosis with what it was made from."""
+
+    diagnosis: Diagnosis
+    identification: Identification | None
+    setup: Setup
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """K and C measured, predicted before, and predicted with the effects found: columns as comparison.csv."""
+        return before_and_after(self.diagnosis, self.identification)
+
+    def summary(self) -> str:
+        """What was found, and what it rests on."""
+        verdict_sentences = shown_by("report.diagnosis_words", "verdict_sentences")
+        name = self.identification.campaign if self.identification is not None else "table"
+        off = median_deviations(self.to_dataframe())
+        return "\n".join(verdict_sentences(name, self.diagnosis.verdict, off))
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the gap by observable, before and after; see `tpjb_ident.report.plots.gap`."""
+        return shown_by("report.plots", "gap")(self.diagnosis, **options)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """All that a diagnosis needs of a campaign, without its records; it can be kept and diagnosed again."""
+
+    identification: Identification = field(repr=False)
+    curves: tuple[PivotCurve, ...] = field(repr=False)
+    polygon: ClearancePolygon | None = field(repr=False)
+    locus: Locus | None = field(repr=False)
+    instruments: Instruments
+    tolerances: Tolerances
+    sensors: tuple[float, ...] = ()
+
+
+def diagnose_campaign(
+    campaign: Campaign,
+    bearing: Bearing,
+    baseline: Baseline | None = None,
+    settings: DiagnoseSettings | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+    ahead: Callable[[], StaticTests | None] | None = None,
+) -> CampaignDiagnosis:
+    """Identify a campaign and find what its model lacks.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    bearing : Bearing
+    baseline : Baseline, optional
+    settings : DiagnoseSettings, optional
+        Tolerances that the bearing file and the campaign's manifest state take the place of defaults.
+    progress : callable, optional
+        ``progress(text, done, total)``.
+    ahead : callable, optional
+        Gives what `measure_static` has found meanwhile; None: nothing was.
+
+    Raises
+    ------
+    ComparisonError
+        The campaign has no dynamic runs.
+    """
+    settings = settings or DiagnoseSettings()
+    measured = measure_campaign(campaign, bearing, settings.tolerances, progress, ahead)
+    return _diagnose_measured(measured, bearing, baseline, settings, progress)
+
+
+def measure_campaign(
+    campaign: Campaign,
+    bearing: Bearing,
+    known: Tolerances | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+    ahead: Callable[[], StaticTests | None] | None = None,
+) -> Measured:
+    """Identify a campaign and measure its static tests."""
+    tell = progress or (lambda text, done, total: None)
+    if not campaign.of_kind("dynamic"):
+        raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to diagnose")
+    least = min(pad.assembled_clearance for pad in bearing.pads)
+    chosen = IdentifySettings(clearance=least)
+    found = identify(campaign, chosen, lambda text, done, total: tell(f"identifying, {text}", 20 * done, 100 * total))
+    tell("pivot curves, clearance and locus", 20, 100)
+    static = (ahead() if ahead is not None else None) or measure_static(campaign, bearing)
+    curves, polygon, locus = static.curves, static.clearance, static.locus
+    found = replace(found, conditions=found.conditions + static.left_out)
+    housing = with_housing(Setup(bearing, pivot_laws("rigid", bearing)), campaign).instruments
+    certain = _stated_tolerances(campaign, bearing, known or Tolerances())
+    if polygon is None and locus is not None:
+        certain = replace(certain, centre=unknown_centre(locus))
+    return Measured(found, tuple(curves), polygon, locus, housing, certain, _sensor_positions(campaign, bearing))
+
+
+def _diagnose_measured(
+    measured: Measured,
+    bearing: Bearing,
+    baseline: Baseline | None = None,
+    settings: DiagnoseSettings | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> CampaignDiagnosis:
+    """Find what the model of an identified campaign lacks."""
+    baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
+    settings = replace(settings, tolerances=measured.tolerances)
+    tell = progress or (lambda text, done, total: None)
+    found, curves = measured.identification, measured.curves
+    given = baseline.pivots == "measured"
+    laws = measured_laws(curves, len(bearing.pads), found.campaign) if given else pivot_laws(baseline.pivots, bearing)
+    plain = Setup(bearing, laws, baseline.thermal, instruments=measured.instruments)
+    setup = apply_effects(plain, baseline.effects)
+    # curves that the model was given cannot testify about it
+    observations = observe(
+        found, () if given else curves, measured.locus, measured.polygon, settings.tolerance
+    )  # fmt: skip
+    observations = replace(observations, layout=replace(observations.layout, temperature_position=measured.sensors))
+    result = diagnose(
+        observations,
+        setup,
+        settings,
+        lambda text, share: tell(f"diagnosing, {text}", 30 + int(70 * share), 100),
+    )
+    return CampaignDiagnosis(result, found, setup)
+
+
+def diagnose_table(
+    path: Path,
+    bearing: Bearing,
+    baseline: Baseline | None = None,
+    settings: DiagnoseSettings | None = None,
+    reading_error: float | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> CampaignDiagnosis:
+    """Find what a model lacks to give the K and C of a table."""
+    baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
+    tell = progress or (lambda text, done, total: None)
+    if baseline.pivots == "measured":
+        raise BadInputError("--pivots measured: a table holds no dry tests. Give kirk, rigid or a pivots.toml.")
+    settings = replace(settings, tolerances=settings.tolerances.layered(bearing))
+    observations = observe_table(path, reading_error, settings.tolerance)
+    setup = apply_effects(Setup(bearing, pivot_laws(baseline.pivots, bearing), baseline.thermal), baseline.effects)
+    result = diagnose(observations, setup, settings, lambda text, share: tell(text, int(100 * share), 100))
+    return CampaignDiagnosis(result, None, setup)
+
+
+def unknown_centre(locus: Locus) -> float:
+    """How far the bearing's centre may lie from where positions are counted when no clearance sweep tells it [m].
+
+    Positions then count from the probes' own zero, and only their differences say something about the bearing.
+    """
+    return max(1e-3, 3.0 * max(math.hypot(*p.position) for p in locus.points))
+
+
+def _stated_tolerances(campaign: Campaign, bearing: Bearing, known: Tolerances) -> Tolerances:
+    """Tolerances by the weight of their source: command line, bearing file, manifest, defaults."""
+    found = known.layered(bearing)
+    probes = [c for c in campaign.channels.values() if c.quantity == "displacement" and c.axis is not None]
+    cells = [c for c in campaign.channels.values() if c.quantity == "force" and c.uncertainty]
+    gains = [float(p.uncertainty) for p in probes if p.uncertainty]
+    if gains and found.stated["probe_gain"].source == "default":
+        found = found.states({"probe_gain": max(gains)}, "manifest")
+    if len(probes) == 2 and abs(math.sin(float(probes[0].axis or 0.0) - float(probes[1].axis or 0.0))) > 0.05:
+        found = replace(found, probe_axes=(float(probes[0].axis or 0.0), float(probes[1].axis or 0.0)))
+    if cells:
+        gain = max(float(c.uncertainty or 0.0) for c in cells)
+        found = replace(found, cell_gain=Stated(gain, "1", "manifest"))
+    return found
+
+
+def _sensor_positions(campaign: Campaign, bearing: Bearing) -> tuple[float, ...]:
+    """Fraction of the arc at which every pad carries its thermometer, as the manifest states it; else 0.75."""
+    given = {int(c.pad): float(c.position) for c in campaign.channels.values()
+             if c.quantity == "temperature" and c.pad is not None and c.position is not None}  # fmt: skip
+    return tuple(given.get(k, SENSOR) for k in range(1, len(bearing.pads) + 1))

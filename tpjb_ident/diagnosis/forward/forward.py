@@ -1,0 +1,137 @@
+"""Forward: a model with effects, asked for exactly what a campaign measured."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from model.effects import Effect, apply_effects
+from model.setup import Setup
+from model.static_tests import dry_curve, polygon_sides
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.diagnosis.forward.memory import Memory, NoEquilibriumError, Reading, StaticPoint
+from tpjb_ident.diagnosis.observations.layout import DryTest, DynamicTest, Layout
+from tpjb_ident.diagnosis.observations.observe import Element
+
+__all__ = ["Forward", "ForwardModel", "NoEquilibriumError"]
+
+Change = Callable[[Setup], Setup]
+#: Fraction of the arc at which a pad carries its thermometer where nothing is said.
+SENSOR = 0.75
+
+
+class ForwardModel(Protocol):
+    """Anything that predicts an observation vector: the bearing model, or a surrogate of it."""
+
+    elements: tuple[Element, ...]
+
+    def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
+        """Predict with effects; see `Forward`."""
+
+    def fresh(self) -> ForwardModel:
+        """Return a copy whose answers depend on nothing that this one goes on to solve."""
+
+
+@dataclass
+class Forward:
+    """Predicts an observation vector; remembers what it has solved, and starts the next call from there."""
+
+    setup: Setup
+    layout: Layout
+    elements: tuple[Element, ...] = field(repr=False)
+    memory: Memory = field(default_factory=Memory, repr=False)
+    _shares: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)
+
+    def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
+        """Predict."""
+        setup = apply_effects(self.setup, effects)
+        if change is not None:
+            setup = change(setup)
+        table = _Answers(setup)
+        for test in self.layout.dynamic:
+            point = (test.load, test.direction, test.speed)
+            reading = self._solve(setup, point, test.excitation)
+            table.dynamic(test, reading)
+            for pad, load in enumerate(reading.pad_load, start=1):
+                self._shares[(*point, float(pad))] = float(load) / test.load
+        for one in self.layout.locus:
+            point = (one.load, one.direction, one.speed)
+            table.locus(point, self._solve(setup, point, ()))
+        for dry in self.layout.dry:
+            table.dry(dry)
+        if self.layout.push_load is not None:
+            table.clearance(self.layout.push_load)
+        return np.array([table.get(e) for e in self.elements])
+
+    def fresh(self) -> Forward:
+        """Return a copy that knows what this one knows now, whatever this one goes on to solve."""
+        return Forward(self.setup, self.layout, self.elements, self.memory.copy(), dict(self._shares))
+
+    def pad_shares(self) -> FloatArray:
+        """Share of the static load on the pad of every temperature element at the last call; NaN elsewhere, (n,)."""
+        names = ("load", "direction", "speed", "pad")
+        places = [tuple(e.place(name) for name in names) for e in self.elements]
+        mine = [e.family == "temperature" for e in self.elements]
+        return np.array(
+            [self._shares.get(place, math.nan) if m else math.nan for place, m in zip(places, mine, strict=True)]
+        )
+
+    @property
+    def _sensors(self) -> tuple[float, ...]:
+        given = self.layout.temperature_position
+        return (*given, *(SENSOR for _ in range(len(self.setup.bearing.pads) - len(given))))
+
+    def _solve(self, setup: Setup, point: StaticPoint, excitation: Sequence[float]) -> Reading:
+        return self.memory.ask(setup, point, tuple(excitation), self._sensors)
+
+
+_ROW = {"xx": (0, 0), "xy": (0, 1), "yx": (1, 0), "yy": (1, 1)}
+
+
+@dataclass
+class _Answers:
+    setup: Setup
+    table: dict[tuple[object, ...], float] = field(default_factory=dict)
+
+    def get(self, element: Element) -> float:
+        return self.table[(element.observable, *(v for _, v in element.where))]
+
+    def dynamic(self, test: DynamicTest, reading: Reading) -> None:
+        point = (test.load, test.direction, test.speed)
+        for h, omega in zip(reading.h, test.excitation, strict=True):
+            for name, at in _ROW.items():
+                self.table[(f"k{name}", *point, omega)] = float(h[at].real)
+                self.table[(f"c{name}", *point, omega)] = float(h[at].imag)
+        for pad, t in enumerate(reading.temperature, start=1):
+            self.table[("pad_temperature", *point, float(pad))] = float(t)
+
+    def locus(self, point: StaticPoint, reading: Reading) -> None:
+        self.table[("locus_x", *point)], self.table[("locus_y", *point)] = map(float, reading.position)
+        load = reading.load
+        self.table[("load_ratio", *point)] = float(np.hypot(*load)) / point[0]
+        turn = np.arctan2(load[1], load[0]) - point[1]
+        self.table[("load_turn", *point)] = float(np.arctan2(np.sin(turn), np.cos(turn)))
+
+    def dry(self, test: DryTest) -> None:
+        """Logarithm of the tangent compliance at loads as read."""
+        for load in test.load:
+            step = 0.02 * load
+            curve = dry_curve(self.setup, test.pad, np.array([load - step, load + step]))
+            gain = curve.load[1] / (load + step)  # loads are as read: ask at the true ones
+            if abs(gain - 1.0) > 1e-12:
+                curve = dry_curve(self.setup, test.pad, np.array([load - step, load + step]) / gain)
+            slope = max(float(np.diff(curve.deflection)[0] / np.diff(curve.load)[0]), 1e-16)
+            self.table[("dry_compliance", float(test.pad), load)] = float(np.log(slope))
+
+    def clearance(self, push_load: float) -> None:
+        sides = polygon_sides(self.setup, push_load)
+        for k, (pad, pushed, angle) in enumerate(
+            zip(self.setup.bearing.pads, sides.pushed, sides.angle, strict=True), start=1
+        ):
+            self.table[("clearance_pushed", float(k), pad.pivot_angle)] = float(pushed)
+            turn = angle - pad.pivot_angle
+            self.table[("side_angle", float(k), pad.pivot_angle)] = float(np.arctan2(np.sin(turn), np.cos(turn)))

@@ -1,0 +1,61 @@
+"""Workers: the same model runs on both cores; answers do not depend on how many there are."""
+
+from __future__ import annotations
+
+import itertools
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from tpjb_ident.diagnosis.forward.forward import ForwardModel
+from tpjb_ident.runtime.executors import Workers, cores, in_order, local_workers
+
+#: What the workers of this process share: they are forked from it and have it from there. Sent with every job it would
+#: be megabytes of equilibria each time.
+_shared: dict[int, tuple[ForwardModel, Any]] = {}
+_numbers = itertools.count()
+
+
+def _run(number: int, task: Callable[..., Any], *arguments: Any) -> Any:
+    forward, problem = _shared[number]
+    # every job starts from the baseline's equilibria: its answer depends on nothing that ran before it
+    return task(forward.fresh(), problem, *arguments)
+
+
+Answer = TypeVar("Answer")
+
+
+@dataclass(frozen=True)
+class Map:
+    """Maps a task over jobs, in this process or in workers."""
+
+    opened: Workers
+    number: int
+
+    def __call__(self, task: Callable[..., Any], jobs: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
+        """Yield ``task(forward, problem, argument, ..)`` for every job, in order."""
+        return in_order(self.opened, _run, [(self.number, task, *arguments) for arguments in jobs])
+
+    def together(self, tasks: Sequence[Callable[[], Answer]]) -> list[Answer]:
+        """Do several things that each wait for workers now and then: while one waits, they work for another."""
+        if self.opened.count == 1 or len(tasks) < 2:
+            return [task() for task in tasks]
+        with ThreadPoolExecutor(len(tasks)) as threads:
+            return list(threads.map(lambda task: task(), tasks))
+
+
+@contextmanager
+def workers(forward: ForwardModel, problem: Any, count: int | None = None) -> Iterator[Map]:
+    """Open workers whose tasks get a `Forward` and what else they share as their first arguments."""
+    number = next(_numbers)
+    _shared[number] = (forward, problem)
+    try:
+        # fork: effects that the user registered are known in the workers too
+        able = "fork" in multiprocessing.get_all_start_methods()
+        with local_workers((count or cores()) if able else 1, start="fork") as opened:
+            yield Map(opened, number)
+    finally:
+        del _shared[number]

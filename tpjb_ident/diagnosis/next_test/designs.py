@@ -1,0 +1,242 @@
+"""Designs: tests that could be run next on this rig, each as far as the model can honestly predict it.
+
+What the library has no effect for (play or friction that a load loop would show) is not on the list: no two
+explanations differ there.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from model.arrays import ComplexArray
+from model.effects import Effect
+from model.instruments import Instruments, SensorMap
+from model.setup import Setup
+from tpjb_ident.diagnosis.forward.forward import Change, Forward
+from tpjb_ident.diagnosis.observations.layout import DynamicTest, Layout
+from tpjb_ident.diagnosis.observations.observe import Observations
+from tpjb_ident.diagnosis.plan.planned import around, dry, dynamic, planned_observations
+
+HZ = 2 * math.pi
+#: Step of the supply temperature that a cooler can make [K].
+HOTTER = 10.0
+#: The model knows one sense of rotation: a shaft that turns clockwise is, seen in a mirror along the y axis, one that
+#: turns counter-clockwise. There x becomes -x, angles pi minus themselves, and a pad's leading edge its trailing one.
+_MIRROR = np.diag([-1.0, 1.0])
+#: How far from the middle of its pad a pivot may sit for the shaft to turn either way [share of the arc].
+CENTRAL = 0.05
+
+
+@dataclass(frozen=True)
+class Design:
+    """A test on the rig that could be run."""
+
+    words: str
+    layout: Layout
+    blind: frozenset[str] = frozenset()
+    unsure: frozenset[str] = frozenset()
+    change: Change | None = None
+
+    def acting(self, effects: Sequence[Effect]) -> tuple[Effect, ...]:
+        """Effects that act in this test."""
+        return tuple(e for e in effects if e.name not in self.blind)
+
+    def fits(self, *explanations: Sequence[Effect]) -> bool:
+        """Whether the model knows what these explanations would do in this test."""
+        return not any(e.name in self.unsure for effects in explanations for e in effects)
+
+    def planned(self, setup: Setup) -> Observations:
+        """Observation vector that the baseline predicts, with the noise to be expected."""
+        return planned_observations(setup if self.change is None else self.change(setup), self.layout)
+
+    def forward(self, setup: Setup, seen: Observations) -> Forward:
+        """The model of this test, for what `planned` lists."""
+        if self.change is None:
+            return Forward(setup, self.layout, seen.elements)
+        return ChangedForward(setup, self.layout, seen.elements, last=self.change)
+
+
+@dataclass
+class ChangedForward(Forward):
+    """A model of a rig that the test itself has changed; `last` is done after effects and nuisances."""
+
+    last: Change = lambda setup: setup
+
+    def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None):  # type: ignore[no-untyped-def]
+        """Predict; see `Forward`."""
+        before = change or (lambda setup: setup)
+        return super().__call__(effects, lambda setup: self.last(before(setup)))
+
+
+def designs(setup: Setup, layout: Layout) -> tuple[Design, ...]:
+    """List tests on this rig that go beyond a campaign's own."""
+    at = _Measured.of(layout, len(setup.bearing.pads))
+    return (
+        *_other_lines(at), *_other_points(at), *_other_rigs(setup, at), *_static(at), *_dry(layout, at.pads)
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """Where a campaign has been: middle, top and lowest load [N], direction, speed, lines [rad/s], pads."""
+
+    load: float
+    top: float
+    low: float
+    direction: float
+    speed: float
+    lines: tuple[float, ...]
+    pads: int
+
+    @classmethod
+    def of(cls, layout: Layout, pads: int) -> _Measured:
+        points = [(t.load, t.direction, t.speed) for t in layout.dynamic] or [(5000.0, -math.pi / 2, 22.0 * HZ)]
+        load, direction, speed = sorted(points)[len(points) // 2]
+        lines = tuple(sorted({w for t in layout.dynamic for w in t.excitation})) or (speed,)
+        return cls(load, max(p[0] for p in points), min(p[0] for p in points), direction, speed, lines, pads)
+
+    @property
+    def shaft(self) -> str:
+        return f"{self.speed / HZ:.0f} Hz"
+
+    def tests(
+        self, loads: Sequence[float], lines: Sequence[float], sensors: bool = False, faster: float = 1.0
+    ) -> tuple[DynamicTest, ...]:
+        pads = self.pads if sensors else 0
+        return dynamic(loads, lines, faster * self.speed, self.direction, pads)
+
+
+def _other_lines(at: _Measured) -> list[Design]:
+    sweep = [HZ * f for f in (10.0, 20.0, 30.0, 40.0, 50.0)]
+    far = [HZ * f for f in (60.0, 90.0, 120.0, 150.0)]
+    return [
+        Design(f"a frequency sweep 10-50 Hz at {w:.0f} N, {at.shaft} shaft speed", Layout(at.tests([w], sweep)))
+        for w in (at.top, at.low)
+    ] + [
+        Design(
+            f"a frequency sweep 60-150 Hz at {at.load:.0f} N, {at.shaft} shaft speed, if the actuators reach that far",
+            Layout(at.tests([at.load], far)),
+        )
+    ]
+
+
+def _other_points(at: _Measured) -> list[Design]:
+    between = replace(at, direction=at.direction + math.pi / at.pads)
+    loads = [at.low, at.load, at.top]
+    out = [
+        Design(f"dynamic tests at half the load, {0.5 * at.low:.0f} N, {at.shaft}",
+               Layout(at.tests([0.5 * at.low], at.lines))),
+        Design(f"dynamic tests at a quarter more than the highest load, {1.25 * at.top:.0f} N, {at.shaft}",
+               Layout(at.tests([1.25 * at.top], at.lines, True))),
+        Design(f"dynamic tests with the load between pads ({at.load:.0f} N turned by half a pad pitch)",
+               Layout(between.tests([at.load], at.lines, True))),
+        Design(f"pad temperatures at {at.low:.0f} N and {at.top:.0f} N, {at.shaft}",
+               Layout(at.tests([at.low, at.top], at.lines[:1], True))),
+    ]  # fmt: skip
+    return out + [
+        Design(
+            f"the load sweep repeated at {factor * at.speed / HZ:.0f} Hz shaft speed, with pad temperatures",
+            Layout(at.tests(loads, at.lines[:1], True, factor)),
+        )
+        for factor in (1.5, 0.5)
+    ]
+
+
+def _other_rigs(setup: Setup, at: _Measured) -> list[Design]:
+    """Tests for which the rig is changed."""
+    sweep = Layout(at.tests([at.low, at.load, at.top], at.lines[:1], True))
+    out = [
+        Design(
+            f"dynamic tests at {at.low:.0f} N and {at.top:.0f} N with the probes carried by the housing itself",
+            Layout(at.tests([at.low, at.top], at.lines)), blind=frozenset({"housing_flexibility"}),
+        ),
+        Design(
+            f"the load sweep repeated with the oil {HOTTER:.0f} K hotter at the inlet, with pad temperatures", sweep,
+            change=functools.partial(_hotter, by=HOTTER),
+        ),
+        Design(
+            "the load sweep repeated with so much oil that more changes nothing, with pad temperatures", sweep,
+            blind=frozenset({"starvation"}), unsure=frozenset({"hot_oil_carryover"}),
+        ),
+    ]  # fmt: skip
+    if reversible(setup):
+        out.append(
+            Design("the load sweep repeated with the shaft turning the other way, with pad temperatures",
+                   _mirrored_layout(sweep), change=mirrored)
+        )  # fmt: skip
+    return out
+
+
+def _hotter(setup: Setup, by: float) -> Setup:
+    return setup.change(supply_change=setup.supply_change + by)
+
+
+def _static(at: _Measured) -> list[Design]:
+    return [
+        *(
+            Design(f"a shaft locus over 20 load directions at {w:.0f} N", Layout((), around(w, 20, at.speed)))
+            for w in (at.top, at.low)
+        ),
+        *(
+            Design(f"the clearance polygon at a push load of {w:.0f} N, cold", Layout((), push_load=w))
+            for w in (200.0, 1000.0)
+        ),
+        Design("the clearance polygon right after a run, at a push load of 200 N, bearing and shaft still hot",
+               Layout((), push_load=200.0), change=grown),
+    ]  # fmt: skip
+
+
+def grown(setup: Setup) -> Setup:
+    """A bearing at standstill that keeps the clearance of the running one."""
+    by = setup.clearance_change
+    hot = setup.change_pads(lambda k, pad: replace(pad, assembled_clearance=pad.assembled_clearance + by))
+    return hot.change(clearance_change=0.0)
+
+
+def _dry(layout: Layout, pads: int) -> list[Design]:
+    done = {d.pad for d in layout.dry}
+    missing = [k for k in range(1, pads + 1) if k not in done]
+    if missing:
+        return [
+            Design(f"a dry load-deflection test on pad #{k}, 0.5-5 kN", Layout((), dry=dry([k]))) for k in missing
+        ]  # fmt: skip
+    return [
+        Design("the dry tests repeated up to 8 kN on all pads",
+               Layout((), dry=dry(range(1, pads + 1), (2000.0, 5000.0, 7600.0))))
+    ]  # fmt: skip
+
+
+def reversible(setup: Setup) -> bool:
+    """Whether every pad would carry with the shaft turning the other way."""
+    return all(abs(pad.pivot_offset - 0.5) <= CENTRAL for pad in setup.bearing.pads)
+
+
+def mirrored(setup: Setup) -> Setup:
+    """The set-up as a mirror shows it: its answers at a mirrored layout are those of the other sense of rotation."""
+    angle, towards = setup.misalignment
+    turned = setup.change_pads(
+        lambda k, pad: replace(pad, pivot_angle=math.pi - pad.pivot_angle, pivot_offset=1.0 - pad.pivot_offset)
+    )
+    return turned.change(misalignment=(angle, math.pi - towards), instruments=_instruments(setup.instruments))
+
+
+def _mirrored_layout(layout: Layout) -> Layout:
+    """Dynamic tests as a mirror shows them, thermometers where they sit."""
+    tests = tuple(DynamicTest(t.load, math.pi - t.direction, t.speed, t.excitation, t.pads) for t in layout.dynamic)
+    return Layout(tests, temperature_position=tuple(1.0 - place for place in layout.temperature_position))
+
+
+def _instruments(read: Instruments) -> Instruments:
+    return replace(read, displacement=tuple(map(_map, read.displacement)), force=tuple(map(_map, read.force)))
+
+
+def _map(one: SensorMap) -> SensorMap:
+    def seen(omega: float) -> ComplexArray:
+        return np.asarray(_MIRROR @ one(omega) @ _MIRROR)
+
+    return seen

@@ -1,0 +1,91 @@
+"""Gap: the root mean square of (measured - predicted) / sigma, over everything and by observable; what scales it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from tpjb_ident.arrays import BoolArray, FloatArray
+from tpjb_ident.diagnosis.observations.observe import Element, Observations
+
+
+def residuals(observations: Observations, prediction: FloatArray) -> FloatArray:
+    """(measured - predicted) / sigma, positions and clearances seen from one common centre.
+
+    The centre from which positions are counted is a convention (the clearance polygon's, by some rule) and says
+    nothing about the bearing: the shift that fits best is taken off.
+    """
+    z = (observations.value - prediction) / observations.total_sigma
+    shifts = centre_shifts(observations.elements) / observations.total_sigma[:, None]
+    if not np.any(shifts):
+        return z
+    return np.asarray(z - shifts @ np.linalg.lstsq(shifts, z, rcond=None)[0])
+
+
+def centre_shifts(elements: Sequence[Element]) -> FloatArray:
+    """Positions and clearances seen from a centre moved by one metre along x and along y, (n, 2)."""
+    out = np.zeros((len(elements), 2))
+    for i, e in enumerate(elements):
+        if e.observable in {"locus_x", "locus_y"}:
+            out[i, "xy".index(e.observable[-1])] = -1.0
+        elif e.observable == "clearance_pushed":
+            angle = e.place("angle")
+            out[i] = -math.cos(angle), -math.sin(angle)
+    return out
+
+
+def gap(observations: Observations, prediction: FloatArray, chosen: BoolArray | None = None) -> float:
+    """Root mean square of `residuals`; NaN where nothing is chosen."""
+    z = residuals(observations, prediction)
+    z = z if chosen is None else z[chosen]
+    return float(np.sqrt(np.mean(z**2))) if len(z) else float("nan")
+
+
+def noise_square(observations: Observations) -> float:
+    """Square of the gap that measurement noise alone would leave under a perfect model."""
+    return float(np.mean(np.diag(observations.covariance) / observations.total_sigma**2))
+
+
+def noise_floor(observations: Observations) -> float:
+    """Gap that measurement noise alone would leave under a perfect model."""
+    return math.sqrt(noise_square(observations))
+
+
+def gap_by_observable(
+    observations: Observations, before: FloatArray, after: FloatArray, chosen: BoolArray
+) -> dict[str, dict[str, float]]:
+    """Held-out gap before and after, per observable; observables without held-out points use all of theirs."""
+    out: dict[str, dict[str, float]] = {}
+    names = np.array([e.observable for e in observations.elements])
+    for name in dict.fromkeys(names):
+        mine = names == name
+        part = mine & chosen
+        key = "heldout" if part.any() else "fitted"
+        part = part if part.any() else mine
+        out[str(name)] = {
+            f"{key}_before": gap(observations, before, part),
+            f"{key}_after": gap(observations, after, part),
+        }
+    return out
+
+
+def direct_scale(elements: Sequence[Element], value: FloatArray) -> FloatArray:
+    """Mean direct coefficient of every element's point and part (k or omega c); 1 outside ``h``, (n,)."""
+    sums: dict[tuple[object, ...], list[float]] = {}
+    for e, v in zip(elements, value, strict=True):
+        if e.family == "h" and e.observable[1] == e.observable[2]:
+            sums.setdefault((e.observable[0], e.where), []).append(abs(float(v)))
+    rows = [sums.get((e.observable[0], e.where), [1.0]) if e.family == "h" else [1.0] for e in elements]
+    return np.array([float(np.mean(row)) for row in rows])
+
+
+def coordinate(elements: Sequence[Element], name: str) -> FloatArray:
+    """A coordinate of every element, spread over -1 .. 1; 0 where it has none or all are alike, (n,)."""
+    values = np.array([e.place(name) for e in elements])
+    known = values[np.isfinite(values)]
+    if len(known) == 0 or np.ptp(known) <= 1e-12 * max(abs(known).max(), 1e-300):
+        return np.zeros(len(values))
+    middle, half = 0.5 * (known.max() + known.min()), 0.5 * np.ptp(known)
+    return np.where(np.isfinite(values), (values - middle) / half, 0.0)

@@ -1,0 +1,230 @@
+"""Observe: everything a campaign offers as one labelled vector with its covariance.
+
+Families: ``h`` (Re and Im of the four entries per operating point), ``position`` (mean shaft position in the
+dynamic tests), ``locus``, ``load`` (the cells' mean reading against the set point), ``clearance`` (polygon sides and
+their angles), ``dry`` (tangent compliance of every pivot), ``temperature``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from tpjb_ident.arrays import FloatArray, TextArray
+from tpjb_ident.clearance.locus import Locus
+from tpjb_ident.clearance.measure import ClearancePolygon
+from tpjb_ident.diagnosis.observations.layout import DryTest, DynamicTest, Layout, LocusTest
+from tpjb_ident.diagnosis.observations.load_scatter import moved_by_miss
+from tpjb_ident.diagnosis.observations.tolerance import Tolerance
+from tpjb_ident.dynamic.corrections.mains import MAINS_CORRECTED, MAINS_ON_LINE
+from tpjb_ident.dynamic.results.identification import Identification
+from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.pivot.curve import PivotCurve
+
+ENTRY_NAMES = ("xx", "xy", "yx", "yy")
+#: Loads at which dry curves are compared, as shares of the range in which contact is complete.
+DRY_SHARES = (0.15, 0.5, 0.95)
+#: Error of a dry curve at each load by itself, as a share of its standard error: no law is quite the pivot's own. From
+#: 110 simulated curves: with less, pads that all were given the same wrong law raise false alarms.
+DRY_SHAPE = 0.7
+#: Standard error of a mean pad temperature [K]: sensors drift and self-heat far more than their noise.
+TEMPERATURE_SE = 0.05
+#: What runs in other directions would differ by where only two were excited, as a share of the direct coefficients.
+UNSEEN_DIFFERENCE = 0.005
+
+
+@dataclass(frozen=True)
+class Element:
+    """What one number of the observation vector is."""
+
+    family: str
+    observable: str
+    block: str
+    where: tuple[tuple[str, float], ...]
+
+    def place(self, name: str) -> float:
+        """Coordinate of the operating point; NaN where it has none."""
+        return dict(self.where).get(name, math.nan)
+
+
+@dataclass(frozen=True)
+class Observations:
+    """A campaign as one vector."""
+
+    layout: Layout
+    value: FloatArray
+    covariance: FloatArray = field(repr=False)
+    sigma: FloatArray = field(repr=False)
+    elements: tuple[Element, ...] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+    @property
+    def blocks(self) -> TextArray:
+        """Block of every element."""
+        return np.array([e.block for e in self.elements])
+
+    @property
+    def total_sigma(self) -> FloatArray:
+        """Measurement and stated model tolerance together: the sigma of the gap."""
+        return np.sqrt(np.diag(self.covariance) + self.sigma**2)
+
+
+@dataclass
+class _Builder:
+    value: list[float] = field(default_factory=list)
+    sigma: list[float] = field(default_factory=list)
+    elements: list[Element] = field(default_factory=list)
+    covariance: list[FloatArray] = field(default_factory=list)
+
+    def add(
+        self,
+        elements: Sequence[Element],
+        value: FloatArray,
+        covariance: FloatArray,
+        tolerance: FloatArray | float,
+    ) -> None:
+        value = np.atleast_1d(value)
+        keep = np.isfinite(value) & np.isfinite(np.diag(covariance))
+        sigma = np.broadcast_to(np.asarray(tolerance, float), value.shape)
+        self.value += list(value[keep])
+        self.sigma += list(sigma[keep])
+        self.elements += [e for e, k in zip(elements, keep, strict=True) if k]
+        self.covariance.append(covariance[np.ix_(keep, keep)])
+        self.kept = keep
+
+
+def observe(
+    identification: Identification,
+    curves: Sequence[PivotCurve] = (),
+    locus: Locus | None = None,
+    polygon: ClearancePolygon | None = None,
+    tolerance: Tolerance | None = None,
+) -> Observations:
+    """Gather a campaign's results into one vector."""
+    tolerance = tolerance or Tolerance()
+    builder = _Builder()
+    dynamic = _add_dynamic(builder, identification, locus, tolerance)
+    locus_tests = _add_locus(builder, locus, identification, tolerance) if locus is not None else ()
+    dry = tuple(_add_dry(builder, c, tolerance) for c in curves if _usable(c))
+    push = _add_clearance(builder, polygon, tolerance) if polygon is not None else None
+    layout = Layout(dynamic, locus_tests, tuple(d for d in dry), push)
+    return Observations(
+        layout, np.array(builder.value), block_diag(*builder.covariance), np.array(builder.sigma),
+        tuple(builder.elements),
+    )  # fmt: skip
+
+
+def _add_dynamic(
+    builder: _Builder, identification: Identification, locus: Locus | None, tolerance: Tolerance
+) -> tuple[DynamicTest, ...]:
+    tests: dict[tuple[float, float, float], list[int]] = {}
+    points = [p for p in identification.points if not _struck_by_mains(p)] or list(identification.points)
+    for i, p in enumerate(points):
+        key = (p.point.static_load, p.point.static_load_direction, p.point.shaft_speed)
+        tests.setdefault(key, []).append(i)
+    out = []
+    for (load, direction, speed), members in tests.items():
+        base = (("load", load), ("direction", direction), ("speed", speed))
+        for i in members:
+            _add_stiffness(builder, points[i], base, tolerance)
+        temperature = _mean_temperatures([points[i].temperatures for i in members])
+        block = f"load {load:.0f} N"
+        names = [Element("temperature", "pad_temperature", block, (*base, ("pad", float(k)))) for k in temperature]
+        if temperature:
+            noise = np.eye(len(names)) * TEMPERATURE_SE**2
+            value = np.array(list(temperature.values()))
+            builder.add(names, value, noise, tolerance.temperature)
+        out.append(
+            DynamicTest(load, direction, speed, tuple(points[i].point.excitation for i in members), tuple(temperature))
+        )
+    return tuple(out)
+
+
+def _struck_by_mains(result: PointResult) -> bool:
+    """Whether mains hum lies on the excitation and could not be taken off: no interval covers that."""
+    return MAINS_ON_LINE in result.quality and MAINS_CORRECTED not in result.quality
+
+
+def _add_stiffness(builder: _Builder, result, base: tuple, tolerance: Tolerance) -> None:  # type: ignore[no-untyped-def, type-arg]
+    omega = result.point.excitation
+    h = result.stiffness.h
+    block = f"load {result.point.static_load:.0f} N, {result.point.excitation_hz:g} Hz"
+    where = (*base, ("excitation", omega))
+    elements = [Element("h", f"k{e}", block, where) for e in ENTRY_NAMES]
+    elements += [Element("h", f"c{e}", block, where) for e in ENTRY_NAMES]
+    scale = np.repeat(result.stiffness.direct, 4)
+    value = np.concatenate([h.real.ravel(), h.imag.ravel()])
+    covariance = np.asarray(result.stiffness.covariance)
+    if "no-spare-direction" in result.quality:  # the interval knows repeats only, not what runs differ by
+        covariance = covariance + np.diag((UNSEEN_DIFFERENCE * scale) ** 2)
+    builder.add(
+        elements,
+        value,
+        covariance,
+        tolerance.stiffness * scale,
+    )
+
+
+def _mean_temperatures(rows: Sequence[dict[int, float]]) -> dict[int, float]:
+    pads = sorted({pad for row in rows for pad in row})
+    mean = {pad: float(np.mean([row[pad] for row in rows if pad in row])) for pad in pads}
+    return {pad: t - 273.15 for pad, t in mean.items()}
+
+
+def _add_locus(
+    builder: _Builder, locus: Locus, identification: Identification, tolerance: Tolerance
+) -> tuple[LocusTest, ...]:
+    """Positions and load readings; a load that misses its set point moves both, so they share an error."""
+    out = []
+    spread = np.diag([tolerance.load_miss**2, tolerance.direction_miss**2])
+    stated = (tolerance.position, tolerance.position, tolerance.load, tolerance.load)
+    for i, (p, give) in enumerate(zip(locus.points, moved_by_miss(locus, identification), strict=True)):
+        where = (
+            ("load", p.point.static_load), ("direction", p.point.static_load_direction), ("speed", p.point.shaft_speed),
+        )  # fmt: skip
+        names = (("locus", "locus_x"), ("locus", "locus_y"), ("load", "load_ratio"), ("load", "load_turn"))
+        turn = math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)
+        both = np.vstack([give, np.eye(2)])
+        covariance = both @ spread @ both.T
+        covariance[:2, :2] += p.covariance
+        builder.add(
+            [Element(family, name, f"locus {i % 5}", where) for family, name in names],
+            np.array([*p.position, p.load / p.point.static_load, turn]), covariance, np.array(stated),
+        )  # fmt: skip
+        out.append(LocusTest(p.point.static_load, p.point.static_load_direction, p.point.shaft_speed))
+    return tuple(out)
+
+
+def _usable(curve: PivotCurve) -> bool:
+    return curve.valid_to > curve.valid_from and math.isfinite(curve.valid_to)
+
+
+def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryTest:
+    load = np.array([curve.valid_from + s * (curve.valid_to - curve.valid_from) for s in DRY_SHARES])
+    value = -np.log(np.asarray(curve.stiffness(load), float))
+    elements = [Element("dry", "dry_compliance", "dry", (("pad", float(curve.pad)), ("load", float(w)))) for w in load]
+    covariance = curve.relative_stiffness_covariance(load)
+    covariance = covariance + np.diag(DRY_SHAPE**2 * np.diag(covariance))
+    builder.add(elements, value, covariance, tolerance.dry)
+    kept = load[builder.kept]
+    return DryTest(curve.pad, tuple(float(w) for w in kept))
+
+
+def _add_clearance(builder: _Builder, polygon: ClearancePolygon, tolerance: Tolerance) -> float:
+    n = len(polygon.angles)
+    places = [(("pad", k + 1.0), ("angle", float(polygon.angles[k]))) for k in range(n)]
+    elements = [Element("clearance", "clearance_pushed", "clearance", where) for where in places]
+    builder.add(
+        elements, polygon.clearance_pushed, np.diag(np.asarray(polygon.clearance_pushed_se) ** 2),
+        tolerance.position,
+    )  # fmt: skip
+    elements = [Element("clearance", "side_angle", "clearance", where) for where in places]
+    turn = np.array([math.remainder(t, 2 * math.pi) for t in polygon.fitted_angle - polygon.angles])
+    builder.add(elements, turn, np.diag(np.asarray(polygon.fitted_angle_se) ** 2), tolerance.angle)
+    return float(polygon.push_load)

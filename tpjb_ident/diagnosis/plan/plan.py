@@ -1,0 +1,168 @@
+"""Plan: what a campaign could and could not tell, before it is run.
+
+Detection floor per effect (the size at which it stands three standard deviations out of noise, tolerance and
+nuisances) and the isolability matrix: how far effect A, at a size seen with d' = 6, stays from everything that B
+can imitate, d_AB = 6 |(I - P_B) s_A| / |s_A|. Below 3 the two are confusable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from model.setup import Setup
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.diagnosis.forward.candidates import Candidate, one_amplitude
+from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
+from tpjb_ident.diagnosis.forward.nuisance import at_baseline
+from tpjb_ident.diagnosis.forward.tolerances import Tolerances
+from tpjb_ident.diagnosis.observations.layout import Layout
+from tpjb_ident.diagnosis.observations.observe import Observations
+from tpjb_ident.diagnosis.plan.planned import planned_observations
+from tpjb_ident.diagnosis.search.components import usual_factor
+from tpjb_ident.presentation import json_data
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SEEN = 6.0
+CONFUSABLE = 3.0
+
+
+@dataclass(frozen=True)
+class CampaignPlan:
+    """What a layout can tell."""
+
+    candidates: tuple[Candidate, ...]
+    detectable: FloatArray = field(repr=False)
+    separation: FloatArray = field(repr=False)
+
+    @property
+    def floor(self) -> FloatArray:
+        """Smallest change of every parameter that would be seen (3 standard deviations), in its nearly linear form."""
+        with np.errstate(divide="ignore"):  # what cannot be detected has an infinite floor
+            return 3.0 * np.array([c.step for c in self.candidates]) / self.detectable
+
+    @property
+    def confusable(self) -> tuple[tuple[str, str], ...]:
+        """Pairs that the campaign could not tell apart."""
+        n = len(self.candidates)
+        return tuple(
+            (self.candidates[i].label, self.candidates[j].label)
+            for i in range(n)
+            for j in range(i + 1, n)
+            if min(self.separation[i, j], self.separation[j, i]) < CONFUSABLE
+        )
+
+    @property
+    def pairs(self) -> int:
+        """Pairs of candidates that have an effect at all."""
+        n = int(np.sum(self.detectable > 0.0))
+        return n * (n - 1) // 2
+
+    @property
+    def below_floor(self) -> tuple[str, ...]:
+        """Effects that this campaign would not see at their typical size."""
+        return tuple(c.label for c, d in zip(self.candidates, self.detectable, strict=True) if d < 3.0)
+
+    def matrix(self) -> pd.DataFrame:
+        """Isolability matrix: row A at d' = 6 against everything that column B can imitate, in standard deviations."""
+        import pandas as pd
+
+        labels = [c.label for c in self.candidates]
+        frame = pd.DataFrame(self.separation, columns=labels)
+        frame.insert(0, "effect", labels)
+        return frame
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``plan.json``."""
+        return {
+            "schema": "tpjb-plan/1",
+            "effects": json_data(self.to_frame().to_dict("records")),
+            "below_floor": list(self.below_floor),
+            "confusable": [list(pair) for pair in self.confusable],
+            "pairs": self.pairs,
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per effect: detection floor and what it could be mistaken for."""
+        import pandas as pd
+
+        rows = []
+        for i, c in enumerate(self.candidates):
+            like = [o.label for j, o in enumerate(self.candidates) if j != i and self.separation[i, j] < CONFUSABLE]
+            at = c.parameter.from_linear(c.neutral + self.floor[i]) if np.isfinite(self.floor[i]) else np.nan
+            rows.append(
+                {
+                    "effect": c.label,
+                    "parameter": c.parameter.name,
+                    "unit": c.parameter.unit,
+                    "typical_size_sigma": self.detectable[i],
+                    "seen_from": at if c.bounds[0] <= c.neutral + self.floor[i] <= c.bounds[1] else np.nan,
+                    "mistaken_for": ", ".join(like),
+                }
+            )
+        return pd.DataFrame(rows)
+
+
+def plan(
+    setup: Setup, layout: Layout, known: Tolerances | None = None, pool: Sequence[Candidate] | None = None
+) -> CampaignPlan:
+    """Work out what a layout of tests could tell."""
+    chosen = tuple(pool if pool is not None else one_amplitude(setup.bearing))
+    seen = signatures(setup, layout, chosen, known)
+    return separated(chosen, np.asarray(np.linalg.solve(seen.factor(), seen.columns)))
+
+
+@dataclass(frozen=True)
+class Signatures:
+    """What every candidate does to the observation vector of a layout, beside what hides it."""
+
+    observations: Observations
+    nuisances: FloatArray = field(repr=False)
+    columns: FloatArray = field(repr=False)
+
+    def factor(self, free: bool = True) -> FloatArray:
+        """Cholesky factor of the covariance, with or without nuisances."""
+        return usual_factor(self.observations, self.nuisances if free else self.nuisances[:, :0])
+
+
+def signatures(
+    setup: Setup, layout: Layout, chosen: Sequence[Candidate], known: Tolerances | None = None
+) -> Signatures:
+    """Work out the signature of every candidate on a layout."""
+    observations = planned_observations(setup, layout)
+    forward = Forward(setup, layout, observations.elements)
+    base = forward()
+    free = at_baseline(forward, (), setup, known or Tolerances(), base)
+    columns = [_signature(forward, base, c) for c in chosen]
+    return Signatures(observations, free, np.column_stack(columns))
+
+
+def _signature(forward: Forward, base: FloatArray, candidate: Candidate) -> FloatArray:
+    """Change by a typical size, from half of it; zero where the model has no equilibrium on either side."""
+    low, high = candidate.bounds
+    for share in (0.5, -0.5, 0.05, -0.05):
+        there = min(max(candidate.neutral + share * candidate.step, low), high)
+        if there == candidate.neutral:
+            continue
+        try:
+            moved = forward.fresh()((candidate.effect(there),)) - base
+        except NoEquilibriumError:
+            continue
+        return np.asarray(moved / (there - candidate.neutral) * candidate.step)
+    return np.zeros_like(base)
+
+
+def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:
+    """Sizes and separations of whitened signatures (n, k)."""
+    size = np.linalg.norm(white, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):  # a signature of nothing has no direction: NaN
+        unit = white / size
+    cosine = np.clip(unit.T @ unit, -1.0, 1.0)
+    separation = SEEN * np.sqrt(1.0 - cosine**2)
+    np.fill_diagonal(separation, np.nan)
+    return CampaignPlan(tuple(chosen), size, separation)

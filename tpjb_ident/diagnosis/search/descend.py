@@ -1,0 +1,152 @@
+"""Descend: amplitudes of effects by damped Gauss-Newton steps, everything that may be off following to first order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.diagnosis.forward.forward import ForwardModel, NoEquilibriumError
+from tpjb_ident.diagnosis.forward.nuisance import predict
+from tpjb_ident.diagnosis.search.assessment import Assessment, Basis, assess
+from tpjb_ident.diagnosis.search.fit import Fit, Start, build, fitted, linear
+from tpjb_ident.diagnosis.search.problem import Problem
+
+MAX_STEPS = 4
+#: Share of their tolerances that nuisances have at first.
+TIGHT = 0.2
+#: A fit is settled when a step would move every amplitude by less than this share of its standard error.
+SETTLED = 0.1
+#: A step that loses less than this [nats] is not tried shorter: it loses by its derivative, which is better known after
+#: it, and not by its length.
+HARDLY = 0.3
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where all free numbers stand, and what the model predicts there, (n,)."""
+
+    start: Start
+    prediction: FloatArray
+
+    def cost(self, problem: Problem, weight: FloatArray) -> float:
+        """Squared misfit under noise and model error, plus that of all priors."""
+        z = problem.scaled(problem.observations.value - self.prediction)
+        return float(z @ weight @ z + np.sum((self.start.free / self.start.width) ** 2))
+
+
+def fit(forward: ForwardModel, problem: Problem, start: Start) -> Fit | None:
+    """Fit amplitudes; nuisances follow to first order.
+
+    First the effects alone have to do it: far from the answer nuisances, linear as they are here, would bend the way.
+    There every element may also be off by itself by as much as is stated: where pads come out of contact a campaign is
+    all cliffs to a weight that knows of smooth errors only. Then nuisances are as free as stated, the model counting as
+    wrong by what is stated and no more: where it may be wrong by anything, nothing needs to move. Last by what the
+    residual tells.
+
+    Derivatives are corrected along every step (Broyden, Math. Comp. 19 (1965) 577): a step costs one run of the model.
+    """
+    y = attempt(forward, problem, start)
+    if y is None:
+        return None
+    coarse, basis = problem.basis.coarse, problem.basis
+    here = _descended(forward, problem, Place(start, y), Weighing(coarse, basis.stated, TIGHT))
+    here = _descended(forward, problem, here, Weighing(basis, basis.stated, TIGHT))
+    here = _descended(forward, problem, here, Weighing(basis, basis.stated))
+    found = fitted(problem, here.start, here.prediction)
+    there = _descended(forward, problem, here, Weighing(basis, found.assessment.scales))
+    if there is here:
+        return found
+    other = fitted(problem, there.start, there.prediction, found.assessment.scales)
+    return other if other.evidence > found.evidence else found
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """What a step is judged by."""
+
+    basis: Basis
+    scales: FloatArray
+    slack: float = 1.0
+
+    def assess(self, problem: Problem, start: Start, y: FloatArray) -> Assessment:
+        """What a place is worth."""
+        return assess(self.basis, linear(problem, start, y, self.slack), self.scales, fixed=True)
+
+
+def _descended(forward: ForwardModel, problem: Problem, here: Place, weighing: Weighing) -> Place:
+    """Steps at fixed scales of the model's error until no amplitude moves."""
+    for _ in range(MAX_STEPS if here.start.jacobian.shape[1] else 0):
+        found = weighing.assess(problem, here.start, here.prediction)
+        now = np.concatenate(here.start.amplitudes)
+        step = np.concatenate(here.start.split(_targets(here.start, found))) - now
+        errors = np.sqrt(np.maximum(np.diag(found.covariance)[: len(now)], 0.0))
+        if np.all(np.abs(step) < SETTLED * errors):
+            break
+        moved = _improved(forward, problem, here, step, (weighing, found))
+        if moved is None:
+            break
+        here = moved
+    return here
+
+
+def _improved(
+    forward: ForwardModel, problem: Problem, here: Place, step: FloatArray, judged: tuple[Weighing, Assessment]
+) -> Place | None:
+    """The place after a step, or after a part of it, that is better; None if none is."""
+    weighing, found = judged
+    now = np.concatenate(here.start.amplitudes)
+    for share in (1.0, 0.4, 0.1):
+        trial = replace(here.start, amplitudes=here.start.split(now + share * step))
+        y = attempt(forward, problem, trial)
+        if y is None:
+            continue
+        taken = np.concatenate(trial.amplitudes) - now
+        trial = replace(trial, jacobian=_corrected(here.start, y - here.prediction, taken))
+        told = weighing.assess(problem, trial, y)
+        if told.evidence > found.evidence:
+            return Place(trial, y)
+        if found.evidence - told.evidence < HARDLY:
+            break
+    return None
+
+
+def _targets(start: Start, found: Assessment) -> FloatArray:
+    count = start.jacobian.shape[1]
+    return np.concatenate([c.origin for c in start.candidates]) + found.free[:count]
+
+
+def _corrected(start: Start, change: FloatArray, step: FloatArray) -> FloatArray:
+    """Broyden's update, amplitudes measured in their prior widths."""
+    width = np.concatenate([c.width for c in start.candidates])
+    scaled = step / width
+    length = float(scaled @ scaled)
+    if length < 1e-20:
+        return start.jacobian
+    return np.asarray(start.jacobian + np.outer(change - start.jacobian @ step, scaled / length) / width)
+
+
+def attempt(forward: ForwardModel, problem: Problem, start: Start) -> FloatArray | None:
+    """Predict; None where the model has no equilibrium."""
+    try:
+        return predict(forward, build(start.candidates, start.amplitudes), problem.nuisances, start.nuisance)
+    except NoEquilibriumError:
+        return None
+
+
+def slope(forward: ForwardModel, problem: Problem, start: Start, y: FloatArray, index: int, share: float) -> FloatArray:
+    """Change of the prediction per unit of one amplitude, by a one-sided difference that stays inside the bounds."""
+    flat = np.concatenate(start.amplitudes)
+    size = share * np.concatenate([c.steps for c in start.candidates])[index]
+    for signed in (size, -size, 0.1 * size, -0.1 * size):
+        moved = flat.copy()
+        moved[index] += signed
+        trial = replace(start, amplitudes=start.split(moved))
+        taken = np.concatenate(trial.amplitudes)[index] - flat[index]
+        if taken == 0.0:
+            continue
+        other = attempt(forward, problem, trial)
+        if other is not None:
+            return np.asarray((other - y) / taken)
+    return np.zeros_like(y)

@@ -1,0 +1,145 @@
+"""Proposals: fits that a search chooses among; one or two candidates more, from where a model stands or afresh."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.diagnosis.forward.candidates import Candidate
+from tpjb_ident.diagnosis.forward.workers import Map
+from tpjb_ident.diagnosis.search.descend import attempt, fit
+from tpjb_ident.diagnosis.search.fit import Fit, Start, fitted
+from tpjb_ident.diagnosis.search.problem import Problem
+from tpjb_ident.diagnosis.search.screen import (
+    Columns,
+    Courses,
+    Score,
+    alone,
+    columns,
+    instead,
+    scores,
+    with_model,
+)
+from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.search.settle import settle
+from tpjb_ident.diagnosis.search.worth import STAND_IN
+
+#: How often a model takes derivatives of its own while the search goes on.
+ROUNDS_ON_THE_WAY = 2
+#: Candidates that are fitted since they explain most by themselves, whatever else may be off.
+ALONE = 3
+#: Pairs of candidates that are fitted from the baseline: forward selection can begin with a compromise.
+PAIRS = 2
+#: Fits afresh that are settled in a second search.
+FAR = 2
+
+
+@dataclass(frozen=True)
+class Proposals:
+    """Makes fits of models with candidates more."""
+
+    run: Map
+    problem: Problem
+    settings: DiagnoseSettings
+    drawn: Fit
+    first: Columns = field(repr=False)
+    courses: Courses = field(repr=False)
+
+    def extended(self, model: Fit, table: Columns) -> list[Fit]:
+        """Fits of a model with one candidate more, best first."""
+        free = self._free(model, table)
+        ranked = self._promising(scores(self.problem, model, free, courses=self.courses))
+        known = {s.candidates for s in ranked}
+        starts = [with_model(model, s, free, self.courses) for s in ranked]
+        starts += [s for s in instead(self.problem, model, free, STAND_IN) if s.candidates[-1:] not in known]
+        return self.fits(starts)
+
+    def afresh(self, drawn: Fit, table: Columns) -> list[Fit]:
+        """Fits of one candidate more where everything else is as drawn; those too that close most by themselves."""
+        free = self._free(drawn, table)
+        every = scores(self.problem, drawn, free, courses=self.courses)
+        ranked = self._promising(every)
+        # a fit of a large effect may end on either side of a hill: it begins at both sizes that were proposed
+        first = alone(self.problem, drawn, free, self.courses)[:ALONE]
+        names = {s.candidates for s in first} - {s.candidates for s in ranked}
+        ranked = [*ranked, *first, *(s for s in every if s.candidates in names)]
+        return best_of(self.fits([with_model(drawn, s, free, self.courses) for s in ranked]))
+
+    def _free(self, model: Fit, table: Columns) -> Columns:
+        """Derivatives of the candidates that a model has not."""
+        return {c: v for c, v in table.items() if c.label not in {o.label for o in model.candidates}}
+
+    def _promising(self, ranked: Sequence[Score]) -> list[Score]:
+        """The best, and the best of every other effect that promises a fair share: a first step can mislead."""
+        chosen = list(ranked[: self.settings.tried])
+        names = {s.candidates[0].name for s in chosen}
+        for s in ranked[self.settings.tried :]:
+            if s.gain > 0.3 * ranked[0].gain and s.candidates[0].name not in names:
+                chosen.append(s)
+                names.add(s.candidates[0].name)
+        # what it is worth is told by the fit
+        return [s for s in chosen if s.gain > 0.0]
+
+    def pairs(self, singles: Sequence[Fit]) -> list[Fit]:
+        """Fits of two candidates at once from the baseline: what a compromise between two would hide."""
+        table = dict(self.first)
+        for f in singles:  # the secant of a fit tells more than the derivative at the baseline
+            (c,), (a,) = f.candidates, f.amplitudes
+            if len(a) == 1 and abs(a[0] - c.neutral) > 1e-3 * c.step:
+                alone = f.prediction - f.columns @ f.nuisance - self.problem.base
+                table[c] = alone[:, None] / (a[0] - c.neutral)
+        ranked = scores(self.problem, self.drawn, table, pairs=True)[:PAIRS]
+        return self.fits([with_model(self.drawn, s, table) for s in ranked])
+
+    def fits(self, starts: Sequence[Start]) -> list[Fit]:
+        """Fits from their starts, best first."""
+        found = self.run(fit, [(start,) for start in starts])
+        return sorted((f for f in found if f is not None), key=lambda f: -f.evidence)
+
+    def refined(self, model: Fit) -> Fit:
+        """The same model with directions off their grid and derivatives of its own."""
+        swapped = tuple(c.refined() for c in model.candidates)
+        if swapped != model.candidates:
+            parts, amplitudes = [], []
+            for old, new, a, at in zip(model.candidates, swapped, model.amplitudes, model.slices, strict=True):
+                more = len(new.free) - len(old.free) if not new.form else 0
+                parts.append(np.column_stack([model.jacobian[:, at], np.zeros((len(model.prediction), more))]))
+                amplitudes.append(np.append(a, [new.about.get("direction", 0.0)] * more))
+            model = replace(model, candidates=swapped, amplitudes=tuple(amplitudes), jacobian=np.column_stack(parts))
+            model = fitted(self.problem, model.start, model.prediction, model.assessment.scales)
+        return settle(self.run, self.problem, model, ROUNDS_ON_THE_WAY)
+
+    def renewed(self, model: Fit) -> dict[Candidate, FloatArray]:
+        """Derivatives at a model: new ones for the candidates that rank best by those of the baseline."""
+        labels = {c.label for c in model.candidates}
+        table = {c: v for c, v in self.first.items() if c.label not in labels}
+        best = [
+            s.candidates[0] for s in scores(self.problem, model, table, courses=self.courses)[: 2 * self.settings.tried]
+        ]
+        return table | columns(self.run, model, best)
+
+    def as_drawn(self, model: Fit) -> Fit:
+        """The effects of a model, everything else as drawn."""
+        start = replace(model.start, nuisance=np.zeros_like(model.nuisance))
+        (y,) = self.run(attempt, [(start,)])
+        return model if y is None else fitted(self.problem, start, y)
+
+    def far(self, near: Sequence[Fit], afresh: Sequence[Fit]) -> list[Fit]:
+        """Fits afresh that close most of the gap, settled, where they come to be likelier than what leads."""
+        least = max((f.evidence for f in near), default=-np.inf)
+        left = [self.problem.scaled(self.problem.observations.value - f.prediction) for f in afresh]
+        order = np.argsort([float(z @ z) for z in left])[:FAR]
+        found = self.run.together([functools.partial(self.refined, afresh[i]) for i in order])
+        return [settle(self.run, self.problem, f) for f in found if f.evidence > least]
+
+
+def best_of(fits: Sequence[Fit]) -> list[Fit]:
+    """The better fit of every set of candidates, best first."""
+    kept: dict[str, Fit] = {}
+    for f in sorted(fits, key=lambda f: -f.evidence):
+        kept.setdefault(f.label, f)
+    return list(kept.values())

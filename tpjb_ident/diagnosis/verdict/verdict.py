@@ -1,0 +1,166 @@
+"""Verdict: what a diagnosis says, and nothing that it cannot say."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from model.effects import Effect, kind_of
+from tpjb_ident.diagnosis.verdict.behaviour import Behaviour, Drift
+from tpjb_ident.effect_words import Found
+from tpjb_ident.presentation import json_data
+
+VerdictName = Literal["consistent", "named", "ambiguous", "partly-explained", "unexplained"]
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """An effect that was added."""
+
+    name: str
+    parameters: dict[str, Found]
+    stands_in: str = ""
+
+    @property
+    def label(self) -> str:
+        """Name with the parameters that are no amplitude: ``soft_pivot pad 5``."""
+        return " ".join([self.name, *(f"{k} {p.value:g}" for k, p in self.parameters.items() if p.lo == p.hi)])
+
+    @property
+    def effect(self) -> Effect:
+        """The effect itself."""
+        return Effect(self.name, **{k: p.value for k, p in self.parameters.items()})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, as in the contract."""
+        parameters = {k: vars(p) for k, p in self.parameters.items()}
+        return {"name": self.name, "parameters": parameters, "stands_in": self.stands_in}
+
+
+@dataclass(frozen=True)
+class RankedCandidate:
+    """An explanation that was fitted."""
+
+    name: str
+    score: float
+    heldout_gap: float
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """Where measurement and baseline part."""
+
+    observable: str
+    where: str
+    size_sigma: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What is left on unseen points."""
+
+    sigma: float
+    share: float
+    where: str
+    p: float
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """A tolerance or nuisance that took part."""
+
+    name: str
+    stated: float
+    fitted: float | list[float]
+    unit: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Result of `diagnose`; `to_json` is ``diagnosis.json`` of `outputs.md`.
+
+    `indistinguishable` holds names of effects; where another pad or direction of the same effect would do, that is
+    spelt out there.
+    """
+
+    verdict: VerdictName
+    effects: tuple[FoundEffect, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+    below_floor: tuple[str, ...]
+    next_test: str
+    candidates: tuple[RankedCandidate, ...]
+    disagreement: tuple[Disagreement, ...]
+    gap_by_observable: dict[str, dict[str, float]]
+    gap: dict[str, float]
+    remainder: Remainder
+    behaves_like: tuple[Behaviour, ...] = ()
+    drift: tuple[Drift, ...] = ()
+    assumptions: tuple[Assumption, ...] = ()
+    reasons: tuple[str, ...] = ()
+    notes: dict[str, Any] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, in the order of the contract."""
+        return {
+            "schema": "tpjb-diagnosis/2",
+            "verdict": self.verdict,
+            "effects": [e.to_dict() for e in self.effects],
+            "indistinguishable": [list(group) for group in self.indistinguishable],
+            "below_floor": list(self.below_floor),
+            "next_test": self.next_test,
+            "candidates": [vars(c) for c in self.candidates],
+            "disagreement": [vars(d) for d in self.disagreement],
+            "gap_by_observable": self.gap_by_observable,
+            "remainder": vars(self.remainder),
+            "behaves_like": [vars(b) for b in self.behaves_like],
+            "drift": [d.to_dict() for d in self.drift],
+            "assumptions": [vars(a) for a in self.assumptions],
+            "gap": self.gap,
+            "reasons": list(self.reasons),
+            **self.notes,
+        }
+
+    def to_json(self) -> str:
+        """Serialise as JSON text; not-a-number becomes null, as JSON knows no other."""
+        return json.dumps(json_data(self.to_dict()), indent=2, allow_nan=False) + "\n"
+
+    def effects_toml(self, before: tuple[Effect, ...] = (), from_measured: bool = False) -> str:
+        """Serialise as ``updated.effects.toml``, which ``predict --effects`` reads.
+
+        Parameters
+        ----------
+        before : tuple of Effect
+            Effects that the baseline had already; they stay in the model.
+        from_measured : bool
+            The baseline had measured pivots: what is found on pivots is meant beside these, and the file says so.
+        """
+        counted = ['counted_from = "measured pivots"'] if from_measured else []
+        lines = ['schema = "tpjb-effects/1"', *counted, ""]
+        for known in before:
+            values = [f"{k} = {v!r}" for k, v in known.parameters.items()]
+            lines += ["[[effects]]", f'name = "{known.name}"', *values, ""]
+        for e in self.effects:
+            kind = kind_of(e.name)
+            lines += ["[[effects]]", f'name = "{e.name}"']
+            lines += [f"{k} = {p.value!r}  # 95 %: {p.lo:.6g} to {p.hi:.6g} {p.unit}" for k, p in e.parameters.items()]
+            lines += [f"# prior: {p.name} {p.low:g} to {p.high:g} {p.unit}" for p in kind.parameters]
+            lines += [f"# {kind.source}", *([f"# {e.stands_in}"] if e.stands_in else []), ""]
+        return "\n".join(lines)
+
+    def terms_toml(self, before: tuple[Effect, ...] = (), from_measured: bool = False) -> str:
+        """Serialise the effects with what the rest behaves like, in the same form.
+
+        Parameters
+        ----------
+        before, from_measured
+            As of `effects_toml`.
+        """
+        lines = [self.effects_toml(before, from_measured)]
+        for b in self.behaves_like:
+            values = [f"{k} = {v!r}" for k, v in b.parameters.items()]
+            lines += ["[[effects]]", f'name = "{b.effect}"', *values, f"# {b.words}", ""]
+        return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""Coefficients in the forms that other programs read, and records as dictionaries (SEP 005)."""

@@ -1,0 +1,148 @@
+"""Tables of the coefficients: CSV, Parquet, an Excel workbook, a MATLAB file; and the intervals beside the rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.exports.formats import ExportError
+from tpjb_ident.exports.points import COLUMNS, StaticPoint
+from tpjb_ident.runtime.tables import printable, safe_for_spreadsheets, write_atomic
+from tpjb_ident.schema import ENTRIES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NAME = "bearing_coefficients"
+#: Beside files of a form that holds no intervals.
+INTERVALS = f"{NAME}_intervals.csv"
+FIELDS = (
+    "load_N", "direction_deg", "speed_Hz", "frequency_rad_per_s", "K", "C", "K_lo", "K_hi", "C_lo", "C_hi",
+    "quality", "trusted",
+)  # fmt: skip
+
+
+def coefficient_table(points: tuple[StaticPoint, ...]) -> pd.DataFrame:
+    """One row per static point and frequency."""
+    import pandas as pd
+
+    parts = [
+        pd.DataFrame(
+            {
+                "static_load_N": p.load,
+                "static_load_direction_deg": p.direction,
+                "shaft_speed_rpm": 60 * p.speed,
+                "frequency_rad_per_s": p.frequency,
+                **{
+                    COLUMNS[name] + end: part[name]
+                    for name in COLUMNS
+                    for end, part in (("", p.coefficients), ("_lo", p.low), ("_hi", p.high))
+                },
+                "quality": list(p.quality),
+                "trusted": p.trusted,
+            }
+        )
+        for p in points
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def write_csv(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
+    """Write bearing_coefficients.csv into an existing folder."""
+    _write_csv(folder / f"{NAME}.csv", points)
+
+
+def write_intervals(folder: Path, points: tuple[StaticPoint, ...]) -> None:
+    """Write the same table beside files of a form that holds no intervals."""
+    _write_csv(folder / INTERVALS, points)
+
+
+def _write_csv(path: Path, points: tuple[StaticPoint, ...]) -> None:
+    frame = safe_for_spreadsheets(coefficient_table(points))
+    write_atomic(path, lambda part: frame.to_csv(part, index=False, encoding="utf-8", lineterminator="\n"))
+
+
+def write_parquet(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
+    """Write bearing_coefficients.parquet; the source stands in the table's metadata."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.Table.from_pandas(coefficient_table(points), preserve_index=False)
+    table = table.replace_schema_metadata({**(table.schema.metadata or {}), b"source": printable(source).encode()})
+    write_atomic(folder / f"{NAME}.parquet", lambda part: pq.write_table(table, part))
+
+
+def write_excel(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
+    """Write bearing_coefficients.xlsx: all coefficients on one sheet, what they are on another.
+
+    Every text is written as text, so that no cell from outside can become a formula. Rows that are not to be trusted
+    are red.
+    """
+    try:
+        from openpyxl import Workbook
+        from openpyxl.styles import Font
+    except ModuleNotFoundError as error:
+        raise ExportError('an Excel file needs openpyxl. Install it: pip install "tpjb-ident[excel]"') from error
+    book = Workbook()
+    sheet = book.active
+    sheet.title = "coefficients"
+    frame = coefficient_table(points)
+    for column, name in enumerate(frame.columns, start=1):
+        _text(sheet.cell(1, column), str(name))
+        sheet.column_dimensions[sheet.cell(1, column).column_letter].width = max(12, len(str(name)) + 2)
+        for row, value in enumerate(frame[name], start=2):
+            _fill(sheet.cell(row, column), value)
+            if not frame["trusted"].iloc[row - 2]:
+                sheet.cell(row, column).font = Font(color="C00000")
+    sheet.freeze_panes = "A2"
+    about = book.create_sheet("about")
+    lines = (printable(source), "K = Re h, C = Im h / omega at the excitation frequency; SI units.",
+             "frequency_rad_per_s is the excitation; the shaft speed is constant along it.",
+             "_lo and _hi: 95 % interval, random and calibration errors together; empty for a prediction.",
+             "quality: named conditions, explained in the report; trusted: FALSE was exported against advice.",
+             *(flag for p in points for flag in (f"{p.load:g} N {text}" for text in p.flags)))  # fmt: skip
+    for row, line in enumerate(lines, start=1):
+        _text(about.cell(row, 1), line)
+    write_atomic(folder / f"{NAME}.xlsx", lambda part: book.save(part))
+
+
+def _fill(cell: Any, value: Any) -> None:
+    if isinstance(value, (bool, np.bool_)):
+        cell.value = bool(value)
+    elif isinstance(value, str):
+        _text(cell, value)
+    else:
+        cell.value = float(value) if np.isfinite(value) else None
+
+
+def _text(cell: Any, text: str) -> None:
+    cell.value = text
+    cell.data_type = "s"  # openpyxl would take a leading = for a formula
+
+
+def write_mat(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
+    """Write bearing_coefficients.mat (MATLAB 5): struct array ``bearing``.
+
+    K and C are 2 x 2 x n, so are ``K_lo``, ``K_hi``, ``C_lo``, ``C_hi``, the ends of their 95 % intervals (NaN where
+    there are none); ``quality`` is a cell array of n texts, ``trusted`` n truth values.
+    """
+    from scipy.io import savemat
+
+    array = np.zeros(len(points), dtype=[(name, object) for name in FIELDS])
+    for i, p in enumerate(points):
+        array[i] = (
+            p.load, p.direction, p.speed, p.frequency,
+            _matrices(p.coefficients, "k"), _matrices(p.coefficients, "c"),
+            _matrices(p.low, "k"), _matrices(p.high, "k"), _matrices(p.low, "c"), _matrices(p.high, "c"),
+            np.array([printable(text) for text in p.quality], dtype=object), p.trusted,
+        )  # fmt: skip
+    path = folder / "bearing_coefficients.mat"
+    content = {"bearing": array, "source": printable(source)}
+    write_atomic(path, lambda part: savemat(part, content, oned_as="column", appendmat=False))
+
+
+def _matrices(values: dict[str, FloatArray], kind: str) -> FloatArray:
+    return np.array([values[f"{kind}{entry}"] for entry in ENTRIES]).reshape(2, 2, -1)

@@ -1,0 +1,117 @@
+"""One export, from a table of coefficients to files: what may leave, in which form, with which intervals beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tpjb_ident.errors import NotTrustedError
+from tpjb_ident.exports.formats import ExportError, export_format
+from tpjb_ident.exports.points import Chosen, static_points
+from tpjb_ident.exports.table import write_intervals
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tpjb_ident.dynamic.results.identification import Identification
+
+#: Tables of an output folder that hold coefficients.
+RESULT_TABLES = ("coefficients.csv", "prediction.csv")
+
+
+@dataclass(frozen=True)
+class Export:
+    """What an export wrote."""
+
+    folder: Path
+    files: tuple[str, ...]
+    chosen: Chosen
+
+    def __str__(self) -> str:
+        sets = sum(len(p.frequency) for p in self.chosen.points)
+        return f"{len(self.chosen.points)} static points, {sets} coefficient sets"
+
+
+def export(
+    source: Identification | pd.DataFrame | str | Path,
+    to: str,
+    folder: str | Path,
+    *,
+    force: bool = False,
+    name: str = "",
+) -> Export:
+    """Write coefficients as another program reads them, with intervals and flags in the files or beside them.
+
+    Parameters
+    ----------
+    source : Identification, DataFrame, str or Path
+        What `identify` gives, a table as coefficients.csv or prediction.csv, such a file, or a folder that holds one.
+    to : str
+        ``"ross"``, ``"csv"``, ``"parquet"``, ``"excel"``, ``"mat"``, ``"xltrc"``, ``"dyrobes"`` or ``"ansys"``.
+    folder : str or Path
+        Made if need be.
+    force : bool
+        Also write points that are not to be trusted, marked as such.
+    name : str
+        What the coefficients are of, for the files' heads; default: known from the source.
+
+    Returns
+    -------
+    Export
+        Its ``chosen.doubtful`` and ``chosen.left_out`` name the points that stayed behind.
+
+    Raises
+    ------
+    ExportError
+        Unknown format, or a table without the columns.
+    NotTrustedError
+        Nothing is left that can be trusted.
+    """
+    form = export_format(to)
+    frame, known = _table(source)
+    chosen = static_points(frame, force)
+    if not chosen.points:
+        reasons = "\n".join(chosen.doubtful[:5])
+        raise NotTrustedError(f"no point can be trusted, nothing is exported:\n{reasons}\n--force writes them, marked.")
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    before = {path.name for path in target.iterdir()}
+    form.writer(target, chosen.points, f"tpjb-ident: coefficients of {name or known}")
+    if not form.holds_intervals:
+        write_intervals(target, chosen.points)
+    files = tuple(sorted(path.name for path in target.iterdir() if path.name not in before))
+    return Export(target, files, chosen)
+
+
+def result_table(path: Path) -> Path | None:
+    """Find the table of coefficients in an output folder of tpjb."""
+    if path.is_file() and path.suffix == ".csv":
+        return path
+    found = [path / name for name in RESULT_TABLES if (path / name).is_file()]
+    return found[0] if found else None
+
+
+def read_result_table(path: Path) -> pd.DataFrame:
+    """Read a table of coefficients."""
+    import pandas as pd
+
+    try:
+        return pd.read_csv(path)
+    except (ValueError, UnicodeDecodeError) as error:  # pandas' own errors are ValueErrors
+        raise ExportError(f"{path}: is no table ({error}). Give the results of tpjb identify.") from error
+
+
+def _table(source: Identification | pd.DataFrame | str | Path) -> tuple[pd.DataFrame, str]:
+    if isinstance(source, (str, Path)):
+        path = result_table(Path(source))
+        if path is None:
+            raise ExportError(f"{source}: holds neither {' nor '.join(RESULT_TABLES)}. Give results of tpjb identify.")
+        return read_result_table(path), path.parent.resolve().name
+    from tpjb_ident.dynamic.results.identification import Identification
+
+    if isinstance(source, Identification):
+        return source.to_frame(), source.campaign
+    if not hasattr(source, "columns"):
+        raise ExportError(f"source: must be a result, a table or the path of one, got {type(source).__name__}.")
+    return source, "a table"
