@@ -28,6 +28,15 @@ class Format:
     """One form of export; its writer puts files of some points into an existing folder.
 
     A writer is called with the folder, the points (tuple of StaticPoint) and a text that says where they come from.
+
+    Attributes
+    ----------
+    module, function : str
+        Where its writer is; imported when it is used.
+    holds_intervals : bool
+        Whether its files hold intervals and flags; where not, a table of them is written beside.
+    note : str
+        What its user must know.
     """
 
     module: str

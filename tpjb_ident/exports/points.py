@@ -22,7 +22,27 @@ COLUMNS = {name[:3]: name for name in COEFFICIENT_COLUMNS}
 
 @dataclass(frozen=True)
 class StaticPoint:
-    """Coefficients of one static load and speed over excitation frequency."""
+    """Coefficients of one static load and speed over excitation frequency.
+
+    Attributes
+    ----------
+    load : float
+        [N]
+    direction : float
+        [deg]
+    speed : float
+        [Hz]
+    frequency : (n,) ndarray
+        Excitation [rad/s], rising.
+    coefficients : dict of str to (n,) ndarray
+        ``"kxx"`` .. ``"cyy"`` [N/m], [N s/m].
+    low, high : dict of str to (n,) ndarray
+        Ends of their 95 % intervals; NaN where the table has none, as of a prediction.
+    quality : tuple of str
+        Per frequency the named conditions, ``"ok"`` if there are none.
+    trusted : (n,) bool ndarray
+        False where the coefficients are exported against advice.
+    """
 
     load: float
     direction: float

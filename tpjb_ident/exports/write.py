@@ -22,7 +22,16 @@ RESULT_TABLES = ("coefficients.csv", "prediction.csv")
 
 @dataclass(frozen=True)
 class Export:
-    """What an export wrote."""
+    """What an export wrote.
+
+    Attributes
+    ----------
+    folder : Path
+    files : tuple of str
+        Names in it.
+    chosen : Chosen
+        The points, and those left out or doubtful.
+    """
 
     folder: Path
     files: tuple[str, ...]
