@@ -22,7 +22,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-SAMPLES = CHECKOUT.parent / "shared" / "samples"
+SAMPLES = (CHECKOUT.parent / "shared" / "samples").resolve()
 CAMPAIGNS = (
     "rocker-baseline", "spherical-baseline.h5", "rocker-measured-pivots.h5", "effect-a.h5", "effect-b.h5",
     "effect-c.h5", "mixture-a.h5", "mixture-b.h5", "mixture-c.h5",
