@@ -2,7 +2,7 @@
 
 This pins the code against itself, not against the truth (the other tests of this folder do that): a change of layout
 must not move a coefficient, its interval or a flag. A change of method may: `python -m tests.recovery.test_golden`
-writes the values anew, and the commit says why. `tests/studies/golden.py` holds fifty commands against another checkout.
+writes the values anew, and the commit says why; `tests/studies/golden.py` holds fifty commands against each other.
 """
 
 from __future__ import annotations

@@ -1,0 +1,72 @@
+"""The examples in docstrings run as they stand, and what a user calls or implements has one.
+
+An example is given `np`, `ti`, and the paths `demo` (the bundled campaign) and `rocker` (a bearing file).
+"""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import tpjb_ident as ti
+from tests.structure.sources import ROOT
+from tests.structure.test_docstrings import definitions, handed_on
+
+#: Faces without an example; this number may only fall.
+WITHOUT_EXAMPLE = 34
+#: What `docs/plots.md` and the readers' own tests show.
+SHOWN_ELSEWHERE = ("tpjb_ident/report/plots/", "tpjb_ident/exports/", "rigdata/readers/formats/", "model/effects/")
+
+
+def described() -> Iterator[tuple[str, str, str]]:
+    """File, name and docstring of everything at the top of a file, and of the public methods of faces."""
+    for path, name, node, face in definitions():
+        text = (node.body[0].value.value if _has_docstring(node) else "") if node.body else ""
+        if face or ">>>" in text:
+            yield path, name, text
+
+
+def _has_docstring(node) -> bool:
+    first = node.body[0]
+    return hasattr(first, "value") and isinstance(getattr(first.value, "value", None), str)
+
+
+EXAMPLES = [(path, name) for path, name, text in described() if ">>>" in text]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("path", "name"), EXAMPLES, ids=lambda part: part)
+def test_an_example_runs(path, name, tmp_path, monkeypatch):
+    module = importlib.import_module(path.removesuffix(".py").removesuffix("/__init__").replace("/", "."))
+    shown = module
+    for part in name.split("."):
+        shown = getattr(shown, part)
+    monkeypatch.chdir(tmp_path)
+    given = {
+        "np": np,
+        "ti": ti,
+        "demo": ROOT / "rigdata/samples/demo.h5",
+        "rocker": ROOT / "model/bearings/rocker.toml",
+    }
+    parsed = doctest.DocTestParser().get_doctest(
+        getattr(shown, "fget", shown).__doc__, {**vars(module), **given}, name, path, 0
+    )
+    report: list[str] = []
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE, verbose=False)
+    runner.run(parsed, out=report.append)
+    assert not runner.failures, "".join(report)
+
+
+def test_faces_have_an_example():
+    public = {name for _, name in handed_on()}
+    without = []
+    for path, name, text in described():
+        if "." in name or name not in public or path.startswith(SHOWN_ELSEWHERE) or name.endswith("Error"):
+            continue
+        if ">>>" not in text:
+            without.append(f"{path}:{name}")
+    assert len(without) <= WITHOUT_EXAMPLE, "\n".join(without)
