@@ -15,7 +15,7 @@ from rigdata.calibration import Channel
 from rigdata.manifest.manifest import MAX_MANIFEST, CsvSpec, Manifest, parse_manifest
 from rigdata.manifest.runs import RunEntry
 from rigdata.near_names import nearest_name
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import TEXT, RunReader
 from rigdata.run import Run
 from rigdata.safe_path import inside
@@ -90,7 +90,7 @@ class Campaign:
                 return run
         close = nearest_name(run_id, [r.id for r in self.runs])
         cure = f"Did you mean {close!r}?" if close else f"There are {len(self.runs)} runs; see campaign.runs"
-        raise RigDataError(Problem("error", self.path.name, "", f"no run has the id {run_id!r}", cure))
+        raise refuse(self.path.name, "", f"no run has the id {run_id!r}", cure)
 
     def of_kind(self, kind: str) -> tuple[Run, ...]:
         """All runs of one kind, in the manifest's order.
@@ -116,7 +116,7 @@ def _sha256(path: Path) -> str:
     except (FileNotFoundError, IsADirectoryError):
         return "missing"
     except OSError as error:
-        raise _cannot(path.name, f"cannot be read ({error.strerror})", "Check the rights of the file") from error
+        raise refuse(path.name, "", f"cannot be read ({error.strerror})", "Check the rights of the file") from error
     return digest.hexdigest()
 
 
@@ -144,7 +144,7 @@ def load_campaign(path: str | Path) -> Campaign:
         raise
     except (OSError, ValueError) as error:  # a name too long or with a NUL, a folder that may not be entered
         what = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
-        raise _cannot(str(path)[:100], what, "Check the path and its rights") from error
+        raise refuse(str(path)[:100], "", what, "Check the path and its rights") from error
     if kind == "folder":
         return _load_folder(given, given / MANIFEST_NAME)
     return _load_folder(given.parent, given) if kind == "manifest" else _load_hdf5(given)
@@ -158,36 +158,33 @@ def _kind_of(given: Path) -> str:
         inside_it = [p.name for p in itertools.islice(given.iterdir(), 1000) if p.suffix.lower() in HDF5_SUFFIXES][:3]
         hint = f", or one of its HDF5 files ({', '.join(inside_it)})" if inside_it else ""
         cure = f"Give the folder that holds {MANIFEST_NAME}{hint}; `tpjb init FOLDER` drafts one for records"
-        raise _cannot(str(given), f"the folder has no {MANIFEST_NAME}", cure)
+        raise refuse(str(given), "", f"the folder has no {MANIFEST_NAME}", cure)
     if not given.exists():
-        raise _cannot(str(given)[:200], "there is no such file or folder", "Check the path")
+        raise refuse(str(given)[:200], "", "there is no such file or folder", "Check the path")
     if not given.is_file():
-        raise _cannot(str(given), "is not an ordinary file", f"Give a folder with {MANIFEST_NAME} or an HDF5 file")
+        raise refuse(str(given), "", "is not an ordinary file", f"Give a folder with {MANIFEST_NAME} or an HDF5 file")
     if given.suffix.lower() in TEXT:
-        raise _cannot(str(given), "is a record, not a campaign", f"Give the folder that holds {MANIFEST_NAME}")
+        raise refuse(str(given), "", "is a record, not a campaign", f"Give the folder that holds {MANIFEST_NAME}")
     return "manifest" if given.suffix.lower() == ".toml" else "hdf5"
-
-
-def _cannot(file: str, what: str, cure: str) -> RigDataError:
-    return RigDataError(Problem("error", file, "", what, cure))
 
 
 def _read_text(path: Path, file: str, limit: int) -> str:
     try:
         if not stat.S_ISREG(path.stat().st_mode):
-            raise _cannot(file, "is not an ordinary file", "Give a text file")
+            raise refuse(file, "", "is not an ordinary file", "Give a text file")
         with path.open("rb") as stream:
             data = stream.read(limit + 1)
     except OSError as error:
-        raise _cannot(file, f"cannot be read ({error.strerror or error})", "Check the path and its rights") from error
+        raise refuse(
+            file, "", f"cannot be read ({error.strerror or error})", "Check the path and its rights"
+        ) from error
     if len(data) > limit:
-        raise _cannot(file, f"is larger than {limit >> 20} MB", "Is it the right file?")
+        raise refuse(file, "", f"is larger than {limit >> 20} MB", "Is it the right file?")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
-        problem = Problem("error", file, f"line {line}", "is not UTF-8 text", "Save the file as UTF-8")
-        raise RigDataError(problem) from error
+        raise refuse(file, f"line {line}", "is not UTF-8 text", "Save the file as UTF-8") from error
 
 
 def _load_folder(folder: Path, manifest_path: Path) -> Campaign:

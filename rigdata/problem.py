@@ -65,3 +65,8 @@ class RigDataError(RigError):
 
     def __reduce__(self) -> tuple[type[RigDataError], tuple[tuple[Problem, ...]]]:
         return RigDataError, (self.problems,)  # so that it travels back whole from a worker process
+
+
+def refuse(file: str, place: str, what: str, cure: str, run: str | None = None) -> RigDataError:
+    """The error to raise for one thing that stops the reading: file, place, what is wrong, what to do."""
+    return RigDataError(Problem("error", file, place, what, cure, run))

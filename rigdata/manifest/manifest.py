@@ -13,7 +13,7 @@ from rigdata.calibration import Channel
 from rigdata.manifest.channels import TextFile, read_channels
 from rigdata.manifest.runs import RunEntry, read_runs
 from rigdata.manifest.table import Findings, Table, key_lines
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import Problem, RigDataError, refuse
 
 SCHEMA = "tpjb-rig/1"
 #: Frequencies of the mains in any country [Hz].
@@ -101,28 +101,20 @@ def _mains(table: Table) -> float | None:
 
 def _load_toml(text: str, file: str) -> dict[str, Any]:
     if len(text) > MAX_MANIFEST:
-        raise RigDataError(
-            Problem(
-                "error",
-                file,
-                "",
-                f"the manifest is larger than {MAX_MANIFEST >> 20} MB",
-                "Is it the right file?",
-            )
-        )
+        raise refuse(file, "", f"the manifest is larger than {MAX_MANIFEST >> 20} MB", "Is it the right file?")
     for number, line in enumerate(text.split("\n"), start=1):
         # Dotted keys nest as deeply as they are long, and parsing them takes the square of it.
         if len(line) > MAX_LINE or (line.count(".") > MAX_DOTS and _QUOTED.sub("", line).count(".") > MAX_DOTS):
             what = "the line is far too long, or nests far too deeply"
-            raise RigDataError(Problem("error", file, f"line {number}", what, "Shorten or break it"))
+            raise refuse(file, f"line {number}", what, "Shorten or break it")
     cure = "Mend the TOML at this place"
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise RigDataError(Problem("error", file, "", f"not valid TOML: {error}", cure)) from error
+        raise refuse(file, "", f"not valid TOML: {error}", cure) from error
     except (RecursionError, ValueError) as error:  # deep nesting; integers of thousands of digits
         what = f"not usable TOML: {type(error).__name__}, nested too deep or a number too long"
-        raise RigDataError(Problem("error", file, "", what, cure)) from error
+        raise refuse(file, "", what, cure) from error
 
 
 def _read_csv(table: Table, findings: Findings) -> CsvSpec:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import FORMATS, TEXT, suffix_hint
 from rigdata.readers.formats.foreign import read_foreign
 from rigdata.readers.series import Series, without_twins
@@ -41,7 +41,7 @@ def record_files(folder: Path) -> list[Path]:
         others = [p for p in sorted(folder.rglob("*")) if p.is_file() and not p.name.startswith(".")][:1]
         cure = suffix_hint(others[0]) if others else f"known are {', '.join((*TEXT, *FORMATS))}"
         named = f"{others[0].name}: {cure}" if others else cure.capitalize()
-        raise RigDataError(Problem("error", str(folder), "", "holds no records", named))
+        raise refuse(str(folder), "", "holds no records", named)
     return found
 
 
@@ -54,8 +54,7 @@ def records_below(folder: Path) -> list[Path]:
         if path.suffix.lower() in known and path.is_file() and not hidden:
             found.append(path)
         if len(found) > MOST_FILES:
-            problem = Problem("error", str(folder), "", f"holds more than {MOST_FILES} records", "Give a folder below")
-            raise RigDataError(problem)
+            raise refuse(str(folder), "", f"holds more than {MOST_FILES} records", "Give a folder below")
     return found
 
 
