@@ -11,17 +11,13 @@ import pytest
 
 from rigdata.problem import RigDataError
 from tpjb_ident.conditions import sentences
-from tpjb_ident.pivot.assemble import Choice, assemble_curve
-from tpjb_ident.pivot.bad_holds import GROUPS_ON_RAMP, bad_blocks
-from tpjb_ident.pivot.fit import LAWS, MODEL_ERROR, REFERENCE_SHARE, UNKNOWN_ZERO, _fit_data
-from tpjb_ident.pivot.laws.law_fit import LawFit
-from tpjb_ident.pivot.records.blocks import Blocks
-from tpjb_ident.pivot.records.dry_record import DryRecord, read_dry_run
-from tpjb_ident.pivot.records.pickup import PickupSignature
-from tpjb_ident.pivot.records.projection import PadDirection, project
-from tpjb_ident.pivot.records.refusals import check_directions, check_pickup, check_placement
-from tpjb_ident.pivot.records.settings import PivotSettings
-from tpjb_ident.pivot.records.steps import Hold
+from tpjb_ident.pivot.blocks import Blocks, PivotSettings
+from tpjb_ident.pivot.dry_record import DryRecord, PadDirection, PickupSignature, project, read_dry_run
+from tpjb_ident.pivot.fit import LAWS, MODEL_ERROR, REFERENCE_SHARE, UNKNOWN_ZERO, Choice, _fit_data, assemble_curve
+from tpjb_ident.pivot.fit_data import GROUPS_ON_RAMP, bad_blocks
+from tpjb_ident.pivot.law_fit import LawFit
+from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement
+from tpjb_ident.pivot.steps import Hold
 from tpjb_ident.slow_records.bad_samples import refuse_flat_channels
 from tpjb_ident.slow_records.noise import NoiseModel
 
@@ -471,7 +467,7 @@ def test_the_shorter_vector_ends_the_record():
 
 @pytest.mark.parametrize("top", [1000.0, 4000.0])
 def test_after_a_reversal_the_pivot_sticks_for_eight_per_cent(top):
-    from tpjb_ident.pivot.bad_holds import sticking
+    from tpjb_ident.pivot.fit_data import sticking
 
     load = top * np.array([0.5, 0.8, 1.0, 0.97, 0.93, 0.91, 0.8, 0.95, 0.5, 0.53, 0.55, 0.9])
     branch = np.array([1, 1, 1, -1, -1, -1, -1, -1, -1, 1, 1, 1])

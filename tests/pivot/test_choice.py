@@ -8,19 +8,18 @@ import math
 import numpy as np
 import pytest
 
-from tpjb_ident.pivot.assemble import contact_onset, contact_onset_se
-from tpjb_ident.pivot.fit import LAWS
-from tpjb_ident.pivot.laws.choice import (
+from tpjb_ident.pivot.blocks import LAW_NAMES, PivotSettings
+from tpjb_ident.pivot.fit import LAWS, contact_onset, contact_onset_se
+from tpjb_ident.pivot.law_fit import (
     ALIKE,
     HOPELESS,
     SMALLEST_SHARE,
+    LawFit,
     keep_likely,
     posterior_weights,
     shared_priors,
     with_shared_shape,
 )
-from tpjb_ident.pivot.laws.law_fit import LawFit
-from tpjb_ident.pivot.records.settings import LAW_NAMES, PivotSettings
 
 REFERENCE = 2000.0
 

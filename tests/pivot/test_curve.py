@@ -11,13 +11,10 @@ from scipy.interpolate import PchipInterpolator
 
 from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot import pads_table, pivot_table, pivots_text, write_pivots
-from tpjb_ident.pivot.assemble import contact_onset, contact_onset_se
-from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
-from tpjb_ident.pivot.fit import LAWS
-from tpjb_ident.pivot.hysteresis import measure_loop
-from tpjb_ident.pivot.laws.choice import keep_likely, posterior_weights
-from tpjb_ident.pivot.laws.law_fit import FitData, fit_law
-from tpjb_ident.pivot.records.projection import PadDirection
+from tpjb_ident.pivot.curve import PivotCurve, PivotSteps, measure_loop
+from tpjb_ident.pivot.dry_record import PadDirection
+from tpjb_ident.pivot.fit import LAWS, contact_onset, contact_onset_se
+from tpjb_ident.pivot.law_fit import FitData, fit_law, keep_likely, posterior_weights
 
 REFERENCE = 2000.0
 LOADS = np.array([50.0, 250.0, 1000.0, 2000.0, 4000.0, 8000.0])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tpjb_ident.pivot.fit import LAWS
-from tpjb_ident.pivot.laws.law_fit import CONTACT_GAP, FitData, ShapePrior, fit_law
-from tpjb_ident.pivot.records.steps import find_holds
+from tpjb_ident.pivot.law_fit import CONTACT_GAP, FitData, ShapePrior, fit_law
+from tpjb_ident.pivot.steps import find_holds
 
 RATE = 500.0
 U = np.geomspace(0.05, 4.0, 30)

@@ -86,7 +86,7 @@ def test_point_contact_tangent_is_one_and_a_half_secants():
 
 def test_a_spline_can_be_a_power_law():
     law, power = LAWS["spline"], LAWS["power"]
-    from tpjb_ident.pivot.laws.spline_law import FIXED, NODES
+    from tpjb_ident.pivot.laws import FIXED, NODES
 
     q = np.delete(-0.3 * NODES, FIXED)
     assert law.psi(LOADS, q)[0] == pytest.approx(power.psi(LOADS, np.array([0.7]))[0], rel=1e-9)

@@ -8,10 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from tpjb_ident.pivot.records.blocks import Blocks
-from tpjb_ident.pivot.records.dry_record import noise_about_curve, noise_within_holds
-from tpjb_ident.pivot.records.pickup import PickupSignature, measure_pickup, mistakes
-from tpjb_ident.pivot.records.projection import Projection
+from tpjb_ident.pivot.blocks import Blocks
+from tpjb_ident.pivot.dry_record import (
+    PickupSignature,
+    Projection,
+    measure_pickup,
+    mistakes,
+    noise_about_curve,
+    noise_within_holds,
+)
 from tpjb_ident.slow_records.noise import DRIFT_OVER_FLICKER, NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 
 BLOCK = 0.1
@@ -337,7 +342,7 @@ def test_a_reversed_channel_is_named(channel):
 
 def test_by_chance_alone_signatures_differ_by_chi_square():
     """Three complex parameters are left of four channels: six degrees of freedom, whatever the factor between runs."""
-    from tpjb_ident.pivot.records.pickup import _mismatch
+    from tpjb_ident.pivot.dry_record import _mismatch
 
     noise = np.array([0.01, 0.03, 0.02, 0.05])
     drawn = []

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tpjb_ident.pivot.records.projection import (
+from tpjb_ident.pivot.dry_record import (
     PadDirection,
     Projection,
     displacement_direction,

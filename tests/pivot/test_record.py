@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tpjb_ident.pivot.records.blocks import MOST_BLOCKS, Samples, cut_blocks
-from tpjb_ident.pivot.records.steps import MAINS_PERIOD, Hold, _bin, find_holds
+from tpjb_ident.pivot.blocks import MOST_BLOCKS, Samples, cut_blocks
+from tpjb_ident.pivot.steps import MAINS_PERIOD, Hold, _bin, find_holds
 from tpjb_ident.slow_records.bad_samples import good_samples
 
 RATE = 500.0

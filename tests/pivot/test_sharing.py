@@ -7,10 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tpjb_ident.pivot.dry_record import measure_pickup, mistakes
 from tpjb_ident.pivot.fit import LAWS
-from tpjb_ident.pivot.laws.choice import ALIKE, posterior_weights, shared_priors, with_shared_shape
-from tpjb_ident.pivot.laws.law_fit import FitData, ShapePrior, fit_law
-from tpjb_ident.pivot.records.pickup import measure_pickup, mistakes
+from tpjb_ident.pivot.law_fit import (
+    ALIKE,
+    FitData,
+    ShapePrior,
+    fit_law,
+    posterior_weights,
+    shared_priors,
+    with_shared_shape,
+)
 
 REFERENCE = 2000.0
 NAMES = ("hertz-point", "point-in-series", "power")

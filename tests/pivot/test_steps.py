@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tpjb_ident.pivot.bad_holds import sticking
-from tpjb_ident.pivot.records.blocks import MOST_BLOCKS, Samples, cut_blocks
-from tpjb_ident.pivot.records.steps import find_holds
+from tpjb_ident.pivot.blocks import MOST_BLOCKS, Samples, cut_blocks
+from tpjb_ident.pivot.fit_data import sticking
+from tpjb_ident.pivot.steps import find_holds
 from tpjb_ident.slow_records.bad_samples import good_samples
 
 RATE = 500.0

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from tpjb_ident.pivot.records.projection import PadDirection
-from tpjb_ident.pivot.records.refusals import structure_behind
+from tpjb_ident.pivot.dry_record import PadDirection
+from tpjb_ident.pivot.refusals import structure_behind
 
 PADS = np.radians([270.0, 342.0, 54.0, 126.0, 198.0])
 LIMIT = math.radians(30.0)

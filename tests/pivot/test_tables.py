@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 
 from tpjb_ident.conditions import Condition
-from tpjb_ident.pivot.curve import EXTRAPOLATION_SPREAD, PivotCurve, PivotSteps
+from tpjb_ident.pivot.curve import EXTRAPOLATION_SPREAD, Hysteresis, PivotCurve, PivotSteps, measure_loop
+from tpjb_ident.pivot.dry_record import PadDirection
 from tpjb_ident.pivot.fit import LAWS
-from tpjb_ident.pivot.hysteresis import Hysteresis, measure_loop
-from tpjb_ident.pivot.laws.law_fit import LawFit
-from tpjb_ident.pivot.pivots_toml import pivots_text, table_loads, write_pivots
-from tpjb_ident.pivot.records.projection import PadDirection
-from tpjb_ident.pivot.table import load_grid, pads_table, pivot_table
+from tpjb_ident.pivot.law_fit import LawFit
+from tpjb_ident.pivot.tables import load_grid, pads_table, pivot_table, pivots_text, table_loads, write_pivots
 
 REFERENCE, SCALE = 2000.0, 4e-9
 

@@ -19,7 +19,7 @@ HANDED_ON = ("tpjb_ident/__init__.py", "model/__init__.py", "rigdata/__init__.py
 #: File and name of what a user's own piece implements or is handed; "=" is the name of the file.
 EXTENSION_POINTS = {
     "an effect": ("model/effects/*.py:apply", "model/setup.py:Setup"),
-    "a pivot law": ("model/pivots.py:PivotLaw", "tpjb_ident/pivot/laws/laws.py:Law"),
+    "a pivot law": ("model/pivots.py:PivotLaw", "tpjb_ident/pivot/laws.py:Law"),
     "a film": ("model/film/models.py:*", "model/film/reynolds.py:solve_film", "model/film/reynolds.py:FilmForces"),
     "a reader": (
         "rigdata/readers/formats/*.py:read_series",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def measured_laws(curves: Sequence[PivotCurve], n_pads: int, source: str = "") -> tuple[PivotLaw, ...]:
     """Turn measured curves into pivot laws, pad #1 first."""
-    from tpjb_ident.pivot.pivots_toml import pad_table
+    from tpjb_ident.pivot.tables import pad_table
 
     if not curves:
         raise ValueError("curves must hold at least one PivotCurve")

@@ -10,10 +10,16 @@ import numpy as np
 
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.pivot.records.dry_record import DryRecord, axial_channels, refusal
-from tpjb_ident.pivot.records.pickup import mistakes
-from tpjb_ident.pivot.records.projection import PadDirection, displacement_direction, load_direction
-from tpjb_ident.pivot.records.settings import PivotSettings
+from tpjb_ident.pivot.blocks import PivotSettings
+from tpjb_ident.pivot.dry_record import (
+    DryRecord,
+    PadDirection,
+    axial_channels,
+    displacement_direction,
+    load_direction,
+    mistakes,
+    refusal,
+)
 from tpjb_ident.slow_records.noise import NoiseModel
 
 ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres

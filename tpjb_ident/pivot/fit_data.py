@@ -12,10 +12,10 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
-from tpjb_ident.pivot.laws.law_fit import FitData, LawFit, fit_law
-from tpjb_ident.pivot.laws.laws import Law
-from tpjb_ident.pivot.records.dry_record import DryRecord
-from tpjb_ident.pivot.records.settings import PivotSettings
+from tpjb_ident.pivot.blocks import PivotSettings
+from tpjb_ident.pivot.dry_record import DryRecord
+from tpjb_ident.pivot.law_fit import FitData, LawFit, fit_law
+from tpjb_ident.pivot.laws import Law
 from tpjb_ident.slow_records.noise import NoiseModel
 
 MakeData = Callable[[Sequence[DryRecord], Sequence[BoolArray], NoiseModel, PivotSettings], FitData]

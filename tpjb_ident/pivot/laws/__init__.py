@@ -1,1 +1,0 @@
-"""Load-deflection laws of a pivot, their fit and the choice among them."""
