@@ -21,8 +21,14 @@ from rigdata.virtual_rig import (
     VirtualRig,
     write_campaign,
 )
-from tpjb_ident.clearance.measure import coldest_run, measure_clearance, measure_run
-from tpjb_ident.clearance.polygon_pairs import clearance_change, pairs_frame, radial_stiffness
+from tpjb_ident.clearance.measure import (
+    clearance_change,
+    coldest_run,
+    measure_clearance,
+    measure_run,
+    pairs_frame,
+    radial_stiffness,
+)
 from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot import fit_pivots
 

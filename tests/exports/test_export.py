@@ -10,8 +10,7 @@ import pandas as pd
 import pytest
 
 from tpjb_ident.errors import NotTrustedError
-from tpjb_ident.exports.formats import FORMATS, ExportError, export_format
-from tpjb_ident.exports.points import COLUMNS, static_points
+from tpjb_ident.exports.formats import COLUMNS, FORMATS, ExportError, export_format, static_points
 from tpjb_ident.exports.rotor_programs import (
     ross_text,
     speed_tables,

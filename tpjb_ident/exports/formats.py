@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from rigdata.near_names import nearest_name
+from tpjb_ident.arrays import BoolArray, FloatArray
+from tpjb_ident.condition_kinds import ERRORS
 from tpjb_ident.errors import TpjbError
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_COLUMNS, coefficient_column
 
 if TYPE_CHECKING:
-    from tpjb_ident.exports.points import StaticPoint
+    import pandas as pd
+
+    from tpjb_ident.exports.formats import StaticPoint
 
 
 class ExportError(TpjbError):
@@ -76,3 +84,134 @@ def export_format(name: str) -> Format:
         hint = f"Did you mean {near!r}?" if near else f"Use one of {', '.join(FORMATS)}."
         raise ExportError(f"--to: {name!r} is not known. {hint}")
     return FORMATS[name]
+
+
+COLUMNS = {name[:3]: name for name in COEFFICIENT_COLUMNS}
+
+
+@dataclass(frozen=True)
+class StaticPoint:
+    """Coefficients of one static load and speed over excitation frequency.
+
+    Attributes
+    ----------
+    load : float
+        [N]
+    direction : float
+        [deg]
+    speed : float
+        [Hz]
+    frequency : (n,) ndarray
+        Excitation [rad/s], rising.
+    coefficients : dict of str to (n,) ndarray
+        ``"kxx"`` .. ``"cyy"`` [N/m], [N s/m].
+    low, high : dict of str to (n,) ndarray
+        Ends of their 95 % intervals; NaN where the table has none, as of a prediction.
+    quality : tuple of str
+        Per frequency the named conditions, ``"ok"`` if there are none.
+    trusted : (n,) bool ndarray
+        False where the coefficients are exported against advice.
+    """
+
+    load: float
+    direction: float
+    speed: float
+    frequency: FloatArray = field(repr=False)
+    coefficients: dict[str, FloatArray] = field(repr=False)
+    low: dict[str, FloatArray] = field(repr=False)
+    high: dict[str, FloatArray] = field(repr=False)
+    quality: tuple[str, ...] = ()
+    trusted: BoolArray = field(repr=False, default_factory=lambda: np.zeros(0, bool))
+
+    @property
+    def tag(self) -> str:
+        """Name that says what the frequency axis means."""
+        return f"{self.load:.0f}N_{self.direction:g}deg_{self.speed:g}Hz_excitation"
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """A sentence per frequency that has something against it."""
+        return tuple(
+            f"{'' if ok else 'NOT TO BE TRUSTED, '}at {omega / (2 * math.pi):g} Hz: {said}"
+            for omega, said, ok in zip(self.frequency, self.quality, self.trusted, strict=True)
+            if said != "ok"
+        )
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What of a table can leave."""
+
+    points: tuple[StaticPoint, ...]
+    left_out: tuple[str, ...] = ()
+    doubtful: tuple[str, ...] = ()
+
+
+def static_points(frame: pd.DataFrame, force: bool = False) -> Chosen:
+    """Sort a coefficient table by static point; what is not to be trusted stays behind."""
+    needed = [*POINT_COLUMNS, *COLUMNS.values()]
+    missing = [name for name in needed if name not in frame.columns]
+    if missing:
+        raise ExportError(f"the table has no column {missing[0]}. Give a coefficients.csv or prediction.csv of tpjb.")
+    finite = np.isfinite(frame[needed].to_numpy(dtype=float)).all(axis=1)
+    left_out = tuple(_place(row) for _, row in frame[~finite].iterrows())
+    if not finite.any():
+        raise ExportError("no point of the table has finite coefficients. Identify or predict again.")
+    usable = frame[finite]
+    reasons = [doubts(row) for _, row in usable.iterrows()]
+    doubtful = tuple(f"{_place(row)}: {why}" for (_, row), why in zip(usable.iterrows(), reasons, strict=True) if why)
+    usable = usable.assign(_trusted=[not why for why in reasons], _doubts=reasons)
+    chosen = usable if force else usable[usable["_trusted"]]
+    points = [_point(keys, group) for keys, group in chosen.groupby(list(STATIC_COLUMNS), sort=True)]
+    return Chosen(tuple(points), left_out, doubtful)
+
+
+def _place(row: pd.Series) -> str:
+    return f"{row['static_load_N']:g} N, {row['excitation_Hz']:g} Hz"
+
+
+def _point(keys: tuple[float, float, float], group: pd.DataFrame) -> StaticPoint:
+    ordered = group.sort_values("excitation_Hz")
+    if ordered["excitation_Hz"].duplicated().any():
+        raise ExportError(f"the point {keys[0]:g} N stands twice at one frequency. Export one method at a time.")
+    omega = 2 * math.pi * ordered["excitation_Hz"].to_numpy(dtype=float)
+    values, low, high = (
+        {short: _numbers(ordered, column + end) for short, column in COLUMNS.items()} for end in ("", "_lo", "_hi")
+    )
+    quality = ordered["quality"] if "quality" in ordered else ordered.get("status")
+    said = [""] * len(ordered) if quality is None else list(quality)
+    words = tuple(_with_doubts(text, why) for text, why in zip(said, ordered["_doubts"], strict=True))
+    return StaticPoint(
+        float(keys[0]), float(keys[1]), float(keys[2]), omega, values, low, high, words,
+        ordered["_trusted"].to_numpy(bool),
+    )  # fmt: skip
+
+
+def _with_doubts(quality: object, doubts: str) -> str:
+    """Named conditions of a row with what forbids trust, each once; ``"ok"`` if there is nothing."""
+    names = quality.split("; ") if isinstance(quality, str) and quality not in ("", "ok") else []
+    return "; ".join(dict.fromkeys([*names, *(part for part in doubts.split("; ") if part)])) or "ok"
+
+
+def _numbers(table: pd.DataFrame, column: str) -> FloatArray:
+    return table[column].to_numpy(dtype=float) if column in table else np.full(len(table), np.nan)
+
+
+def doubts(row: Mapping[str, Any]) -> str:
+    """Say why a row of coefficients is not to be trusted.
+
+    A film's direct stiffness and damping are positive by the sign convention of CONTRIBUTING; a wrong polarity of a
+    probe or cell turns the sign of one or of all of them.
+    """
+    quality = row.get("quality")
+    found = [name for name in quality.split("; ") if name in ERRORS] if isinstance(quality, str) else []
+    if row.get("converged") is False or str(row.get("converged")) == "False":
+        found.append("the model did not converge")
+    for name in ("kxx", "kyy", "cxx", "cyy"):
+        column = coefficient_column(name)
+        value, high = float(row[column]), float(row.get(f"{column}_hi", math.nan))
+        kind = KINDS[name[0]]
+        if (high if math.isfinite(high) else value) < 0:
+            size = f"{value / kind.display_scale:.4g} {kind.display_unit}"
+            found.append(f"{name} is negative ({size}): check polarity and axes of probes and cells")
+    return "; ".join(found)

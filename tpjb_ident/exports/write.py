@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.errors import NotTrustedError
-from tpjb_ident.exports.formats import ExportError, export_format
-from tpjb_ident.exports.points import Chosen, static_points
+from tpjb_ident.exports.formats import Chosen, ExportError, export_format, static_points
 from tpjb_ident.exports.table import write_intervals
 
 if TYPE_CHECKING:

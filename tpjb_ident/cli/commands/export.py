@@ -21,7 +21,7 @@ from tpjb_ident.runtime.provenance import sha256
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tpjb_ident.exports.points import Chosen
+    from tpjb_ident.exports.formats import Chosen
 
 Source = Annotated[
     Path,

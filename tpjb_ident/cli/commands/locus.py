@@ -103,7 +103,7 @@ def _write_pairs(folder: Path, polygon: ClearancePolygon, others: Sequence[Clear
     """Write all polygons, and each beside the one that counts."""
     import pandas as pd
 
-    from tpjb_ident.clearance.polygon_pairs import pairs_frame
+    from tpjb_ident.clearance.measure import pairs_frame
 
     frames = [one.to_frame() for one in (polygon, *others)]
     write_table(folder, "clearance_runs", pd.concat(frames, ignore_index=True))
