@@ -18,7 +18,7 @@ from tpjb_ident.watch.next_steps import described, lacking, said
 
 if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.point_result import PointResult
-    from tpjb_ident.watch.run_status import RunStatus
+    from tpjb_ident.watch.next_steps import RunStatus
     from tpjb_ident.watch.watcher import Snapshot
 
 #: Words of the page for the states of a run.

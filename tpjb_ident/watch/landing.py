@@ -1,11 +1,20 @@
-"""When a record has landed: nobody has written to it for a while, and nobody did while it was read."""
+"""Records that have landed: nobody writes to them any more; those that no run names, by their name or content."""
 
 from __future__ import annotations
 
+import math
+import re
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
+
+from rigdata.campaign import Campaign, run_in_file
+from rigdata.problem import Problem, RigDataError
+from rigdata.run import Run
+from tpjb_ident.arrays import FloatArray
 
 
 @dataclass(frozen=True)
@@ -61,3 +70,101 @@ class Landings:
             else:
                 moving.append(path)
         return resting, moving
+
+
+#: What loggers and people append to the name of a record that is made again.
+_AGAIN = re.compile(r"[-_. (]*(?:r|rep|repeat|again|copy|wdh|bis|v|no|nr)?[-_. ]*\d{0,4}[a-d]?\)?", re.IGNORECASE)
+#: How near the record must be to a planned set point: load vector and frequency as shares, direction [rad].
+NEAR_LOAD, NEAR_LINE, NEAR_DIRECTION = 0.1, 0.01, math.radians(10.0)
+#: The planned line must hold this share of the swinging of the force.
+_DRIVEN = 0.5
+
+
+@dataclass(frozen=True)
+class Unplanned:
+    """A record that the manifest does not name."""
+
+    file: str
+    run: Run | None
+    like: str
+    why: str
+
+
+def place_record(campaign: Campaign, path: Path, done: frozenset[str]) -> Unplanned:
+    """Find the planned run that a record is, or repeats."""
+    file = path.relative_to(campaign.path).as_posix()
+    taken = {run.id for run in campaign.runs}
+    named = [r for r in campaign.runs if _named_like(path.stem, r.id)]
+    if named:
+        like = max(named, key=lambda r: len(r.id))
+        again = "repeats" if like.id in done else "is"
+        own = path.stem if path.stem not in taken else file
+        return Unplanned(file, run_in_file(like, path, file, own), like.id, f"{again} {like.id} by its name")
+    try:
+        found = _by_content(campaign, path, file)
+    except RigDataError as error:
+        return Unplanned(file, None, "", f"cannot be read ({error.problems[0].what})")
+    if found is None:
+        return Unplanned(file, None, "", "no planned run has its load, frequency and direction")
+    again = "repeats" if found.id in done else "is"
+    own = path.stem if path.stem not in taken else file
+    return Unplanned(file, run_in_file(found, path, file, own), found.id, f"{again} {found.id} by load and line")
+
+
+def _named_like(stem: str, run_id: str) -> bool:
+    return stem.lower().startswith(run_id.lower()) and bool(_AGAIN.fullmatch(stem[len(run_id) :]))
+
+
+def _by_content(campaign: Campaign, path: Path, file: str) -> Run | None:
+    """The one planned dynamic or locus run whose mean force and line the record shows; None if none or several."""
+    candidates = [r for r in campaign.runs if r.kind in ("dynamic", "locus")]
+    if not candidates:
+        return None
+    trial = run_in_file(candidates[0], path, file, path.stem)
+    force, rate = trial.vector("force").values, trial.sample_rate
+    force = force[np.isfinite(force).all(axis=1)]
+    if len(force) < 16:
+        return None
+    fitting = [r for r in candidates if _fits(r, force, rate)]
+    tests = {(r.kind, r.point, r.excitation_direction) for r in fitting}
+    return fitting[0] if len(tests) == 1 else None
+
+
+def _fits(run: Run, force: FloatArray, rate: float) -> bool:
+    point = run.point
+    # the housing is pulled the way the film carries the shaft: cells read the load on the shaft, reversed or not
+    planned = point.static_load * np.array(
+        [math.cos(point.static_load_direction), math.sin(point.static_load_direction)]
+    )
+    mean = force.mean(axis=0)
+    if min(np.linalg.norm(mean - planned), np.linalg.norm(mean + planned)) > NEAR_LOAD * point.static_load:
+        return False
+    swing = force - mean
+    size = float(np.sqrt((swing**2).sum(axis=1).mean()))
+    if run.kind != "dynamic":
+        return size < 0.02 * point.static_load
+    phasor = _line(swing, point.excitation_hz, rate)
+    if np.linalg.norm(phasor) < _DRIVEN * size * math.sqrt(2.0):
+        return False
+    if run.excitation_direction is None:
+        return True
+    along = np.linalg.svd(np.stack([phasor.real, phasor.imag]))[2][0]
+    away = math.atan2(along[1], along[0]) - run.excitation_direction
+    return abs((away + math.pi / 2) % math.pi - math.pi / 2) < NEAR_DIRECTION
+
+
+def _line(values: FloatArray, frequency: float, rate: float) -> np.ndarray:
+    """Phasor of every column at the strongest bin near a frequency [Hz]."""
+    time = np.arange(len(values)) / rate
+    window = np.hanning(len(values))[:, None]
+    tries = frequency * (1.0 + NEAR_LINE * np.linspace(-1.0, 1.0, 9))
+    phasors = [
+        2.0 * (values * window * np.exp(-2j * math.pi * f * time)[:, None]).sum(axis=0) / window.sum() for f in tries
+    ]
+    return max(phasors, key=lambda p: float(np.linalg.norm(p)))
+
+
+def unplanned_problem(found: Sequence[Unplanned]) -> list[Problem]:
+    """What to do with records that nothing was found for."""
+    cure = "Add a [[runs]] table for it to campaign.toml, or move it out of the folder"
+    return [Problem("warning", one.file, "", one.why, cure) for one in found if one.run is None]

@@ -16,11 +16,9 @@ from tpjb_ident.check.campaign import judged
 from tpjb_ident.check.findings import Finding
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.runtime.provenance import sha256
-from tpjb_ident.watch.landing import FileState, Landings, file_state
+from tpjb_ident.watch.landing import FileState, Landings, Unplanned, file_state, place_record, unplanned_problem
 from tpjb_ident.watch.measured import Measured, Measuring
-from tpjb_ident.watch.next_steps import Step, next_steps, plan_lacks
-from tpjb_ident.watch.run_status import RunStatus, judge_states
-from tpjb_ident.watch.unplanned import Unplanned, place_record, unplanned_problem
+from tpjb_ident.watch.next_steps import RunStatus, Step, judge_states, next_steps, plan_lacks
 
 #: Share of the usual length below which a record was cut off.
 WHOLE = 0.8

@@ -20,7 +20,7 @@ from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.tables import write_table, write_text
 
 if TYPE_CHECKING:
-    from tpjb_ident.watch.run_status import RunStatus
+    from tpjb_ident.watch.next_steps import RunStatus
     from tpjb_ident.watch.watcher import Snapshot, Watcher
 
 SCHEMA = "tpjb-watch/1"
