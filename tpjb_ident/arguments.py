@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.errors import ArgumentError
-from tpjb_ident.presentation import shown_by
 
 if TYPE_CHECKING:
+    from model.bearing import Bearing
     from rigdata.campaign import Campaign
 
 
@@ -26,6 +26,18 @@ def as_campaign(given: Any, name: str) -> Campaign:
         raise ArgumentError(f"{name}: must be a Campaign or the path of one, got {type(given).__name__}.")
     campaign: Campaign = given
     return campaign
+
+
+def as_bearing(given: Any, name: str) -> Bearing:
+    """Return the bearing given, or read its file."""
+    from model.bearing import Bearing
+    from model.bearing_file import load_bearing
+
+    if isinstance(given, Bearing):
+        return given
+    if isinstance(given, (str, Path)):
+        return load_bearing(given)
+    raise ArgumentError(f"{name}: must be a Bearing or the path of a bearing file, got {type(given).__name__}.")
 
 
 def _path(given: Any, name: str) -> Any:
@@ -52,14 +64,10 @@ def _comparison(given: Any, name: str) -> Any:
     return given
 
 
-def _bearing(given: Any, name: str) -> Any:
-    return shown_by("diagnosis.from_python", "as_bearing")(given)
-
-
 #: What arguments of these names may be.
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
-    "campaign": as_campaign, "bearing": _bearing, "source": _path, "path": _path, "folder": _folder, "curves": _curves,
-    "comparison": _comparison,
+    "campaign": as_campaign, "bearing": as_bearing, "source": _path, "path": _path, "folder": _folder,
+    "curves": _curves, "comparison": _comparison,
 }  # fmt: skip
 
 

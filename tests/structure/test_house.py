@@ -39,6 +39,10 @@ MAY_IMPORT = {
     "cli": {"rigdata", "model", "check", "dynamic", "pivot", "clearance", "compare", "diagnosis", "report", "exports",
             "view", "watch", "runtime"},
 }  # fmt: skip
+#: What a result may import inside the methods that show it: its picture, its table, its sentences.
+SHOWS = ("plot", "to_dataframe", "to_frame", "summary")
+SHOWN_BY = ("tpjb_ident/report/plots/", "tpjb_ident/report/diagnosis_words.py", "tpjb_ident/compare/tables.py",
+            "tpjb_ident/compare/summary.py", "tpjb_ident/pivot/table.py")  # fmt: skip
 #: The one way back: a campaign is checked with the line fit and the oil force of identification, and with nothing else.
 ONE_WAY_BACK = ("check", ("tpjb_ident/dynamic/records/",))
 
@@ -46,14 +50,18 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def imported_files(tree: ast.AST, files: dict[str, str]) -> set[str]:
-    """Files (values of `files`, by dotted name) that a tree imports at any depth, types apart."""
+    """Files (values of `files`, by dotted name) that a tree imports at any depth, types and `SHOWN_BY` apart."""
     found = set()
+    methods = [s for s in statements(tree) if isinstance(s, ast.FunctionDef) and s.name in SHOWS]
+    showing = {node for method in methods for node in method.body}
     for node in statements(tree):
+        names = []
         if isinstance(node, ast.ImportFrom):
-            names = [n for a in node.names for n in (f"{node.module}.{a.name}", str(node.module)) if n in files]
-            found.update(files[n] for n in names)
+            names = [n for a in node.names for n in (f"{node.module}.{a.name}", str(node.module))]
         elif isinstance(node, ast.Import):
-            found.update(files[a.name] for a in node.names if a.name in files)
+            names = [a.name for a in node.names]
+        imported = [files[n] for n in names if n in files]
+        found.update(f for f in imported if not (node in showing and f.startswith(SHOWN_BY)))
     return found
 
 

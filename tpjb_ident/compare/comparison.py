@@ -14,7 +14,7 @@ from tpjb_ident.compare.measured_pivots import counted_twice
 from tpjb_ident.compare.model_side import Asked, ModelSide, model_side
 from tpjb_ident.compare.predictions import PointPrediction, Progress
 from tpjb_ident.errors import TpjbError
-from tpjb_ident.presentation import Presented, changed, shown_by
+from tpjb_ident.presentation import Presented, changed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,12 +119,15 @@ class Comparison(Presented):
 
     def to_dataframe(self) -> pd.DataFrame:
         """``comparison.csv``."""
-        frame: pd.DataFrame = shown_by("compare.tables", "comparison_frame")(self)
-        return frame
+        from tpjb_ident.compare.tables import comparison_frame
+
+        return comparison_frame(self)
 
     def summary(self) -> str:
         """What to conclude, and what it rests on."""
-        return "\n".join(shown_by("compare.summary", "summary_sentences")(self))
+        from tpjb_ident.compare.summary import summary_sentences
+
+        return "\n".join(summary_sentences(self))
 
     def plot(self, **options: Any) -> Any:
         """Draw kxx over load, measured and predicted; see `tpjb_ident.report.plots.coefficient`.
@@ -134,7 +137,9 @@ class Comparison(Presented):
         **options
             ``name``, ``over``, ``title``.
         """
-        return shown_by("report.plots", "coefficient")(self, **{"name": "kxx", **options})
+        from tpjb_ident.report import plots
+
+        return plots.coefficient(self, **{"name": "kxx", **options})
 
     def __str__(self) -> str:
         names = ", ".join(v.name for v in self.variants)

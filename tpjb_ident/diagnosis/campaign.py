@@ -19,7 +19,7 @@ from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.presentation import Presented, shown_by
+from tpjb_ident.presentation import Presented
 
 from model.effects import Effect, apply_effects  # isort: skip
 from model.pivots import NAMED_LAWS, pivot_laws  # isort: skip
@@ -69,14 +69,17 @@ class CampaignDiagnosis(Presented):
 
     def summary(self) -> str:
         """What was found, and what it rests on."""
-        verdict_sentences = shown_by("report.diagnosis_words", "verdict_sentences")
+        from tpjb_ident.report.diagnosis_words import verdict_sentences
+
         name = self.identification.campaign if self.identification is not None else "table"
         off = median_deviations(self.to_dataframe())
         return "\n".join(verdict_sentences(name, self.diagnosis.verdict, off))
 
     def plot(self, **options: Any) -> Any:
         """Draw the gap by observable, before and after; see `tpjb_ident.report.plots.gap`."""
-        return shown_by("report.plots", "gap")(self.diagnosis, **options)
+        from tpjb_ident.report import plots
+
+        return plots.gap(self.diagnosis, **options)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from model.setup import Setup
 from model.units import to_si
 from rigdata.near_names import unknown_name
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.arguments import as_campaign
+from tpjb_ident.arguments import as_bearing, as_campaign
 from tpjb_ident.diagnosis.campaign import Baseline, CampaignDiagnosis, diagnose_campaign
 from tpjb_ident.diagnosis.observations.layout import DynamicTest, Layout
 from tpjb_ident.diagnosis.plan.plan import CampaignPlan
@@ -110,7 +110,7 @@ def plan(
     ArgumentError
         No dynamic runs.
     """
-    drawn = as_bearing(bearing)
+    drawn = as_bearing(bearing, "bearing")
     tests = points_of(points) if isinstance(points, Mapping) else points
     static = (locus, dry_tests, float(to_si(push, "force", "push")), temperatures)
     return work_out(Setup(drawn, pivot_laws(pivots, drawn)), planned_layout(drawn, tests, static))
@@ -158,16 +158,7 @@ def planned_layout(bearing: Bearing, points: Sequence[OperatingPoint], static: t
 def _bearing_of(campaign: Campaign, given: Bearing | str | Path | None) -> Bearing:
     """The bearing given, or the one that a campaign carries."""
     if given is not None:
-        return as_bearing(given)
+        return as_bearing(given, "bearing")
     if not campaign.bearing_text:
         raise ArgumentError(f"bearing: campaign {campaign.id} carries no bearing file. Give one, or its path.")
     return load_bearing(campaign.bearing_text)
-
-
-def as_bearing(given: Bearing | str | Path) -> Bearing:
-    """Return the bearing given, or read its file."""
-    if isinstance(given, Bearing):
-        return given
-    if isinstance(given, (str, Path)):
-        return load_bearing(given)
-    raise ArgumentError(f"bearing: must be a Bearing or the path of a bearing file, got {type(given).__name__}.")

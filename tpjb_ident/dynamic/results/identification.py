@@ -14,7 +14,7 @@ from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES, DynamicStiffness
 from tpjb_ident.dynamic.results.frequency_fit import FrequencyFit, LoadFits, fits_per_load
 from tpjb_ident.dynamic.results.point_result import PointResult
-from tpjb_ident.presentation import Presented, shown_by
+from tpjb_ident.presentation import Presented
 from tpjb_ident.schema import DAMPING, KINDS, POINT_COLUMNS, STATIC_COLUMNS, STIFFNESS
 
 if TYPE_CHECKING:
@@ -85,7 +85,9 @@ class Identification(Presented):
         **options
             ``part``, ``over``, ``entries``, ``title``.
         """
-        return shown_by("report.plots", "direct_coefficients")({self.campaign: self}, **options)
+        from tpjb_ident.report import plots
+
+        return plots.direct_coefficients({self.campaign: self}, **options)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per operating point, by the default method: ``coefficients.csv``."""
