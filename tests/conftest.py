@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import gc
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import hypothesis
@@ -79,12 +80,20 @@ def session_folder(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def small_campaign(session_folder) -> Path:
+def campaign_of(session_folder) -> Callable[..., Path]:
+    """Gives the read-only campaign of a virtual rig, in a layout; computed once in a run (tests/good_campaigns.py)."""
+    from tests.good_campaigns import shared_campaign
+
+    return functools.partial(shared_campaign, session_folder)
+
+
+@pytest.fixture(scope="session")
+def small_campaign(campaign_of) -> Path:
     """HDF5 campaign of a linear bearing: two loads, three directions, three locus runs, one sweep, no dry tests."""
     from dataclasses import replace
 
     from rigdata.virtual_rig import ClearanceSweep, operating_points
-    from tests.good_campaigns import SMALL_PLAN, once, rocker_rig, written
+    from tests.good_campaigns import SMALL_PLAN, rocker_rig
 
     plan = replace(
         SMALL_PLAN,
@@ -93,5 +102,4 @@ def small_campaign(session_folder) -> Path:
         clearance=(ClearanceSweep(seconds=8.0),),
     )
     text = '=HYPERLINK("http://example.invalid")<script>alert(1)</script>'
-    rig = rocker_rig(3, plan=plan, campaign="small <b>&", description=text)
-    return once(session_folder / "small.h5", lambda path: written(path, rig))
+    return campaign_of(rocker_rig(3, plan=plan, campaign="small <b>&", description=text), name="small")

@@ -2,19 +2,34 @@
 
 Two linear bearings: `stiff_rig` for what is judged by `check` (five pads from no bearing file), `rocker_rig` for whole
 commands (the rocker bearing file, three temperatures). Everything random hangs on the seed.
+
+A test that only reads its campaign takes the fixture `campaign_of` (tests/conftest.py) instead of writing one:
+
+    def test_something(campaign_of):
+        path = campaign_of(rocker_rig(3))                       # .../campaign.h5
+        folder = campaign_of(rocker_rig(3), "csv-german")       # .../campaign/
+
+The file is written by the first test of the whole run that asks for this content, whichever worker it is on: truth,
+plan, instruments, noise, faults, seed, names and layout together are the key (`content_key`). Nothing else is: give the
+same rig the same way in several tests, and it is computed once. The file is read-only and shared; what spoils, renames
+or adds to a campaign copies it first (`shutil.copy`, `shutil.copytree`) or has its own `written`. A rig of another kind
+is shared by `once(session_folder / NAME, write)`.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import (
     ClearanceSweep,
     DryTest,
@@ -29,6 +44,7 @@ from rigdata.virtual_rig import (
     operating_points,
     write_campaign,
 )
+from rigdata.virtual_rig.layout import CsvLayout, Layout, layout_named
 
 BEARINGS = Path(__file__).resolve().parents[1] / "model" / "bearings"
 STIFFNESS = np.array([[3.0e8, 0.2e8], [-0.3e8, 4.5e8]])
@@ -79,10 +95,61 @@ def rocker_rig(seed: int, *faults: Fault, plan: RigPlan = SMALL_PLAN, **names: s
     return VirtualRig(truth, plan, instruments, Noise.like_samples(), faults=faults, seed=seed, **names)
 
 
-def written(path: Path, rig: VirtualRig, layout: str = "hdf5") -> Path:
+def written(path: Path, rig: VirtualRig, layout: str | Layout = "hdf5") -> Path:
     """Write a rig's campaign; its path."""
     write_campaign(path, rig, layout)
     return path
+
+
+def shared_campaign(folder: Path, rig: VirtualRig, layout: str | Layout = "hdf5", name: str = "campaign") -> Path:
+    """The read-only campaign of `rig` in `folder`, written by the first who asks; see the top of this file."""
+    layout = layout_named(layout)
+    place = folder / f"campaign-{content_key(rig, layout)}"
+    place.mkdir(exist_ok=True)
+    return once(
+        place / (name if isinstance(layout, CsvLayout) else f"{name}.h5"),
+        lambda path: _read_only(written(path, rig, layout)),
+    )
+
+
+def _read_only(path: Path) -> None:
+    for file in [path, *path.rglob("*")]:
+        if file.is_file():
+            file.chmod(0o444)
+
+
+def content_key(rig: VirtualRig, layout: Layout) -> str:
+    """What a campaign is made of, as a hash: plain fields by what they print, laws by their values at the points."""
+    digest = hashlib.sha256(f"{type(layout).__name__} {asdict(layout)}".encode())
+    truth = rig.truth
+    for part in (
+        rig.plan,
+        rig.instruments,
+        rig.noise,
+        *rig.faults,
+    ):
+        digest.update(f"{type(part).__name__} {asdict(part)}".encode())
+    plain = (rig.seed, rig.campaign, rig.description, truth.pivot_angles, truth.clearance)
+    digest.update(f"{plain} {truth.bearing_name} {truth.bearing_text} {truth.cold_temperature}".encode())
+    for point in _probed(rig):
+        for law in (truth.stiffness, truth.position, truth.temperature):
+            digest.update(np.asarray(law(point), dtype=complex).tobytes())
+    for pad in range(1, len(truth.pivot_angles) + 1):
+        digest.update(np.asarray(truth.pivot_deflection(pad, np.linspace(0.0, 2e4, 41)), dtype=float).tobytes())
+    return digest.hexdigest()[:20]
+
+
+def _probed(rig: VirtualRig) -> Iterator[OperatingPoint]:
+    """Every planned point, and one a little off: a rig that misses its set points asks the laws there."""
+    for point in dict.fromkeys(run.point for run in rig.runs() if run.point is not None):
+        yield point
+        yield replace(
+            point,
+            static_load=1.01 * point.static_load,
+            static_load_direction=point.static_load_direction + 0.01,
+            shaft_speed=1.01 * point.shaft_speed,
+            excitation=1.01 * point.excitation,
+        )
 
 
 def once(path: Path, write: Callable[[Path], object], patience: float = 120.0) -> Path:
