@@ -36,6 +36,8 @@ DIMENSIONS = {
 UNCALIBRATED = ("command", "keyphasor")
 #: Quantities with a direction in the bearing's plane.
 VECTOR_QUANTITIES = ("displacement", "force", "acceleration")
+#: Loggers write readings of this size and more for an overflow.
+OVERFLOW = 1e30
 _ZERO_CELSIUS = 273.15
 
 
@@ -117,7 +119,7 @@ class Channel:
         """
         values = np.array(reading, dtype=np.float64)
         with np.errstate(invalid="ignore"):  # a NaN compared is what "no value" looks like
-            values[~(np.abs(values) < 1e30)] = np.nan
+            values[~(np.abs(values) < OVERFLOW)] = np.nan
         values *= self.slope
         values += self.zero
         return values

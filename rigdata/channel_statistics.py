@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from rigdata.calibration import OVERFLOW
 
-_OVERFLOW = 1e30
 _LEVELS = 100
 
 
@@ -32,7 +32,7 @@ class ChannelStatistics:
         """Take the next block, (n,) readings as the file holds them."""
         if len(readings) == 0:
             return
-        valid = np.isfinite(readings) & (np.abs(np.nan_to_num(readings)) < _OVERFLOW)
+        valid = np.isfinite(readings) & (np.abs(np.nan_to_num(readings)) < OVERFLOW)
         self.missing += int(len(readings) - np.count_nonzero(valid))
         values = readings if valid.all() else readings[valid]
         if not len(values):

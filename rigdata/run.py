@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
@@ -14,8 +15,8 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import LEAST_RATE, MOST_RATE, RunReader
 from rigdata.record import Record, VectorRecord
-from rigdata.rows import FileRows, RowReader
-from rigdata.vector import COLLINEAR_SINE, solve_vector
+from rigdata.rows import RowReader, Rows
+from rigdata.vector import COLLINEAR_SINE, vector_rows
 
 
 @dataclass(frozen=True)
@@ -159,26 +160,31 @@ class Run:
         RigDataError
             Fewer than two channels, all of them along one line, or the file cannot give them.
         """
+        channels = self._vector_channels(quantity)
+        names = tuple(c.name for c in channels)
+        first, last = self._slice(start, stop)
+        rows = vector_rows(channels, self.reader.read(names, first, last))
+        rate = self.sample_rate  # refused before times are counted from it
+        return VectorRecord(
+            quantity=quantity,
+            values=np.ascontiguousarray(rows.T),
+            time=self.reader.time(first, last),
+            rate=rate,
+            names=names,
+        )
+
+    def _vector_channels(self, quantity: str) -> list[Channel]:
+        """Channels that X and Y of a quantity come from."""
         chosen = [c for c in self.channels.values() if c.quantity == quantity and c.axis is not None]
-        names = tuple(c.name for c in chosen)
         if len(chosen) < 2:
             cure = f"Describe two {quantity} channels with different axes in the manifest"
             raise self._error(f"quantity {quantity}", f"has {len(chosen)} channels, two are needed", cure)
         axes = np.array([c.axis for c in chosen])
         if not np.any(np.abs(np.sin(axes - axes[0])) > COLLINEAR_SINE):
             cure = "Two channels at different angles (3 deg apart or more) are needed; check their axis"
-            raise self._error(f"channels {', '.join(names)}", "all measure along one line", cure)
-        first, last = self._slice(start, stop)
-        readings = self.reader.read(names, first, last)
-        values = np.stack([c.to_si(r) for c, r in zip(chosen, readings)], axis=1)
-        rate = self.sample_rate  # refused before times are counted from it
-        return VectorRecord(
-            quantity=quantity,
-            values=solve_vector(axes, values),
-            time=self.reader.time(first, last),
-            rate=rate,
-            names=names,
-        )
+            names = ", ".join(c.name for c in chosen)
+            raise self._error(f"channels {names}", "all measure along one line", cure)
+        return chosen
 
     def row_reader(self, quantities: Sequence[str]) -> RowReader:
         """Reader of several quantities, all their channels in one request per stretch.
@@ -188,7 +194,7 @@ class Run:
         quantities : sequence of str
             As of `vector`.
         """
-        return FileRows(self, quantities)
+        return _FileRows(self, quantities)
 
     def kept_open(self) -> AbstractContextManager[None]:
         """Keep the file open while the block runs, where its reader can do that; nested blocks share it."""
@@ -197,9 +203,8 @@ class Run:
 
     def temperatures(self) -> tuple[Channel, ...]:
         """Temperature channels of this run, by pad and position."""
-        found = [c for c in self.channels.values() if c.quantity == "temperature"]
-        found.sort(key=lambda c: (c.pad or 0, c.position or 0.0, c.name))
-        return tuple(found)
+        thermometers = [c for c in self.channels.values() if c.quantity == "temperature"]
+        return tuple(sorted(thermometers, key=lambda c: (c.pad or 0, c.position or 0.0, c.name)))
 
     def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
         """Read the shaft speed [rad/s], from pulses if need be; None where no channel measures it.
@@ -221,29 +226,52 @@ class Run:
         return None
 
 
+class _FileRows:
+    """Rows of a run's file, all channels in one request."""
+
+    def __init__(self, run: Run, quantities: Sequence[str]) -> None:
+        self._run, self._quantities = run, quantities
+        self._tachometers = [c for c in run.channels.values() if c.quantity == "speed"][:1]
+        counted = getattr(run.reader, "counted", None)
+        self._counted = counted is not None and counted()
+
+    def read(self, start: int, stop: int) -> Rows:
+        """Samples start..stop-1."""
+        reader = self._run.reader
+        channels = {q: self._run._vector_channels(q) for q in self._quantities}
+        names = [c.name for c in (*itertools.chain(*channels.values()), *self._tachometers)]
+        readings = dict(zip(names, reader.read(names, start, stop), strict=True)) if names else {}
+        rows = {q: vector_rows(used, [readings[c.name] for c in used]) for q, used in channels.items()}
+        time = None if self._counted else reader.time(start, stop)
+        speed = None
+        for tachometer in self._tachometers:
+            speed = tachometer.to_si(readings[tachometer.name])
+        return Rows(rows, time, speed)
+
+
 def pulse_times(readings: FloatArray, time: FloatArray) -> FloatArray:
-    """Times of the rising edges of once-per-revolution pulses [s], (m,)."""
-    known = readings[np.isfinite(readings)]
-    if len(known) < 4:
+    """Times (m,) of the rising edges of once-per-revolution pulses [s], from readings and times (n,)."""
+    finite = readings[np.isfinite(readings)]
+    if len(finite) < 4:
         return np.empty(0)
-    low, high = (float(q) for q in np.quantile(known, (0.001, 0.999)))
+    low, high = np.quantile(finite, (0.001, 0.999)).tolist()
     level = 0.5 * (low + high)
     above = np.nan_to_num(readings, nan=low) > level
     # short dips in a pulse are none: the reading must have been low again
     armed = np.nan_to_num(readings, nan=low) < low + 0.25 * (high - low)
     rising = np.flatnonzero(above[1:] & ~above[:-1])
-    kept, last = [], -1
-    for k in rising:
-        if last < 0 or armed[last : k + 1].any():
-            kept.append(int(k))
-            last = int(k) + 1
-    at = np.array(kept, dtype=int)
+    edges, after_last = [], -1
+    for edge in rising:
+        if after_last < 0 or armed[after_last : edge + 1].any():
+            edges.append(int(edge))
+            after_last = int(edge) + 1
+    at = np.array(edges, dtype=int)
     share = (level - readings[at]) / (readings[at + 1] - readings[at])
     return np.asarray(time[at] + share * (time[at + 1] - time[at]))
 
 
 def speed_from_pulses(readings: FloatArray, time: FloatArray) -> FloatArray:
-    """Shaft speed at every sample [rad/s]; NaN where fewer than two pulses tell it."""
+    """Shaft speed at every sample (n,) [rad/s]; NaN where there are fewer than two pulses."""
     pulses = pulse_times(readings, time)
     if len(pulses) < 2:
         return np.full(len(readings), np.nan)

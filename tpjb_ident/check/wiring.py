@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from rigdata.calibration import Channel
-from rigdata.vector import solve_vector
+from rigdata.vector import inverse_directions
 from tpjb_ident.arrays import FloatArray
 
 
@@ -29,10 +29,10 @@ def guess_wiring(channels: Sequence[Channel], readings: FloatArray, wanted: Floa
     """Say which fault would turn the readings into the direction `wanted`; "" where not just one would."""
     if len(channels) != 2 or not np.all(np.isfinite(readings)):
         return ""
-    axes = np.array([c.axis for c in channels])
+    inverse = inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
     explanations = []
     for words, matrix in repairs(channels):
-        vector = solve_vector(axes, (matrix @ readings)[None, :])[0]
+        vector = inverse @ matrix @ readings
         size = float(np.hypot(*vector))
         if size > 0 and float(vector @ wanted) > math.cos(math.radians(within)) * size:
             explanations.append(words)
