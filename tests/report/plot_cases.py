@@ -197,21 +197,10 @@ EFFECTS = ("pivot_flexibility", "soft_pivot, pad 1", "thermal_growth", "oil_visc
 SEPARATION = np.array([[np.nan, 1.2, 4.8, 5.5], [4.1, np.nan, 5.9, 5.0], [5.2, 3.4, np.nan, 2.2], [np.nan] * 4])
 
 
-def arcs() -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
-    """Angles, deformation and temperature of five pads."""
-    angles = [np.linspace(a - 0.5, a + 0.5, 30) for a in np.radians([270.0, 342.0, 414.0, 486.0, 558.0])]
-    bent = [1e-6 * (3 + k - 20 * (a - a.mean()) ** 2) for k, a in enumerate(angles)]
-    return angles, bent, [40.0 + 20.0 * (a - a[0]) - 2.0 * k for k, a in enumerate(angles)]
-
-
 CASES = {
-    "pad_deformation": lambda: plots.pad_deformation(*arcs(), title="Pad deformation"),
     "pad_projection": lambda: plots.pad_projection(curves()),
     "load_deflection": lambda: plots.load_deflection([curve(1, down=True), curve(3, 2.0, 3e-6)], up_to=6000.0),
     "pivot_stiffness": lambda: plots.pivot_stiffness(curves(), formula, loads=np.linspace(200.0, 6500.0, 80)),
-    "pivots_of_bearings": lambda: plots.pivots_of_bearings(
-        {"rocker": curve(), "spherical": curve(1, 3.0)}, {"rocker": formula}, title="Pad #1"
-    ),
     "clearance_and_locus": lambda: plots.clearance_and_locus(
         {"rocker": polygon(), "spherical": polygon(100e-6, 0.0)}, locus(), {"kirk": oval(0.8), "measured": oval(1.0)},
         drawing=(ANGLES, np.full(5, 80e-6)),
@@ -228,9 +217,6 @@ CASES = {
     "window_weights": lambda: plots.window_weights(windows()),
     "isolability": lambda: plots.isolability(SEPARATION, EFFECTS),
     "gap": lambda: plots.gap(GAPS),
-    "gap_controls": lambda: plots.gap_controls(
-        11.9, 1.2, {"best wrong effect": (6.3, 5.1, 7.7), "no-effect campaign": 1.04}, noise_floor=0.9
-    ),
 }  # fmt: skip
 
 

@@ -241,7 +241,6 @@ NOTHING = [
     (lambda: plots.coefficient(comparison()[:1], "kxx"), "no two points"),
     (lambda: plots.gap({}), "no gap"),
     (lambda: plots.isolability(np.eye(3), ["a"]), "square"),
-    (lambda: plots.pad_deformation([[0.0, 1.0]], [[0.0]]), "one array per pad"),
 ]
 
 

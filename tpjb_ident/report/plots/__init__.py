@@ -25,14 +25,11 @@ if TYPE_CHECKING:
     from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
     from tpjb_ident.report.plots.frf import frf
     from tpjb_ident.report.plots.gap import gap
-    from tpjb_ident.report.plots.gap_controls import gap_controls
     from tpjb_ident.report.plots.isolability import isolability
     from tpjb_ident.report.plots.load_deflection import load_deflection
     from tpjb_ident.report.plots.orbit import orbit
-    from tpjb_ident.report.plots.pad_deformation import pad_deformation
     from tpjb_ident.report.plots.pad_projection import pad_projection
     from tpjb_ident.report.plots.pivot_stiffness import pivot_stiffness
-    from tpjb_ident.report.plots.pivots_of_bearings import pivots_of_bearings
     from tpjb_ident.report.plots.residual_map import residual_map
     from tpjb_ident.report.plots.residual_series import residual_series
     from tpjb_ident.report.plots.spectra import spectra
@@ -46,14 +43,11 @@ __all__ = [
     "direct_coefficients",
     "frf",
     "gap",
-    "gap_controls",
     "isolability",
     "load_deflection",
     "orbit",
-    "pad_deformation",
     "pad_projection",
     "pivot_stiffness",
-    "pivots_of_bearings",
     "residual_map",
     "residual_series",
     "spectra",
