@@ -13,9 +13,8 @@ from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_ro
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Page, Section, Table, grouped, write_page
 from tpjb_ident.report.panels import coefficient_panels
-from tpjb_ident.report.plots.gap import gap
-from tpjb_ident.report.plots.residual_map import residual_frame, residual_map
-from tpjb_ident.report.plots.residual_series import residual_series
+from tpjb_ident.report.plots.diagnoses import gap
+from tpjb_ident.report.plots.residuals import residual_frame, residual_map, residual_series
 from tpjb_ident.rounding import signed
 
 if TYPE_CHECKING:

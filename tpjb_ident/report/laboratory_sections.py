@@ -16,7 +16,9 @@ from tpjb_ident.report.comparison_tables import point_label
 from tpjb_ident.report.drawing.series import longest_series, where
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
-from tpjb_ident.report.plots import coherence, coherence_spectrum, frf, orbit, spectra
+from tpjb_ident.report.plots.coefficients import frf
+from tpjb_ident.report.plots.points import coherence
+from tpjb_ident.report.plots.runs import coherence_spectrum, orbit, spectra
 from tpjb_ident.rounding import fixed, with_interval
 from tpjb_ident.schema import DAMPING, STIFFNESS
 

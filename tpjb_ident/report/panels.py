@@ -12,12 +12,10 @@ import numpy as np
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.report.drawing.series import CROSS, DIRECT, longest_series, where
 from tpjb_ident.report.figure import Panel, panel, save_panels
-from tpjb_ident.report.plots.clearance_and_locus import clearance_and_locus
-from tpjb_ident.report.plots.coefficient import coefficient
-from tpjb_ident.report.plots.isolability import isolability
-from tpjb_ident.report.plots.load_deflection import load_deflection
-from tpjb_ident.report.plots.pad_projection import pad_projection
-from tpjb_ident.report.plots.pivot_stiffness import Formula, pivot_stiffness
+from tpjb_ident.report.plots.coefficients import coefficient
+from tpjb_ident.report.plots.diagnoses import isolability
+from tpjb_ident.report.plots.pivot_tests import Formula, load_deflection, pad_projection, pivot_stiffness
+from tpjb_ident.report.plots.positions import clearance_and_locus
 from tpjb_ident.schema import KINDS
 
 if TYPE_CHECKING:

@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from tpjb_ident.clearance.measure import ClearancePolygon
 
 
-POLYGON_STYLE: tuple[tuple[str, Any], ...] = (
+_POLYGON_STYLE: tuple[tuple[str, Any], ...] = (
     ("ink", "-"),
     ("red", (0, (6, 2, 1, 2))),
     ("green", (0, (4, 2))),
     ("purple", (0, (1, 1.5))),
 )
-TWO_SIGMA = 2.4477  # radius of the 95 % region of two normal variables, in standard deviations
+_TWO_SIGMA = 2.4477  # radius of the 95 % region of two normal variables, in standard deviations
 
 
 def clearance_and_locus(
@@ -64,23 +64,23 @@ def clearance_and_locus(
     if drawing is not None:
         axes.plot(*(1e6 * _closed(_ordered_corners(*drawing))).T, color=LIGHT["grey"], linewidth=1.0,
                   linestyle=(0, (5, 2)), label="clearance, drawing")  # fmt: skip
-    for (name, polygon), (colour, dashes) in zip(named.items(), POLYGON_STYLE * len(named), strict=False):
-        _polygon(axes, name, polygon, LIGHT[colour], dashes)
+    for (name, polygon), (colour, dashes) in zip(named.items(), _POLYGON_STYLE * len(named), strict=False):
+        _draw_polygon(axes, name, polygon, LIGHT[colour], dashes)
     if named:
-        _numbers(axes, next(iter(named.values())))
+        _draw_numbers(axes, next(iter(named.values())))
     for name, places in (predicted or {}).items():
         colour, dashes, _ = VARIANT_STYLE.get(name, ("green", (0, (4, 1, 1, 1)), ""))
         axes.plot(*(1e6 * _closed(np.asarray(places))).T, color=LIGHT[colour], linestyle=dashes, linewidth=1.5,
                   label=VARIANT_LABEL.get(name, name))  # fmt: skip
     if locus is not None:
-        _locus(axes, locus)
+        _draw_locus(axes, locus)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.07)
     add_legend(axes)
     return figure
 
 
-def _polygon(axes: Axes, name: str, polygon: ClearancePolygon, colour: str, dashes: Any) -> None:
+def _draw_polygon(axes: Axes, name: str, polygon: ClearancePolygon, colour: str, dashes: Any) -> None:
     if not np.isfinite(polygon.corners).all():
         return
     text = "clearance, measured" if name == "measured" else f"clearance, {name}"
@@ -89,7 +89,7 @@ def _polygon(axes: Axes, name: str, polygon: ClearancePolygon, colour: str, dash
     axes.plot(*(1e6 * pushed).T, color=colour, linestyle=dashes, linewidth=0.6)
 
 
-def _numbers(axes: Axes, polygon: ClearancePolygon) -> None:
+def _draw_numbers(axes: Axes, polygon: ClearancePolygon) -> None:
     """Number of each pad, just inside its side."""
     for k, (angle, clearance) in enumerate(zip(polygon.angles, polygon.clearance, strict=True), 1):
         if np.isfinite(clearance):
@@ -100,7 +100,7 @@ def _numbers(axes: Axes, polygon: ClearancePolygon) -> None:
             )  # fmt: skip
 
 
-def _locus(axes: Axes, locus: Locus | FloatArray) -> None:
+def _draw_locus(axes: Axes, locus: Locus | FloatArray) -> None:
     if isinstance(locus, np.ndarray):
         places = locus
     else:
@@ -108,7 +108,7 @@ def _locus(axes: Axes, locus: Locus | FloatArray) -> None:
         for point in locus.points:
             size, turn = np.linalg.eigh(point.covariance)
             axes.add_patch(Ellipse(
-                tuple(1e6 * point.position), *(2e6 * TWO_SIGMA * np.sqrt(np.maximum(size, 0.0))),
+                tuple(1e6 * point.position), *(2e6 * _TWO_SIGMA * np.sqrt(np.maximum(size, 0.0))),
                 angle=float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0]))), color=LIGHT["ink"], alpha=0.25,
                 linewidth=0,
             ))  # fmt: skip

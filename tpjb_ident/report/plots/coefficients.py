@@ -1,0 +1,296 @@
+"""Pictures of coefficients: of several bearings (Fig. 15, 16), with predictions (Fig. 17 to 20), h over frequency."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tpjb_ident.report.drawing.colours import LIGHT, VARIANT_LABEL, VARIANT_STYLE
+from tpjb_ident.report.drawing.picture import add_legend, label, new_picture, new_pictures
+from tpjb_ident.report.drawing.series import AXES, DIRECT, as_table, longest_series
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, STATIC_COLUMNS, coefficient_column
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import pandas as pd
+
+    from tpjb_ident.compare.comparison import Comparison
+    from tpjb_ident.dynamic.broadband.band_result import BandResult
+    from tpjb_ident.dynamic.results.identification import Identification
+
+
+def coefficient(
+    comparison: Comparison | pd.DataFrame,
+    name: str,
+    *,
+    over: Literal["load", "frequency"] = "load",
+    title: str | None = None,
+) -> Figure:
+    """Draw one coefficient over load or frequency (the paper's Fig. 17 to 20).
+
+    Parameters
+    ----------
+    comparison : Comparison or DataFrame
+        What `compare_campaign` gives, or its table (``comparison.csv``). A prediction that needed a pivot beyond its
+        measured loads stands in a frame.
+    name : str
+        ``"kxx"``, ``"kxy"``, .. ``"cyy"``.
+    over : {"load", "frequency"}
+        The longest series over it is drawn.
+    title : str, optional
+
+    Raises
+    ------
+    ValueError
+        For an unknown coefficient, or when nothing varies over `over`.
+    """
+    known = [column[:3] for column in COEFFICIENT_COLUMNS]
+    if name not in known:
+        raise ValueError(f"name must be one of {', '.join(known)}; got {name!r}")
+    series = longest_series(_comparison_table(comparison), over)
+    if series is None:
+        raise ValueError(f"the campaign has no two points that differ in {over} alone")
+    kind = KINDS[name[0]]
+    scale, key = kind.display_scale, coefficient_column(name)
+    column, axis_scale, axis_label = AXES[over]
+    figure, axes = new_picture(axis_label, f"{name}, {kind.display_unit}", title=title)
+    for variant in dict.fromkeys(series["pivots"]):
+        rows = series[series["pivots"] == variant].sort_values(column)
+        _draw_predicted(axes, rows[column] / axis_scale, rows[f"{key}_predicted"] / scale, rows, str(variant))
+    measured = series.drop_duplicates(column).sort_values(column)
+    value, low, high = (measured[f"{key}{end}"].to_numpy(float) / scale for end in ("", "_lo", "_hi"))
+    axes.errorbar(
+        measured[column] / axis_scale, value, yerr=np.abs([value - low, high - value]), fmt="o", color=LIGHT["ink"],
+        markersize=5, capsize=3, linewidth=1.2, label="measured, 95 %", zorder=5,
+    )  # fmt: skip
+    axes.margins(x=0.06, y=0.1)
+    if name in DIRECT:
+        axes.set_ylim(bottom=0.0)
+    add_legend(axes)
+    return figure
+
+
+def _comparison_table(comparison: Comparison | pd.DataFrame) -> pd.DataFrame:
+    import pandas as pd
+
+    if isinstance(comparison, pd.DataFrame):
+        return comparison
+    from tpjb_ident.compare.tables import comparison_frame
+
+    return comparison_frame(comparison)
+
+
+def _draw_predicted(axes: Axes, over: pd.Series, predicted: pd.Series, rows: pd.DataFrame, variant: str) -> None:
+    colour, dashes, marker = VARIANT_STYLE.get(variant, ("green", (0, (4, 1, 1, 1)), "*"))
+    x, y = over.to_numpy(float), predicted.to_numpy(float)
+    axes.plot(x, y, color=LIGHT[colour], linestyle=dashes, linewidth=1.6, marker=marker, markersize=4,
+              label=VARIANT_LABEL.get(variant, variant))  # fmt: skip
+    if variant == "measured" and "pivot_extrapolated" in rows:
+        beyond = rows["pivot_extrapolated"].to_numpy(bool)
+        if beyond.any():
+            axes.plot(x[beyond], y[beyond], linestyle="none", marker=marker, markersize=8.5, color=LIGHT[colour],
+                      markerfacecolor="none", label="beyond the dry tests")  # fmt: skip
+
+
+_BEARING_COLOURS = ("blue", "red", "green", "purple")
+#: Marker, line and fill of the entry: full lines for the loaded direction.
+_ENTRY_STYLE: dict[str, tuple[str, Any, str | None]] = {
+    "xx": ("s", (0, (4, 2)), "paper"),
+    "yy": ("o", "-", None),
+    "xy": ("<", (0, (1, 1.5)), "paper"),
+    "yx": (">", (0, (3, 1, 1, 1)), "paper"),
+}
+
+
+def direct_coefficients(
+    bearings: Mapping[str, Identification | pd.DataFrame],
+    part: Literal["k", "c"] = "k",
+    *,
+    over: Literal["load", "frequency"] = "load",
+    entries: tuple[str, ...] = ("xx", "yy"),
+    title: str | None = None,
+) -> Figure:
+    """Draw measured coefficients of one or several bearings with their 95 % intervals (the paper's Fig. 15, 16).
+
+    Parameters
+    ----------
+    bearings : mapping of str to Identification or DataFrame
+        By name; a table as ``coefficients.csv`` or ``comparison.csv``.
+    part : {"k", "c"}
+        Stiffness or damping.
+    over : {"load", "frequency"}
+        The longest series over it is drawn; the points that lie apart from it are not.
+    entries : tuple of str
+        Out of ``"xx"``, ``"xy"``, ``"yx"``, ``"yy"``.
+    title : str, optional
+
+    Raises
+    ------
+    ValueError
+        When no bearing was measured at two loads or frequencies.
+    """
+    kind = KINDS[part]
+    column, axis_scale, axis_label = AXES[over]
+    figure, axes = new_picture(axis_label, f"{kind.quantity}, {kind.display_unit}", title=title)
+    drawn = False
+    for (name, source), colour in zip(bearings.items(), _BEARING_COLOURS * len(bearings), strict=False):
+        series = longest_series(as_table(source), over)
+        if series is None:
+            continue
+        drawn = True
+        rows = series.drop_duplicates(column).sort_values(column)
+        for entry in entries:
+            marker, dashes, face = _ENTRY_STYLE[entry]
+            key = kind.column(entry)
+            value, low, high = (rows[f"{key}{end}"].to_numpy(float) / kind.display_scale for end in ("", "_lo", "_hi"))
+            axes.errorbar(
+                rows[column] / axis_scale, value, yerr=np.abs([value - low, high - value]), marker=marker,
+                markersize=5, markerfacecolor=LIGHT[face or colour], color=LIGHT[colour], linestyle=dashes,
+                linewidth=1.3, capsize=3, label=f"{name}, {part}{entry}",
+            )  # fmt: skip
+    if not drawn:
+        raise ValueError(f"no bearing was measured at two points over {over}: give a campaign with a series over it")
+    if set(entries) <= {"xx", "yy"}:
+        axes.set_ylim(bottom=0.0)
+    axes.margins(x=0.06)
+    add_legend(axes)
+    return figure
+
+
+_FRF_STYLE = {"xx": ("blue", "o"), "yy": ("red", "s"), "xy": ("green", "^"), "yx": ("ink", "v")}
+
+
+@dataclass(frozen=True)
+class _FittedModel:
+    """The model that the data support: its name, its band [Hz] and h (n, 2, 2) of angular frequencies (n,) [rad/s]."""
+
+    name: str
+    band: tuple[float, float]
+    h: Callable[[np.ndarray], np.ndarray]
+
+
+def frf(
+    source: BandResult | Identification | pd.DataFrame,
+    *,
+    entries: tuple[str, ...] = ("xx", "yy"),
+    title: str | None = None,
+) -> Figure:
+    """Draw the real and the imaginary part of h over frequency with 95 % intervals, over a band the coherence below.
+
+    Parameters
+    ----------
+    source : BandResult, Identification or DataFrame
+        One operating point of ``Identification.bands`` or its rows of ``frf.csv``; or points shaken by sines, or their
+        ``coefficients.csv``: then the longest series over frequency. With a result the model that its frequencies
+        support is drawn through them.
+    entries : tuple of str
+        Of ``"xx"``, ``"xy"``, ``"yx"``, ``"yy"``.
+    title : str, optional
+
+    Raises
+    ------
+    ValueError
+        No line, an unknown entry, or the rows of several operating points.
+    """
+    unknown = [entry for entry in entries if entry not in _FRF_STYLE]
+    if unknown or not entries:
+        raise ValueError(f"entries must be some of {', '.join(_FRF_STYLE)}; got {entries}")
+    table, model = _frf_rows(source)
+    if table is None or not len(table):
+        raise ValueError("there is no line to draw, or no two excitation frequencies at one load")
+    over_band = "coherence_x" in table
+    if over_band and table[[*STATIC_COLUMNS, "excitation"]].nunique().max() > 1:
+        raise ValueError("the table holds several operating points; give the rows of one")
+    figure, ((real,), (imag,), *below) = new_pictures(3 if over_band else 2, 1, title=title, height=2.3)
+    for axes, part, name in ((real, "real", "Re h, MN/m"), (imag, "imag", "Im h, MN/m")):
+        label(axes, "frequency, Hz", name)
+        for entry in entries:
+            _draw_measured(axes, table, f"h{entry}_{part}_N_per_m", entry)
+            _draw_model(axes, model, entry, part, label=entry == entries[0])
+        axes.margins(x=0.05, y=0.1)
+    add_legend(real)
+    for (axes,) in below:
+        _draw_coherence(axes, table)
+    return figure
+
+
+def _draw_coherence(axes: Axes, table: pd.DataFrame) -> None:
+    label(axes, "frequency, Hz", "multiple coherence")
+    for axis, colour, dashes in (("x", "blue", "-"), ("y", "red", (0, (4, 2)))):
+        axes.plot(table["excitation_Hz"], table[f"coherence_{axis}"], color=LIGHT[colour], linestyle=dashes,
+                  linewidth=1.2, label=f"force along {axis}")  # fmt: skip
+    axes.set_ylim(min(0.9, 0.98 * float(table[["coherence_x", "coherence_y"]].min().min())), 1.01)
+    axes.margins(x=0.05)
+    add_legend(axes)
+
+
+def _frf_rows(source: BandResult | Identification | pd.DataFrame) -> tuple[pd.DataFrame | None, _FittedModel | None]:
+    """Rows as in ``frf.csv`` (without coherence where sines were run), and the model through them."""
+    import pandas as pd
+
+    from tpjb_ident.dynamic.results.identification import Identification
+
+    if isinstance(source, Identification):
+        series = longest_series(source.to_frame(), "frequency")
+        return _rows_of_sines(series), _model_of_sines(source, series)
+    if isinstance(source, pd.DataFrame):
+        if "hxx_real_N_per_m" in source:
+            return source.sort_values("excitation_Hz", kind="stable"), None
+        return _rows_of_sines(longest_series(source, "frequency")), None
+    from tpjb_ident.dynamic.broadband.band_result import frf_frame
+
+    model = source.models.get(source.supported)
+    return frf_frame([source]), None if model is None else _FittedModel(model.model, model.band, model.h)
+
+
+def _rows_of_sines(series: pd.DataFrame | None) -> pd.DataFrame | None:
+    """K and C as h = K + i omega C, with the names that ``frf.csv`` has."""
+    if series is None:
+        return None
+    rows = series.drop_duplicates("excitation_Hz").sort_values("excitation_Hz", kind="stable")
+    omega = 2 * np.pi * rows["excitation_Hz"]
+    made = {}
+    for entry, end in itertools.product(_FRF_STYLE, ("", "_lo", "_hi")):
+        made[f"h{entry}_real_N_per_m{end}"] = rows[f"k{entry}_N_per_m{end}"]
+        made[f"h{entry}_imag_N_per_m{end}"] = rows[f"c{entry}_Ns_per_m{end}"] * omega
+    return rows[["excitation_Hz"]].assign(**made)
+
+
+def _model_of_sines(source: Identification, series: pd.DataFrame | None) -> _FittedModel | None:
+    """The model that the frequencies of the series support, None where they refuse all."""
+    if series is None:
+        return None
+    wanted = tuple(series.iloc[0][list(STATIC_COLUMNS)])
+    for group in source.frequency_fits():
+        p, fit = group.points[0].point, group.fits.get(group.supported)
+        if fit is not None and (p.static_load, p.static_load_direction_deg, p.shaft_speed_hz) == wanted:
+            low, high = (omega / (2 * np.pi) for omega in fit.omega_range)
+            return _FittedModel(fit.model, (low, high), fit.h)
+    return None
+
+
+def _draw_measured(axes: Axes, table: pd.DataFrame, column: str, entry: str) -> None:
+    colour, marker = _FRF_STYLE[entry]
+    value, low, high = (table[f"{column}{end}"].to_numpy(float) / 1e6 for end in ("", "_lo", "_hi"))
+    axes.errorbar(
+        table["excitation_Hz"], value, yerr=np.abs([value - low, high - value]), fmt=marker, color=LIGHT[colour],
+        markersize=3, capsize=1.5, linewidth=0.8, linestyle="none", label=f"h{entry}, 95 %",
+    )  # fmt: skip
+
+
+def _draw_model(axes: Axes, model: _FittedModel | None, entry: str, part: str, label: bool) -> None:
+    """The model over the band as a line."""
+    if model is None:
+        return
+    f = np.linspace(*model.band, 200)
+    i, j = ("xy".index(letter) for letter in entry)
+    h = model.h(2 * np.pi * f)[:, i, j]
+    values = (h.real if part == "real" else h.imag) / 1e6
+    axes.plot(f, values, color=LIGHT[_FRF_STYLE[entry][0]], linewidth=1.4, label=model.name if label else None)

@@ -1,0 +1,138 @@
+"""Pictures of a diagnosis: the gap by observable, and which effects a campaign could tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import ArrayLike
+
+from tpjb_ident.effect_words import label_in_words
+from tpjb_ident.report.drawing.colours import LIGHT, SEQUENTIAL
+from tpjb_ident.report.drawing.picture import (
+    CHARACTER,
+    FONT_SIZE,
+    LEFT,
+    add_colour_bar,
+    add_legend,
+    label,
+    new_picture,
+    new_pictures,
+    shrink,
+)
+
+if TYPE_CHECKING:
+    from tpjb_ident.diagnosis.diagnose import Diagnosis
+    from tpjb_ident.diagnosis.plan.plan import CampaignPlan
+    from tpjb_ident.diagnosis.verdict.verdict import Verdict
+
+
+def gap(
+    source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]],
+    *,
+    logarithmic: bool | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Draw the root mean square of (measured - predicted) / sigma per observable, before and after.
+
+    Observables that got worse have their name in brackets with a minus; those that no held-out point shows are
+    marked with an asterisk.
+
+    Parameters
+    ----------
+    source : Diagnosis, Verdict or mapping
+        Or ``gap_by_observable`` of ``diagnosis.json``: ``{"kxx": {"heldout_before": 9.1, "heldout_after": 1.0}}``.
+    logarithmic : bool, optional
+        Default: when the gaps span more than a factor of thirty.
+    title : str, optional
+    """
+    gaps = _gaps(source)
+    if not gaps:
+        raise ValueError("there is no gap by observable to draw")
+    before, after = (np.array([_gap_at(g, end) for g in gaps.values()]) for end in ("_before", "_after"))
+    words = [_row_label(name, g, b, a) for (name, g), b, a in zip(gaps.items(), before, after, strict=True)]
+    figure, axes = new_picture("gap, sigma", "", title=title, height=0.3 * len(words) + 1.3)
+    shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))
+    y = np.arange(len(words))
+    for offset, values, colour, hatch, name in (
+        (-0.2, before, "orange", "////", "baseline"), (0.2, after, "blue", None, "with the effects found"),
+    ):  # fmt: skip
+        axes.barh(y + offset, values, 0.38, color=LIGHT[colour] if hatch is None else LIGHT["paper"], hatch=hatch,
+                  edgecolor=LIGHT[colour], linewidth=0.8, label=name)  # fmt: skip
+    axes.set_yticks(y, words)
+    axes.invert_yaxis()
+    axes.grid(axis="y", visible=False)
+    axes.axvline(1.0, color=LIGHT["ink"], linewidth=0.9, linestyle=(0, (2, 2)), label="noise and tolerance")
+    handles = axes.get_legend_handles_labels()[0]
+    both = np.concatenate([before, after])
+    wide = float(both.max()) > 30.0 * max(float(both[both > 0].min(initial=1.0)), 1e-3)
+    if logarithmic or (logarithmic is None and wide):
+        axes.set_xscale("log")
+        axes.set_xlim(left=max(0.7 * float(both[both > 0].min(initial=1.0)), 1e-2))
+    add_legend(axes, 3, [*handles[1:], handles[0]], across=True)
+    return figure
+
+
+def _gaps(source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]]) -> Mapping[str, Mapping[str, float]]:
+    if isinstance(source, Mapping):
+        return source
+    # a diagnosis holds a verdict, whose own `verdict` is a word
+    return source.gap_by_observable if hasattr(source, "gap_by_observable") else source.verdict.gap_by_observable
+
+
+def _gap_at(gaps: Mapping[str, float], end: str) -> float:
+    return next((float(v) for k, v in gaps.items() if k.endswith(end)), 0.0)
+
+
+def _row_label(name: str, gaps: Mapping[str, float], before: float, after: float) -> str:
+    star = "" if any(k.startswith("heldout") for k in gaps) else "*"
+    worse = " (worse)" if after > max(1.05 * before, 1.0) else ""
+    return f"{name.replace('_', ' ')}{star}{worse}"
+
+
+_CELL = 0.3  # [inches]
+_TALL = 2.0  # the colour bar needs it [inches]
+_CONFUSABLE = 3.0
+_VISIBLE = 6.0
+
+
+def isolability(
+    plan: CampaignPlan | ArrayLike, names: Sequence[str] | None = None, *, title: str | None = None
+) -> Figure:
+    """Draw how far each effect stands from what every other one can imitate, in standard deviations.
+
+    Row A, column B: distance of A, at a size that is seen with 6 standard deviations, from all that B can do. Pairs
+    below 3 are framed: the campaign could not tell them apart. Blank rows are effects that it does not see at all.
+
+    Parameters
+    ----------
+    plan : CampaignPlan or (k, k) array_like
+        As `tpjb_ident.diagnosis.plan.plan.plan` makes it, or its matrix.
+    names : sequence of str, optional
+        Of the k effects; default: the plan's own.
+    title : str, optional
+    """
+    matrix = np.asarray(getattr(plan, "separation", plan), dtype=float)
+    names = names or [c.label for c in getattr(plan, "candidates", ())]
+    k = len(matrix)
+    if matrix.shape != (k, k) or len(names) != k:
+        raise ValueError(f"the matrix must be square with one name per row, got shape {matrix.shape}")
+    words = [label_in_words(name) for name in names]
+    room = CHARACTER * max(len(word) for word in words)
+    # the panel's own margins and the colour bar come on top of cells and names
+    figure, ((axes,),) = new_pictures(
+        1, 1, title=title, width=_CELL * k + room + 2.0, height=max(_CELL * k, _TALL) + room + 1.0
+    )
+    label(axes, "could pass for (framed: closer than 3)", "effect at work")
+    shrink(axes, left=room - 0.1, bottom=room - 0.1)
+    image = axes.imshow(matrix, cmap=SEQUENTIAL, vmin=0.0, vmax=_VISIBLE, aspect="auto", interpolation="nearest")
+    axes.grid(False)
+    axes.set_xticks(range(k), words, rotation=90, fontsize=FONT_SIZE - 1)
+    axes.set_yticks(range(k), words, fontsize=FONT_SIZE - 1)
+    for i, j in zip(*np.nonzero(matrix < _CONFUSABLE), strict=True):
+        axes.add_patch(Rectangle((j - 0.45, i - 0.45), 0.9, 0.9, fill=False, edgecolor=LIGHT["red"], linewidth=1.2))
+    add_colour_bar(axes, image, "distance, standard deviations")
+    return figure
