@@ -8,7 +8,7 @@ import shutil
 import pytest
 
 from tests.command_line import tpjb
-from tpjb_ident.runtime.publish import READY
+from tpjb_ident.runtime.output_folder import READY
 
 
 @pytest.fixture(scope="module")

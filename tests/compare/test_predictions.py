@@ -11,8 +11,7 @@ from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.predict import predict
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.compare.pivot_formula import printed_formula
-from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
+from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame, printed_formula
 from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 
 HZ = 2 * math.pi

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from tests.runtime.test_executors import dies_once
-from tpjb_ident.runtime.cluster import ClusterError, dask_workers
 from tpjb_ident.runtime.executors import in_order, local_workers
+from tpjb_ident.runtime.workers import ClusterError, dask_workers
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -9,8 +9,7 @@ import pytest
 
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.runtime.output_folder import former_runs, output_folder
-from tpjb_ident.runtime.publish import READY
+from tpjb_ident.runtime.output_folder import READY, former_runs, output_folder
 
 
 def fill(target, command, names, inputs=()):

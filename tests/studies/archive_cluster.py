@@ -30,7 +30,7 @@ from rigdata.campaign import Campaign, load_campaign
 from rigdata.run import Run
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.settings import IdentifySettings
-from tpjb_ident.runtime.cluster import dask_workers
+from tpjb_ident.runtime.workers import dask_workers
 
 ROOT = Path(__file__).resolve().parents[2]
 DIRECTIONS = 6

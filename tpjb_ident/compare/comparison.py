@@ -2,31 +2,48 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from model.bearing import Bearing
 from model.effects import Effect
 from rigdata.campaign import Campaign
-from tpjb_ident.compare.coefficient_table import TableSource
+from rigdata.operating_point import OperatingPoint
+from tpjb_ident.arrays import FloatArray
+from tpjb_ident.compare.coefficient_table import TableRow, TableSource, read_coefficients
 from tpjb_ident.compare.measured_pivots import counted_twice
-from tpjb_ident.compare.model_side import Asked, ModelSide, model_side
-from tpjb_ident.compare.predictions import PointPrediction, Progress
+from tpjb_ident.compare.model_side import Asked, ModelSide, model_side, possible_variants
+from tpjb_ident.compare.predictions import (
+    ModelSettings,
+    PointPrediction,
+    Progress,
+    coefficient_names,
+    point_columns,
+    predict_points,
+)
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.results.identification import Identification, coefficient_columns
+from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.presentation import Presented, changed
+from tpjb_ident.schema import ENTRIES
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
-    from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.settings import IdentifySettings
     from tpjb_ident.pivot import PivotCurve
 
     #: Somebody who worked out the model's side while the campaign was identified.
     Ahead = Callable[["CompareSettings", Identification], ModelSide | None]
+
 
 #: Pivot models that are compared, in the order of the tables.
 VARIANTS = ("rigid", "kirk", "kirk-secant", "measured")
@@ -119,8 +136,6 @@ class Comparison(Presented):
 
     def to_dataframe(self) -> pd.DataFrame:
         """``comparison.csv``."""
-        from tpjb_ident.compare.tables import comparison_frame
-
         return comparison_frame(self)
 
     def summary(self) -> str:
@@ -237,3 +252,134 @@ def _check(campaign: Campaign, settings: CompareSettings) -> None:
 
 def _labelled(progress: Progress, label: str) -> Progress:
     return lambda text, done, total: progress(f"{label}, {text}", done, total)
+
+
+def measured_locus(comparison: Comparison) -> FloatArray:
+    """Measured positions (n, 2) [m], from the bearing centre if the campaign has a clearance run."""
+    if comparison.locus is None:
+        return np.zeros((0, 2))
+    return np.array([p.position for p in comparison.locus.points]).reshape(-1, 2)
+
+
+def predicted_locus(comparison: Comparison, variant: Variant) -> FloatArray:
+    """Predicted positions (n, 2) [m] in the order and about the origin of the measured ones.
+
+    Without a clearance run the probes' zero stands anywhere: then the prediction is shifted by the mean difference,
+    and only the shape of the two can be compared.
+    """
+    places = np.array([p.prediction.position for p in variant.locus]).reshape(-1, 2)
+    if comparison.clearance is None and len(places):
+        places = places + np.nanmean(measured_locus(comparison) - places, axis=0)
+    return places
+
+
+def locus_distance(comparison: Comparison, variant: Variant) -> float:
+    """Root mean square distance between the two loci [m]; NaN without locus runs."""
+    off = predicted_locus(comparison, variant) - measured_locus(comparison)
+    distance = np.hypot(off[:, 0], off[:, 1])
+    distance = distance[np.isfinite(distance)]
+    return float(np.sqrt(np.mean(distance**2))) if len(distance) else math.nan
+
+
+def locus_frame(comparison: Comparison) -> pd.DataFrame:
+    """Build locus_comparison.csv: measured and predicted position per load direction and pivot model."""
+    import pandas as pd
+
+    if comparison.locus is None:
+        return pd.DataFrame(columns=["pivots", "static_load_direction_deg", "x_m", "y_m"])
+    frames = []
+    for variant in comparison.variants:
+        frame = comparison.locus.to_frame()
+        places = predicted_locus(comparison, variant)
+        frame.insert(0, "pivots", variant.name)
+        frame["x_m_predicted"], frame["y_m_predicted"] = places[:, 0], places[:, 1]
+        frames.append(frame)
+    return pd.concat(frames, ignore_index=True)
+
+
+NAMES = (*coefficient_names("k"), *coefficient_names("c"))
+DIRECT = tuple(name for name in NAMES if name[1:3] in ("xx", "yy"))
+
+
+def comparison_frame(comparison: Comparison) -> pd.DataFrame:
+    """Build comparison.csv."""
+    import pandas as pd
+
+    rows = [
+        _row(variant, measured, predicted)
+        for variant in comparison.variants
+        for measured, predicted in zip(comparison.identification.points, variant.points, strict=True)
+    ]
+    return pd.DataFrame(rows)
+
+
+def _row(variant: Variant, measured: PointResult, predicted: PointPrediction) -> dict[str, Any]:
+    row: dict[str, Any] = {"pivots": variant.name, **point_columns(measured.point)}
+    row["static_load_measured_N"] = measured.static_load_measured
+    values = coefficient_columns(measured.stiffness)
+    model = dict(zip(NAMES, np.concatenate([predicted.k.ravel(), predicted.c.ravel()]), strict=True))
+    for name in NAMES:
+        low, high = values[f"{name}_lo"], values[f"{name}_hi"]
+        row[name], row[f"{name}_lo"], row[f"{name}_hi"] = values[name], low, high
+        row[f"{name}_predicted"] = model[name]
+        row[f"{name}_difference"] = model[name] - values[name]
+        row[f"{name}_ratio"] = model[name] / values[name] if low * high > 0 else np.nan
+    p = predicted.prediction
+    row.update(
+        x_m_predicted=p.position[0],
+        y_m_predicted=p.position[1],
+        converged=p.converged,
+        pivot_extrapolated=pivot_extrapolated(predicted),
+        quality="; ".join(str(c) for c in measured.quality) or "ok",
+        status="; ".join(p.status),
+    )
+    return row
+
+
+def pivot_extrapolated(predicted: PointPrediction) -> bool:
+    """Whether a pad that carries presses its pivot harder than the dry test did."""
+    p = predicted.prediction
+    loads = zip(p.setup.pivots, p.pad_load, strict=True)
+    return any(load > getattr(law, "valid_to", np.inf) for law, load in loads)
+
+
+METHOD = "table"
+
+
+def compare_table(
+    path: Path,
+    bearing: Bearing,
+    settings: CompareSettings | None = None,
+    reading_error: float | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Comparison:
+    """Predict the operating points of a table of coefficients with every pivot model but measured ones."""
+    settings = settings or CompareSettings()
+    tell = progress or (lambda text, done, total: None)
+    points = tuple(_point(row) for row in read_coefficients(path, reading_error))
+    names, remarks = possible_variants(tuple(v for v in settings.variants if v != "measured"), (), bearing)
+    if "measured" in settings.variants:
+        remarks.append("Measured pivots are left out: a table holds no dry tests.")
+    variants = []
+    for name in names:
+        model = ModelSettings(name, settings.thermal, settings.effects)
+        found = predict_points(bearing, [p.point for p in points], model, tell)
+        variants.append(Variant(name, found))
+    identification = Identification(path.stem, METHOD, points, np.zeros((0, 8 * len(points))))
+    source = TableSource(path.stem)
+    return Comparison(source, bearing, settings, identification, (), None, None, tuple(variants), tuple(remarks))
+
+
+def _point(row: TableRow) -> PointResult:
+    """A row as if it had been identified; what it does not hold is NaN."""
+    value, error = np.full(8, np.nan), np.full(8, np.nan)
+    for j, entry in enumerate(ENTRIES):
+        value[j], error[j] = row.coefficients.get(f"k{entry}", (np.nan, np.nan))
+        value[4 + j], error[4 + j] = row.omega * np.array(row.coefficients.get(f"c{entry}", (np.nan, np.nan)))
+    h = (value[:4] + 1j * value[4:]).reshape(2, 2)
+    stiffness = DynamicStiffness(h, row.omega, np.diag(error**2), np.full(8, np.inf), METHOD, np.zeros((0, 2)))
+    nothing = np.full(2, np.nan)
+    point = OperatingPoint(row.load, row.direction, row.speed, row.omega)
+    return PointResult(
+        point, stiffness, {METHOD: stiffness}, row.load, nothing, nothing, {}, 0, 0, 0.0, np.nan, np.nan, (), (), ()
+    )

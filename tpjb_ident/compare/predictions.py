@@ -12,6 +12,7 @@ import numpy as np
 from model.bearing import Bearing
 from model.effects import Effect
 from model.options import Options
+from model.pivots import formula_pivot
 from model.predict import predict
 from model.prediction import Prediction
 from rigdata.operating_point import OperatingPoint
@@ -19,6 +20,7 @@ from tpjb_ident.schema import KINDS
 
 if TYPE_CHECKING:
     import pandas as pd
+
 
 #: Called with what is being done, how many are done, of how many.
 Progress = Callable[[str, int, int], None]
@@ -165,3 +167,15 @@ def _pad_columns(p: Prediction, number: int) -> dict[str, float]:
         f"{pad}_inlet_temperature_degC": p.pad_flow[i].inlet,
         f"{pad}_outlet_temperature_degC": p.pad_flow[i].outlet,
     }
+
+
+#: (pad, load [N]) -> (secant, tangent) stiffness [N/m].
+Formula = Callable[[int, float], tuple[float, float]]
+
+
+def printed_formula(bearing: Bearing) -> Formula | None:
+    """Kirk and Reedy's formula for a bearing's pivots, Eq. (16) or (17); None if its pivots are rigid."""
+    if bearing.pivot.kind == "rigid":
+        return None
+    printed = formula_pivot(bearing.pivot, secant_vibrations=True)
+    return lambda pad, load: (printed.vibration_stiffness(load), printed.stiffness(load))

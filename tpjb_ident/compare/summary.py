@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.effects import kind_of
-from tpjb_ident.compare.pivot_formula import printed_formula
-from tpjb_ident.compare.positions import locus_distance
-from tpjb_ident.compare.tables import DIRECT, comparison_frame
+from tpjb_ident.compare.comparison import DIRECT, comparison_frame, locus_distance
+from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.effect_words import Found, finding
 from tpjb_ident.rounding import percent, signed
 

@@ -12,8 +12,7 @@ import numpy as np
 from rigdata.problem import RigDataError
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
-from tpjb_ident.report.comparison_tables import point_label
-from tpjb_ident.report.drawing.series import longest_series, where
+from tpjb_ident.report.drawing.series import longest_series, point_label, where
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
 from tpjb_ident.report.plots.coefficients import frf

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
-from tpjb_ident.runtime.cluster import dask_workers
+from tpjb_ident.errors import TpjbError
 from tpjb_ident.runtime.executors import PoolWorkers, Workers, cores, local_workers
+from tpjb_ident.runtime.provenance import versions
 
 
 @contextmanager
@@ -25,3 +28,67 @@ def open_workers(
         return
     with dask_workers(scheduler) as workers:
         yield workers
+
+
+#: Seconds to wait for the scheduler, and for its first worker.
+PATIENCE = 20.0
+#: Versions that numbers depend on.
+_SAME = ("tpjb-ident", "numpy", "scipy", "h5py", "statsmodels", "numba")
+
+
+class ClusterError(TpjbError):
+    """The cluster cannot be used; the message says why and what to do."""
+
+
+@contextmanager
+def dask_workers(address: str, patience: float = PATIENCE) -> Iterator[Workers]:
+    """Open the workers of a running Dask scheduler."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ClusterError("a scheduler needs the extra `cluster`: pip install 'tpjb-ident[cluster]'") from error
+    place = {"scheduler_file": address} if address.endswith(".json") else {"address": address}
+    try:
+        client = Client(**place, timeout=patience, set_as_default=False, name="tpjb-ident")
+    except (OSError, ValueError, TimeoutError) as error:
+        why = str(error).partition("\n")[0][:120] or type(error).__name__
+        raise ClusterError(
+            f"no Dask scheduler answers at {address} ({why}). "
+            "Start one with `dask scheduler` and give the address that it prints"
+        ) from error
+    with client:
+        count = _checked(client, address, patience)
+        # pure: a job is known by a hash of all that it is given, which took longer here than the job did there
+        opened = functools.partial(client.get_executor, pure=False)
+        pool = PoolWorkers(opened, count, alive=lambda: bool(client.scheduler_info()["workers"]))
+        try:
+            yield pool
+        finally:
+            pool.close(wait=False)
+
+
+def _checked(client: Any, address: str, patience: float) -> int:
+    """Threads of all workers, after a look at what they have installed."""
+    try:
+        client.wait_for_workers(1, timeout=patience)
+    except TimeoutError as error:
+        raise ClusterError(
+            f"the scheduler at {address} has no workers. Start some with `dask worker {address} --nthreads 1`"
+        ) from error
+    ours = {name: versions()[name] for name in _SAME}
+    try:
+        theirs = client.run(_versions)
+    except Exception as error:  # what a worker without this package raises depends on its versions
+        raise ClusterError(
+            f"the workers of {address} cannot run tpjb-ident ({type(error).__name__}: {str(error)[:160]}). "
+            "Install the same tpjb-ident there"
+        ) from error
+    for worker, found in theirs.items():
+        other = [f"{name} {found[name]} (here {ours[name]})" for name in _SAME if found[name] != ours[name]]
+        if other:
+            raise ClusterError(f"worker {worker} has {', '.join(other)}. Install the same versions on all machines")
+    return max(1, sum(client.nthreads().values()))
+
+
+def _versions() -> dict[str, str]:
+    return versions()

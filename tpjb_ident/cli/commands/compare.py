@@ -90,8 +90,7 @@ def _compared(
 
     source = data.source
     if isinstance(source, TableSource):
-        from tpjb_ident.compare.from_table import compare_table
-        from tpjb_ident.compare.tables import comparison_frame
+        from tpjb_ident.compare.comparison import compare_table, comparison_frame
         from tpjb_ident.report.comparison_page import write_report
 
         with progress("comparing") as show:
@@ -125,9 +124,8 @@ def _variants(text: str) -> tuple[str, ...]:
 
 def write_comparison(order: ReportOrder, result: Comparison, other: OtherHalf, show: Progress) -> None:
     """Write every table and pivots.toml, and the report unless the other process has written it."""
-    from tpjb_ident.compare.pivot_formula import printed_formula
-    from tpjb_ident.compare.positions import locus_frame
-    from tpjb_ident.compare.tables import comparison_frame
+    from tpjb_ident.compare.comparison import comparison_frame, locus_frame
+    from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.pivot import pivot_table, write_pivots
 
     folder = order.folder
@@ -150,8 +148,8 @@ def write_comparison(order: ReportOrder, result: Comparison, other: OtherHalf, s
 
 def show_comparison(result: Comparison, then: str = "") -> None:
     """Print what to conclude, the command that comes next, and the median deviations with what belongs to them."""
+    from tpjb_ident.compare.comparison import comparison_frame
     from tpjb_ident.compare.summary import deviations, summary_sentences
-    from tpjb_ident.compare.tables import comparison_frame
     from tpjb_ident.rounding import percent
 
     frame = comparison_frame(result)

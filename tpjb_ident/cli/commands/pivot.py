@@ -24,7 +24,7 @@ def pivot(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None
 
     Writes pivot_curves and pivot_pads (.csv, .parquet), pivots.toml, which `tpjb predict --pivots` reads, and figures.
     """
-    from tpjb_ident.compare.pivot_formula import printed_formula
+    from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.pivot import PivotSettings, fit_pivots, pads_table, pivot_table, write_pivots
     from tpjb_ident.report.figure import save_panels
     from tpjb_ident.report.panels import pivot_panels

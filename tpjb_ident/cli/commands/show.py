@@ -165,7 +165,7 @@ def _write(
     with output_folder(target, "show", (source,) if source.is_dir() else ()) as folder:
         write_table(folder, "channels", pd.DataFrame(rows))
         if picture:
-            from tpjb_ident.report.quick_look import write_quick_look
+            from tpjb_ident.report.panels import write_quick_look
 
             write_quick_look(folder, title, *picture)
         write_record(folder, target, "show", {"source": source, "shown": title}, inputs)

@@ -16,9 +16,8 @@ from tpjb_ident.cli.common.options import Out, out_folder
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import note_line, print_line, table
 from tpjb_ident.errors import BadInputError, NotTrustedError
-from tpjb_ident.runtime.output_folder import output_folder
+from tpjb_ident.runtime.output_folder import READY, RECORD, former_runs, output_folder, outputs_of
 from tpjb_ident.runtime.provenance import sha256, versions
-from tpjb_ident.runtime.publish import READY, RECORD, former_runs, outputs_of
 from tpjb_ident.runtime.tables import write_text
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Output folder of tpjb commands, with its run.json.")]

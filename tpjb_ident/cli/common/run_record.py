@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from tpjb_ident.cli.common.output import command_output
+from tpjb_ident.runtime.output_folder import RECORD, former_runs, record_text
 from tpjb_ident.runtime.provenance import sha256, versions
-from tpjb_ident.runtime.publish import RECORD, former_runs, record_text
 from tpjb_ident.runtime.tables import write_text
 
 

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.dynamic.results.point_result import PointResult
 
 AXES = {
     "load": ("static_load_N", 1e3, "static load, kN"),
@@ -42,3 +43,8 @@ def where(series: pd.DataFrame, axis: str) -> str:
     first = series.iloc[0]
     fixed = f"{first.excitation_Hz:g} Hz excitation" if axis == "load" else f"{first.static_load_N / 1e3:g} kN"
     return f"{fixed}, {first.shaft_speed_Hz:g} Hz shaft speed"
+
+
+def point_label(p: PointResult) -> str:
+    """Load and excitation of a point, in words."""
+    return f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz"

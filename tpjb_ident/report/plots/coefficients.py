@@ -82,7 +82,7 @@ def _comparison_table(comparison: Comparison | pd.DataFrame) -> pd.DataFrame:
 
     if isinstance(comparison, pd.DataFrame):
         return comparison
-    from tpjb_ident.compare.tables import comparison_frame
+    from tpjb_ident.compare.comparison import comparison_frame
 
     return comparison_frame(comparison)
 

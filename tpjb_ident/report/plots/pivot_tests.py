@@ -119,7 +119,7 @@ def pivot_stiffness(
     curves : sequence of PivotCurve
     formula : callable, optional
         ``formula(pad, load)`` gives the printed formula's (secant, tangent) stiffness [N/m], as
-        `tpjb_ident.compare.pivot_formula.printed_formula` makes it; drawn for the first curve's pad. What the
+        `tpjb_ident.compare.predictions.printed_formula` makes it; drawn for the first curve's pad. What the
         paper prints is the secant.
     loads : (n,) array_like, optional
         Pad loads [N]; default: up to the largest measured one.

@@ -59,7 +59,7 @@ def residual_frame(source: Diagnosis | Comparison | pd.DataFrame) -> pd.DataFram
     from tpjb_ident.compare.comparison import Comparison
 
     if isinstance(source, Comparison):
-        from tpjb_ident.compare.tables import comparison_frame
+        from tpjb_ident.compare.comparison import comparison_frame
 
         return _of_comparison(comparison_frame(source))
     return _of_diagnosis(source)
