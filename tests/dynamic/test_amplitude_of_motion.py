@@ -6,9 +6,9 @@ import pytest
 from rigdata import load_campaign
 from tests.dynamic.test_figures import stiff
 from tests.dynamic.test_quality import H, point_of, run
-from tests.studies.field.bearing import Bearing
-from tests.studies.field.campaign_file import plans_of, write_campaign
-from tests.studies.field.rig import Rig
+from tests.rigs.campaign_file import plans_of, write_campaign
+from tests.rigs.closed_form_bearing import Bearing
+from tests.rigs.field_rig import Rig
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.instruments.amplitude import zero_amplitude
 from tpjb_ident.dynamic.instruments.harmonics import MAX_AMPLITUDE, NEVER_LINEAR, FilmChange, change_conditions

@@ -12,9 +12,9 @@ from scipy.stats import t as student_t
 
 from rigdata import load_campaign
 from tests.command_line import tpjb
-from tests.studies.field.band_campaign import write_band_campaign
-from tests.studies.field.band_rig import BandRig, band_plans, stiffness
-from tests.studies.field.broadband import true_parameters
+from tests.rigs.band_campaign import write_band_campaign
+from tests.rigs.band_rig import BandRig, band_plans, stiffness
+from tests.studies.band_coverage import true_parameters
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.dynamic.broadband.band_equations import line_sums
 from tpjb_ident.dynamic.broadband.band_models import Shared, fit_band

@@ -8,8 +8,8 @@ import pytest
 from rigdata import load_campaign
 from rigdata.readers.hdf5.reader import Hdf5Reader
 from rigdata.readers.text import csv
-from tests.studies.field.campaign_file import BEARING, manifest_text, plans_of, write_campaign
-from tests.studies.field.rig import Device, Rig, record
+from tests.rigs.campaign_file import BEARING, manifest_text, plans_of, write_campaign
+from tests.rigs.field_rig import Device, Rig, record
 from tpjb_ident.check.findings import Reporter, verdicts
 from tpjb_ident.check.observation import observe
 from tpjb_ident.dynamic.identify import identify

@@ -243,8 +243,8 @@ def test_thousands_of_windows_start_from_a_share_of_them():
     """Two robust answers from 2400 windows, 30 % of them bad: within 0.3 %, and memory for hundreds, not thousands."""
     import tracemalloc
 
-    from tests.studies.estimator_cases import H_TRUE, Case, draw
-    from tests.studies.estimator_cases import OMEGA as STUDY_OMEGA
+    from tests.rigs.estimator_cases import H_TRUE, Case, draw
+    from tests.rigs.estimator_cases import OMEGA as STUDY_OMEGA
 
     sample = draw(Case("lev", 0.3, windows=300), 4, 0)
     for method in ("mm-eiv", "iv"):

@@ -10,7 +10,7 @@ import pytest
 from rigdata.campaign import load_campaign
 from rigdata.rows import VectorRows
 from rigdata.virtual_rig import Fault, Noise, RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
-from tests.studies.bench_phasors import HeldRun
+from tests.rigs.held_run import HeldRun
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.records.extraction import extract
 from tpjb_ident.dynamic.records.line_tuning import speeds_from_runout

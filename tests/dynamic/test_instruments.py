@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rigdata import load_campaign
-from tests.studies.field.campaign_file import plans_of, write_campaign
-from tests.studies.field.conditions import Row, rows
-from tests.studies.field.judge import judge
-from tests.studies.field.rig import Device, Rig
+from tests.rigs.campaign_file import plans_of, write_campaign
+from tests.rigs.field_conditions import Row, rows
+from tests.rigs.field_judge import judge
+from tests.rigs.field_rig import Device, Rig
 from tpjb_ident.check.set_points import without_static_part
 from tpjb_ident.dynamic.corrections.cell_zero import cell_zero
 from tpjb_ident.dynamic.estimators.uncertainty import DirectionMeans, pooled_effect

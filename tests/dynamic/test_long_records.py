@@ -10,7 +10,7 @@ import pytest
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import Timing, write_campaign
 from tests.dynamic.test_identify import rig
-from tests.studies.bench_phasors import HeldRun
+from tests.rigs.held_run import HeldRun
 from tpjb_ident.dynamic.records.extraction import extract
 from tpjb_ident.dynamic.records.kept_readings import SHORT, ShortRecord
 from tpjb_ident.dynamic.records.line_tuning import retuned

@@ -9,8 +9,8 @@ import pytest
 
 from rigdata import load_campaign
 from rigdata.run import pulse_times
-from tests.studies.field.campaign_file import plans_of, write_campaign
-from tests.studies.field.rig import Rig
+from tests.rigs.campaign_file import plans_of, write_campaign
+from tests.rigs.field_rig import Rig
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.records.shaft import shaft_order

@@ -37,10 +37,9 @@ def names_below(folder):
 
 
 def test_killed_at_random_moments_a_rerun_gives_the_same_bits(tmp_path):
-    bench = ROOT / "tests" / "studies" / "fault_kills.py"
     done = subprocess.run(
-        [sys.executable, bench, "--kills", "4", "--seed", "11", "--commands", "locus"],
-        capture_output=True, text=True, timeout=300, check=False,
+        [sys.executable, "-m", "tests.hostile.kills", "--kills", "4", "--seed", "11", "--commands", "locus"],
+        cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     assert "killed" in done.stdout

@@ -99,10 +99,9 @@ def test_results_for_a_read_only_disk_are_refused_before_any_work(tmp_path):
 
 @pytest.mark.skipif(not shutil.which("mkfs.ext4") or not Path("/dev/loop-control").exists(), reason="takes loop, ext4")
 def test_power_cut_at_any_step_leaves_former_or_whole_results():
-    bench = ROOT / "tests" / "studies" / "fault_power.py"
     done = subprocess.run(
-        [sys.executable, bench, "--trials", "1", "--commands", "locus", "--reruns", "1"],
-        capture_output=True, text=True, timeout=300, check=False,
+        [sys.executable, "-m", "tests.hostile.power_cuts", "--trials", "1", "--commands", "locus", "--reruns", "1"],
+        cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     assert "cut after the end, results new" in done.stdout

@@ -1,30 +1,21 @@
-"""A few hundred cases of the fuzzer (tests/studies/fuzz_readers.py) per reader: only documented errors."""
+"""A few hundred cases of the fuzzer (tests/studies/fuzz.py) per reader: only documented errors."""
 
 from __future__ import annotations
 
-import importlib.util
 import logging
 import random
-import sys
 import warnings
-from pathlib import Path
 
 import pytest
 
-BENCHMARKS = Path(__file__).parents[1] / "studies"
+from tests.hostile.fuzz_mutations import mutated
+from tests.hostile.fuzz_targets import make_target
+
 CASES = {
     "manifest": 100, "bearing": 100, "pivots": 150, "effects": 150, "csv": 40, "hdf5": 40, "mat": 150, "parquet": 60,
     "tdms": 60, "uff": 60, "mat73": 60, "asc": 60, "mf4": 5,
 }  # fmt: skip
 LIBRARIES = {"tdms": "nptdms", "uff": "pyuff", "mf4": "asammdf"}
-
-
-def load(name):
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, BENCHMARKS / f"{name}.py")
-        sys.modules[name] = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(sys.modules[name])
-    return sys.modules[name]
 
 
 @pytest.fixture
@@ -40,12 +31,9 @@ def quiet_libraries():
 def test_spoilt_files_end_in_data_or_documented_errors(name, tmp_path, quiet_libraries):
     if name in LIBRARIES:
         pytest.importorskip(LIBRARIES[name])
-    mutated = load("fuzz_mutations").mutated
     with warnings.catch_warnings():
         warnings.simplefilter("default")  # what other people's writers warn of is not ours to judge
-        targets = load("fuzz_targets")
-        # MDF through the real wall, not the one that the fuzzer keeps warm
-        target = targets.foreign_target(tmp_path, ".mf4") if name == "mf4" else targets.make_target(name, tmp_path)
+        target = make_target(name, tmp_path)
     target.feed(target.seeds[0])  # the good file itself is read
     refused = 0
     for number in range(CASES[name]):

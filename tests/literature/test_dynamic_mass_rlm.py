@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.studies.estimator_cases import Case, draw
+from tests.rigs.estimator_cases import Case, draw
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table, real_rows
 from tpjb_ident.dynamic.estimators.rlm import RlmSettings, solve_rlm
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.studies.convergence_model import CASES, MESHES, NAMES, Case, errors, orders, overall_order, table
+from tests.literature.mesh_convergence import CASES, MESHES, NAMES, Case, errors, orders, overall_order, table
 
 
 @pytest.mark.slow

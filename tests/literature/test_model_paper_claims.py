@@ -1,4 +1,4 @@
-"""The paper's claims (Lubricants 2019, 7, 61) as far as its text bears them; table: `tests/studies/paper_claims.py`.
+"""The paper's claims (Lubricants 2019, 7, 61) as far as its text bears them; table: `tests/literature/paper_claims.py`.
 
 Tolerances are those of sentences ("about 200 %", "2-3 times") read off figures, wide on purpose. Where the model cannot
 follow, the test says what it does instead, so that a change of the model shows.
@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.studies import paper_claims as paper
-from tests.studies.paper_claims import CXX, CYY, KXX, KYY
+from tests.literature import paper_claims as paper
+from tests.literature.paper_claims import CXX, CYY, KXX, KYY
 
 
 def test_kirks_rocker_is_about_thirteen_hundred_newtons_per_micrometre():  # claims 2, 3

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,21 +14,10 @@ from model.pivots import ConstantPivot
 from model.predict import predict
 from model.prediction import Prediction
 from model.statics.compiled.constants import EDGE
+from tests.rigs import random_bearings
 
 SPEED = 2 * math.pi * 22.0
 DOWN = -math.pi / 2
-
-
-def _robustness():
-    path = Path(__file__).resolve().parents[1] / "studies" / "robustness_model.py"
-    spec = importlib.util.spec_from_file_location("robustness_model", path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-robustness = _robustness()
 
 
 @pytest.fixture(scope="module")
@@ -40,8 +26,8 @@ def rocker(rocker_file) -> Bearing:
 
 
 def assert_equilibrium(p: Prediction) -> None:
-    for name, value in robustness.errors(p).items():
-        assert value <= robustness.LIMITS[name], (name, value)
+    for name, value in random_bearings.errors(p).items():
+        assert value <= random_bearings.LIMITS[name], (name, value)
 
 
 @pytest.mark.parametrize("thermal", ["isothermal", "adiabatic"])
@@ -56,19 +42,19 @@ def test_every_condition_can_fail(rocker):
     p = predict(rocker, 5000.0, DOWN, SPEED)
     assert_equilibrium(p)
     p.equilibrium.films[0].tilt += 1e-6
-    assert robustness.errors(p)["reynolds"] > 10 * robustness.LIMITS["reynolds"]
+    assert random_bearings.errors(p)["reynolds"] > 10 * random_bearings.LIMITS["reynolds"]
     p = predict(rocker, 5000.0, DOWN, SPEED)
     p.equilibrium.films[1].deflection += 1e-9
-    assert robustness.errors(p)["pivot"] > robustness.LIMITS["pivot"]
+    assert random_bearings.errors(p)["pivot"] > random_bearings.LIMITS["pivot"]
     p = predict(rocker, 5000.0, DOWN, SPEED)
     p.equilibrium.films[0].work.pressure[:] *= 1.0001
-    assert robustness.errors(p)["force"] > 10 * robustness.LIMITS["force"]
+    assert random_bearings.errors(p)["force"] > 10 * random_bearings.LIMITS["force"]
     p = predict(rocker, 5000.0, DOWN, SPEED)
     p.equilibrium.films[0].work.temperature[5:] += 0.01
-    assert robustness.errors(p)["heat"] > 10 * robustness.LIMITS["heat"]
+    assert random_bearings.errors(p)["heat"] > 10 * random_bearings.LIMITS["heat"]
     p = predict(rocker, 5000.0, DOWN, SPEED)
     p.equilibrium.films[2].idle = True
-    assert robustness.errors(p)["missed"] > robustness.LIMITS["missed"]
+    assert random_bearings.errors(p)["missed"] > random_bearings.LIMITS["missed"]
 
 
 @pytest.mark.parametrize("pivots", ["rigid", "kirk"])
@@ -185,7 +171,7 @@ def test_one_law_per_pad(rocker):
 
 @pytest.mark.slow
 def test_sixty_random_bearings():
-    outcome = robustness.run(robustness.draw(60, seed=11), turn_every=12)
+    outcome = random_bearings.run(random_bearings.draw(60, seed=11), turn_every=12)
     assert outcome.converged >= 59
     assert outcome.wrong == []
     assert outcome.asymmetry < 1e-6

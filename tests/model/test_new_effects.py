@@ -21,8 +21,8 @@ from model.prediction import Prediction
 from model.setup import Setup
 from model.static_tests import dry_curve, polygon_sides
 from model.statics.tilt_hold import friction_limits, rolling_radius, tilt_hold
-from tests.studies.regimes_model import fault, rolling
-from tests.studies.robustness_model import draw
+from tests.rigs.random_bearings import draw
+from tests.studies.random_bearings import fault, rolling
 
 SPEED, OMEGA, LOAD, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, 5000.0, -math.pi / 2
 

@@ -6,7 +6,7 @@ import pytest
 
 from rigdata.campaign import load_campaign
 from tests.good_campaigns import rocker_rig, written
-from tests.studies.five_laboratories import LABORATORIES, MOST_LINES, through
+from tests.rigs.laboratories import LABORATORIES, MOST_LINES, through
 
 pytestmark = pytest.mark.slow
 

@@ -16,7 +16,7 @@ from scipy.integrate import trapezoid
 from rigdata.campaign import load_campaign
 from rigdata.problem import RigDataError
 from rigdata.virtual_rig import ClearanceSweep, DryTest, Fault, Instruments, Noise
-from tests.studies.pivot_cases import (
+from tests.rigs.pivot_cases import (
     ANGLES,
     LOADS,
     PROGRAMMES,

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.command_line import tpjb
-from tests.studies.five_laboratories import fill_in
+from tests.rigs.laboratories import fill_in
 from tpjb_ident.report import plots
 
 ROOT = Path(__file__).parents[2]

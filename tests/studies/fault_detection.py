@@ -1,10 +1,9 @@
 """Put each named fault into good virtual campaigns: what does `tpjb check` say, and does identification go on?
 
-    python tests/studies/fault_detection.py [--seeds 3] [--first 1] [--good 30] [--faults dead ..] [--identify]
-        [--rows FILE]
+    python -m tests.studies.fault_detection [--seeds 3] [--good 30] [--faults dead ..] [--rows FILE] [--write]
 
 Per fault: the share of campaigns in which the struck run is named with an error or a warning, the share in which
-another run is blamed, and with ``--identify`` what became of the coefficients: the largest error of the direct terms
+another run is blamed, and what became of the coefficients: the largest error of the direct terms
 against the truth, what identification itself says of them, and in how many campaigns it says so. Good campaigns of
 various make (number of directions, noise, points, bearings that wander from run to run) give the rate of false alarms.
 ``--rows FILE`` keeps a JSON line per campaign; the same call again does what is missing there and prints the table.
@@ -15,9 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import sys
 import tempfile
-import time
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,6 +28,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Fault, Noise, operating_points
 from rigdata.virtual_rig.truth import load_vector
 from tests.good_campaigns import BEARINGS, DAMPING, PLAN, RUN, STIFFNESS, directions, stiff_rig, written
+from tests.studies.results import table, write_section
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.compare.static_tests import bearing_problems
 
@@ -209,7 +207,7 @@ def identified(path: Path) -> tuple[float, frozenset[str]]:
     return float(max(errors)), frozenset(said - USUAL)
 
 
-def row(name: str, outcomes: list[Outcome]) -> str:
+def row(name: str, outcomes: list[Outcome]) -> list[str]:
     """One line of the table."""
     n = len(outcomes)
     named, others = sum(o.named for o in outcomes), sum(o.blamed_others for o in outcomes)
@@ -218,7 +216,7 @@ def row(name: str, outcomes: list[Outcome]) -> str:
     severity = ", ".join(sorted({o.severity for o in outcomes}))
     counts = Counter(c for o in outcomes for c in o.said)
     said = ", ".join(f"{c} {k}" for c, k in counts.most_common()) or "-"
-    return f"| {name} | {named} of {n} | {severity} | {others} of {n} | {worst} | {said} |"
+    return [name, f"{named} of {n}", severity, f"{others} of {n}", worst, said]
 
 
 class Rows:
@@ -240,10 +238,8 @@ class Rows:
     def outcome(self, fault: str, seed: int) -> Outcome:
         """What is known of one campaign."""
         checked = self.known["check", fault, seed]
-        found = self.known.get(("identify", fault, seed))
+        found = self.known["identify", fault, seed]
         named, others, severity = (checked[k] for k in ("named", "others", "severity"))
-        if found is None:
-            return Outcome(named, others, severity)
         error = math.nan if found["error"] is None else found["error"]
         return Outcome(named, others, severity, error, frozenset(found["said"]))
 
@@ -266,9 +262,9 @@ def make(path: Path, name: str, seed: int) -> str | None:
     return None if fault is None else fault.run
 
 
-def work(name: str, seed: int, rows: Rows, folder: Path, wanted: tuple[str, ...]) -> None:
+def work(name: str, seed: int, rows: Rows, folder: Path) -> None:
     """Do what is missing of one campaign."""
-    missing = [w for w in wanted if (w, name, seed) not in rows.known]
+    missing = [step for step in ("check", "identify") if (step, name, seed) not in rows.known]
     if not missing:
         return
     path = folder / "c.h5"
@@ -293,24 +289,23 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=1, help="first seed")
     parser.add_argument("--good", type=int, default=12, help="good campaigns")
     parser.add_argument("--faults", nargs="*", help="parts of names")
-    parser.add_argument("--identify", action="store_true")
-    parser.add_argument("--no-check", action="store_true", help="identify only, for a file of rows that has the rest")
     parser.add_argument("--rows", type=Path, help="file of results, one JSON line each; what it has is not done again")
+    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     given = parser.parse_args()
-    began, rows = time.time(), Rows(given.rows)
-    wanted = (*(() if given.no_check else ("check",)), *(("identify",) if given.identify else ()))
-    print("| fault | named | as | others blamed | worst error of direct terms | identify says |")
-    print("|---|---|---|---|---|---|")
+    rows, entries = Rows(given.rows), []
     with tempfile.TemporaryDirectory() as scratch:
         for name in (GOOD, WANDERING, *FAULTS, *AMPLIFIED, MIXED):
             if given.faults and not any(part in name for part in given.faults):
                 continue
             seeds = range(given.first, given.first + (given.good if name in (GOOD, WANDERING) else given.seeds))
             for seed in seeds:
-                work(name, seed, rows, Path(scratch), wanted)
-            if not given.no_check:
-                print(row(name, [rows.outcome(name, seed) for seed in seeds]), flush=True)
-    print(f"\n{given.seeds} campaigns per row, {time.time() - began:.0f} s", file=sys.stderr)
+                work(name, seed, rows, Path(scratch))
+            entries.append(row(name, [rows.outcome(name, seed) for seed in seeds]))
+            print(entries[-1], flush=True)
+    if given.write:
+        seeds = f"--seeds {given.seeds} --first {given.first} --good {given.good}"
+        head = ("fault", "named", "as", "others blamed", "worst error", "identify says")
+        write_section("faults", f"python -m tests.studies.fault_detection {seeds} --write", table(head, entries))
 
 
 if __name__ == "__main__":

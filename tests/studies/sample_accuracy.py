@@ -1,94 +1,98 @@
-"""Identified figures of the sample campaigns against their truth: share inside the interval and relative errors.
+"""Identified figures of the sample campaigns against their truth: shares inside the intervals and errors.
 
-python tests/studies/sample_accuracy.py ../shared/samples [campaign ..]
+python -m tests.studies.sample_accuracy [../shared/samples] [--write]
 """
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import rigdata
 from model.bearing_file import parse_bearing
+from tests.studies.results import table, write_section
 from tpjb_ident.clearance.locus import measure_locus
 from tpjb_ident.clearance.measure import measure_clearance
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.pivot import fit_pivots
 
+NAMES = ("rocker-baseline", "rocker-measured-pivots.h5", "spherical-baseline.h5")
+LOADS = (1000.0, 2000.0, 4000.0)
 
-def report(path: Path, truth: dict) -> None:
-    """Print one campaign."""
+
+def row(path: Path, truth: dict[str, Any]) -> list[str]:
+    """One campaign."""
     campaign = rigdata.load_campaign(path)
     bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
     angles = [pad.pivot_angle for pad in bearing.pads]
-    _coefficients(identify(campaign), truth)
     curves = fit_pivots(campaign, angles)
-    _pivots(curves, truth)
     polygon = measure_clearance(campaign, angles, curves)
-    error = 1e6 * (polygon.clearance - np.array(truth["clearance_cold_m"]))
-    print("  clearance per pad, error um:", np.round(error, 3))
-    true = {p["static_load_direction_deg"]: (p["x_m"], p["y_m"]) for p in truth["locus"]}
-    locus = measure_locus(campaign, polygon)
-    off = [1e6 * np.hypot(*(p.position - true[_degrees(p, true)])) for p in locus.points]
-    print(f"  locus, distance from truth um: median {np.median(off):.3f}, largest {max(off):.3f}")
+    clearance = 1e6 * np.abs(polygon.clearance - np.array(truth["clearance_cold_m"])).max()
+    return [
+        path.stem,
+        *coefficients(identify(campaign), truth),
+        *pivots(curves, truth),
+        f"{clearance:.2f} um",
+        f"{locus_error(measure_locus(campaign, polygon), truth):.2f} um",
+    ]
 
 
-def _degrees(point, true: dict) -> float:  # type: ignore[no-untyped-def]
-    mine = point.point.static_load_direction_deg
-    return min(true, key=lambda d: abs((d - mine + 180) % 360 - 180))
-
-
-def _coefficients(found, truth: dict) -> None:  # type: ignore[no-untyped-def]
-    table = {(p["static_load_N"], p["excitation_Hz"]): p for p in truth["points"]}
-    inside, total, errors, mains = 0, 0, [], []
-    for p in found.points:
-        true = table[(round(p.point.static_load, 3), round(p.point.excitation_hz, 6))]
+def coefficients(identification: Any, truth: dict[str, Any]) -> tuple[str, str]:
+    """Entries of K and C inside their intervals; largest error of a direct one, mains line apart."""
+    points = {(p["static_load_N"], p["excitation_Hz"]): p for p in truth["points"]}
+    inside, errors = [], []
+    for p in identification.points:
+        true = points[round(p.point.static_load, 3), round(p.point.excitation_hz, 6)]
         k, c = np.array(true["K_apparent"]), np.array(true["C_apparent"])
         interval = p.stiffness.interval(0.95)
-        omega = p.point.excitation
-        vector = np.concatenate([k.ravel(), omega * c.ravel()])
-        low, high = np.asarray(interval.lo).ravel(), np.asarray(interval.hi).ravel()
-        inside += int(np.sum((low <= vector) & (vector <= high)))
-        total += 8
-        e = [p.stiffness.k[0, 0] / k[0, 0], p.stiffness.k[1, 1] / k[1, 1],
-             p.stiffness.c[0, 0] / c[0, 0], p.stiffness.c[1, 1] / c[1, 1]]  # fmt: skip
-        on_mains = abs(p.point.excitation_hz - 50.0) < 0.5
-        (mains if on_mains else errors).append(np.array(e) - 1)
-        if on_mains:
-            print(f"  50 Hz flagged: {[str(q) for q in p.quality][:2]}")
-    print(f"  K, C entries inside the 95 % interval: {inside} of {total}")
-    print("  kxx kyy cxx cyy, largest error %:", np.round(100 * np.abs(errors).max(axis=0), 2),
-          "median %:", np.round(100 * np.median(np.abs(errors), axis=0), 2))  # fmt: skip
-    if mains:
-        print("  at 50 Hz (mains) %:", np.round(100 * np.abs(mains).max(axis=0), 2))
+        vector = np.concatenate([k.ravel(), p.point.excitation * c.ravel()])
+        inside += list((np.ravel(interval.lo) <= vector) & (vector <= np.ravel(interval.hi)))
+        if abs(p.point.excitation_hz - 50.0) > 0.5:
+            errors += [*np.diag(p.stiffness.k / k - 1), *np.diag(p.stiffness.c / c - 1)]
+    return f"{sum(inside)} of {len(inside)}", f"{100 * np.abs(errors).max():.2f} %"
 
 
-def _pivots(curves, truth: dict) -> None:  # type: ignore[no-untyped-def]
-    rows = []
+def pivots(curves: Any, truth: dict[str, Any]) -> tuple[str, str]:
+    """Tangents inside their band, largest error."""
+    true = {p["pad"]: p for p in truth["pivot_curves"]}
+    inside, errors = [], []
     for curve in curves:
-        true = next(p for p in truth["pivot_curves"] if p["pad"] == curve.pad)
-        for load in (1000.0, 2000.0, 4000.0):
-            exact = float(np.interp(load, true["force_N"], true["stiffness_N_per_m"]))
-            low, high = curve.stiffness_band(load)
-            value = float(np.ravel(curve.stiffness(load))[0])
-            inside = float(np.ravel(low)[0]) <= exact <= float(np.ravel(high)[0])
-            rows.append((curve.pad, 100 * (value / exact - 1), inside))
-    for pad in sorted({r[0] for r in rows}):
-        errors = ", ".join(f"{r[1]:+.2f}" for r in rows if r[0] == pad)
-        print(f"  pivot of pad {pad}, tangent stiffness at 1, 2, 4 kN, error %: {errors}")
-    print(f"  inside the 95 % band: {sum(r[2] for r in rows)} of {len(rows)}")
+        exact = np.interp(LOADS, true[curve.pad]["force_N"], true[curve.pad]["stiffness_N_per_m"])
+        low, high = curve.stiffness_band(np.array(LOADS))
+        inside += list((low <= exact) & (exact <= high))
+        errors += list(curve.stiffness(np.array(LOADS)) / exact - 1)
+    return f"{sum(inside)} of {len(inside)}", f"{100 * np.abs(errors).max():.1f} %"
+
+
+def locus_error(locus: Any, truth: dict[str, Any]) -> float:
+    """Largest distance of a position from the truth [um]."""
+    true = {p["static_load_direction_deg"]: (p["x_m"], p["y_m"]) for p in truth["locus"]}
+    distances = []
+    for p in locus.points:
+        direction = p.point.static_load_direction_deg
+        nearest = min(true, key=lambda d, at=direction: abs((d - at + 180) % 360 - 180))
+        distances.append(1e6 * np.hypot(*(p.position - true[nearest])))
+    return max(distances)
 
 
 def main() -> None:
-    """Run over the sample folder."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "../shared/samples")
-    names = sys.argv[2:] or ["rocker-baseline", "rocker-measured-pivots.h5", "spherical-baseline.h5"]
-    for name in names:
-        print(name)
-        report(folder / name, json.loads((folder / "truth" / f"{name.removesuffix('.h5')}.json").read_text()))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("../shared/samples"))
+    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
+    asked = parser.parse_args()
+    rows = []
+    for name in NAMES:
+        truth = json.loads((asked.folder / "truth" / f"{name.removesuffix('.h5')}.json").read_text("utf-8"))
+        rows.append(row(asked.folder / name, truth))
+    head = ("campaign", "K, C in 95 %", "largest error", "pivots in band", "largest error", "clearance", "locus")
+    text = table(head, rows)
+    print(text)
+    if asked.write:
+        write_section("samples", "python -m tests.studies.sample_accuracy --write", text)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Constants of the search for an equilibrium, compiled or not.
 
-Those of which pads carry were tried on random bearings: 300 as `tests/studies/robustness_model.py` draws them (seed 7),
+Those of which pads carry were tried on random bearings: 300 as `tests/rigs/random_bearings.py` draws them (seed 7),
 and 300 or 900 with preloads down to zero, offsets to 0.62 and loads from 0.03 MPa (seed 8), where pads take up and shed
 their load all the time. What was found stands with each; what made no difference has gone.
 """

@@ -106,18 +106,7 @@ def at(base: Setup, name: str, value: float) -> Setup:
 
 @dataclass(frozen=True)
 class Table:
-    """Answers of the model as numbers that are nearly linear in the coordinates.
-
-    Attributes
-    ----------
-    base : (m,) ndarray
-    splines : list of CubicSpline
-        Of the change along every coordinate.
-    pairs : (c, c, m) ndarray
-        Bilinear terms, half of each at either place.
-    together : dict of str to CubicSpline
-        Of what is still missing when all pads move alike.
-    """
+    """Answers of the model as numbers that are nearly linear in the coordinates."""
 
     base: FloatArray
     splines: list[CubicSpline] = field(repr=False)
@@ -207,17 +196,7 @@ def _solved(latent: FloatArray, point: StaticPoint, lines: int) -> Solved:
 
 
 def emulate(forward: Forward, more: Layout, kept: Path | None = None) -> Emulated:
-    """Solve what an emulator needs (some minutes), or read it.
-
-    Parameters
-    ----------
-    forward : Forward
-        The model at its baseline.
-    more : Layout
-        Further operating points that are asked for.
-    kept : Path, optional
-        File that holds it, or is going to.
-    """
+    """Solve what an emulator needs (some minutes), or read it."""
     points: dict[tuple[StaticPoint, tuple[float, ...]], slice] = {}
     count = 0
     for point, lines in _asked(forward.layout, more):

@@ -68,22 +68,12 @@ SMOOTH = (0.0005, 0.002)
 
 @dataclass(frozen=True)
 class Bench:
-    """One bearing with all that does not change from campaign to campaign.
+    """One bearing with all that does not change from campaign to campaign."""
 
-    Attributes
-    ----------
-    problem : Problem
-        Its measured values are replaced by every campaign's.
-    forward, elsewhere : Forward
-        The emulated model, at the plan's points and at points that no campaign holds.
-    seen : dict of str to float
-        Size of a typical step of every candidate, in standard deviations of everything else.
-    """
-
-    problem: Problem
-    forward: Forward
-    elsewhere: Forward
-    seen: dict[str, float]
+    problem: Problem  #: its measured values are replaced by those of each campaign
+    forward: Forward  #: the emulated model at the points of the plan
+    elsewhere: Forward  #: the same at points that no campaign holds
+    seen: dict[str, float]  #: a typical step of each candidate, in standard deviations of everything else
 
 
 def plan_of_the_paper() -> tuple[Layout, Layout]:
@@ -111,17 +101,7 @@ def plan_between() -> tuple[Layout, Layout]:
 
 
 def bench(name: str, folder: Path | None, skip: frozenset[str] = SKIPPED) -> Bench:
-    """Pose a bearing's plan, on an emulator whose table is kept in a folder, or on the model.
-
-    Parameters
-    ----------
-    name : str
-        Of the bearing.
-    folder : Path or None
-        None: the model itself.
-    skip : frozenset of str
-        Effects that are left out.
-    """
+    """Pose a bearing's plan, on an emulator whose table is kept in a folder, or on the model."""
     bearing = load_bearing((HERE if name == "between" else BEARINGS) / f"{name}.toml")
     setup = Setup(bearing, pivot_laws("kirk", bearing), mesh=MESH, accuracy=ACCURACY)
     layout, new = plan_between() if name == "between" else plan_of_the_paper()
@@ -158,47 +138,19 @@ def _slope(forward: Forward, base: FloatArray, c: Candidate, i: int) -> FloatArr
 
 @dataclass(frozen=True)
 class Drawn:
-    """One campaign.
+    """One campaign."""
 
-    Attributes
-    ----------
-    truth : tuple of Effect
-        Hidden effects that the library holds.
-    outside : str
-        What is hidden beyond it.
-    problem : Problem
-        With the pool it is diagnosed with, and what was measured.
-    shares : tuple of float
-        Squared change in sigma that every effect of `truth` makes beside the others.
-    size : (m,) ndarray
-        What is off, in standard deviations.
-    hidden : tuple of Effect
-        Everything that is hidden.
-    growth : float
-        Of the clearance, in proportion to the load, at the top load [m].
-    """
-
-    truth: tuple[Effect, ...]
-    outside: str
-    problem: Problem
-    shares: tuple[float, ...]
-    size: FloatArray
+    truth: tuple[Effect, ...]  #: hidden effects that the library holds
+    outside: str  #: what is hidden beyond it
+    problem: Problem  #: with the pool it is diagnosed with, and what was measured
+    shares: tuple[float, ...]  #: squared change in sigma of each effect of `truth` with the others present
+    size: FloatArray  #: (m,), what is off, in standard deviations
     hidden: tuple[Effect, ...]
-    growth: float
+    growth: float  #: of the clearance, in proportion to the load, at the top load [m]
 
 
 def draw(one: Bench, kind: str, rng: np.random.Generator, beyond: Sequence[str] = OUTSIDE) -> Drawn | None:
-    """Draw a campaign; None where the model has no equilibrium.
-
-    Parameters
-    ----------
-    one : Bench
-    kind : str
-        See `HIDDEN`.
-    rng : Generator
-    beyond : sequence of str
-        What may be hidden that the library does not hold.
-    """
+    """Draw a campaign; None where the model has no equilibrium."""
     library = [
         c for c in one.problem.pool
         if c.name not in TERMS and len(c.steps) == 1 and SIZES[1] * one.seen[c.label] >= SEEN

@@ -1,10 +1,13 @@
 """Tables of mixtures, from their rows.
 
-python -m tests.studies.diagnosis.tables ROWS.jsonl [MORE.jsonl ..]
+    python -m tests.studies.diagnosis.tables [--write SECTION] ROWS.jsonl [MORE.jsonl ..]
+
+`SECTION` of RESULTS.md: mixtures, mixtures-between, volts.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import sys
@@ -16,6 +19,8 @@ from typing import Any
 
 from scipy.stats import beta
 
+from tests.studies.results import write_section
+
 Row = Mapping[str, Any]
 VERDICTS = ("consistent", "named", "ambiguous", "partly-explained", "unexplained")
 #: A group of more members than this says nothing.
@@ -23,13 +28,7 @@ FEW = 3
 
 
 def tables(rows: Sequence[Row]) -> str:
-    """Every table as Markdown.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        As `mixtures.run` gives them.
-    """
+    """Every table as Markdown."""
     mixed = [r for r in rows if r["truth"] and not r["outside"] and r["kind"] != "clean"]
     scatter, sized, there, no_false, intervals, described, clean = standing(rows)
     outside = [r for r in rows if r["kind"] == "outside"]
@@ -57,12 +56,7 @@ def tables(rows: Sequence[Row]) -> str:
 
 
 def standing(rows: Sequence[Row]) -> list[list[bool]]:
-    """What holds, row by row: by what is asked, in the order of `tables`; groups and elsewhere left out.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-    """
+    """What holds, row by row: by what is asked, in the order of `tables`; groups and elsewhere left out."""
     inside = [r for r in rows if r["truth"] and not r["outside"]]
     mixed = [r for r in inside if r["kind"] != "clean"]
     return [
@@ -157,5 +151,17 @@ def _held(row: Row, true: Mapping[str, float]) -> list[bool]:
     return out
 
 
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("rows", nargs="+", type=Path)
+    parser.add_argument("--write", metavar="SECTION", help="replace this section of RESULTS.md")
+    asked = parser.parse_args()
+    text = tables([json.loads(line) for path in asked.rows for line in path.read_text("utf-8").splitlines()])
+    if asked.write:
+        write_section(asked.write, f"python -m tests.studies.diagnosis.tables {' '.join(sys.argv[1:])}", text)
+    else:
+        print(text)
+
+
 if __name__ == "__main__":
-    print(tables([json.loads(line) for path in sys.argv[1:] for line in Path(path).read_text("utf-8").splitlines()]))
+    main()

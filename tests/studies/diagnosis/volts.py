@@ -1,6 +1,6 @@
 """Mixtures as raw records: written by the virtual rig, identified and diagnosed by the command line.
 
-    python -m tests.studies.diagnosis.volts --rows FILE [--bearing rocker] [--count 100] [--seed 80000] [--core 1]
+    python -m tests.studies.diagnosis.volts --rows FILE [--bearing rocker] [--count 100] [--core 1] [--write]
 
 Everything that may be off is drawn from its stated tolerance as in `mixtures`, the same kinds in the same order; the
 rig writes a campaign of the paper's plan from it (bearing and pivots that are off, probes, cells and thermometers with
@@ -35,6 +35,7 @@ from model.setup import Setup
 from rigdata.virtual_rig import Instruments, Noise, RigPlan, RigTruth, VirtualRig, write_campaign
 from tests.studies.diagnosis.mixtures import BEARINGS, KINDS, OUTSIDE, Bench, Drawn, bench, draw, hidden
 from tests.studies.diagnosis.tables import tables
+from tests.studies.results import write_section
 from tpjb_ident.compare.rig_from_model import (
     INSTRUMENT_ERRORS,
     ModelConvergenceError,
@@ -49,16 +50,7 @@ PROBES, CELLS = ("X1A", "X1B"), {"cell x": "L1H", "cell y": "L1V"}
 
 
 def rig_of(name: str, drawn: Drawn, seed: int) -> VirtualRig:
-    """A virtual rig with what was drawn in it.
-
-    Parameters
-    ----------
-    name : str
-        Of the bearing.
-    drawn : Drawn
-    seed : int
-        Of its noise.
-    """
+    """A virtual rig with what was drawn in it."""
     text = (BEARINGS / f"{name}.toml").read_text(encoding="utf-8")
     bearing = load_bearing(BEARINGS / f"{name}.toml")
     known = list(zip(drawn.problem.nuisances, map(float, drawn.size), strict=True))
@@ -112,17 +104,7 @@ def _off(instruments: Instruments, known: list[tuple[Nuisance, float]]) -> Instr
 
 
 def run(one: Bench, name: str, kind: str, seed: int) -> dict[str, Any] | None:
-    """Draw, write, diagnose one campaign; a row as of `mixtures.run`.
-
-    Parameters
-    ----------
-    one : Bench
-        On the model itself.
-    name : str
-        Of the bearing.
-    kind : str
-    seed : int
-    """
+    """Draw, write, diagnose one campaign; a row as of `mixtures.run`."""
     rng = np.random.default_rng([seed, 20190761])
     drawn = draw(replace(one, forward=one.forward.fresh()), kind, rng, OUTSIDE[1:])
     if drawn is None:
@@ -162,6 +144,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=80000)
     parser.add_argument("--rows", type=Path, default=Path("volts.jsonl"))
+    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     parser.add_argument("--core", type=int, help="run on this core only, with one worker")
     asked = parser.parse_args()
     if asked.core is not None:
@@ -179,7 +162,10 @@ def main() -> None:
             asked.rows.parent.mkdir(parents=True, exist_ok=True)
             with asked.rows.open("a", encoding="utf-8") as out:
                 out.write(json.dumps(rows[-1], default=float) + "\n")
-    print(tables([row for row in rows if "failed" not in row]))
+    text = tables([row for row in rows if "failed" not in row])
+    print(text)
+    if asked.write:
+        write_section("volts", f"python -m tests.studies.diagnosis.volts --rows {asked.rows} --write", text)
     for row in rows:
         if "failed" in row:
             print(row["seed"], row["kind"], row["failed"])

@@ -10,7 +10,7 @@ from tpjb_ident.diagnosis.observations.tolerance import Tolerance
 
 @dataclass(frozen=True)
 class DiagnoseSettings:
-    """How a diagnosis decides; studies in `tests/studies/diagnosis`, tables in `docs/diagnosis.md`."""
+    """How a diagnosis decides; studies in `tests/studies/diagnosis`, tables in `tests/studies/RESULTS.md`."""
 
     tolerances: Tolerances = field(default_factory=Tolerances)
     wanted: float = 5.0

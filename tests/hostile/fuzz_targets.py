@@ -1,0 +1,385 @@
+"""What the fuzzer feeds: each reader with its good files, and the errors that it documents."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import shlex
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+CSV_MANIFEST = """\
+schema = "tpjb-rig/1"
+id = "t"
+bearing = "b.toml"
+[acquisition]
+sample_rate = "10 Hz"
+[channels.X1A]
+quantity = "displacement"
+axis = "0 deg"
+unit = "um"
+[channels.X1B]
+quantity = "displacement"
+axis = "90 deg"
+unit = "um"
+[channels.Zeit]
+quantity = "time"
+unit = "s"
+[[runs]]
+id = "c-1"
+file = "c-1.csv"
+kind = "clearance"
+"""
+
+
+@dataclass(frozen=True)
+class Target:
+    """One reader under test: good inputs, what takes an input, the errors that are an answer, late imports."""
+
+    name: str
+    seeds: tuple[bytes, ...]
+    feed: Callable[[bytes], None]
+    documented: tuple[type[BaseException], ...]
+    preload: tuple[str, ...] = ()
+
+
+def _text(data: bytes) -> str:
+    return data.decode("utf-8", "replace")
+
+
+def manifest_target(folder: Path) -> Target:
+    """`rigdata.manifest.manifest.parse_manifest`."""
+    from rigdata.manifest.manifest import parse_manifest
+    from rigdata.problem import RigDataError
+
+    seeds = (CSV_MANIFEST.encode(), _shortened(_demo_manifest()))
+    return Target("manifest", seeds, lambda data: _ignore(parse_manifest(_text(data))), (RigDataError,))
+
+
+def _ignore(result: object) -> None:
+    str(result)
+
+
+def _demo_manifest() -> bytes:
+    import h5py
+
+    with h5py.File(ROOT / "rigdata" / "samples" / "demo.h5") as file:
+        value = file.attrs["manifest"]
+    return value if isinstance(value, bytes) else str(value).encode()
+
+
+def _shortened(manifest: bytes) -> bytes:
+    """The demo's manifest with one run of each kind: parsing the other dozens would only cost time."""
+    head, *runs = manifest.split(b"[[runs]]\n")
+    by_kind = {line: run for run in runs for line in run.splitlines() if line.startswith(b"kind")}
+    return b"[[runs]]\n".join([head, *by_kind.values()])
+
+
+def bearing_target(folder: Path) -> Target:
+    """`model.bearing_file.parse_bearing`."""
+    from model.bearing import BearingError
+    from model.bearing_file import parse_bearing
+    from model.units import UnitError
+
+    seeds = tuple(p.read_bytes() for p in sorted((ROOT / "model" / "bearings").glob("*.toml")))
+    return Target("bearing", seeds, lambda d: _ignore(parse_bearing(_text(d), "b.toml")), (BearingError, UnitError))
+
+
+def pivots_target(folder: Path) -> Target:
+    """`model.pivots.load_pivots`, and the law at two loads."""
+    from model.bearing import BearingError
+    from model.pivots import load_pivots
+
+    loads = np.r_[0.0, np.geomspace(2.0, 12000.0, 12)]
+    pads = [
+        f'[[pads]]\npad = {k}\nlaw = "hertz-line"\nvalid_from_N = 50.0\nvalid_to_N = 5000.0\n'
+        f"force_N = {[float(w) for w in loads]}\ndeflection_m = {[float(2e-8 * w**0.7) for w in loads]}\n"
+        for k in range(1, 4)
+    ]
+    text = 'schema = "tpjb-pivots/1"\nsource = "x"\nincludes_housing = true\n' + "\n".join(pads)
+
+    def feed(data: bytes) -> None:
+        path = folder / "pivots.toml"
+        path.write_bytes(data)
+        for law in load_pivots(path):
+            law.deflection(1000.0), law.stiffness(1000.0)
+
+    return Target("pivots.toml", (text.encode(), "\n".join([text[:70], *pads[:1]]).encode()), feed, (BearingError,))
+
+
+def effects_target(folder: Path) -> Target:
+    """`model.effects.load_effects`, and the effects applied to the rocker bearing."""
+    from model.bearing import BearingError
+    from model.effects import EffectError, load_effects
+    from model.units import UnitError
+
+    text = (
+        'schema = "tpjb-effects/1"\n[[effects]]\nname = "soft_pivot"\npad = 5\nstiffness_factor = 0.3\n'
+        '[effects.stiffness_factor_interval]\nlo = 0.2\nhi = 0.4\n[[effects]]\nname = "probe_gain"\nfactor = 1.02\n'
+        '[[effects]]\nname = "channel_delay"\ndelay = "0.2 ms"\n'
+    )
+
+    def feed(data: bytes) -> None:
+        path = folder / "x.effects.toml"
+        path.write_bytes(data)
+        _ignore(load_effects(path))
+
+    return Target("effects", (text.encode(),), feed, (EffectError, BearingError, UnitError))
+
+
+def csv_target(folder: Path) -> Target:
+    """One CSV record: dialect, numbers, times."""
+    from rigdata.manifest.manifest import parse_manifest
+    from rigdata.problem import RigDataError
+    from rigdata.readers.text.csv import CsvReader
+
+    manifest = parse_manifest(CSV_MANIFEST)
+    record = folder / "c-1.csv"
+
+    def feed(data: bytes) -> None:
+        record.write_bytes(data)
+        reader = CsvReader(record, "c-1.csv", "c-1", manifest.csv, manifest.channels, manifest.sample_rate)
+        length = reader.length()
+        reader.read(["X1A", "X1B"], 0, length)
+        reader.rate(), reader.time(0, length), reader.problems()
+
+    preload = ("pyarrow.csv", "pyarrow.compute", "rigdata.readers.text.csv")
+    return Target("csv", _csv_seeds(), feed, (RigDataError,), preload)
+
+
+def _csv_seeds() -> tuple[bytes, ...]:
+    rows = [(0.5 * i, 1.5 + math.sin(i), -2.25 * i) for i in range(12)]
+    out = []
+    for delimiter, decimal, end, codec in (
+        (";", ",", "\r\n", "cp1252"),
+        (",", ".", "\n", "utf-8-sig"),
+        ("\t", ".", "\n", "utf-16"),
+        (" ", ".", "\n", "ascii"),
+    ):
+        body = [delimiter.join(f"{v:.4f}".replace(".", decimal) for v in row) for row in rows]
+        names = delimiter.join(("Zeit", "X1A", "X1B"))
+        units = delimiter.join(("s", "um", "um"))
+        head = [] if delimiter == " " else ["Pr\xfcfstand" if codec != "ascii" else "rig", "operator: A"]
+        out.append(end.join([*head, names, units, *body, ""]).encode(codec, "replace"))
+    return tuple(out)
+
+
+def hdf5_target(folder: Path) -> Target:
+    """A small HDF5 campaign, fuzzed as bytes: opened, every channel read."""
+    import h5py
+
+    import rigdata
+
+    path = folder / "seed.h5"
+    seeds = []
+    for options in ({"compression": "gzip", "chunks": (16,)}, {}):
+        with h5py.File(path, "w", libver="earliest" if options else "latest") as file:
+            file.attrs["manifest"] = CSV_MANIFEST.replace("[channels.Zeit]", "[channels.T]")
+            file.attrs["bearing"] = 'name = "b"\n'
+            group = file.create_group("runs/c-1")
+            group.attrs["sample_rate_hz"] = 100.0
+            for k, name in enumerate(("X1A", "X1B")):
+                group.create_dataset(name, data=np.sin(0.1 * np.arange(40) + k).astype("f4"), **options)
+        seeds.append(path.read_bytes())
+    fuzzed = folder / "fuzzed.h5"
+
+    def feed(data: bytes) -> None:
+        fuzzed.write_bytes(data)
+        run = rigdata.load_campaign(fuzzed).run("c-1")
+        run.record("X1A")
+        run.vector("displacement")
+        run.reader.problems()
+
+    return Target("hdf5", tuple(seeds), feed, (rigdata.RigDataError,), ("rigdata.readers.hdf5.reader",))
+
+
+def foreign_target(folder: Path, suffix: str) -> Target:
+    """One of the other loggers' formats."""
+    from rigdata.problem import RigDataError
+    from rigdata.readers.formats.foreign import read_foreign
+
+    ending = ".mat" if suffix == ".mat73" else suffix
+    path = folder / f"fuzzed{ending}"
+    seed = folder / f"seed{suffix}"
+    _write_foreign(seed)
+
+    def feed(data: bytes) -> None:
+        path.write_bytes(data)
+        read_foreign(path, path.name, "r")
+
+    return Target(suffix.lstrip("."), (seed.read_bytes(),), feed, (RigDataError,))
+
+
+def _write_foreign(path: Path) -> None:
+    time = np.arange(120) / 100.0
+    values = np.sin(time)
+    if path.suffix == ".mat":
+        from scipy.io import savemat
+
+        savemat(path, {"time": time, "X1A": values, "X1B": 2 * values})
+    elif path.suffix == ".mat73":
+        import h5py
+
+        with h5py.File(path, "w", userblock_size=512) as file:  # MATLAB's own text stands in the first 512 bytes
+            for name, column in (("time", time), ("s/X1A", values)):
+                file.create_dataset(name, data=column[None, :])
+    elif path.suffix == ".mf4":
+        from asammdf import MDF, Signal
+
+        with MDF(version="4.10") as file:
+            file.append([Signal(samples=values[:20], timestamps=time[:20], name="X1A", unit="um")])
+            file.append([Signal(samples=values[:5], timestamps=time[:5], name="T1", unit="degC")])
+            file.save(path, overwrite=True)
+    elif path.suffix == ".asc":
+        rows = [f"{i / 10:.1f}\t{i * 0.5:.3f}\t" + (f"{i:.1f}\t{20.0 + i:.2f}" if i < 4 else "\t") for i in range(12)]
+        head = ["Time  1 - fast [s]\tX1A [um]\tTime  2 - slow [s]\tT1 [degC]"]
+        path.write_text("\n".join(["rig", *head, *rows, ""]), encoding="cp1252")
+    elif path.suffix == ".parquet":
+        import pandas as pd
+
+        pd.DataFrame({"time": time, "X1A": values}).to_parquet(path)
+    elif path.suffix == ".tdms":
+        from nptdms import ChannelObject, TdmsWriter
+
+        with TdmsWriter(str(path)) as writer:
+            writer.write_segment([ChannelObject("g", "X1A", values, properties={"wf_increment": 0.01})])
+    else:
+        import pyuff
+
+        pyuff.UFF(str(path)).write_sets(_uff_set(time, values), mode="overwrite")
+
+
+def _uff_set(time: np.ndarray, values: np.ndarray) -> dict[str, object]:
+    import pyuff
+
+    return pyuff.prepare_58(
+        binary=0,
+        id1="X1A",
+        func_type=1,
+        rsp_node=1,
+        rsp_dir=1,
+        ref_node=1,
+        ref_dir=1,
+        data=values,
+        x=time,
+        abscissa_inc=0.01,
+        abscissa_min=0.0,
+        abscissa_spec_data_type=17,
+        abscissa_axis_units_lab="s",
+        ordinate_spec_data_type=0,
+        ordinate_axis_units_lab="NONE",
+        orddenom_spec_data_type=0,
+        z_axis_spec_data_type=0,
+    )
+
+
+COMMAND_LINES = (
+    'predict rocker.toml --pivots kirk --load "5 kN" --speed "22 Hz" --excitation "25 Hz" --thermal isothermal --out o',
+    "check none.h5 --out o --json",
+    "identify none.h5 --method rlm --norm huber --lines '20, 25 Hz' --delay force=0.2ms --out o",
+    "pivot none.h5 --bearing rocker.toml --out o",
+    "locus folder --out o -q",
+    "compare none.h5 --bearing none.toml --out o",
+    "diagnose none.h5 --bearing rocker.toml --out o",
+    "simulate none.toml --out o",
+    "export folder --to ross --out o",
+    "show none.h5 run",
+    "init folder --out o",
+    "verify folder",
+    "--version",
+    "--help",
+    "identify --workers 0 none.h5",
+)
+
+
+_COMMAND_MODULES = (
+    "rich.console",
+    "rich.table",
+    "rich.progress",
+    "rich.panel",
+    "pyarrow.parquet",
+    "pandas",
+    "numba",
+    "scipy.interpolate",
+    "scipy.optimize",
+    "scipy.sparse.linalg",
+    "statsmodels.api",
+    "h5py",
+    "matplotlib.figure",
+    "matplotlib.backends.backend_svg",
+    "jinja2",
+    "model.predict",
+    "tpjb_ident.clearance.sweep",
+    "tpjb_ident.dynamic.identify",
+    "tpjb_ident.pivot",
+    "tpjb_ident.compare",
+    "tpjb_ident.diagnosis",
+    "tpjb_ident.runtime.executors",
+    "tpjb_ident.clearance.locus",
+    "tpjb_ident.exports",
+    "rigdata.survey.draft",
+)
+
+
+def command_target(folder: Path) -> Target:
+    """The command line: words spoilt; only the exit codes 0, 2 and 3 are an answer (1 is a bug)."""
+    import os
+
+    import typer
+
+    from tpjb_ident.cli.app import app
+
+    command = typer.main.get_command(app)  # typer would build it again for every case, which costs three times the rest
+    place = folder / "cli"
+    (place / "folder").mkdir(parents=True, exist_ok=True)
+    (place / "rocker.toml").write_bytes((ROOT / "model" / "bearings" / "rocker.toml").read_bytes())
+
+    def feed(data: bytes) -> None:
+        try:
+            words = shlex.split(_text(data))[:40]
+        except ValueError:
+            return
+        if words[:1] == ["demo"]:
+            return  # a minute of work for no input
+        here = Path.cwd()
+        os.chdir(place)
+        try:
+            with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as told:
+                command.main(words, prog_name="tpjb", standalone_mode=True)
+        except SystemExit as end:
+            if end.code not in (0, 2, 3, None):
+                raise AssertionError(f"exit {end.code}: {told.getvalue()[-600:]}") from end
+        finally:
+            os.chdir(here)
+
+    for thermal in ("isothermal", "adiabatic"):  # compiled here and not in the first case of every child
+        feed(f"predict rocker.toml --thermal {thermal} --out o".encode())
+    return Target("command line", tuple(c.encode() for c in COMMAND_LINES), feed, (), _COMMAND_MODULES)
+
+
+def make_target(name: str, folder: Path) -> Target:
+    """Target by name, working in `folder`."""
+    makers: dict[str, Callable[[Path], Target]] = {
+        "manifest": manifest_target,
+        "bearing": bearing_target,
+        "pivots": pivots_target,
+        "effects": effects_target,
+        "csv": csv_target,
+        "hdf5": hdf5_target,
+        "cli": command_target,
+    }
+    if name in makers:
+        return makers[name](folder)
+    if name in FOREIGN:
+        return foreign_target(folder, "." + name)
+    sys.exit(f"no target {name!r}; there are {', '.join(TARGETS)}")
+
+
+FOREIGN = ("mat", "mat73", "parquet", "tdms", "uff", "mf4", "asc")
+TARGETS = ("manifest", "bearing", "pivots", "effects", "csv", "hdf5", "cli", *FOREIGN)

@@ -1,0 +1,183 @@
+"""Excitation over a band against the truth.
+
+    python -m tests.studies.band_coverage [--seeds 20] [--only WORDS] [--write]
+
+The conditions named go to the other stream.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import warnings
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from rigdata import load_campaign
+from tests.rigs.band_campaign import write_band_campaign
+from tests.rigs.band_rig import BandPlan, BandRig, band_plans, stiffness
+from tests.rigs.closed_form_bearing import NOMINAL
+from tests.studies.results import table, write_section
+from tpjb_ident.conditions import untrusted
+from tpjb_ident.dynamic.broadband.band_result import BandResult
+from tpjb_ident.dynamic.identify import identify
+
+#: Noise of probes, cells and accelerometers, in units of `rig.NOISE`: usual, and with 5 to 20 % on the displacements.
+USUAL, LOUD = (5.0, 5.0, 1.0), (15.0, 8.0, 3.0)
+FOUR = (0.0, 45.0, 90.0, 135.0)
+
+
+@dataclass(frozen=True)
+class BandRow:
+    """One condition of the table."""
+
+    name: str
+    rig: BandRig
+    plans: Sequence[BandPlan] = field(default_factory=band_plans)
+
+
+def band_rows() -> list[BandRow]:
+    """Kinds of excitation, noise, directions, lengths."""
+    loads = (2500.0, 5000.0, 8750.0)
+    rows = []
+    for noise, word in ((USUAL, ""), (LOUD, ", loud")):
+        kinds = ("multisine", "periodic random", "random", "sweep", "impact")
+        rows += [BandRow(kind + word, BandRig(kind=kind, noise=noise)) for kind in kinds]
+    silent = replace(rows[2].rig, command=0)
+    return [
+        *rows,
+        BandRow("random, no command", silent),
+        BandRow("random, no command, loud", replace(silent, noise=LOUD)),
+        BandRow("sweep, no command", replace(silent, kind="sweep")),
+        BandRow("random, both actuators at once", replace(silent, command=2), band_plans(directions=(30.0,))),
+        BandRow("multisine, four directions", BandRig(kind="multisine"), band_plans(directions=FOUR)),
+        BandRow("random, four directions", BandRig(kind="random"), band_plans(directions=FOUR)),
+        BandRow("random, runs differ by 1 %", BandRig(kind="random", run_gain=0.01), band_plans(directions=FOUR)),
+        BandRow("multisine, loads missed", BandRig(kind="multisine", miss=(0.003, 0.0035)), band_plans(loads)),
+        BandRow("multisine, three periods", BandRig(kind="multisine", seconds=6.1)),
+        BandRow("random, 4 s", BandRig(kind="random", seconds=4.0)),
+        BandRow("random, 40 s", BandRig(kind="random", seconds=40.0)),
+        BandRow("random, cells' clock 30 ppm off", BandRig(kind="random", cells=30e-6)),
+        BandRow("multisine, cells' clock 30 ppm off", BandRig(kind="multisine", cells=30e-6)),
+        BandRow("multisine, generator 37 ppm fast", BandRig(kind="multisine", generator=37e-6)),
+    ]
+
+
+@dataclass
+class Tally:
+    """What became of a row's campaigns."""
+
+    inside: list[float] = field(default_factory=list)
+    model_inside: list[float] = field(default_factory=list)
+    points_inside: list[float] = field(default_factory=list)
+    width: list[float] = field(default_factory=list)
+    model_width: list[float] = field(default_factory=list)
+    bias_h1: list[float] = field(default_factory=list)
+    bias: list[float] = field(default_factory=list)
+    refused: int = 0
+    models_refused: int = 0
+    results: int = 0
+    lines: int = 0
+    method: str = ""
+    named: Counter[str] = field(default_factory=Counter)
+
+    def add(self, result: BandResult, rig: BandRig) -> None:
+        """Hold one operating point against the truth."""
+        self.results += 1
+        self.refused += bool(untrusted(result.quality))
+        self.named.update(str(c) for c in result.quality)
+        if not result.lines:
+            return
+        load = result.point.static_load
+        h = stiffness(rig.bearing, 2 * np.pi * result.frequencies, load)
+        truth = np.concatenate([h.real.reshape(-1, 4), h.imag.reshape(-1, 4)], axis=1)
+        found = np.array([line.stiffness.vector for line in result.lines])
+        half = result.half_width()
+        self.inside.append(float(np.mean(np.abs(found - truth) <= half)))
+        size = np.abs(h[:, [0, 1], [0, 1]]).mean()
+        self.width.append(float(np.median(half[:, [0, 3]])) / size)
+        self.lines, self.method = len(result.lines), result.method
+        h1 = np.array([line.by_method["h1"].h[1, 1] for line in result.lines if "h1" in line.by_method])
+        if len(h1):
+            self.bias_h1.append(float(np.mean((h1 / h[: len(h1), 1, 1]).real)) - 1)
+        self.bias.append(float(np.mean((result.h[:, 1, 1] / h[:, 1, 1]).real)) - 1)
+        for point in result.points:
+            est = point.stiffness
+            known = stiffness(rig.bearing, np.array([est.omega]), load)[0]
+            truth = np.concatenate([known.real.ravel(), known.imag.ravel()])
+            self.points_inside.append(float(np.mean(np.abs(est.vector - truth) <= est.half_width())))
+        model = result.models.get("K-C-M")
+        if model is not None:
+            known = true_parameters(rig, load)
+            self.model_inside.append(float(np.mean(np.abs(model.parameters - known) <= model.half_width())))
+            self.model_width.append(float(model.half_width()[3] / known[3]))
+            self.models_refused += model.refused
+
+    def cells(self, name: str) -> list[str]:
+        """Row of the table."""
+
+        def share(values: list[float]) -> str:
+            return f"{100 * np.mean(values):.1f}" if values else "-"
+
+        def signed(values: list[float]) -> str:
+            return f"{100 * np.mean(values):+.1f}" if values else "-"
+
+        told = f"{self.refused} of {self.results}"
+        cells = [name, f"`{self.method}`", str(self.lines), share(self.inside), share(self.width)]
+        cells += [signed(self.bias_h1), signed(self.bias), share(self.points_inside), share(self.model_inside)]
+        cells += [share(self.model_width), str(self.models_refused), told]
+        return cells
+
+
+def true_parameters(rig: BandRig, load: float) -> np.ndarray:
+    """K, C, M of the rig's bearing at a load, in the order of `BandModel.parameters`."""
+    share = load / NOMINAL
+    bearing = rig.bearing
+    K = np.ravel(bearing.K) * share**bearing.stiffness_exponent
+    C = np.ravel(bearing.C) * share**bearing.damping_exponent
+    return np.concatenate([K, C, np.ravel(bearing.M)])
+
+
+def run_row(row: BandRow, seeds: range) -> Tally:
+    """Fresh campaigns of one row."""
+    tally = Tally()
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for seed in seeds:
+            path = Path(folder) / "band.h5"
+            write_band_campaign(path, row.rig, row.plans, seed)
+            for result in identify(load_campaign(path)).bands:
+                tally.add(result, row.rig)
+            path.unlink()
+    return tally
+
+
+def main() -> None:
+    """Command line."""
+    options = argparse.ArgumentParser()
+    options.add_argument("--seeds", type=int, default=20)
+    options.add_argument("--first-seed", type=int, default=7000)
+    options.add_argument("--only", default="")
+    options.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
+    given = options.parse_args()
+    head = ["excitation", "method", "lines", "h inside %", "half width %", "H1 kyy %", "kyy %", "points inside %"]
+    rows = []
+    for row in band_rows():
+        if given.only in row.name:
+            tally = run_row(row, range(given.first_seed, given.first_seed + given.seeds))
+            rows.append(tally.cells(row.name))
+            print(rows[-1], flush=True)
+            print(f"{row.name}: {dict(tally.named)}", file=sys.stderr, flush=True)
+    if given.write:
+        command = f"python -m tests.studies.band_coverage --seeds {given.seeds} --first-seed {given.first_seed} --write"
+        head += ["K-C-M inside %", "kyy +- %", "refused", "reported"]
+        write_section("band", command, table(head, rows))
+
+
+if __name__ == "__main__":
+    main()

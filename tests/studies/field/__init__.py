@@ -1,1 +1,0 @@
-"""Field battery: identification on rigs that have what real ones have, against a bearing known in closed form."""

@@ -1,0 +1,42 @@
+"""The one way to write a table of ``tests/studies/RESULTS.md``: a study replaces the text of its own section.
+
+A section begins with ``<!-- NAME: begin -->`` and ends with ``<!-- NAME: end -->``. Its first line says which command
+made it, on which commit and on which day.
+"""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterable, Sequence
+from datetime import date
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+PAGE = HERE / "RESULTS.md"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A Markdown table."""
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
+    return "\n".join(lines)
+
+
+def write_section(name: str, command: str, text: str, page: Path = PAGE) -> None:
+    """Replace a section and print it; `command` is what a reader types to make it again."""
+    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    before, opening, rest = page.read_text(encoding="utf-8").partition(begin)
+    _, closing, after = rest.partition(end)
+    if not opening or not closing:
+        raise LookupError(f"{page.name} has no section {name!r}: add its two marks under a heading")
+    source = f"Made by `{command}` on {date.today().isoformat()}, commit {commit()}."
+    page.write_text(f"{before}{begin}\n{source}\n\n{text.strip()}\n{end}{after}", encoding="utf-8", newline="\n")
+    print(f"{source}\n\n{text}", flush=True)
+
+
+def commit() -> str:
+    """Commit of the checkout, with a plus sign where files differ from it."""
+    told = subprocess.run(
+        ["git", "describe", "--always", "--dirty=+"], cwd=HERE, capture_output=True, text=True, check=False
+    )
+    return told.stdout.strip() or "unknown"
