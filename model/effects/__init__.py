@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from model.effects.effect import Effect, apply_effects
 from model.effects.effects_file import load_effects
-from model.effects.kind import EffectError, EffectKind, Parameter
+from model.effects.kind import EffectError, EffectKind, EffectWords, Parameter
 from model.effects.registry import kind_of, known_effects, register
 
 __all__ = [
     "Effect",
     "EffectError",
     "EffectKind",
+    "EffectWords",
     "Parameter",
     "apply_effects",
     "kind_of",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from model.arrays import ComplexArray
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -24,4 +24,13 @@ KIND = EffectKind(
     parameters=(Parameter("delay", "s", "time", 0.0, -0.005, 0.005, 0.0001),),
     apply=apply,
     source="Demodulator and anti-alias filters: 20 to 500 us",
+    words=EffectWords(
+        finding="force comes {delay} late against displacement",
+        physics=(
+            "A delay between the channels turns every phasor in proportion to the frequency. Stiffness passes into "
+            "damping."
+        ),
+        on_the_rig="Damping is off by K times the delay at all loads.",
+        check="filters and amplifiers of both sorts of channel",
+    ),
 )

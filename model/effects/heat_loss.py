@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -17,4 +17,12 @@ KIND = EffectKind(
     parameters=(Parameter("share", "1", "ratio", 0.0, 0.0, 0.95, 0.1),),
     apply=apply,
     source="What pads, shaft and drained oil take of a film's heat: 5 to 25 %",
+    words=EffectWords(
+        finding="pads, shaft and drained oil take {share} of the films' heat",
+        physics=(
+            "Heat that leaves the film lowers its temperature. Films are cooler and more viscous than an adiabatic one."
+        ),
+        on_the_rig="Pad temperatures are lower than predicted, stiffness and damping higher.",
+        check="pad temperatures over speed and load",
+    ),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -21,4 +21,12 @@ KIND = EffectKind(
     parameters=(Parameter("fraction", "1", "ratio", 0.0, 0.0, 0.98, 0.4),),
     apply=apply,
     source="Ettles 1992; groove mixing 0.4 to 0.95 in flooded bearings",
+    words=EffectWords(
+        finding="{fraction} of the hot oil of one pad enters the next",
+        physics=(
+            "Oil that leaves a pad is carried into the next film. Films run hotter and thinner than with fresh oil."
+        ),
+        on_the_rig="Pad temperatures rise from pad to pad around the shaft.",
+        check="oil flow and the spray bars between the pads",
+    ),
 )

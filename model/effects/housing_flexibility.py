@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.effects.series import add_compliance
 from model.setup import Setup
 
@@ -20,4 +20,15 @@ KIND = EffectKind(
     parameters=(Parameter("stiffness", "N/m", "stiffness", math.inf, 50000000.0, math.inf, 2e9, "inverse"),),
     apply=apply,
     source="The paper names it as a likely cause (Sec. 6): 1e9 to 5e9 N/m in rig housings",
+    words=EffectWords(
+        finding="the housing gives like a spring of {stiffness}",
+        physics=(
+            "Structure between film and probes bends under the dynamic load. It stands in series with the whole "
+            "bearing."
+        ),
+        on_the_rig=(
+            "Stiffness is short in the stiff direction, most at high load; a probe elsewhere on the housing disagrees."
+        ),
+        check="the housing's stiffness and where the probes are fixed",
+    ),
 )

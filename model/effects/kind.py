@@ -99,6 +99,30 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class EffectWords:
+    """What to say of an effect to an engineer.
+
+    Attributes
+    ----------
+    finding : str
+        One clause on what was found, with parameters as fields: ``{pad}``, ``{delay}`` (its amount with interval),
+        ``{factor:size}`` (how far it is from neutral), ``{factor:more|less}`` (by the side of neutral), ``{share:2}``
+        (decimals of the SI number), ``{angle:°}``, ``{angle:mm/m}``; the name of a parameter per pad lists all pads.
+    physics : str
+        What it is, in a sentence or two.
+    on_the_rig : str
+        How it shows in measurements.
+    check : str
+        Where to look first.
+    """
+
+    finding: str
+    physics: str
+    on_the_rig: str
+    check: str
+
+
+@dataclass(frozen=True)
 class EffectKind:
     """A kind of effect, as the library holds it.
 
@@ -116,6 +140,8 @@ class EffectKind:
         The effect has one such parameter per pad, named ``<name>_1`` to ``<name>_n``, after `parameters`.
     obstacle : callable, optional
         ``obstacle(bearing) -> str``: why a bearing cannot have this effect; empty if it can.
+    words : EffectWords, optional
+        Default: verdicts give its name and the amounts of its parameters.
     """
 
     name: str
@@ -125,6 +151,7 @@ class EffectKind:
     source: str = ""
     per_pad: Parameter | None = None
     obstacle: Callable[[Bearing], str] | None = None
+    words: EffectWords | None = None
 
     def parameters_of(self, pads: int) -> tuple[Parameter, ...]:
         """Every parameter, for a bearing of `pads` pads.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -24,4 +24,13 @@ KIND = EffectKind(
     ),
     apply=apply,
     source="Half the clearance over half the length is 1e-3 rad",
+    words=EffectWords(
+        finding="the shaft is tilted by {angle:mm/m} towards {direction:°}",
+        physics=(
+            "The shaft axis is tilted in the bearing, so the film is thinner at one end. Stiffness rises, most across "
+            "the loaded pad."
+        ),
+        on_the_rig="Probes at the two ends read differently; the pads wear at one edge.",
+        check="the alignment of shaft and housing under load",
+    ),
 )

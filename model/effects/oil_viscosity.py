@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -20,4 +20,10 @@ KIND = EffectKind(
     parameters=(Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.1),),
     apply=apply,
     source="ISO 3448: +-10 % within a viscosity grade",
+    words=EffectWords(
+        finding="the oil is {factor:size} {factor:thicker|thinner} than stated",
+        physics="Stiffness and damping of the film grow with the viscosity. Pad temperatures change with it.",
+        on_the_rig="All coefficients are off alike, damping most.",
+        check="a sample of the oil, and its temperature at the pads",
+    ),
 )

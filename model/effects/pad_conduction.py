@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -26,4 +26,10 @@ KIND = EffectKind(
     parameters=(Parameter("back_convection", "W/m^2/K", "heat transfer", 0.0, 0.0, 10000.0, 100.0),),
     apply=apply,
     source="Pad backs in oil: 25 to 500 W/m^2/K, more where they are sprayed",
+    words=EffectWords(
+        finding="the pads' backs lose heat with {back_convection:0} W/m²/K",
+        physics="Pads conduct the film's heat to the oil around them. The film's temperature evens out along the pad.",
+        on_the_rig="Pad temperatures are lower and flatter than predicted.",
+        check="the oil around the pads, and sprays on their backs",
+    ),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -27,4 +27,13 @@ KIND = EffectKind(
     ),
     apply=apply,
     source="Machining tolerance; the paper explains an irregular clearance polygon so (Fig. 14)",
+    words=EffectWords(
+        finding="{pad} stands {radial_offset:size} too far {radial_offset:out|in}",
+        physics=(
+            "The assembled clearance of one pad differs from the drawing. Its film is thicker or thinner than the "
+            "others', so the load shares itself out anew among the pads."
+        ),
+        on_the_rig="One side of the clearance polygon stands off; kxx and kyy part when the load turns.",
+        check="the pad's seat and shims, and the clearance sweep",
+    ),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -20,4 +20,13 @@ KIND = EffectKind(
     ),
     apply=apply,
     source="Generic: whatever adds a constant damping to the records; a tenth of a bearing's own",
+    words=EffectWords(
+        finding="something beside the film adds a damping: xx {xx}, xy {xy}, yx {yx}, yy {yy}",
+        physics=(
+            "A generic term: a constant damping that the records hold besides the film's, for what no named effect "
+            "describes."
+        ),
+        on_the_rig="The same damping is off at every load; stiffness agrees.",
+        check="hoses, seals and dampers across the film; shake the rig dry",
+    ),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from model.bearing import Bearing
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -24,4 +24,13 @@ KIND = EffectKind(
     apply=apply,
     source="Steel on steel in oil: 0.05 to 0.15; dry up to 0.5",
     obstacle=obstacle,
+    words=EffectWords(
+        finding="the pivots rub with a friction coefficient of {coefficient:3}",
+        physics=(
+            "A sphere that rubs in its seat holds the pad until the moment is large enough. A pad that is held "
+            "behaves like a fixed one."
+        ),
+        on_the_rig="Coefficients depend on the amplitude; loading and unloading differ.",
+        check="wear and lubrication of the seats",
+    ),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from model.bearing import Bearing
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -24,4 +24,13 @@ KIND = EffectKind(
     apply=apply,
     source="The radii of the drawing; 1 is as computed",
     obstacle=obstacle,
+    words=EffectWords(
+        finding="the pivots resist rolling with {factor} of what their radii give",
+        physics=(
+            "A rocker rolls on its seat, so the contact walks away from the pivot line. The pad resists tilting in "
+            "proportion to its load."
+        ),
+        on_the_rig="Cross-coupled stiffness and a loss of damping that grow with the load.",
+        check="the radii of rocker and seat",
+    ),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -17,4 +17,10 @@ KIND = EffectKind(
     parameters=(Parameter("rotational_stiffness", "N m/rad", "rotational stiffness", 0.0, 0.0, 1000000.0, 1000.0),),
     apply=apply,
     source="Flexure pivots: 1e3 to 1e5 N m/rad; a stuck rocker more",
+    words=EffectWords(
+        finding="the pivots resist tilting with {rotational_stiffness}",
+        physics="A pad that cannot tilt freely behaves like a fixed one. Cross-coupled stiffness appears.",
+        on_the_rig="kxy and kyx of opposite sign, that no free pad gives.",
+        check="whether the pads tilt freely by hand",
+    ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -19,4 +19,13 @@ KIND = EffectKind(
     parameters=(Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.03),),
     apply=apply,
     source="Eddy-current probes: 5 % for another target steel",
+    words=EffectWords(
+        finding="the probes read {factor:size} {factor:more|less} than true",
+        physics=(
+            "Sensitivity of eddy-current probes depends on the target's steel. Stiffness, damping, positions and "
+            "clearance are off by the same factor."
+        ),
+        on_the_rig="The clearance polygon and all coefficients are off alike.",
+        check="the probes' calibration on this shaft",
+    ),
 )

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -23,4 +23,10 @@ KIND = EffectKind(
     parameters=(Parameter("angle", "rad", "angle", 0.0, -1.6, 1.6, 0.035),),
     apply=apply,
     source="Drilled bores: 1 to 3 deg",
+    words=EffectWords(
+        finding="the probes stand {angle} off their stated angle",
+        physics="Displacements are then resolved along wrong axes. Direct terms leak into the cross-coupled ones.",
+        on_the_rig="The clearance polygon is turned against the pads.",
+        check="the angles of the probe holders",
+    ),
 )

@@ -6,6 +6,7 @@ import functools
 import importlib
 import pkgutil
 from pathlib import Path
+from string import Formatter
 
 from model.effects.kind import EffectError, EffectKind
 from model.nearest import hint
@@ -52,9 +53,16 @@ def register(kind: EffectKind) -> EffectKind:
     Raises
     ------
     EffectError
-        The name is taken by a bundled effect.
+        The name is taken by a bundled effect, or its words name a parameter that it has not.
     """
     if kind.name in _bundled():
         raise EffectError(f"effect {kind.name!r} is bundled; give yours another name.")
+    if kind.words is not None:
+        names = {p.name for p in (*kind.parameters, kind.per_pad) if p is not None}
+        fields = {field for _, field, _, _ in Formatter().parse(kind.words.finding) if field is not None}
+        if not fields <= names:
+            raise EffectError(
+                f"effect {kind.name!r}: its words name {', '.join(sorted(fields - names))}, no parameter."
+            )
     _registered[kind.name] = kind
     return kind

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.pivots import ScaledPivot
 from model.setup import Setup
 
@@ -28,4 +28,10 @@ KIND = EffectKind(
     ),
     apply=apply,
     source="Pad #5 of the paper is the softest of five (Lubricants 2019, 7, 61, Fig. 12)",
+    words=EffectWords(
+        finding="the pivot of {pad} has {stiffness_factor} of the formula's stiffness",
+        physics="One pivot gives more, or less, than the others. It stands in series with that pad's film.",
+        on_the_rig="One dry test is off; coefficients are off along that pad's direction.",
+        check="that pad's seat, pivot and fit",
+    ),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -17,4 +17,10 @@ KIND = EffectKind(
     parameters=(Parameter("arc_fraction", "1", "ratio", 0.0, 0.0, 0.6, 0.1),),
     apply=apply,
     source="He, Allaire 2002: leading-edge starvation of 10 to 40 % at low flow",
+    words=EffectWords(
+        finding="the film is missing over the first {arc_fraction} of the pads",
+        physics="Too little oil reaches the leading edge. The film begins late, so it carries and damps less.",
+        on_the_rig="Damping falls with speed; unloaded pads flutter.",
+        check="oil flow and nozzles",
+    ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.effects.series import add_compliance
 from model.setup import Setup
 
@@ -26,4 +26,13 @@ KIND = EffectKind(
     ),
     apply=apply,
     source="A cap or a foot is as stiff as a rig housing, in one direction: 1e9 to 5e9 N/m",
+    words=EffectWords(
+        finding="the structure gives like a spring of {stiffness} in one direction, {direction:°}",
+        physics=(
+            "A cap, a foot or a joint between bearing and probes bends under the dynamic load. It stands in series "
+            "with the bearing in that direction only."
+        ),
+        on_the_rig="Stiffness is short in one direction; dry tests of pads that lie there give too much.",
+        check="bolts, joints and feet along that direction",
+    ),
 )

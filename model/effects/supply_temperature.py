@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -17,4 +17,10 @@ KIND = EffectKind(
     parameters=(Parameter("change", "K", "temperature difference", 0.0, -30.0, 60.0, 3.0),),
     apply=apply,
     source="A sensor in the pipe, not at the pads",
+    words=EffectWords(
+        finding="the oil arrives {change:size} {change:warmer|colder} than stated",
+        physics="A warmer supply makes a thinner film. All pad temperatures move along.",
+        on_the_rig="All pad temperatures are off by about the same amount.",
+        check="where the supply sensor sits",
+    ),
 )

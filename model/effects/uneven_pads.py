@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -34,4 +34,13 @@ KIND = EffectKind(
     apply=apply,
     source="Machining of pads and seats holds a few micrometres from pad to pad",
     per_pad=Parameter("offset", "m", "length", 0.0, -6e-05, 6e-05, 2.5e-06),
+    words=EffectWords(
+        finding="the pads stand unevenly: {offset}",
+        physics=(
+            "Machining of pads and seats leaves each pad at its own assembled clearance. The load shares itself out "
+            "anew among them."
+        ),
+        on_the_rig="The clearance polygon is irregular; coefficients part where the load turns.",
+        check="the clearance sweep, pad by pad",
+    ),
 )

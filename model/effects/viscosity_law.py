@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from model.effects.kind import EffectKind, Parameter
+from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -24,4 +24,13 @@ KIND = EffectKind(
     parameters=(Parameter("factor", "1", "ratio", 1.0, 0.2, 3.0, 0.1),),
     apply=apply,
     source="An exponential through two points of a data sheet: 5 to 15 % by the points chosen and the viscosity index",
+    words=EffectWords(
+        finding="the oil's viscosity falls {factor:size} {factor:faster|more slowly} with temperature than stated",
+        physics=(
+            "The viscosity at film temperature differs from what two points of a data sheet give. Hot films are then "
+            "thinner or thicker than computed."
+        ),
+        on_the_rig="Coefficients agree when cool and part as the films warm up.",
+        check="the oil's viscosity at 40 and 100 °C",
+    ),
 )

@@ -15,6 +15,7 @@ from model.effects import (
     Effect,
     EffectError,
     EffectKind,
+    EffectWords,
     Parameter,
     apply_effects,
     known_effects,
@@ -341,6 +342,8 @@ def test_ones_own_effect(rocker, base, monkeypatch):
     np.testing.assert_allclose(p.h, base.h - OMEGA**2 * 10.0 * np.eye(2), rtol=1e-10)
     with pytest.raises(EffectError, match="is bundled"):
         register(replace(kind, name="soft_pivot"))
+    with pytest.raises(EffectError, match="its words name amount, no parameter"):
+        register(replace(kind, words=EffectWords("oil sloshes by {amount}", "", "", "")))
 
 
 def test_file(tmp_path):

@@ -10,8 +10,8 @@ import numpy as np
 
 from model.effects import kind_of
 from tpjb_ident.compare.comparison import DIRECT, comparison_frame, locus_distance
+from tpjb_ident.compare.effect_words import Estimate, finding
 from tpjb_ident.compare.predictions import printed_formula
-from tpjb_ident.effect_words import Found, finding
 from tpjb_ident.rounding import percent, signed
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
     listed = []
     for e in effects:
         sizes = {p.name: (float(e.parameters[p.name]), p.unit) for p in kind_of(e.name).parameters_of(pads)}
-        listed.append(finding(e.name, {name: Found(v, v, v, unit) for name, (v, unit) in sizes.items()}))
+        listed.append(finding(e.name, {name: Estimate(v, v, v, unit) for name, (v, unit) in sizes.items()}))
     return (
         f"The model holds effects: {'; '.join(listed)}. Where `tpjb diagnose` found them in this campaign they were "
         "fitted to these data, and agreement with them is no independent proof.",

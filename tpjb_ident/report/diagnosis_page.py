@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from tpjb_ident.compare.effect_words import UNITS, finding, label_in_words, words_of
 from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
-from tpjb_ident.effect_words import UNITS, WORDS, finding, label_in_words
 from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_rows, place, verdict_sentences
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Page, Section, Table, grouped, write_page
@@ -85,14 +85,13 @@ def _gap_table(verdict: Verdict) -> Table:
 
 def _effect_sections(verdict: Verdict) -> list[Section]:
     """What each named effect is, how it looks on a rig, what to check first."""
-    known = [(finding(e.name, e.parameters), WORDS[e.name]) for e in verdict.effects if e.name in WORDS]
-    return [
-        Section(
-            f"What it means: {said}",
-            [words.physics, f"On the rig: {words.on_the_rig}", f"Check first: {words.check}."],
-        )
-        for said, words in known
-    ]
+    sections = []
+    for effect in verdict.effects:
+        words = words_of(effect.name)
+        if words is not None:
+            texts = [words.physics, f"On the rig: {words.on_the_rig}", f"Check first: {words.check}."]
+            sections.append(Section(f"What it means: {finding(effect.name, effect.parameters)}", texts))
+    return sections
 
 
 def _coefficient_sections(table: pd.DataFrame) -> list[Section]:

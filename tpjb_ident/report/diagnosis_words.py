@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.effect_words import UNITS, WORDS, amount, finding, label_in_words
+from tpjb_ident.compare.effect_words import UNITS, amount, finding, label_in_words, words_of
 from tpjb_ident.rounding import MINUS, percent
 
 if TYPE_CHECKING:
@@ -42,7 +42,8 @@ def verdict_sentences(
             f"{verdict.gap['heldout_before']:.1f} standard deviations before, {verdict.gap['heldout_after']:.1f} after "
             f"with all else as stated{_within(verdict)}."
         )
-        checks = [f"{WORDS[e.name].check}" for e in verdict.effects if e.name in WORDS]
+        words = [words_of(effect.name) for effect in verdict.effects]
+        checks = [word.check for word in words if word is not None]
         if checks:
             sentences.append(f"Check first: {'; '.join(dict.fromkeys(checks))}.")
     sentences += _remainder_sentences(verdict)

@@ -23,7 +23,7 @@ from tpjb_ident.cli.common.options import (
 )
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import print_line, progress, table
-from tpjb_ident.effect_words import UNITS, label_in_words
+from tpjb_ident.compare.effect_words import UNITS, label_in_words
 from tpjb_ident.rounding import signed
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256

@@ -10,6 +10,7 @@ import numpy as np
 
 from model.effects import kind_of
 from tpjb_ident.arrays import FloatArray
+from tpjb_ident.compare.effect_words import Estimate
 from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.observations.gap import gap, gap_by_observable, noise_floor
 from tpjb_ident.diagnosis.search.fit import Fit
@@ -29,7 +30,6 @@ from tpjb_ident.diagnosis.verdict.verdict import (
     Verdict,
     VerdictName,
 )
-from tpjb_ident.effect_words import Found
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ def _effects(problem: Problem, found: Search, judged: Judged) -> tuple[FoundEffe
     return tuple(e for _, e in sorted(rows, key=lambda row: -row[0]))
 
 
-def _stands_in(problem: Problem, name: str, parameters: dict[str, Found]) -> str:
+def _stands_in(problem: Problem, name: str, parameters: dict[str, Estimate]) -> str:
     pads = sum(n.name == "clearance_scatter" for n in problem.nuisances)
     words = []
     for key, value in parameters.items():
@@ -189,7 +189,7 @@ def _stands_in(problem: Problem, name: str, parameters: dict[str, Found]) -> str
     return "; ".join(w for w in words if w)
 
 
-def parameters_of(fitted: Fit, index: int) -> dict[str, Found]:
+def parameters_of(fitted: Fit, index: int) -> dict[str, Estimate]:
     """Parameters of one candidate of a fit with their 95 % intervals."""
     candidate, amplitudes = fitted.candidates[index], fitted.amplitudes[index]
     errors = fitted.errors[fitted.slices[index]]
@@ -197,17 +197,17 @@ def parameters_of(fitted: Fit, index: int) -> dict[str, Found]:
     if candidate.basis:
         spread = np.sqrt((np.asarray(candidate.basis).T ** 2) @ errors**2)
         units = {p.name: p.unit for p in candidate.free}
-        return {p.name: Found(value[p.name], value[p.name] - 1.96 * s, value[p.name] + 1.96 * s, units[p.name])
+        return {p.name: Estimate(value[p.name], value[p.name] - 1.96 * s, value[p.name] + 1.96 * s, units[p.name])
                 for p, s in zip(candidate.free, spread, strict=True)}  # fmt: skip
     out = {}
     for k, parameter in enumerate(candidate.free):
         step = np.zeros(len(amplitudes))
         step[k] = 1.96 * errors[k]
         ends = [candidate.values(amplitudes + s * step)[parameter.name] for s in (-1.0, 1.0)]
-        out[parameter.name] = Found(value[parameter.name], min(ends), max(ends), parameter.unit)
+        out[parameter.name] = Estimate(value[parameter.name], min(ends), max(ends), parameter.unit)
     for name, fixed in candidate.fixed.items():
         unit = next((p.unit for p in kind_of(candidate.name).parameters if p.name == name), "1")
-        out[name] = Found(fixed, fixed, fixed, "1" if unit == "pad" else unit)
+        out[name] = Estimate(fixed, fixed, fixed, "1" if unit == "pad" else unit)
     return out
 
 

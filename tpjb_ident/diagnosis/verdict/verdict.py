@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from model.effects import Effect, kind_of
+from tpjb_ident.compare.effect_words import Estimate
 from tpjb_ident.diagnosis.verdict.behaviour import Behaviour, Drift
-from tpjb_ident.effect_words import Found
 from tpjb_ident.presentation import json_data
 
 VerdictName = Literal["consistent", "named", "ambiguous", "partly-explained", "unexplained"]
@@ -19,7 +19,7 @@ class FoundEffect:
     """An effect that was added."""
 
     name: str
-    parameters: dict[str, Found]
+    parameters: dict[str, Estimate]
     stands_in: str = ""
 
     @property

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
-from tpjb_ident.effect_words import label_in_words
+from tpjb_ident.compare.effect_words import label_in_words
 from tpjb_ident.report.drawing.colours import LIGHT, SEQUENTIAL
 from tpjb_ident.report.drawing.picture import (
     CHARACTER,
