@@ -100,25 +100,18 @@ class Parameter:
 
 @dataclass(frozen=True)
 class EffectWords:
-    """What to say of an effect to an engineer.
+    """What to say of an effect to an engineer; `finding` is one clause with parameters as fields.
 
-    Attributes
-    ----------
-    finding : str
-        One clause on what was found, with parameters as fields: ``{pad}``, ``{delay}`` (its amount with interval),
-        ``{factor:size}`` (how far it is from neutral), ``{factor:more|less}`` (by the side of neutral), ``{share:2}``
-        (decimals of the SI number), ``{angle:°}``, ``{angle:mm/m}``; the name of a parameter per pad lists all pads.
-    physics : str
-        What it is, in a sentence or two.
-    on_the_rig : str
-        How it shows in measurements.
-    check : str
-        Where to look first.
+    ``{delay}`` is an amount with its interval, ``{pad}`` a pad's number, ``{factor:size}`` how far a parameter is from
+    neutral, ``{factor:more|less}`` on which side; ``{share:2}`` has decimals of the SI number, ``{angle:°}`` and
+    ``{angle:mm/m}`` another unit; the name of a parameter that each pad has lists all pads.
     """
 
     finding: str
     physics: str
+    #: How it shows in measurements.
     on_the_rig: str
+    #: Where to look first.
     check: str
 
 
