@@ -17,8 +17,8 @@ from model.setup import Mesh, Setup
 from tpjb_ident.diagnosis.diagnose import diagnose
 from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.forward.forward import Forward
-from tpjb_ident.diagnosis.observations.layout import Layout
-from tpjb_ident.diagnosis.plan.planned import around, dry, dynamic, planned_observations
+from tpjb_ident.diagnosis.observations.observe import Layout
+from tpjb_ident.diagnosis.planned import around, dry, dynamic, planned_observations
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 
 BEARING = Path(__file__).parents[2] / "model" / "bearings" / "rocker.toml"

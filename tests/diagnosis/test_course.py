@@ -13,8 +13,8 @@ from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
 from tpjb_ident.diagnosis.diagnose import pose
 from tpjb_ident.diagnosis.forward.forward import Forward
-from tpjb_ident.diagnosis.observations.layout import Layout
-from tpjb_ident.diagnosis.plan.planned import around, dry, dynamic, planned_observations
+from tpjb_ident.diagnosis.observations.observe import Layout
+from tpjb_ident.diagnosis.planned import around, dry, dynamic, planned_observations
 from tpjb_ident.diagnosis.search.course import course_through
 from tpjb_ident.diagnosis.search.descend import fit
 from tpjb_ident.diagnosis.search.fit import Start

@@ -11,9 +11,9 @@ from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
-from tpjb_ident.diagnosis.next_test.designs import Design, designs, mirrored, reversible
-from tpjb_ident.diagnosis.observations.layout import Layout
-from tpjb_ident.diagnosis.plan.planned import dynamic
+from tpjb_ident.diagnosis.next_test import Design, designs, mirrored, reversible
+from tpjb_ident.diagnosis.observations.observe import Layout
+from tpjb_ident.diagnosis.planned import dynamic
 
 BEARINGS = Path(__file__).parents[2] / "model" / "bearings"
 SPEED = 2 * math.pi * 22

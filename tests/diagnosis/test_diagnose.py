@@ -14,13 +14,12 @@ from tpjb_ident.diagnosis.diagnose import diagnose
 from tpjb_ident.diagnosis.forward.candidates import candidates
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
-from tpjb_ident.diagnosis.next_test.designs import Design
-from tpjb_ident.diagnosis.next_test.rank import ranked, say, separated
+from tpjb_ident.diagnosis.next_test import Design, ranked, say, separated
 from tpjb_ident.diagnosis.observations.folds import folds, held_out
 from tpjb_ident.diagnosis.observations.gap import gap, residuals
-from tpjb_ident.diagnosis.observations.layout import Layout
-from tpjb_ident.diagnosis.plan.plan import plan
-from tpjb_ident.diagnosis.plan.planned import around, dry, dynamic, planned_observations
+from tpjb_ident.diagnosis.observations.observe import Layout
+from tpjb_ident.diagnosis.plan import plan
+from tpjb_ident.diagnosis.planned import around, dry, dynamic, planned_observations
 from tpjb_ident.diagnosis.search.selection import Selection
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.verdict.remainder import localise

@@ -9,7 +9,7 @@ from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import Instruments, RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
 from tests.rigs.band_campaign import write_band_campaign
 from tests.rigs.band_rig import BandRig, band_plans
-from tpjb_ident.diagnosis.observations.housing import cell_stiffness
+from tpjb_ident.diagnosis.campaign import cell_stiffness
 
 
 @pytest.mark.slow

@@ -10,12 +10,13 @@ from model.effects import Effect, kind_of
 from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
-from tpjb_ident.diagnosis.next_test.designs import Design, designs
-from tpjb_ident.diagnosis.next_test.rank import (
+from tpjb_ident.diagnosis.next_test import (
     CHECKS,
     Check,
+    Design,
     Separation,
     chance,
+    designs,
     options_for,
     ranked,
     say,
@@ -23,8 +24,8 @@ from tpjb_ident.diagnosis.next_test.rank import (
     suggested,
     together,
 )
-from tpjb_ident.diagnosis.observations.layout import Layout
-from tpjb_ident.diagnosis.plan.planned import dynamic
+from tpjb_ident.diagnosis.observations.observe import Layout
+from tpjb_ident.diagnosis.planned import dynamic
 
 BEARINGS = Path(__file__).parents[2] / "model" / "bearings"
 SPEED = 2 * math.pi * 22

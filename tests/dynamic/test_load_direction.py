@@ -10,7 +10,7 @@ import pytest
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.clearance.locus import Locus, LocusPoint
-from tpjb_ident.diagnosis.observations.load_scatter import moved_by_miss
+from tpjb_ident.diagnosis.observations.observe import moved_by_miss
 from tpjb_ident.dynamic.corrections.load_direction import direction_slopes, run_ratios, turned_back
 from tpjb_ident.dynamic.corrections.static_load import load_misses
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness

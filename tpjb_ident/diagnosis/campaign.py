@@ -6,6 +6,13 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from model.effects import Effect, apply_effects
+from model.instruments import Instruments
+from model.pivots import NAMED_LAWS, pivot_laws
+from model.setup import Setup
+from rigdata.manifest.manifest import MAINS_FREQUENCIES
 from tpjb_ident.compare.comparison import ComparisonError
 from tpjb_ident.compare.measured_pivots import measured_laws
 from tpjb_ident.compare.static_tests import measure_static
@@ -13,18 +20,16 @@ from tpjb_ident.diagnosis.diagnose import Diagnosis, before_and_after, diagnose,
 from tpjb_ident.diagnosis.forward.forward import SENSOR
 from tpjb_ident.diagnosis.forward.tolerances import Stated, Tolerances
 from tpjb_ident.diagnosis.observations.from_table import observe_table
-from tpjb_ident.diagnosis.observations.housing import with_housing
 from tpjb_ident.diagnosis.observations.observe import observe
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
+from tpjb_ident.dynamic.broadband.run_spectra import SpectraSettings, run_spectra
 from tpjb_ident.dynamic.identify import identify
+from tpjb_ident.dynamic.records.run_data import RunPhasors
+from tpjb_ident.dynamic.records.run_phasors import run_phasors
+from tpjb_ident.dynamic.records.windows import RecordTooShortError
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.presentation import Presented
-
-from model.effects import Effect, apply_effects  # isort: skip
-from model.pivots import NAMED_LAWS, pivot_laws  # isort: skip
-from model.instruments import Instruments  # isort: skip
-from model.setup import Setup  # isort: skip
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,6 +39,7 @@ if TYPE_CHECKING:
 
     from model.bearing import Bearing
     from rigdata.campaign import Campaign
+    from rigdata.run import Run
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.static_tests import StaticTests
@@ -231,3 +237,59 @@ def _sensor_positions(campaign: Campaign, bearing: Bearing) -> tuple[float, ...]
     given = {int(c.pad): float(c.position) for c in campaign.channels.values()
              if c.quantity == "temperature" and c.pad is not None and c.position is not None}  # fmt: skip
     return tuple(given.get(k, SENSOR) for k in range(1, len(bearing.pads) + 1))
+
+
+#: Runs that are looked at: those of the highest frequencies, where the housing shakes most.
+RUNS = 8
+#: Beyond, the housing does not move as far as accelerometers can tell [N/m].
+STIFF = 1e13
+
+
+def with_housing(setup: Setup, campaign: Campaign) -> Setup:
+    """Tell a model the rig's housing mass and cell stiffness; what the campaign does not show stays as assumed."""
+    instruments = setup.instruments
+    if math.isfinite(campaign.housing_mass):
+        instruments = replace(instruments, housing_mass=campaign.housing_mass)
+    found = cell_stiffness(campaign)
+    if found is not None:
+        instruments = replace(instruments, cell_stiffness=found)
+    return setup.change(instruments=instruments)
+
+
+def cell_stiffness(campaign: Campaign) -> tuple[float, float] | None:
+    """Estimate the stiffness between housing and frame in X and Y [N/m].
+
+    Accelerations are regressed on cell forces, -a / omega^2 = F / K, run by run; the median over runs counts.
+    """
+    runs = sorted(campaign.of_kind("dynamic"), key=lambda run: -run.point.excitation)[:RUNS]
+    if not any(c.quantity == "acceleration" for c in campaign.channels.values()):
+        return None
+    mass = campaign.housing_mass if math.isfinite(campaign.housing_mass) else 0.0
+    rows = []
+    for run in runs:
+        try:
+            band = None if run.excitation_kind == "sine" else run.band
+            found = run_phasors(run, mass) if band is None else _over_band(run, band, mass, campaign.mains)
+        except RecordTooShortError:
+            continue
+        if found.acceleration is None:
+            continue
+        lines = len(found.lines.excitation)
+        omega = 2 * np.pi * np.array([line.frequency for line in found.lines.excitation])
+        force, acceleration = found.cell_force.phasors[:, :lines], found.acceleration.phasors[:, :lines]
+        power = np.sum(np.abs(force) ** 2, axis=(0, 1))
+        slope = np.sum((np.conj(force) * -acceleration / omega[:, None] ** 2).real, axis=(0, 1))
+        # an axis that the run does not excite says nothing
+        rows.append(np.where(power > 0.05 * power.max(), slope / np.maximum(power, 1e-300), np.nan))
+    if not rows:
+        return None
+    table = np.array(rows)
+    if np.any(np.all(np.isnan(table), axis=0)):
+        return None
+    x, y = (float(v) for v in np.nanmedian(table, axis=0))
+    return tuple(1.0 / max(c, 1.0 / STIFF) for c in (x, y))  # type: ignore[return-value]
+
+
+def _over_band(run: Run, band: tuple[float, float], housing_mass: float, mains: float | None) -> RunPhasors:
+    """Phasors of a run that is excited over a band; `cell_stiffness` needs them at no common bins."""
+    return run_spectra(run, housing_mass, SpectraSettings(band, None, mains or MAINS_FREQUENCIES[0], {})).phasors

@@ -17,9 +17,8 @@ from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel, NoEquili
 from tpjb_ident.diagnosis.forward.nuisance import Nuisance, column_of, nuisances
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.forward.workers import Map, workers
-from tpjb_ident.diagnosis.next_test.rank import Separation, options_for, ranked, say, separated, suggested
-from tpjb_ident.diagnosis.observations.layout import Layout
-from tpjb_ident.diagnosis.observations.observe import Observations
+from tpjb_ident.diagnosis.next_test import Separation, options_for, ranked, say, separated, suggested
+from tpjb_ident.diagnosis.observations.observe import Layout, Observations
 from tpjb_ident.diagnosis.search.fit import Fit
 from tpjb_ident.diagnosis.search.problem import Problem, loosened
 from tpjb_ident.diagnosis.search.search import Search, search

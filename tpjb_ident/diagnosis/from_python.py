@@ -20,10 +20,10 @@ from rigdata.near_names import unknown_name
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arguments import as_bearing, as_campaign
 from tpjb_ident.diagnosis.campaign import Baseline, CampaignDiagnosis, diagnose_campaign
-from tpjb_ident.diagnosis.observations.layout import DynamicTest, Layout
-from tpjb_ident.diagnosis.plan.plan import CampaignPlan
-from tpjb_ident.diagnosis.plan.plan import plan as work_out
-from tpjb_ident.diagnosis.plan.planned import around, dry, dynamic
+from tpjb_ident.diagnosis.observations.observe import DynamicTest, Layout
+from tpjb_ident.diagnosis.plan import CampaignPlan
+from tpjb_ident.diagnosis.plan import plan as work_out
+from tpjb_ident.diagnosis.planned import around, dry, dynamic
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 from tpjb_ident.errors import ArgumentError
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rigdata.survey.spectrum import Look
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
-    from tpjb_ident.diagnosis.plan.plan import CampaignPlan
+    from tpjb_ident.diagnosis.plan import CampaignPlan
     from tpjb_ident.pivot import PivotCurve
 
 

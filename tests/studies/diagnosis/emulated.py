@@ -27,9 +27,17 @@ from model.effects import Effect, apply_effects
 from model.pivots import PivotLaw, ScaledPivot
 from model.setup import Setup
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.diagnosis.forward.forward import SENSOR, Forward
-from tpjb_ident.diagnosis.forward.memory import _PLAIN, Memory, NoEquilibriumError, Reading, Solved, StaticPoint
-from tpjb_ident.diagnosis.observations.layout import Layout
+from tpjb_ident.diagnosis.forward.forward import (
+    _PLAIN,
+    SENSOR,
+    Forward,
+    Memory,
+    NoEquilibriumError,
+    Reading,
+    Solved,
+    StaticPoint,
+)
+from tpjb_ident.diagnosis.observations.observe import Layout
 
 #: Coordinates: name, where its spline is solved, and the step of its bilinear terms.
 _BOTH = (-1.0, -0.6, -0.3, 0.3, 0.6, 1.0)

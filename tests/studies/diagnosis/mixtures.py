@@ -38,9 +38,8 @@ from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel, NoEquili
 from tpjb_ident.diagnosis.forward.nuisance import predict
 from tpjb_ident.diagnosis.forward.workers import workers
 from tpjb_ident.diagnosis.observations.gap import coordinate, direct_scale
-from tpjb_ident.diagnosis.observations.layout import Layout
-from tpjb_ident.diagnosis.observations.observe import Observations
-from tpjb_ident.diagnosis.plan.planned import around, dry, dynamic, planned_observations
+from tpjb_ident.diagnosis.observations.observe import Layout, Observations
+from tpjb_ident.diagnosis.planned import around, dry, dynamic, planned_observations
 from tpjb_ident.diagnosis.search.problem import Problem
 from tpjb_ident.diagnosis.search.screen import visible
 from tpjb_ident.diagnosis.search.search import Search, baseline_fit, search

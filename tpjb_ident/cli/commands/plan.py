@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
     from model.effects.kind import Parameter
     from model.setup import Setup
-    from tpjb_ident.diagnosis.observations.layout import Layout
-    from tpjb_ident.diagnosis.plan.plan import CampaignPlan
+    from tpjb_ident.diagnosis.observations.observe import Layout
+    from tpjb_ident.diagnosis.plan import CampaignPlan
 
 
 @guarded
@@ -68,7 +68,7 @@ def plan(
     from model.pivots import pivot_laws
     from model.setup import Setup
     from tpjb_ident.diagnosis.from_python import planned_layout
-    from tpjb_ident.diagnosis.plan.plan import plan as work_out
+    from tpjb_ident.diagnosis.plan import plan as work_out
     from tpjb_ident.report.panels import save_isolability
 
     drawn = load_bearing(bearing)
@@ -99,7 +99,7 @@ def _parts(folder: Path, setup: Setup, tests: Layout) -> dict[str, CampaignPlan]
     """Write the table of data sets; what each could tell with calibration errors free, by file name."""
     import pandas as pd
 
-    from tpjb_ident.diagnosis.plan.data_sets import data_sets
+    from tpjb_ident.diagnosis.plan import data_sets
 
     found = data_sets(setup, tests)
     write_table(folder, "data_sets", pd.DataFrame([one.to_row() for one in found]))

@@ -8,9 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tpjb_ident.compare.coefficient_table import read_coefficients
-from tpjb_ident.diagnosis.observations.layout import DynamicTest, Layout
-from tpjb_ident.diagnosis.observations.observe import Element, Observations
-from tpjb_ident.diagnosis.observations.tolerance import Tolerance
+from tpjb_ident.diagnosis.observations.observe import DynamicTest, Element, Layout, Observations, Tolerance
 
 #: A small coefficient is read off the same axis as the large ones: its error is no smaller than that of a value of this
 #: share of the direct ones.

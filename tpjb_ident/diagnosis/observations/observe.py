@@ -15,15 +15,70 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from tpjb_ident.arrays import FloatArray, TextArray
-from tpjb_ident.clearance.locus import Locus
+from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
-from tpjb_ident.diagnosis.observations.layout import DryTest, DynamicTest, Layout, LocusTest
-from tpjb_ident.diagnosis.observations.load_scatter import moved_by_miss
-from tpjb_ident.diagnosis.observations.tolerance import Tolerance
 from tpjb_ident.dynamic.corrections.mains import MAINS_CORRECTED, MAINS_ON_LINE
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.pivot.curve import PivotCurve
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Stated model tolerances of `outputs.md`, one standard deviation: the sigma in which the gap is told.
+
+    How much of it a campaign really needs is learnt (`search.assessment`); what is needed beyond it is a remainder.
+    """
+
+    stiffness: float = 0.015
+    position: float = 0.5e-6
+    temperature: float = 0.5
+    dry: float = 0.02
+    angle: float = 0.003
+    load: float = 0.003
+    idle_temperature: float = 1.0
+    load_miss: float = 0.003
+    direction_miss: float = 0.0035
+
+
+@dataclass(frozen=True)
+class DynamicTest:
+    """Dynamic tests at one static operating point."""
+
+    load: float
+    direction: float
+    speed: float
+    excitation: tuple[float, ...]
+    pads: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class LocusTest:
+    """One load direction of the locus: load [N], direction [rad], speed [rad/s]."""
+
+    load: float
+    direction: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class DryTest:
+    """A dry test on one pad: read loads [N] at which the compliance is compared."""
+
+    pad: int
+    load: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """All tests of a campaign, in the order of the observation vector."""
+
+    dynamic: tuple[DynamicTest, ...]
+    locus: tuple[LocusTest, ...] = ()
+    dry: tuple[DryTest, ...] = ()
+    push_load: float | None = None
+    temperature_position: tuple[float, ...] = ()
+
 
 ENTRY_NAMES = ("xx", "xy", "yx", "yy")
 #: Loads at which dry curves are compared, as shares of the range in which contact is complete.
@@ -228,3 +283,54 @@ def _add_clearance(builder: _Builder, polygon: ClearancePolygon, tolerance: Tole
     turn = np.array([math.remainder(t, 2 * math.pi) for t in polygon.fitted_angle - polygon.angles])
     builder.add(elements, turn, np.diag(np.asarray(polygon.fitted_angle_se) ** 2), tolerance.angle)
     return float(polygon.push_load)
+
+
+#: Harmonics of the load's direction that a locus of many directions is described by.
+HARMONICS = 3
+
+
+def moved_by_miss(locus: Locus, identification: Identification) -> list[FloatArray]:
+    """Change of every position with the load's size and direction."""
+    out = []
+    for p in locus.points:
+        along = np.array([math.cos(p.point.static_load_direction), math.sin(p.point.static_load_direction)])
+        more = along * p.point.static_load / _stiffness(identification, p.point.static_load)
+        out.append(np.column_stack([more, _turned(p, locus)]))
+    return out
+
+
+def _stiffness(identification: Identification, load: float) -> float:
+    """Mean direct stiffness at the nearest load and the lowest excitation [N/m]."""
+    known = [p for p in identification.points if np.isfinite(p.stiffness.h).all()]
+    if not known:
+        return math.inf
+    nearest = min(known, key=lambda p: (abs(p.point.static_load - load), p.point.excitation))
+    return nearest.stiffness.direct[0]
+
+
+def _turned(point: LocusPoint, locus: Locus) -> FloatArray:
+    """Change of a position with the load's direction: slope of the locus itself, through its harmonics (2,)."""
+    alike = [
+        p for p in locus.points
+        if (p.point.static_load, p.point.shaft_speed) == (point.point.static_load, point.point.shaft_speed)
+    ]  # fmt: skip
+    angle = np.array([p.point.static_load_direction for p in alike])
+    place = np.array([p.position for p in alike])
+    count = len(np.unique(np.round(np.exp(1j * angle), 6)))
+    orders = np.arange(1, min(HARMONICS, (count - 1) // 2) + 1)
+    if not len(orders) or _largest_gap(angle) > math.pi / orders[-1]:
+        # too few directions: as if the whole locus turned about its middle, or about the zero where that is all
+        middle = place.mean(axis=0) if count > 2 else np.zeros(2)
+        x, y = point.position - middle
+        return np.array([-y, x])
+    at = point.point.static_load_direction
+    design = np.column_stack([np.ones_like(angle), np.cos(np.outer(angle, orders)), np.sin(np.outer(angle, orders))])
+    fitted = np.linalg.lstsq(design, place, rcond=None)[0]
+    slope = np.concatenate([[0.0], -orders * np.sin(at * orders), orders * np.cos(at * orders)])
+    return np.asarray(slope @ fitted)
+
+
+def _largest_gap(angle: FloatArray) -> float:
+    """Largest angle between neighbouring directions."""
+    around = np.sort(np.mod(angle, 2 * math.pi))
+    return float(np.diff(np.append(around, around[0] + 2 * math.pi)).max())

@@ -11,8 +11,7 @@ from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnosis.forward.candidates import Candidate
 from tpjb_ident.diagnosis.forward.nuisance import Nuisance
 from tpjb_ident.diagnosis.observations.folds import Fold, folds, held_out
-from tpjb_ident.diagnosis.observations.observe import Observations
-from tpjb_ident.diagnosis.observations.tolerance import Tolerance
+from tpjb_ident.diagnosis.observations.observe import Observations, Tolerance
 from tpjb_ident.diagnosis.search.assessment import Basis
 from tpjb_ident.diagnosis.search.components import components
 

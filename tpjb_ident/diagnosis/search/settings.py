@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
-from tpjb_ident.diagnosis.observations.tolerance import Tolerance
+from tpjb_ident.diagnosis.observations.observe import Tolerance
 
 
 @dataclass(frozen=True)

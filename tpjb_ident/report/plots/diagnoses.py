@@ -26,7 +26,7 @@ from tpjb_ident.report.drawing.picture import (
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnosis.diagnose import Diagnosis
-    from tpjb_ident.diagnosis.plan.plan import CampaignPlan
+    from tpjb_ident.diagnosis.plan import CampaignPlan
     from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
 
@@ -110,7 +110,7 @@ def isolability(
     Parameters
     ----------
     plan : CampaignPlan or (k, k) array_like
-        As `tpjb_ident.diagnosis.plan.plan.plan` makes it, or its matrix.
+        As `tpjb_ident.diagnosis.plan.plan` makes it, or its matrix.
     names : sequence of str, optional
         Of the k effects; default: the plan's own.
     title : str, optional

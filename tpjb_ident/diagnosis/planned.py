@@ -10,9 +10,16 @@ import numpy as np
 from model.setup import Setup
 from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.observations.gap import direct_scale
-from tpjb_ident.diagnosis.observations.layout import DryTest, DynamicTest, Layout, LocusTest
-from tpjb_ident.diagnosis.observations.observe import ENTRY_NAMES, Element, Observations
-from tpjb_ident.diagnosis.observations.tolerance import Tolerance
+from tpjb_ident.diagnosis.observations.observe import (
+    ENTRY_NAMES,
+    DryTest,
+    DynamicTest,
+    Element,
+    Layout,
+    LocusTest,
+    Observations,
+    Tolerance,
+)
 
 #: Standard errors that a well-run test reaches (the sample campaigns' own): share of the mean direct coefficient,
 #: position [m], temperature [K], share of a dry compliance, angle of a polygon side [rad].

@@ -8,25 +8,25 @@ can imitate, d_AB = 6 |(I - P_B) s_A| / |s_A|. Below 3 the two are confusable.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from model.setup import Setup
-from tpjb_ident.arrays import FloatArray
+from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnosis.forward.candidates import Candidate, one_amplitude
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
-from tpjb_ident.diagnosis.observations.layout import Layout
-from tpjb_ident.diagnosis.observations.observe import Observations
-from tpjb_ident.diagnosis.plan.planned import planned_observations
+from tpjb_ident.diagnosis.observations.observe import Element, Layout, Observations
+from tpjb_ident.diagnosis.planned import planned_observations
 from tpjb_ident.diagnosis.search.components import usual_factor
 from tpjb_ident.presentation import json_data
 
 if TYPE_CHECKING:
     import pandas as pd
+
 
 SEEN = 6.0
 CONFUSABLE = 3.0
@@ -166,3 +166,74 @@ def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:
     separation = SEEN * np.sqrt(1.0 - cosine**2)
     np.fill_diagonal(separation, np.nan)
     return CampaignPlan(tuple(chosen), size, separation)
+
+
+DIRECT = frozenset({"kxx", "kyy", "cxx", "cyy"})
+FAMILIES = {
+    "B": frozenset({"h"}),
+    "C": frozenset({"h", "locus", "load", "clearance"}),
+    "D": frozenset({"h", "locus", "load", "clearance", "dry", "temperature"}),
+}
+#: Second speed of data set E over the planned one.
+FASTER = 1.5
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """What one part of a campaign could tell."""
+
+    name: str
+    numbers: int
+    known: CampaignPlan = field(repr=False)
+    free: CampaignPlan = field(repr=False)
+
+    def to_row(self) -> dict[str, object]:
+        """Counts, flat."""
+        row: dict[str, object] = {"data_set": self.name, "numbers": self.numbers}
+        k = len(self.known.candidates)
+        for words, told in (("known", self.known), ("free", self.free)):
+            row |= {
+                f"detectable_nuisances_{words}": k - len(told.below_floor),
+                f"confusable_pairs_nuisances_{words}": len(told.confusable), "pairs": k * (k - 1) // 2,
+            }  # fmt: skip
+        return {**row, "mixed_up": "; ".join(" / ".join(pair) for pair in self.free.confusable)}
+
+
+def data_sets(setup: Setup, layout: Layout) -> tuple[DataSet, ...]:
+    """Work out what every data set sees at typical sizes and mixes up at d' = 6, nuisances known and free."""
+    faster = tuple(replace(t, speed=FASTER * t.speed) for t in layout.dynamic)
+    chosen = one_amplitude(setup.bearing)
+    seen = signatures(setup, replace(layout, dynamic=(*layout.dynamic, *faster)), chosen)
+    planned = {t.speed for t in layout.dynamic}
+    return tuple(
+        DataSet(name, int(mine.sum()), *(_told(seen, mine, chosen, free) for free in (False, True)))
+        for name, mine in masks(seen.observations.elements, planned).items()
+    )
+
+
+def _told(seen: Signatures, mine: BoolArray, chosen: Sequence[Candidate], free: bool) -> CampaignPlan:
+    """Sizes and separations by a part of the elements."""
+    factor = seen.factor(free)
+    part = (factor @ factor.T)[np.ix_(mine, mine)]
+    scale = np.sqrt(np.diag(part))
+    whole = np.linalg.cholesky(part / np.outer(scale, scale))
+    return separated(chosen, np.asarray(np.linalg.solve(whole, seen.columns[mine] / scale[:, None])))
+
+
+def masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArray]:
+    """Elements of every data set."""
+    families = np.array([e.family for e in elements])
+    first = np.array([not np.isfinite(e.place("speed")) or e.place("speed") in planned for e in elements])
+    line = np.array([e.place("excitation") for e in elements])
+    one = line == _usual(line[np.isfinite(line)])
+    direct = np.array([e.observable in DIRECT for e in elements])
+    masks = {"A": direct & one & first}
+    masks |= {name: np.isin(families, sorted(kept)) & first for name, kept in FAMILIES.items()}
+    return {**masks, "E": np.ones(len(elements), dtype=bool)}
+
+
+def _usual(lines: FloatArray) -> float:
+    """The frequency that is there at the most loads, the middle one among equals."""
+    found, counts = np.unique(lines, return_counts=True)
+    most = found[counts == counts.max()]
+    return float(most[len(most) // 2])

@@ -1,1 +1,0 @@
-"""The one more test that would separate what these data cannot tell apart."""

@@ -1,1 +1,0 @@
-"""What a campaign could and could not tell, before it is run."""
