@@ -1,7 +1,8 @@
 """statsmodels' robust linear model on the stacked real rows of Eq. (15): the paper's choice.
 
-Huber's and Tukey's norms with the MAD scale are `robust_fit`, equal to statsmodels to the last bit; for all
-others, and where its own numbers are promised (`plain`), statsmodels itself is run.
+Every identification solves Huber's and Tukey's norms with the MAD scale, and the import of statsmodels would make it
+1.2 times as long: these two are `robust_fit`, equal to statsmodels to the last bit. For all other norms and scales,
+and where its own numbers are promised (`plain`), statsmodels itself is run.
 
 Kept as a reference with its traps guarded: complex input is refused (statsmodels takes it and returns false standard
 errors), the system is scaled before (``conv="coefs"`` has an absolute tolerance and never ends in SI units), and
@@ -41,15 +42,8 @@ NORMS = {
 HUBER, TUKEY = 1.345, 4.685
 #: Median of the absolute value of a standard normal variable.
 NORMAL_MAD = 0.6744897501960817
-
-
-@dataclass(frozen=True)
-class Norm:
-    """How residuals over their scale count: psi(z) / z, psi(z), its derivative."""
-
-    weights: Callable[[FloatArray], FloatArray]
-    psi: Callable[[FloatArray], FloatArray]
-    slope: Callable[[FloatArray], FloatArray]
+#: Weight psi(z) / z, psi(z) and its derivative of residuals z over their scale.
+NormValues = tuple[FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -98,7 +92,7 @@ def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | 
 
 
 def _fit(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RlmSolution:
-    if settings.norm in OWN_NORMS and settings.scale == "mad" and not settings.library:
+    if settings.norm in QUICK_NORMS and settings.scale == "mad" and not settings.library:
         return robust_fit(design, response, settings.norm, settings.max_iterations, settings.tolerance)
     from statsmodels.robust.robust_linear_model import RLM
 
@@ -172,18 +166,14 @@ def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = Non
 def robust_fit(
     design: FloatArray, response: FloatArray, norm: str, max_iterations: int, tolerance: float
 ) -> RlmSolution:  # fmt: skip
-    """Robust regression by iteratively reweighted least squares.
-
-    Every identification computes these two beside its own estimate; to import statsmodels and what it draws in took as
-    long as to read all records. A test holds the two equal to the last bit.
-    """
-    chosen = OWN_NORMS[norm]
+    """Robust regression by iteratively reweighted least squares with the MAD scale."""
+    norm_of = QUICK_NORMS[norm]
     inverse = np.linalg.pinv(design)
     params, weights = inverse.dot(response), np.ones(len(response))
     residual = response - design.dot(params)
     scale, iterations = _mad(residual), 1
     while scale != 0.0:
-        weights = chosen.weights(residual / scale)
+        weights = norm_of(residual / scale)[0]
         half = np.sqrt(weights)
         before, params = params, np.linalg.pinv(half[:, None] * design).dot(half * response)
         residual = response - design.dot(params)
@@ -193,51 +183,33 @@ def robust_fit(
             break
     sizes = residual / scale if scale != 0.0 else np.zeros(len(response))
     rank = int(np.linalg.matrix_rank(design))
-    return RlmSolution(params, _spread(chosen, sizes, scale, rank) * inverse.dot(inverse.T), weights, scale, iterations)
+    covariance = _variance_factor(norm_of(sizes), scale, rank) * inverse.dot(inverse.T)
+    return RlmSolution(params, covariance, weights, scale, iterations)
 
 
 def _mad(residual: FloatArray) -> float:
     return float(np.median(np.abs(residual) / NORMAL_MAD))
 
 
-def _spread(norm: Norm, sizes: FloatArray, scale: float, rank: int) -> float:
+def _variance_factor(norm: NormValues, scale: float, rank: int) -> float:
     """Variance of a coefficient over that of the plain design: H1 of Huber 1973 with the small-sample factor k."""
-    n, slope = len(sizes), norm.slope(sizes)
+    _, psi, slope = norm
+    n = len(slope)
     k = 1 + rank / n * np.var(slope) / np.mean(slope) ** 2
-    with np.errstate(divide="ignore", invalid="ignore"):  # no row to spare: no covariance
-        square = np.divide(1.0, n - rank) * np.sum(norm.psi(sizes) ** 2) * scale**2
+    with np.errstate(divide="ignore", invalid="ignore"):  # no spare row: no covariance
+        square = np.divide(1.0, n - rank) * np.sum(psi**2) * scale**2
     return float(k**2 * square / ((1 / n * np.sum(slope)) ** 2))
 
 
-def _huber_weights(z: FloatArray) -> FloatArray:
-    inside, size = np.less_equal(np.abs(z), HUBER), np.abs(z)
-    size[inside] = 1.0
-    return np.asarray(inside + (1 - inside) * HUBER / size)
+def _huber(z: FloatArray) -> NormValues:
+    size = np.abs(z)
+    return HUBER / np.maximum(size, HUBER), np.clip(z, -HUBER, HUBER), (size <= HUBER).astype(float)
 
 
-def _huber_psi(z: FloatArray) -> FloatArray:
-    inside = np.less_equal(np.abs(z), HUBER)
-    return np.asarray(inside * z + (1 - inside) * HUBER * np.sign(z))
+def _tukey(z: FloatArray) -> NormValues:
+    inside = np.abs(z) <= TUKEY
+    root = inside * (1 - (z / TUKEY) ** 2)
+    return root**2, z * root**2, root**2 - (4 * z**2 / TUKEY**2) * root
 
 
-def _huber_slope(z: FloatArray) -> FloatArray:
-    return np.less_equal(np.abs(z), HUBER).astype(float)
-
-
-def _tukey_weights(z: FloatArray) -> FloatArray:
-    return np.asarray((1 - (z / TUKEY) ** 2) ** 2 * np.less_equal(np.abs(z), TUKEY))
-
-
-def _tukey_psi(z: FloatArray) -> FloatArray:
-    return np.asarray(z * (1 - (z / TUKEY) ** 2) ** 2 * np.less_equal(np.abs(z), TUKEY))
-
-
-def _tukey_slope(z: FloatArray) -> FloatArray:
-    inside = np.less_equal(np.abs(z), TUKEY)
-    return np.asarray(inside * ((1 - (z / TUKEY) ** 2) ** 2 - (4 * z**2 / TUKEY**2) * (1 - (z / TUKEY) ** 2)))
-
-
-_TUKEY = Norm(_tukey_weights, _tukey_psi, _tukey_slope)
-
-
-OWN_NORMS = {"huber": Norm(_huber_weights, _huber_psi, _huber_slope), "tukey": _TUKEY, "bisquare": _TUKEY}
+QUICK_NORMS: dict[str, Callable[[FloatArray], NormValues]] = {"huber": _huber, "tukey": _tukey, "bisquare": _tukey}
