@@ -21,7 +21,8 @@ from tpjb_ident.check.findings import Finding, Reporter, merge
 from tpjb_ident.check.lines import fit_lines, strongest_line
 from tpjb_ident.check.response import definiteness, mirrored
 from tpjb_ident.check.wiring import guess_wiring, name_fault, repairs
-from tpjb_ident.dynamic.records.line_fit import GLITCH_MARGIN
+from tpjb_ident.dynamic.records.line_fit import GLITCH_MARGIN, fit_without_glitches
+from tpjb_ident.dynamic.records.windows import line_design
 
 SAMPLES = Path(__file__).parents[2].parent / "shared" / "samples"
 PROBES = (
@@ -91,7 +92,8 @@ def test_lines_are_fitted_through_glitches_and_gaps():
     lines = fit_lines(time, values, [25.0, 22.0, 44.0])
     assert lines.mean[0] == pytest.approx(3.0, abs=2e-3)
     assert lines.phasor[0] == pytest.approx(0.5 * np.exp(0.3j), abs=2e-3)
-    assert lines.glitches[0] == 40 + 2 * GLITCH_MARGIN
+    used = fit_without_glitches(line_design(time, np.array([25.0, 22.0, 44.0])), values[:, :1], np.array([np.inf])).kept
+    assert np.isfinite(values[:, 0]).sum() - used.sum() == 40 + 2 * GLITCH_MARGIN
     assert lines.floor[0] < 2e-3
     assert np.isnan(lines.mean[1])
     assert np.isnan(lines.phasor[1])

@@ -103,5 +103,4 @@ def test_the_nearest_rival_counts_and_two_tests_may_be_chosen_for_what_each_tell
     chosen = suggested(tests)
     assert {s.design for s in chosen} == {CHECKS[0], CHECKS[2]}
     assert together(chosen) == pytest.approx(math.hypot(1.0, 7.0))
-    assert together(chosen, now=(0.0, 2.0)) == pytest.approx(math.sqrt(1.0 + 49.0 + 4.0))
     assert "from b and c by at least 7 standard deviations" in say(chosen, "a", "b", "c")

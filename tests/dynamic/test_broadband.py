@@ -171,8 +171,8 @@ def test_a_period_need_not_hold_a_whole_number_of_samples(true):
     samples = Samples(rate, {"displacement": rows, "force": rows.copy()}, None, None)
     found = find_period(samples, (9.0, 121.0), np.zeros(n // 2 + 1, dtype=bool))
     assert found is not None
-    assert found.samples == pytest.approx(true, abs=0.01)
-    whole = resampled(samples, found.samples, 121.0)
+    assert found == pytest.approx(true, abs=0.01)
+    whole = resampled(samples, found, 121.0)
     folded = whole.values["displacement"][0].reshape(-1, 500)
     assert np.std(folded[2] - folded[3]) < 0.2
 

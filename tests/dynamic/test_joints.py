@@ -54,12 +54,6 @@ def test_an_interval_is_students_with_what_is_systematic_added_as_squares():
             both.half_width(level)
 
 
-def test_an_answer_has_converged_unless_it_is_none_or_was_cut_short():
-    assert stiff().converged
-    assert not stiff(status=(Condition("iteration-limit"),)).converged
-    assert not stiff(np.array([[1.0, np.nan], [1.0, 1.0]])).converged
-
-
 def tachometer(values, nominal=20.0):
     asked = []
 

@@ -464,7 +464,6 @@ def test_exact_windows_are_told_by_the_usual_force_not_by_the_wildest():
     Y[10] *= 30.0
     fit = mm_fit(X, Y, np.arange(40) % 5)
     np.testing.assert_array_equal(fit.weights, np.arange(40) > 10)
-    np.testing.assert_array_equal(np.isinf(fit.distance2), np.arange(40) <= 10)
     np.testing.assert_allclose(fit.coefficients, H, atol=1e-9)
     assert fit.conditions == ("zero-scale",)
     assert "29 of 40 windows" in fit.conditions[0].detail

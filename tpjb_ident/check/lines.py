@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.run import Run
-from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.dynamic.records.line_fit import GLITCH_LIMIT, fit_without_glitches
 from tpjb_ident.dynamic.records.windows import line_design
 
@@ -42,7 +42,6 @@ class RecordLines:
     mean: FloatArray
     phasor: ComplexArray
     floor: FloatArray
-    glitches: IntArray
     scatter: FloatArray
 
 
@@ -62,14 +61,13 @@ def fit_lines(
     counts = np.count_nonzero(used, axis=0)
     known = np.where(counts > 0, 1.0, np.nan)
     scatter = np.sqrt(np.sum(rest**2, axis=0) / np.maximum(counts, 1)) * known
-    glitches = np.count_nonzero(np.isfinite(values), axis=0) - counts
     mean = coefficients[2 * len(kept)]
     if not kept:
         missing = np.full(values.shape[1], np.nan)
-        return RecordLines(mean, missing + 0j, missing, glitches, scatter)
+        return RecordLines(mean, missing + 0j, missing, scatter)
     phasor = (coefficients[0] + 1j * coefficients[1]) * np.exp(-2j * math.pi * kept[0] * time[0])
     floor = _floor(time, rest, kept[0], span) * len(time) / np.maximum(counts, 1) * known
-    return RecordLines(mean, phasor, floor, glitches, scatter)
+    return RecordLines(mean, phasor, floor, scatter)
 
 
 def _robust(design: FloatArray, values: FloatArray) -> tuple[FloatArray, BoolArray]:

@@ -228,7 +228,7 @@ def _stated_tolerances(campaign: Campaign, bearing: Bearing, known: Tolerances) 
         found = replace(found, probe_axes=(float(probes[0].axis or 0.0), float(probes[1].axis or 0.0)))
     if cells:
         gain = max(float(c.uncertainty or 0.0) for c in cells)
-        found = replace(found, cell_gain=Stated(gain, "1", "manifest"))
+        found = replace(found, cell_gain=Stated(gain, "manifest"))
     return found
 
 

@@ -328,10 +328,9 @@ def suggested(tests: Sequence[Separation]) -> tuple[Separation, ...]:
     return max(itertools.combinations(tests, 2), key=together)
 
 
-def together(tests: Sequence[Separation], now: Sequence[float] = ()) -> float:
+def together(tests: Sequence[Separation]) -> float:
     """Separation from the nearest rival by several tests at once, in standard deviations."""
-    rows = [t.each for t in tests] + ([tuple(now)] if now else [])
-    return float(np.linalg.norm(rows, axis=0).min())
+    return float(np.linalg.norm([t.each for t in tests], axis=0).min())
 
 
 def say(best: Sequence[Separation], one: str, *rivals: str) -> str:

@@ -108,12 +108,10 @@ class CampaignPlan:
         return pd.DataFrame(rows)
 
 
-def plan(
-    setup: Setup, layout: Layout, known: Tolerances | None = None, pool: Sequence[Candidate] | None = None
-) -> CampaignPlan:
+def plan(setup: Setup, layout: Layout, pool: Sequence[Candidate] | None = None) -> CampaignPlan:
     """Work out what a layout of tests could tell."""
     chosen = tuple(pool if pool is not None else one_amplitude(setup.bearing))
-    seen = signatures(setup, layout, chosen, known)
+    seen = signatures(setup, layout, chosen)
     return separated(chosen, np.asarray(np.linalg.solve(seen.factor(), seen.columns)))
 
 
@@ -130,14 +128,12 @@ class Signatures:
         return usual_factor(self.observations, self.nuisances if free else self.nuisances[:, :0])
 
 
-def signatures(
-    setup: Setup, layout: Layout, chosen: Sequence[Candidate], known: Tolerances | None = None
-) -> Signatures:
+def signatures(setup: Setup, layout: Layout, chosen: Sequence[Candidate]) -> Signatures:
     """Work out the signature of every candidate on a layout."""
     observations = planned_observations(setup, layout)
     forward = Forward(setup, layout, observations.elements)
     base = forward()
-    free = at_baseline(forward, (), setup, known or Tolerances(), base)
+    free = at_baseline(forward, (), setup, Tolerances(), base)
     columns = [_signature(forward, base, c) for c in chosen]
     return Signatures(observations, free, np.column_stack(columns))
 

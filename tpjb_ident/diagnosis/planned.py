@@ -53,24 +53,18 @@ def _elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:
     for test in layout.dynamic:
         base = (("load", test.load), ("direction", test.direction), ("speed", test.speed))
         for omega in test.excitation:
-            block = f"load {test.load:.0f} N, {omega / (2 * math.pi):g} Hz"
             where = (*base, ("excitation", omega))
-            out += [Element("h", f"{part}{entry}", block, where) for part in "kc" for entry in ENTRY_NAMES]
-        out += [
-            Element("temperature", "pad_temperature", f"load {test.load:.0f} N", (*base, ("pad", float(k))))
-            for k in test.pads
-        ]
-    for i, one in enumerate(layout.locus):
+            out += [Element("h", f"{part}{entry}", where) for part in "kc" for entry in ENTRY_NAMES]
+        out += [Element("temperature", "pad_temperature", (*base, ("pad", float(k)))) for k in test.pads]
+    for one in layout.locus:
         where3 = (("load", one.load), ("direction", one.direction), ("speed", one.speed))
-        out += [Element("locus", f"locus_{a}", f"locus {i % 5}", where3) for a in "xy"]
-        out += [Element("load", f"load_{a}", f"locus {i % 5}", where3) for a in ("ratio", "turn")]
+        out += [Element("locus", f"locus_{a}", where3) for a in "xy"]
+        out += [Element("load", f"load_{a}", where3) for a in ("ratio", "turn")]
     for dry in layout.dry:
-        out += [Element("dry", "dry_compliance", "dry", (("pad", float(dry.pad)), ("load", load))) for load in dry.load]
+        out += [Element("dry", "dry_compliance", (("pad", float(dry.pad)), ("load", load))) for load in dry.load]
     if layout.push_load is not None:
         places = [(("pad", k + 1.0), ("angle", angle)) for k, angle in enumerate(angles)]
-        out += [
-            Element("clearance", name, "clearance", p) for name in ("clearance_pushed", "side_angle") for p in places
-        ]
+        out += [Element("clearance", name, p) for name in ("clearance_pushed", "side_angle") for p in places]
     return tuple(out)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tpjb_ident.compare.effect_words import UNITS, amount, finding, label_in_words, words_of
 from tpjb_ident.rounding import MINUS, percent
@@ -94,18 +94,10 @@ def _largest(deviations: Mapping[str, tuple[float, float]] | None) -> str:
 
 def _remainder_sentences(verdict: Verdict) -> list[str]:
     """What is left and what it behaves like, where a diagnosis says so."""
-    known: dict[str, Any] = {**verdict.notes}
-    for name in ("behaves_like", "drift", "remainder"):
-        known.setdefault(name, getattr(verdict, name, None))
-    sentences = [f"What is left behaves like {in_words(_get(one, 'words'))}." for one in known["behaves_like"] or ()]
+    sentences = [f"What is left behaves like {in_words(term.words)}." for term in verdict.behaves_like]
     return sentences + [
-        f"The size of {label_in_words(_get(one, 'effect'))} {in_words(_get(one, 'words'))}."
-        for one in known["drift"] or ()
+        f"The size of {label_in_words(drift.effect)} {in_words(drift.words)}." for drift in verdict.drift
     ]
-
-
-def _get(entry: Any, name: str) -> str:
-    return str(entry[name] if isinstance(entry, Mapping) else getattr(entry, name))
 
 
 def observable(name: str) -> str:

@@ -27,7 +27,6 @@ class Candidate:
     name: str
     free: tuple[Parameter, ...]
     fixed: Mapping[str, float] = field(default_factory=dict, hash=False)
-    side: str = "bearing"
     form: str = ""
     basis: tuple[tuple[float, ...], ...] = ()
     about: Mapping[str, float] = field(default_factory=dict, hash=False)
@@ -138,7 +137,7 @@ def candidates(bearing: Bearing, skip: frozenset[str] = frozenset()) -> tuple[Ca
                 continue
             options = range(1, len(bearing.pads) + 1) if parameter.discrete else parameter.options
             choices = [{**c, parameter.name: v} for c in choices for v in options]
-        out += [Candidate(kind.name, free, c, kind.side) for c in choices]
+        out += [Candidate(kind.name, free, c) for c in choices]
     return tuple(out)
 
 
@@ -164,4 +163,4 @@ _SERIES: dict[str, tuple[tuple[float, ...], ...]] = {
 def _terms(kind: EffectKind) -> list[Candidate]:
     """Forms of a generic term."""
     forms = _SERIES if len(kind.parameters) == 3 else _FORMS
-    return [Candidate(kind.name, kind.parameters, {}, kind.side, form, basis) for form, basis in forms.items()]
+    return [Candidate(kind.name, kind.parameters, {}, form, basis) for form, basis in forms.items()]

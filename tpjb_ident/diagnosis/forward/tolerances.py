@@ -18,26 +18,25 @@ from tpjb_ident.errors import BadInputError
 
 @dataclass(frozen=True)
 class Stated:
-    """One stated tolerance: one standard deviation in SI, its unit, and where it comes from."""
+    """One stated tolerance: one standard deviation in SI, and where it comes from."""
 
     value: float
-    unit: str
     source: str = "default"
 
 
-#: Defaults of `rig-export.md`: value, unit, and the dimension in which a text states another one.
-DEFAULTS: dict[str, tuple[float, str, str]] = {
-    "viscosity": (0.05, "1", "ratio"),
-    "viscosity_exponent": (0.03, "1", "ratio"),
-    "supply_temperature": (0.5, "K", "temperature difference"),
-    "assembled_clearance": (2e-6, "m", "length"),
-    "pad_clearance": (3e-6, "m", "length"),
-    "clearance_scatter": (2e-6, "m", "length"),
-    "pivot_stiffness_scatter": (0.05, "1", "ratio"),
-    "film_heat": (0.07, "1", "ratio"),
-    "thermometer": (0.5, "K", "temperature difference"),
-    "probe_gain": (0.005, "1", "ratio"),
-    "model": (0.015, "1", "ratio"),
+#: Defaults of `rig-export.md`: value and the dimension in which a text states another one.
+DEFAULTS: dict[str, tuple[float, str]] = {
+    "viscosity": (0.05, "ratio"),
+    "viscosity_exponent": (0.03, "ratio"),
+    "supply_temperature": (0.5, "temperature difference"),
+    "assembled_clearance": (2e-6, "length"),
+    "pad_clearance": (3e-6, "length"),
+    "clearance_scatter": (2e-6, "length"),
+    "pivot_stiffness_scatter": (0.05, "ratio"),
+    "film_heat": (0.07, "ratio"),
+    "thermometer": (0.5, "temperature difference"),
+    "probe_gain": (0.005, "ratio"),
+    "model": (0.015, "ratio"),
 }
 
 
@@ -47,7 +46,7 @@ class Tolerances:
 
     stated: Mapping[str, Stated] = field(default_factory=lambda: dict(_defaults()))
     probe_axes: tuple[float, float] = (math.pi / 4, 3 * math.pi / 4)
-    cell_gain: Stated = Stated(0.002, "1")
+    cell_gain: Stated = Stated(0.002)
     centre: float = 10e-6
 
     def __getitem__(self, name: str) -> float:
@@ -62,14 +61,14 @@ class Tolerances:
                 near = difflib.get_close_matches(name, DEFAULTS, n=1)
                 hint = f"Did you mean {near[0]!r}?" if near else f"Known: {', '.join(DEFAULTS)}."
                 raise BadInputError(f"tolerance {name!r} ({source}): not known. {hint}")
-            _, unit, dimension = DEFAULTS[name]
+            dimension = DEFAULTS[name][1]
             try:
                 number = parse_quantity(value, dimension, name) if isinstance(value, str) else float(value)
             except (UnitError, ValueError) as error:
                 raise BadInputError(f"tolerance {name} ({source}): {error}") from error
             if not 0.0 <= number < math.inf:
                 raise BadInputError(f"tolerance {name} ({source}): must be zero or more, got {value!r}.")
-            table[name] = Stated(number, unit, source)
+            table[name] = Stated(number, source)
         return Tolerances(table, self.probe_axes, self.cell_gain, self.centre)
 
     def layered(self, bearing: Bearing) -> Tolerances:
@@ -79,4 +78,4 @@ class Tolerances:
 
 
 def _defaults() -> dict[str, Stated]:
-    return {name: Stated(value, unit) for name, (value, unit, _) in DEFAULTS.items()}
+    return {name: Stated(value) for name, (value, _) in DEFAULTS.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +22,6 @@ def observe_table(path: Path, reading_error: float | None = None, tolerance: Tol
     for one in read_coefficients(path, reading_error):
         tests.setdefault((one.load, one.direction, one.speed), []).append(one.omega)
         where = (("load", one.load), ("direction", one.direction), ("speed", one.speed), ("excitation", one.omega))
-        block = f"load {one.load:.0f} N, {one.omega / (2 * math.pi):g} Hz"
         for part in "kc":
             factor = one.omega if part == "c" else 1.0
             mine = {n: v for n, v in one.coefficients.items() if n[0] == part}
@@ -32,7 +30,7 @@ def observe_table(path: Path, reading_error: float | None = None, tolerance: Tol
             least = AXIS * scale * (reading_error or 0.0)
             for name, (value, error) in mine.items():
                 sigma = max(factor * error, least)
-                rows.append((Element("h", name, block, where), factor * value, sigma, tolerance.stiffness * scale))
+                rows.append((Element("h", name, where), factor * value, sigma, tolerance.stiffness * scale))
     dynamic = tuple(DynamicTest(*key, tuple(lines)) for key, lines in tests.items())
     value, error, sigma = np.array([row[1:] for row in rows]).T
     elements = tuple(row[0] for row in rows)

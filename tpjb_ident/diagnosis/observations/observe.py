@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import block_diag
 
-from tpjb_ident.arrays import FloatArray, TextArray
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.dynamic.corrections.mains import MAINS_CORRECTED, MAINS_ON_LINE
@@ -98,7 +98,6 @@ class Element:
 
     family: str
     observable: str
-    block: str
     where: tuple[tuple[str, float], ...]
 
     def place(self, name: str) -> float:
@@ -118,11 +117,6 @@ class Observations:
 
     def __len__(self) -> int:
         return len(self.value)
-
-    @property
-    def blocks(self) -> TextArray:
-        """Block of every element."""
-        return np.array([e.block for e in self.elements])
 
     @property
     def total_sigma(self) -> FloatArray:
@@ -164,7 +158,7 @@ def observe(
     """Gather a campaign's results into one vector."""
     tolerance = tolerance or Tolerance()
     builder = _Builder()
-    dynamic = _add_dynamic(builder, identification, locus, tolerance)
+    dynamic = _add_dynamic(builder, identification, tolerance)
     locus_tests = _add_locus(builder, locus, identification, tolerance) if locus is not None else ()
     dry = tuple(_add_dry(builder, c, tolerance) for c in curves if _usable(c))
     push = _add_clearance(builder, polygon, tolerance) if polygon is not None else None
@@ -175,9 +169,7 @@ def observe(
     )  # fmt: skip
 
 
-def _add_dynamic(
-    builder: _Builder, identification: Identification, locus: Locus | None, tolerance: Tolerance
-) -> tuple[DynamicTest, ...]:
+def _add_dynamic(builder: _Builder, identification: Identification, tolerance: Tolerance) -> tuple[DynamicTest, ...]:
     tests: dict[tuple[float, float, float], list[int]] = {}
     points = [p for p in identification.points if not _struck_by_mains(p)] or list(identification.points)
     for i, p in enumerate(points):
@@ -189,8 +181,7 @@ def _add_dynamic(
         for i in members:
             _add_stiffness(builder, points[i], base, tolerance)
         temperature = _mean_temperatures([points[i].temperatures for i in members])
-        block = f"load {load:.0f} N"
-        names = [Element("temperature", "pad_temperature", block, (*base, ("pad", float(k)))) for k in temperature]
+        names = [Element("temperature", "pad_temperature", (*base, ("pad", float(k)))) for k in temperature]
         if temperature:
             noise = np.eye(len(names)) * TEMPERATURE_SE**2
             value = np.array(list(temperature.values()))
@@ -209,10 +200,9 @@ def _struck_by_mains(result: PointResult) -> bool:
 def _add_stiffness(builder: _Builder, result, base: tuple, tolerance: Tolerance) -> None:  # type: ignore[no-untyped-def, type-arg]
     omega = result.point.excitation
     h = result.stiffness.h
-    block = f"load {result.point.static_load:.0f} N, {result.point.excitation_hz:g} Hz"
     where = (*base, ("excitation", omega))
-    elements = [Element("h", f"k{e}", block, where) for e in ENTRY_NAMES]
-    elements += [Element("h", f"c{e}", block, where) for e in ENTRY_NAMES]
+    elements = [Element("h", f"k{e}", where) for e in ENTRY_NAMES]
+    elements += [Element("h", f"c{e}", where) for e in ENTRY_NAMES]
     scale = np.repeat(result.stiffness.direct, 4)
     value = np.concatenate([h.real.ravel(), h.imag.ravel()])
     covariance = np.asarray(result.stiffness.covariance)
@@ -239,7 +229,7 @@ def _add_locus(
     out = []
     spread = np.diag([tolerance.load_miss**2, tolerance.direction_miss**2])
     stated = (tolerance.position, tolerance.position, tolerance.load, tolerance.load)
-    for i, (p, give) in enumerate(zip(locus.points, moved_by_miss(locus, identification), strict=True)):
+    for p, give in zip(locus.points, moved_by_miss(locus, identification), strict=True):
         where = (
             ("load", p.point.static_load), ("direction", p.point.static_load_direction), ("speed", p.point.shaft_speed),
         )  # fmt: skip
@@ -249,7 +239,7 @@ def _add_locus(
         covariance = both @ spread @ both.T
         covariance[:2, :2] += p.covariance
         builder.add(
-            [Element(family, name, f"locus {i % 5}", where) for family, name in names],
+            [Element(family, name, where) for family, name in names],
             np.array([*p.position, p.load / p.point.static_load, turn]), covariance, np.array(stated),
         )  # fmt: skip
         out.append(LocusTest(p.point.static_load, p.point.static_load_direction, p.point.shaft_speed))
@@ -263,7 +253,7 @@ def _usable(curve: PivotCurve) -> bool:
 def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryTest:
     load = np.array([curve.valid_from + s * (curve.valid_to - curve.valid_from) for s in DRY_SHARES])
     value = -np.log(np.asarray(curve.stiffness(load), float))
-    elements = [Element("dry", "dry_compliance", "dry", (("pad", float(curve.pad)), ("load", float(w)))) for w in load]
+    elements = [Element("dry", "dry_compliance", (("pad", float(curve.pad)), ("load", float(w)))) for w in load]
     covariance = curve.relative_stiffness_covariance(load)
     covariance = covariance + np.diag(DRY_SHAPE**2 * np.diag(covariance))
     builder.add(elements, value, covariance, tolerance.dry)
@@ -274,12 +264,12 @@ def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryT
 def _add_clearance(builder: _Builder, polygon: ClearancePolygon, tolerance: Tolerance) -> float:
     n = len(polygon.angles)
     places = [(("pad", k + 1.0), ("angle", float(polygon.angles[k]))) for k in range(n)]
-    elements = [Element("clearance", "clearance_pushed", "clearance", where) for where in places]
+    elements = [Element("clearance", "clearance_pushed", where) for where in places]
     builder.add(
         elements, polygon.clearance_pushed, np.diag(np.asarray(polygon.clearance_pushed_se) ** 2),
         tolerance.position,
     )  # fmt: skip
-    elements = [Element("clearance", "side_angle", "clearance", where) for where in places]
+    elements = [Element("clearance", "side_angle", where) for where in places]
     turn = np.array([math.remainder(t, 2 * math.pi) for t in polygon.fitted_angle - polygon.angles])
     builder.add(elements, turn, np.diag(np.asarray(polygon.fitted_angle_se) ** 2), tolerance.angle)
     return float(polygon.push_load)

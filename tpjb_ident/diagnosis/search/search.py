@@ -31,7 +31,6 @@ class Search:
     model: Fit
     effects: Fit
     worth: tuple[Worth, ...]
-    less: tuple[Fit | None, ...] = field(repr=False)
     first: Columns = field(repr=False)
     singles: tuple[Fit, ...] = field(repr=False)
     rivals: tuple[tuple[Fit, ...], ...] = field(repr=False)
@@ -55,8 +54,7 @@ def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Pro
             model, singles, rivals = again
     values = tuple(selection.worth_in(model, i) for i in range(len(model.candidates)))
     effects = selection.named(model)
-    less = tuple(selection.without(effects, i) for i in range(len(effects.candidates)))
-    return Search(selection.baseline, model, effects, values, less, first.secants, singles, rivals)
+    return Search(selection.baseline, model, effects, values, first.secants, singles, rivals)
 
 
 def _selected(

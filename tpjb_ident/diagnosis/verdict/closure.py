@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnosis.observations.gap import gap, noise_square
 from tpjb_ident.diagnosis.search.fit import Fit
@@ -19,7 +17,6 @@ class Closure:
     before: float
     after: float
     closed: float
-    parts: tuple[float, ...]
 
 
 def unseen(problem: Problem, fitted: Fit) -> FloatArray:
@@ -40,14 +37,10 @@ def effects_unseen(problem: Problem, fitted: Fit, exact: FloatArray) -> FloatArr
     return out
 
 
-def closure(problem: Problem, baseline: Fit, model: Fit, less: tuple[Fit | None, ...]) -> Closure:
+def closure(problem: Problem, baseline: Fit, model: Fit) -> Closure:
     """Measure what a model closes on unseen points."""
     before, after = (gap(problem.observations, unseen(problem, f)) for f in (baseline, model))
     floor = noise_square(problem.observations)
     room = before**2 - floor
     closed = 1.0 - max(after**2 - floor, 0.0) / room if room > 0.0 and model.candidates else float("nan")
-    parts = []
-    for one in less:
-        opened = gap(problem.observations, unseen(problem, one)) ** 2 - after**2 if one is not None else np.inf
-        parts.append(opened / room if room > 0.0 else float("nan"))
-    return Closure(before, after, closed, tuple(parts))
+    return Closure(before, after, closed)

@@ -49,7 +49,7 @@ def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Judged
     baseline, effects = found.baseline, found.effects
     before = excess(problem, baseline)
     # against the drawing: a baseline at its likeliest has tolerances exceeded in the place of an effect
-    closed = closure(problem, baseline_fit(problem), effects, found.less)
+    closed = closure(problem, baseline_fit(problem), effects)
     if not found.model.candidates:
         if before.p >= settings.alarm:
             told = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"

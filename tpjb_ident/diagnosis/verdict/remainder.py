@@ -18,9 +18,11 @@ from tpjb_ident.diagnosis.verdict.verdict import Disagreement
 
 #: Share of its prior variance that the data take from something that may be off, before they say anything about it.
 TOLD = 0.05
+#: Rows of the list of disagreements.
+MOST = 12
 
 
-def localise(observations: Observations, prediction: FloatArray, most: int = 12) -> tuple[Disagreement, ...]:
+def localise(observations: Observations, prediction: FloatArray) -> tuple[Disagreement, ...]:
     """Split the squared gap by observable and region, largest share first."""
     z = residuals(observations, prediction)
     total = float(np.sum(z**2))
@@ -31,7 +33,7 @@ def localise(observations: Observations, prediction: FloatArray, most: int = 12)
             square = float(np.sum(z[part] ** 2))
             rows.append(Disagreement(name, where, math.sqrt(square / part.sum()), square / total if total else 0.0))
     rows.sort(key=lambda d: -d.share)
-    return tuple(rows[:most])
+    return tuple(rows[:MOST])
 
 
 def _regions(observations: Observations, mine: BoolArray):  # type: ignore[no-untyped-def]

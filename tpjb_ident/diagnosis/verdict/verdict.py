@@ -101,7 +101,6 @@ class Verdict:
     drift: tuple[Drift, ...] = ()
     assumptions: tuple[Assumption, ...] = ()
     reasons: tuple[str, ...] = ()
-    notes: dict[str, Any] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, in the order of the contract."""
@@ -121,7 +120,6 @@ class Verdict:
             "assumptions": [vars(a) for a in self.assumptions],
             "gap": self.gap,
             "reasons": list(self.reasons),
-            **self.notes,
         }
 
     def to_json(self) -> str:

@@ -6,7 +6,8 @@ need not hold a whole number of samples; the record is then resampled, all chann
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,16 +22,8 @@ REPEATS = 0.5
 MAX_SLIP = 0.01
 
 
-@dataclass(frozen=True)
-class Period:
-    """Length of a period."""
-
-    samples: float
-    share: float
-
-
-def find_period(samples: Samples, band: tuple[float, float], disturbed: BoolArray) -> Period | None:
-    """Period of what excites the band, None where it does not repeat."""
+def find_period(samples: Samples, band: tuple[float, float], disturbed: BoolArray) -> float | None:
+    """Period in samples of what excites the band, None where it does not repeat."""
     least, most = int(2 * samples.rate / band[0]), samples.length // MIN_PERIODS
     best = _first_peak(_correlation(samples, band, disturbed), least // 2, most + 1)
     if best is None:
@@ -41,7 +34,7 @@ def find_period(samples: Samples, band: tuple[float, float], disturbed: BoolArra
     chance = 1.0 / max(count, 1)
     if count < MIN_PERIODS or share < chance + REPEATS * (1 - chance):
         return None
-    return Period(period, share)
+    return period
 
 
 def _signals(samples: Samples) -> FloatArray:
@@ -131,8 +124,7 @@ def resampled(samples: Samples, period: float, top: float) -> Samples:
     return _each(samples, samples.rate * q / period, lambda rows: interpolated(rows, at))
 
 
-def _each(samples: Samples, rate: float, change: object) -> Samples:
-    assert callable(change)
+def _each(samples: Samples, rate: float, change: Callable[[FloatArray], FloatArray]) -> Samples:
     values = {q: change(rows) for q, rows in samples.values.items()}
     command = None if samples.command is None else change(samples.command)
     angle = None

@@ -19,7 +19,7 @@ from tpjb_ident.dynamic.broadband.disturbing_lines import (
     find_disturbances,
     without_disturbances,
 )
-from tpjb_ident.dynamic.broadband.period import Period, find_period, resampled
+from tpjb_ident.dynamic.broadband.period import find_period, resampled
 from tpjb_ident.dynamic.broadband.samples import Samples, read_samples
 from tpjb_ident.dynamic.instruments.findings import START
 from tpjb_ident.dynamic.records.compensation import compensated, look_at_readings
@@ -93,8 +93,8 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
     if period is None:
         clean, length = without_disturbances(samples, lines), samples.length
     else:
-        cut = resampled(samples, period.samples, settings.band[1])
-        length = round(period.samples)
+        cut = resampled(samples, period, settings.band[1])
+        length = round(period)
         clean = without_disturbances(cut, lines, length)
     result = _transformed(run, clean, length, housing_mass, settings)
     phasors = compensated(result, run, slower)
@@ -133,7 +133,7 @@ def _error(run: Run, place: str, what: str, cure: str) -> RigDataError:
     return RigDataError(Problem("error", run.file, place, what, cure, run.id))
 
 
-def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Disturbance, ...]) -> Period | None:
+def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Disturbance, ...]) -> float | None:
     if run.excitation_kind not in MAY_REPEAT:
         return None
     frequency = np.asarray(np.fft.rfftfreq(samples.length, 1 / samples.rate), dtype=float)

@@ -29,7 +29,6 @@ class CellZero:
 
     force: complex = 0.0
     error: float = 0.0
-    stated: float = 0.0
 
     def conditions(self) -> tuple[Condition, ...]:
         """What to say of it at the points."""
@@ -65,7 +64,7 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0
     zero, error = complex(found[1]), float(np.sqrt(covariance[1, 1]))
     there = abs(zero) > CLEAR * error and abs(zero) > NOTABLE * size.min()
     allowed = stated == 0.0 or abs(zero) < 3 * stated + 3 * error
-    return CellZero(zero, error, stated) if there and allowed else CellZero()
+    return CellZero(zero, error) if there and allowed else CellZero()
 
 
 def _one_direction(set_points: ComplexArray) -> bool:

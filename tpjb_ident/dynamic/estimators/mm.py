@@ -33,7 +33,6 @@ class RobustFit:
     coefficients: ComplexArray
     scatter: ComplexArray
     weights: FloatArray
-    distance2: FloatArray
     iterations: int
     conditions: tuple[Condition, ...]
 
@@ -63,7 +62,7 @@ def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1,
     if steps == _MAX_ITERATIONS:
         conditions = (Condition("iteration-limit", f"MM regression not settled after {steps} steps"),)
     weights = bisquare_weight(np.sqrt(distance), constant)
-    return RobustFit(B, scatter, weights, distance, steps, conditions)
+    return RobustFit(B, scatter, weights, steps, conditions)
 
 
 def _exact_fit(regression: Regression, B: ComplexArray) -> RobustFit:
@@ -75,16 +74,15 @@ def _exact_fit(regression: Regression, B: ComplexArray) -> RobustFit:
     condition = Condition(
         "zero-scale", f"{int(good.sum())} of {len(good)} windows fit exactly; the others got no weight"
     )
-    q = regression.q
-    return RobustFit(B, np.zeros((q, q), dtype=complex), weights, np.where(good, 0.0, np.inf), 0, (condition,))
+    return RobustFit(B, np.zeros((regression.q, regression.q), dtype=complex), weights, 0, (condition,))
 
 
 def _least_squares_only(X: ComplexArray, Y: ComplexArray) -> RobustFit:
-    n, q = len(Y), Y.shape[1]
+    n = len(Y)
     weights = np.ones(n)
     regression = Regression(X, Y)
     B = regression.fit(weights)
     residual = regression.residual(B)
     scatter = residual.T @ residual.conj() / max(n - X.shape[1], 1)
     condition = Condition("no-robust-start", f"{n} windows are too few for a robust fit; least squares was used")
-    return RobustFit(B, scatter, weights, np.full(n, 2.0 * q), 0, (condition,))
+    return RobustFit(B, scatter, weights, 0, (condition,))

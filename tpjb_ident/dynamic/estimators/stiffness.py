@@ -98,11 +98,6 @@ class DynamicStiffness:
         """Random standard error of the eight entries [N/m]."""
         return np.sqrt(np.diag(self.covariance))
 
-    @property
-    def converged(self) -> bool:
-        """Whether there is an answer and its iteration reached its end."""
-        return bool(np.isfinite(self.h).all()) and "iteration-limit" not in self.status
-
     def half_width(self, level: float = 0.95, systematic: bool = True) -> FloatArray:
         """Half the width of the interval of the eight entries [N/m].
 

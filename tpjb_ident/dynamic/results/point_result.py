@@ -94,16 +94,6 @@ class PointResult:
     def __repr__(self) -> str:
         return f"<PointResult: {self}>"
 
-    @property
-    def condition_number(self) -> float:
-        """Condition number of the displacement directions."""
-        return self.stiffness.condition
-
-    @property
-    def attenuation(self) -> FloatArray:
-        """What noise on the displacements would do to a plain regression; see `DynamicStiffness`."""
-        return self.stiffness.attenuation
-
 
 def named_at_points(
     points: Sequence[PointResult], left: Sequence[LeftOut], any_excitation: bool
