@@ -26,10 +26,7 @@ EXTENSION_POINTS = {
         "rigdata/readers/*.py:Series",
         "rigdata/readers/*.py:RunReader",
     ),
-    "an estimator": (
-        "tpjb_ident/dynamic/estimators/r_matrix.py:PhasorTable",
-        "tpjb_ident/dynamic/estimators/rlm.py:Norm",
-    ),
+    "an estimator": ("tpjb_ident/dynamic/estimators/r_matrix.py:PhasorTable",),
     "an export": tuple(f"tpjb_ident/exports/*.py:{n}" for n in ("write_*", "StaticPoint", "Export", "Format")),
     "workers": ("tpjb_ident/runtime/executors.py:Workers",),
     "a motion of the virtual rig": ("rigdata/virtual_rig/motion.py:Motion",),
