@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from model.bearing import BABBITT, STEEL, Bearing, BearingError, Material, Oil, Pad, Pivot
-from model.nearest import hint
 from model.toml_text import parse_toml
-from model.units import UnitError, parse_quantity
+from rigdata.near_names import hint
+from rigdata.units import ZERO_CELSIUS, UnitError, parse_quantity
 
 _MATERIAL_KEYS = {
     "youngs_modulus": "pressure",
@@ -205,7 +205,9 @@ def _read_value(value: Any, entry: str, dimension: str, where: str) -> Any:
         number = parse_quantity(value, dimension, where)
     except UnitError as error:
         raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
-    signed = dimension in {"temperature"} or entry == "pivot_angles"
+    if dimension == "temperature":
+        number = round(number - ZERO_CELSIUS, 9)  # the decimals of the file, not those of the difference
+    signed = dimension == "temperature" or entry == "pivot_angles"
     if not signed and (number < 0 or (number == 0 and entry not in _MAY_BE_ZERO)):
         raise BearingError(f"{where}: must be positive, got {value!r}.")
     if entry == "poissons_ratio" and not number < 0.5:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal
 
-#: ``error``: there is no answer; ``warning``: there is one that no bearing may live up to; ``note``: good to know.
-Severity = Literal["error", "warning", "note"]
+from rigdata.problem import Severity
 
 
 class Condition(str):

@@ -1,10 +1,14 @@
 """What the model raises when it must refuse: one base, so that a caller needs to know one name.
 
 Kinds of it stand with what they refuse: `model.bearing.BearingError`, `model.effects.EffectError`,
-`model.units.UnitError`, `model.predict.OperatingPointError`.
+`model.predict.OperatingPointError`.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rigdata.near_names import hint
 
 
 class ModelError(ValueError):
@@ -13,3 +17,10 @@ class ModelError(ValueError):
 
 class OptionError(ModelError):
     """A mesh, a model of heat or cavitation, or another option that there is not; names the nearest there is."""
+
+
+def check_known(what: str, name: object, known: Iterable[str]) -> None:
+    """Refuse an option's value that there is not."""
+    names = list(known)
+    if name not in names:
+        raise OptionError(f"{what} must be one of {', '.join(names)}, got {name!r}. {hint(name, names, 'Use one of')}")

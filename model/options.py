@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from model.errors import OptionError
+from model.errors import OptionError, check_known
 from model.film.models import FILM_MODELS
 from model.growth import Growth
-from model.nearest import check_known
 
 #: Names of the models of a rupturing film.
 CAVITATION = tuple(FILM_MODELS)

@@ -17,8 +17,8 @@ import numpy as np
 
 from model.bearing import Bearing, BearingError, Pivot
 from model.measured_pivot import MeasuredPivot
-from model.nearest import hint
 from model.toml_text import parse_toml
+from rigdata.near_names import hint
 
 
 @runtime_checkable

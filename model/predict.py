@@ -23,7 +23,7 @@ from model.prediction import Prediction
 from model.setup import Mesh, Setup
 from model.statics.equilibrium import Equilibrium
 from model.statics.solve import solve_equilibrium
-from model.units import to_si
+from rigdata.units import UnitError, to_si
 
 #: No shaker excites faster [rad/s]; beyond, squares overflow.
 FASTEST = 1e9
@@ -81,7 +81,7 @@ def predict(
     ------
     BearingError, OperatingPointError
         The bearing, or the load, direction, speed or excitation, has a number that none can have.
-    OptionError, UnitError, EffectError
+    OptionError, EffectError
         Another argument has a wrong name, dimension or sign. All are `ModelError`, and a ValueError too.
     """
     if not (options is None or isinstance(options, Options)):
@@ -89,8 +89,8 @@ def predict(
     check_possible(bearing)
     plain = Setup(bearing, pivot_laws(pivots, bearing), thermal, _mesh(mesh), options=options or Options())
     setup = apply_effects(plain, effects)
-    speed_si = _number(speed, "angular speed", "speed")
-    omega = speed_si if excitation is None else to_si(excitation, "angular speed", "excitation")
+    speed_si = _number(speed, "speed", "speed")
+    omega = speed_si if excitation is None else _in_si(excitation, "speed", "excitation")
     force, direction = _number(load, "force", "load"), _number(load_direction, "angle", "load_direction")
     return predict_setup(setup, force, direction, speed_si, omega, start.equilibrium if start is not None else None)
 
@@ -109,9 +109,16 @@ def _number(value: Any, dimension: str, name: str) -> float:
     if isinstance(value, bool):
         raise OperatingPointError(f"{name} must be a number, got {value!r}")
     try:
-        return float(to_si(value, dimension, name))
+        return float(_in_si(value, dimension, name))
     except TypeError as error:
         raise OperatingPointError(f"{name} must be a number, got {value!r}") from error
+
+
+def _in_si(value: Any, dimension: str, name: str) -> Any:
+    try:
+        return to_si(value, dimension, name)
+    except UnitError as error:
+        raise OperatingPointError(str(error)) from error
 
 
 def predict_setup(

@@ -10,10 +10,9 @@ import numpy as np
 
 from model.arrays import FloatArray
 from model.bearing import Bearing, BearingError, Pad
-from model.errors import OptionError
+from model.errors import OptionError, check_known
 from model.growth import Growth
 from model.instruments import Instruments
-from model.nearest import check_known
 from model.options import Options
 from model.pivots import PivotLaw
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rigdata.arrays import FloatArray
 from rigdata.channel_response import NO_RESPONSE, ChannelResponse
 from rigdata.units import (
+    ZERO_CELSIUS,
     UnitError,
     is_bridge_ratio,
     is_signal,
@@ -38,7 +39,6 @@ UNCALIBRATED = ("command", "keyphasor")
 VECTOR_QUANTITIES = ("displacement", "force", "acceleration")
 #: Loggers write readings of this size and more for an overflow.
 OVERFLOW = 1e30
-_ZERO_CELSIUS = 273.15
 
 
 @dataclass(frozen=True)
@@ -162,4 +162,4 @@ def reading_zero(quantity: str, unit: str, zero: object) -> float:
         return 0.0 if zero is None else parse_quantity(zero, DIMENSIONS[quantity])
     if zero is not None:
         return parse_quantity(zero, "temperature")
-    return _ZERO_CELSIUS if is_signal(unit) else temperature_offset(unit)
+    return ZERO_CELSIUS if is_signal(unit) else temperature_offset(unit)

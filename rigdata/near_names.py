@@ -12,6 +12,13 @@ def nearest_name(name: object, known: Iterable[str], cutoff: float = 0.6) -> str
     return close[0] if close else None
 
 
+def hint(name: object, known: Iterable[str], listed: str = "Known:", cutoff: float = 0.6) -> str:
+    """The name that may have been meant as a question, or all that there are."""
+    names = list(known)
+    near = nearest_name(name, names, cutoff)
+    return f"Did you mean {near!r}?" if near else f"{listed} {', '.join(names)}"
+
+
 def unknown_name(what: str, name: object, known: Iterable[str]) -> str:
     """The refusal of a name that a registry does not hold, with the nearest one and all there are."""
     names = list(known)

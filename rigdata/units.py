@@ -1,7 +1,7 @@
-"""Quantities with units, as a rig manifest gives them, into SI floats.
+"""Quantities with units, as manifests, bearing files, options and notebooks give them, into SI floats.
 
 A quantity is a number, then a unit: ``"7.78 mV/um"``. The grammar is narrower than that of pint,
-so that nothing a stranger writes in a manifest is evaluated: single unit names go to pint, the
+so that nothing a stranger writes in a file is evaluated: single unit names are looked up, the
 products, quotients and powers between them are worked out here.
 """
 
@@ -14,24 +14,37 @@ from dataclasses import dataclass
 from typing import Any
 
 from rigdata.problem import RigError
-from rigdata.unit_table import COMMON
 
+#: Characters of a quantity; more are a slip or a bomb.
+LONGEST = 200
+ZERO_CELSIUS = 273.15
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _TOKEN = re.compile(r"\s*(?:([A-Za-z_Ω%]{1,24})(?:(?:\^|\*\*)?([+-]?[1-6]))?(?![0-9])|([*/()])|(1)(?![0-9]))")
 _MAX_UNIT = 48
-#: SI unit of every dimension that a manifest can name.
+#: SI unit of every dimension.
 SI_UNITS = {
     "length": "m",
-    "force": "N",
-    "acceleration": "m/s^2",
-    "temperature": "K",
-    "temperature difference": "K",
-    "pressure": "Pa",
-    "speed": "rad/s",
     "angle": "rad",
     "mass": "kg",
-    "frequency": "Hz",
     "time": "s",
+    "frequency": "Hz",
+    "speed": "rad/s",
+    "acceleration": "m/s^2",
+    "force": "N",
+    "pressure": "Pa",
+    "stiffness": "N/m",
+    "compliance": "m/N",
+    "damping": "N*s/m",
+    "rotational stiffness": "N*m/rad",
+    "moment of inertia": "kg*m^2",
+    "viscosity": "Pa*s",
+    "density": "kg/m^3",
+    "temperature": "K",
+    "temperature difference": "K",
+    "per kelvin": "1/K",
+    "specific heat": "J/kg/K",
+    "conductivity": "W/m/K",
+    "heat transfer": "W/m^2/K",
     "voltage": "V",
     "current": "A",
     "ratio": "",
@@ -46,7 +59,6 @@ _EXAMPLES = {
     "pressure": "bar",
     "ratio": "%",
 }
-_ZERO_CELSIUS = 273.15
 _SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "\u2126": "Ω", "\u00a0": " "})
 #: Unit names that mean something else here than in pint (where g is a gram and C a coulomb).
 _ALIASES = {"%": "percent", "degC": "kelvin", "celsius": "kelvin", "degF": "degR", "kp": "kgf"}
@@ -84,17 +96,51 @@ class Unit:
         return self.powers == other.powers
 
 
+#: Units that campaigns and bearings use all the time, as factors of SI base units. pint has them all, bit for bit
+#: (tests/rigdata/test_units.py); to import it would make `predict` of a bearing take 1.2 times as long.
+_COMMON = {
+    "meter": {"m": 1.0, "meter": 1.0, "cm": 0.01, "mm": 0.001, "um": 1e-6, "micrometer": 1e-6, "nm": 1e-9},
+    "second": {"s": 1.0, "second": 1.0, "ms": 0.001, "us": 1e-6, "min": 60.0, "minute": 60.0, "hour": 3600.0},
+    "second^-1": {"Hz": 1.0, "hertz": 1.0, "kHz": 1000.0},
+    "kilogram": {"kg": 1.0, "gram": 0.001, "g": 0.001},
+    "kilogram meter second^-2": {"N": 1.0, "newton": 1.0, "kN": 1000.0, "MN": 1e6, "kgf": 9.80665},
+    "kilogram meter^-1 second^-2": {"Pa": 1.0, "mPa": 0.001, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "bar": 1e5},
+    "kilogram meter^2 second^-2": {"J": 1.0},
+    "kilogram meter^2 second^-3": {"W": 1.0},
+    "ampere^-1 kilogram meter^2 second^-3": {"V": 1.0, "volt": 1.0, "mV": 0.001, "millivolt": 0.001},
+    "ampere": {"A": 1.0, "mA": 0.001},
+    "kelvin": {"K": 1.0, "kelvin": 1.0},
+    "radian": {"rad": 1.0, "radian": 1.0, "deg": math.pi / 180, "degree": math.pi / 180, "revolution": 2 * math.pi},
+    "meter second^-2": {"standard_gravity": 9.80665},
+    "": {"percent": 0.01},
+}
+
+
+@functools.cache
+def common_units() -> dict[str, Unit]:
+    """Units that need no pint, by name."""
+    units = {}
+    for dimension, factors in _COMMON.items():
+        powers = []
+        for base in dimension.split():
+            name, _, power = base.partition("^")
+            powers.append((name, int(power or 1)))
+        for name, factor in factors.items():
+            units[name] = Unit(factor, tuple(powers))
+    return units
+
+
+@functools.lru_cache(maxsize=512)
+def _base(name: str) -> Unit:
+    """One unit name, without powers or quotients."""
+    return common_units().get(name) or from_pint(name)
+
+
 @functools.cache
 def _registry() -> Any:
     import pint
 
     return pint.UnitRegistry(cache_folder=None, on_redefinition="ignore")
-
-
-@functools.lru_cache(maxsize=512)
-def _base(name: str) -> Unit:
-    """One unit name, without powers or quotients: of the table, else from pint."""
-    return Unit(*COMMON[name]) if name in COMMON else from_pint(name)
 
 
 def from_pint(name: str) -> Unit:
@@ -109,10 +155,6 @@ def from_pint(name: str) -> Unit:
     return Unit(factor, tuple(sorted(powers.items())))
 
 
-def _dialect(dimension: str) -> dict[str, str]:
-    return {**_ALIASES, **_ALIASES_BY_DIMENSION.get(dimension, {})}
-
-
 @functools.lru_cache(maxsize=1024)
 def parse_unit(text: str, dimension: str = "") -> Unit:
     """Read a unit such as ``"mV/um"``, ``"m/s^2"`` or ``"V/(rad/s)"``."""
@@ -122,30 +164,31 @@ def parse_unit(text: str, dimension: str = "") -> Unit:
     if dimension == "speed" and plain in {"1/s", "s^-1", "s-1", "1/min", "min^-1", "min-1"}:
         plain = "revolution/min" if "min" in plain else "revolution/s"
     tokens = _tokens(plain, text)
-    unit, rest = _product(tokens, 0, dimension, text)
-    if rest != len(tokens):
+    unit, end = _product(tokens, 0, dimension, text)
+    if end != len(tokens):
         raise UnitError(f"unit {text!r} has an unmatched parenthesis")
     return unit
 
 
-def _tokens(plain: str, text: str) -> list[tuple[str, str, str, str]]:
+def _tokens(plain: str, text: str) -> list[tuple[str, str, str]]:
+    """Name, power and symbol of every piece; a plain 1 has none of them but the power."""
     tokens, at = [], 0
     while at < len(plain):
         match = _TOKEN.match(plain, at)
         if match is None or match.end() == at:
             raise UnitError(f"unit {text!r} cannot be read from {plain[at:].strip()!r} on")
-        tokens.append((match[1] or "", match[2] or "1", match[3] or "", match[4] or ""))
+        tokens.append((match[1] or "", match[2] or "1", match[3] or ""))
         at = match.end()
     return tokens
 
 
 def _product(
-    tokens: list[tuple[str, str, str, str]], at: int, dimension: str, text: str, depth: int = 0
+    tokens: list[tuple[str, str, str]], at: int, dimension: str, text: str, depth: int = 0
 ) -> tuple[Unit, int]:
     """Multiply and divide from left to right until the closing parenthesis."""
     result, sign, waiting = Unit(1.0), 1, True
     while at < len(tokens):
-        name, power, symbol, _one = tokens[at]
+        name, power, symbol = tokens[at]
         if symbol == ")":
             break
         if symbol in {"*", "/"}:
@@ -168,9 +211,10 @@ def _product(
 
 
 def _named(name: str, dimension: str) -> Unit:
-    if dimension == "speed" and name in {"Hz", "kHz"}:
-        return _base("revolution") * _base("second") ** -1 * Unit(1000.0 if name == "kHz" else 1.0)
-    return _base(_dialect(dimension).get(name, name))
+    if dimension == "speed" and name in {"Hz", "kHz"}:  # of a shaft or a vibration: cycles
+        return _base("revolution") * _base(name)
+    aliases = _ALIASES | _ALIASES_BY_DIMENSION.get(dimension, {})
+    return _base(aliases.get(name, name))
 
 
 def unit_factor(unit: str, dimension: str) -> float:
@@ -195,6 +239,8 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
         if dimension != "ratio":
             raise UnitError(f'{_short(value)} has no unit; write it with one, like "{_short(value)} {example}"')
         return _to_float(value), ""
+    if len(value) > LONGEST:
+        raise UnitError(f"a text of {len(value)} characters is not a quantity")
     text = value.strip()
     match = _NUMBER.match(text)
     if match is None or (match.end() < len(text) and text[match.end()] in "0123456789.,"):
@@ -214,7 +260,9 @@ def _to_float(value: str | float) -> float:
 
 
 def _short(value: object) -> str:
-    # A table or array can be nested too deeply to be printed.
+    # A table or array can be nested too deeply to be printed, a whole number have more digits than Python prints.
+    if isinstance(value, int) and abs(value) > 10**60:
+        return "a whole number of hundreds of digits"
     text = repr(value) if isinstance(value, (str, int, float)) or value is None else f"a {type(value).__name__}"
     return text if len(text) <= 60 else text[:57] + "..."
 
@@ -225,22 +273,44 @@ def _finite(number: float) -> float:
     return number
 
 
-def parse_quantity(value: object, dimension: str) -> float:
-    """Turn ``"22 Hz"`` into SI."""
-    number, unit = split_quantity(value, dimension)
-    if dimension == "temperature":
-        return _finite(number * unit_factor(unit, dimension) + temperature_offset(unit))
-    if dimension == "ratio" and not unit:
-        return number
-    return _finite(number * unit_factor(unit, dimension))
+def parse_quantity(value: object, dimension: str, name: str = "") -> float:
+    """Turn ``"22 Hz"`` into SI, ``"40 degC"`` into kelvin; an error begins with `name`.
+
+    >>> parse_quantity("0.080 mm", "length")
+    8e-05
+    """
+    try:
+        number, unit = split_quantity(value, dimension)
+        if dimension == "ratio" and not unit:
+            return number
+        offset = temperature_offset(unit) if dimension == "temperature" else 0.0
+        return _finite(number * unit_factor(unit, dimension) + offset)
+    except UnitError as error:
+        if not name:
+            raise
+        raise UnitError(f"{name}: {error}") from error
+
+
+def to_si(value: Any, dimension: str, name: str) -> Any:
+    """Take SI floats or arrays as they are; read texts, convert pint quantities, refuse a wrong dimension."""
+    if isinstance(value, str):
+        return parse_quantity(value, dimension, name)
+    if not (hasattr(value, "to") and hasattr(value, "magnitude")):
+        return value
+    if dimension == "speed" and str(value.units) in {"hertz", "kilohertz"}:
+        return value.to("1/s").magnitude * 2 * math.pi
+    try:
+        return value.to(SI_UNITS[dimension]).magnitude
+    except Exception as error:  # a foreign registry raises its own DimensionalityError
+        raise UnitError(f"{name}: {value} is not a {dimension}") from error
 
 
 def temperature_offset(unit: str) -> float:
     """Kelvin at 0 of the temperature `unit`."""
     plain = unit.strip().replace("°", "deg")
     if plain in {"degC", "C", "celsius"}:
-        return _ZERO_CELSIUS
-    return _ZERO_CELSIUS - 32 / 1.8 if plain == "degF" else 0.0
+        return ZERO_CELSIUS
+    return ZERO_CELSIUS - 32 / 1.8 if plain == "degF" else 0.0
 
 
 def is_signal(unit: str) -> bool:

@@ -9,9 +9,9 @@ from typing import Any, Literal
 
 from model.bearing import Bearing
 from model.errors import ModelError
-from model.nearest import hint
 from model.setup import Setup
-from model.units import parse_quantity
+from rigdata.near_names import hint
+from rigdata.units import UnitError, parse_quantity
 
 #: A bearing file lists no more pads.
 MAX_PADS = 40
@@ -33,7 +33,7 @@ class Parameter:
     unit : str
         SI unit as text ("1" for a ratio, "pad" for a pad number).
     dimension : str
-        Key of `model.units.SI_UNITS`, for quantities with units in effects files.
+        Key of `rigdata.units.SI_UNITS`, for quantities with units in effects files.
     neutral : float
         Value at which the effect does nothing (nan: there is none, e.g. a pad number or an infinite stiffness).
     low, high : float
@@ -202,7 +202,10 @@ class EffectKind:
 
 def _number(value: Any, parameter: Parameter, where: str) -> float:
     if isinstance(value, str):
-        value = parse_quantity(value, parameter.dimension, where)
+        try:
+            value = parse_quantity(value, parameter.dimension, where)
+        except UnitError as error:
+            raise EffectError(f"{error}.") from error
     if isinstance(value, bool) or not hasattr(value, "__float__"):
         raise EffectError(f"{where}: must be a number [{parameter.unit}], got {value!r}.")
     try:

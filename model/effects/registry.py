@@ -9,7 +9,7 @@ from pathlib import Path
 from string import Formatter
 
 from model.effects.kind import EffectError, EffectKind
-from model.nearest import hint
+from rigdata.near_names import hint
 
 _registered: dict[str, EffectKind] = {}
 

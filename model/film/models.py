@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from model.errors import check_known
 from model.film.cavitation import solve_flooded_film
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, solve_film
-from model.nearest import check_known
 
 #: Grid, work, (Cp, a, b), surface speed, sharp: pressure and derivatives of one film, see `solve_film`.
 FilmSolver = Callable[[FilmGrid, FilmWork, tuple[float, float, float], float, bool], FilmForces]

@@ -7,7 +7,7 @@ import math
 import pint
 import pytest
 
-from model.units import UnitError
+from rigdata.units import UnitError
 from tpjb_ident.diagnosis.from_python import points_of
 from tpjb_ident.errors import ArgumentError
 

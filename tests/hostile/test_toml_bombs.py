@@ -11,9 +11,9 @@ from model.bearing_file import load_bearing, parse_bearing
 from model.effects import EffectError, load_effects
 from model.pivots import load_pivots
 from model.toml_text import MAX_DEPTH, parse_toml
-from model.units import UnitError, parse_quantity
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
+from rigdata.units import UnitError, parse_quantity
 from tpjb_ident.cli.common.quantities import parse_values
 from tpjb_ident.errors import BadInputError
 

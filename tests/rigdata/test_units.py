@@ -8,16 +8,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigdata.unit_table import COMMON
 from rigdata.units import (
     SI_UNITS,
-    Unit,
     UnitError,
+    common_units,
     from_pint,
     is_signal,
     parse_quantity,
     parse_unit,
     sensitivity_gain,
+    to_si,
     unit_factor,
 )
 
@@ -57,6 +57,13 @@ TWO_PI = 2 * math.pi
         ("20 ms", "time", 0.02),
         (".5 V", "voltage", 0.5),
         ("5. V", "voltage", 5.0),
+        ("12e-6 1/K", "per kelvin", 12e-6),
+        ("0.256e-3 kg m^2", "moment of inertia", 0.256e-3),
+        ("5 N/um", "stiffness", 5e6),
+        ("2 kN*s/m", "damping", 2e3),
+        ("3 mPa s", "viscosity", 3e-3),
+        ("50 W/m/K", "conductivity", 50.0),
+        ("210 GPa", "pressure", 2.1e11),
     ],
 )
 def test_values(text, dimension, value):
@@ -91,13 +98,18 @@ def test_values(text, dimension, value):
         ("5 /N", "force", "where a unit name"),
         ("5 (N", "force", "parenthesis"),
         ("5 N)", "force", "parenthesis"),
-        ("5 " + "N*" * 100 + "N", "force", "too long"),
+        ("5 " + "N*" * 30 + "N", "force", "too long"),
+        ("5 " + "N*" * 100 + "N", "force", "a text of 203 characters"),
         (float("nan"), "ratio", "finite"),
+        pytest.param(16**5000, "force", "no unit", id="5000 hexadecimal digits"),
+        ("five mm", "length", "not a number with a unit"),
+        ("5 mm; import os", "length", "cannot be read"),
+        ("9" * 300 + " N", "force", "302 characters"),
     ],
 )
 def test_refusals(text, dimension, says):
-    with pytest.raises(UnitError, match=says):
-        parse_quantity(text, dimension)
+    with pytest.raises(UnitError, match=f"^gap: .*({says})"):
+        parse_quantity(text, dimension, "gap")
 
 
 @pytest.mark.parametrize(
@@ -168,6 +180,19 @@ def test_si_units_are_their_own_unit():
             assert unit_factor(unit, dimension) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("name", COMMON)
+@pytest.mark.parametrize("name", common_units())
 def test_units_of_the_table_are_those_of_pint(name):
-    assert Unit(*COMMON[name]) == from_pint(name)
+    assert common_units()[name] == from_pint(name)
+
+
+def test_pint_quantities():
+    import pint
+
+    u = pint.UnitRegistry(cache_folder=None)
+    assert to_si(5 * u.kN, "force", "load") == pytest.approx(5000.0)
+    assert to_si(22 * u.hertz, "speed", "speed") == pytest.approx(22 * TWO_PI)
+    assert to_si(1320 * u.rpm, "speed", "speed") == pytest.approx(22 * TWO_PI)
+    assert to_si([1.0, 2.0] * u.rad / u.s, "speed", "excitation") == pytest.approx([1.0, 2.0])
+    with pytest.raises(UnitError, match="load"):
+        to_si(5 * u.mm, "force", "load")
+    assert to_si("5 kN", "force", "load") == pytest.approx(5000.0)

@@ -13,6 +13,8 @@ import pytest
 
 from tests.structure.sources import OURS, ROOT, SOURCES, Spoken, imports_and_calls, texts
 
+#: Files of rigdata that know nothing of rigs: the model imports them, and only them.
+GROUND = ("rigdata.units", "rigdata.near_names", "rigdata.arrays", "rigdata.problem")
 #: The guard only looks whether the `model` found is ours; a bearing may be given as the path of its file.
 MAY_IMPORT_MODEL = ("compare", "diagnosis", "cli", "model_guard.py", "arguments.py")
 
@@ -33,7 +35,7 @@ def modules_of(nodes: Iterable[Spoken]) -> frozenset[str]:
             assert node.level == 0, "relative import"
             found.add(node.module or "")
             found.update(f"{node.module}.{alias.name}" for alias in node.names)
-        elif getattr(node.func, "attr", "") == "import_module":
+        elif "import_module" in {getattr(node.func, "attr", ""), getattr(node.func, "id", "")}:
             found.update(a.value for a in node.args if isinstance(a, ast.Constant))
     return frozenset(found)
 
@@ -41,6 +43,8 @@ def modules_of(nodes: Iterable[Spoken]) -> frozenset[str]:
 def breaches(path: str, modules: frozenset[str]) -> list[str]:
     """Imports of the file `path` (relative, with slashes) that go through a wall."""
     parts = path.split("/")
+    if parts[0] == "model":
+        modules = frozenset(m for m in modules if ".".join(m.split(".")[:2]) not in GROUND)
     tops = {m.split(".")[0] for m in modules}
     found = []
     if parts[0] in ("rigdata", "model"):
@@ -70,7 +74,9 @@ def test_no_import_goes_through_a_wall():
         ("rigdata/x.py", "import model.units"),
         ("rigdata/readers/x.py", "def f():\n    from tpjb_ident import locus"),
         ("model/x.py", "from rigdata import load_campaign"),
+        ("model/x.py", "from rigdata.calibration import Channel"),
         ("model/effects/x.py", "import importlib\nimportlib.import_module('rigdata')"),
+        ("model/effects/x.py", "from importlib import import_module\nimport_module('rigdata')"),
         ("tpjb_ident/dynamic/x.py", "from model.bearing import Bearing"),
         ("tpjb_ident/compare/x.py", "import matplotlib.pyplot as plt"),
         ("tpjb_ident/report/x.py", "from tpjb_ident.cli import app"),
@@ -84,6 +90,7 @@ def test_a_breach_is_seen(path, source):
     ("path", "source"),
     [
         ("tpjb_ident/compare/x.py", "from model.predict import predict"),
+        ("model/x.py", "from rigdata.units import parse_quantity"),
         ("tpjb_ident/cli/x.py", "from tpjb_ident.cli.common.errors import guarded"),
         ("tpjb_ident/report/x.py", "from matplotlib.figure import Figure"),
     ],

@@ -15,9 +15,9 @@ from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.pivots import pivot_laws
 from model.setup import Setup
-from model.units import to_si
 from rigdata.near_names import unknown_name
 from rigdata.operating_point import OperatingPoint
+from rigdata.units import to_si
 from tpjb_ident.arguments import as_bearing, as_campaign
 from tpjb_ident.diagnosis.campaign import Baseline, CampaignDiagnosis, diagnose_campaign
 from tpjb_ident.diagnosis.observations.observe import DynamicTest, Layout
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
 
 #: Set points of a plan and what they must be.
-_POINT = {"load": "force", "load_direction": "angle", "speed": "angular speed", "excitation": "angular speed"}
+_POINT = {"load": "force", "load_direction": "angle", "speed": "speed", "excitation": "speed"}
 
 
 def diagnose(

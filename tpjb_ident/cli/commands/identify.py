@@ -145,7 +145,7 @@ def _phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings
     from tpjb_ident.dynamic.records.extraction import QUANTITIES
     from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
 
-    driven = () if lines is None else parse_values(lines, "angular speed", "--lines")
+    driven = () if lines is None else parse_values(lines, "speed", "--lines")
     known: dict[str, float] = {}
     for text in delays:
         quantity, _, time = text.partition("=")

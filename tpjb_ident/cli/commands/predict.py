@@ -180,8 +180,8 @@ def operating_points(load: str, load_direction: str, speed: str, excitation: str
     """Every combination of the four options as `OperatingPoint`, SI."""
     loads = parse_values(load, "force", "--load")
     directions = parse_values(load_direction, "angle", "--load-direction")
-    speeds = parse_values(speed, "angular speed", "--speed")
-    frequencies = parse_values(excitation, "angular speed", "--excitation") if excitation else (0.0,)
+    speeds = parse_values(speed, "speed", "--speed")
+    frequencies = parse_values(excitation, "speed", "--excitation") if excitation else (0.0,)
     _positive(loads, "--load", "Give the direction of the load with --load-direction.")
     _positive(speeds, "--speed", "The shaft turns counter-clockwise.")
     if excitation:

@@ -102,7 +102,7 @@ def open_data(
             f"{command}: give a campaign, or --coefficients TABLE.csv with --bearing FILE; one of them."
         )
     from model.bearing_file import load_bearing
-    from model.units import parse_quantity
+    from rigdata.units import parse_quantity
     from tpjb_ident.compare.coefficient_table import TableSource
 
     refuse_special(table, bearing)

@@ -14,15 +14,16 @@ from __future__ import annotations
 import math
 import re
 
+from rigdata.units import LONGEST, UnitError, parse_quantity
 from tpjb_ident.errors import BadInputError
 
 #: More values than this in one option are a slip of the keyboard.
 MAX_VALUES = 10_000
 _NUMBER = r"[+-]?(?:\d+\.(?!\.)\d*|\d+|\.\d+)(?:[eE][+-]?\d{1,3})?"
 _PART = re.compile(rf"\s*({_NUMBER})\s*([^\d\s.,;:+-][^,;:]*?)?\s*")
-EXAMPLES = {
+_EXAMPLES = {
     "force": "2.5 kN, 5 kN",
-    "angular speed": "22 Hz",
+    "speed": "22 Hz",
     "angle": "-90 deg",
     "mass": "30 kg",
 }
@@ -57,7 +58,7 @@ def parse_value(text: str, dimension: str, option: str) -> float:
 
 
 def _example(dimension: str) -> str:
-    return EXAMPLES.get(dimension, "1 (with a unit)")
+    return _EXAMPLES.get(dimension, "1 (with a unit)")
 
 
 def _item(item: str, unit: str, dimension: str, option: str) -> tuple[list[float], str]:
@@ -89,8 +90,6 @@ def _range(start: float, stop: float, step: float, where: str) -> list[float]:
 
 
 def _quantity(text: str, unit: str, dimension: str, option: str) -> tuple[float, str]:
-    from model.units import LONGEST, UnitError, parse_quantity
-
     match = _PART.fullmatch(text) if len(text) <= LONGEST else None
     if match is None:
         raise BadInputError(

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from model.bearing import Bearing
-from model.units import UnitError, parse_quantity
+from rigdata.units import UnitError, parse_quantity
 from tpjb_ident.errors import BadInputError
 
 
