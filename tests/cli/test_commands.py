@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 from tests.command_line import tpjb
-from tpjb_ident.report import comparison_beside
+from tpjb_ident.runtime import executors
 
 COMMANDS = ("check", "identify", "pivot", "locus", "predict", "compare", "diagnose", "plan", "verify",
             "simulate", "demo", "export")  # fmt: skip
@@ -205,7 +205,7 @@ def test_compare_writes_a_report(small_campaign, tmp_path):
 
 
 @pytest.mark.slow
-def test_compare_writes_the_same_where_there_is_no_other_process_or_it_is_lost(small_campaign, tmp_path, monkeypatch):
+def test_compare_writes_the_same_where_the_background_job_is_lost(small_campaign, tmp_path, monkeypatch):
     def written(name):
         result = tpjb("compare", small_campaign, "--thermal", "isothermal", "--out", tmp_path / name)
         assert result.exit_code == 0, result.output
@@ -215,10 +215,7 @@ def test_compare_writes_the_same_where_there_is_no_other_process_or_it_is_lost(s
         return {f.relative_to(tmp_path / name): f.read_bytes() for f in files}
 
     both = written("both")
-    monkeypatch.setattr(comparison_beside, "cores", lambda: 1)
-    assert written("alone") == both
-    monkeypatch.undo()
-    monkeypatch.setattr(comparison_beside.Companion, "hear", lambda self: None)
+    monkeypatch.setattr(executors, "_received_value", lambda receiver: None)
     assert written("lost") == both
 
 

@@ -44,13 +44,13 @@ def test_only_effects_on_how_pivots_give_way_are_what_a_dry_test_holds():
 
 def test_compare_leaves_them_out_beside_measured_pivots_alone():
     settings = CompareSettings(effects=(SOFTER, GROWN))
-    assert settings.asked().effects["kirk"] == (SOFTER, GROWN)
-    assert settings.asked().effects["measured"] == (GROWN,)
+    assert settings.effects_with("kirk") == (SOFTER, GROWN)
+    assert settings.effects_with("measured") == (GROWN,)
 
 
 def test_sizes_that_a_diagnosis_found_beside_measured_pivots_stay(tmp_path):
     settings = CompareSettings(effects=(SOFTER,), from_measured=True)
-    assert settings.asked().effects["measured"] == (SOFTER,)
+    assert settings.effects_with("measured") == (SOFTER,)
     path = tmp_path / "updated.effects.toml"
     path.write_text('counted_from = "measured pivots"\n' + FOUND)
     assert counts_from_measured(path)

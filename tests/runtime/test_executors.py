@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy  # noqa: F401  (has to be loaded)
 import pytest
 
-from tpjb_ident.runtime.beside import beside, companion
+from tpjb_ident.runtime import executors
 from tpjb_ident.runtime.executors import (
     InProcessWorkers,
     LostJobsError,
     PoolWorkers,
+    background_job,
     in_order,
     local_workers,
 )
@@ -158,58 +159,25 @@ def test_linear_algebra_that_is_loaded_takes_one_thread_in_workers_and_beside_th
 
 
 @pytest.mark.slow
-def test_a_job_beside_gives_its_value_or_nothing(tmp_path):
-    with beside(doubled, 4) as value:
+def test_a_background_job_gives_its_value_or_nothing(tmp_path, monkeypatch):
+    with background_job(doubled, 4) as value:
         assert value() == value() == 8
-    with beside(refused, 3) as value:  # whoever needs the value works it out again, and finds what was wrong
+    with background_job(len, bytes(10**7)) as value:
+        assert value() == 10**7
+    with background_job(refused, 3) as value:  # whoever needs the value computes it again, and finds what was wrong
         assert value() is None
-    with beside(dies_once, str(tmp_path), 4) as value:
+    with background_job(dies_once, str(tmp_path), 4) as value:
+        assert value() is None
+    monkeypatch.setattr(executors, "cores", lambda: 1)
+    with background_job(doubled, 4) as value:
         assert value() is None
 
 
 @pytest.mark.slow
-def test_a_job_beside_ends_with_its_block():
-    with beside(time.sleep, 600.0):
+def test_a_background_job_ends_with_its_block():
+    with background_job(time.sleep, 600.0):
         began = time.monotonic()
     assert time.monotonic() - began < 60.0
-
-
-def answers(talk, folder):
-    """Tell more than a line holds before the other end listens, hear as much, and leave a worker at work."""
-    talk.tell(bytes(10**7))
-    heard = talk.hear()
-    with local_workers(2, start="fork") as workers:
-        for _ in in_order(workers, writes_for_ever, [(folder,)] * (2 if heard == b"go on" else 0)):
-            pass
-    return len(heard)
-
-
-def writes_for_ever(folder):
-    while True:
-        (Path(folder) / "mark").write_text("x")
-
-
-@pytest.mark.slow
-def test_two_processes_tell_each_other_much_and_neither_waits_for_the_other_to_listen():
-    with companion(answers, "") as other:
-        other.tell(bytes(2 * 10**7))
-        assert len(other.hear()) == 10**7
-        assert other.hear() == 2 * 10**7
-        assert other.hear() is None  # it has said all
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no groups of processes here")
-def test_the_workers_of_another_process_end_with_the_block(tmp_path):
-    mark = tmp_path / "mark"
-    with companion(answers, str(tmp_path)) as other:
-        other.tell(b"go on")
-        assert len(other.hear()) == 10**7
-        while not mark.exists():
-            time.sleep(0.01)
-    mark.unlink(missing_ok=True)
-    time.sleep(0.3)
-    assert not mark.exists()
 
 
 @pytest.mark.slow

@@ -16,8 +16,7 @@ from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.compare.coefficient_table import TableRow, TableSource, read_coefficients
-from tpjb_ident.compare.measured_pivots import counted_twice
-from tpjb_ident.compare.model_side import Asked, ModelSide, model_side, possible_variants
+from tpjb_ident.compare.measured_pivots import beside_measured, counted_twice, measured_laws
 from tpjb_ident.compare.predictions import (
     ModelSettings,
     PointPrediction,
@@ -38,11 +37,9 @@ if TYPE_CHECKING:
 
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
+    from tpjb_ident.compare.static_tests import StaticTests
     from tpjb_ident.dynamic.settings import IdentifySettings
     from tpjb_ident.pivot import PivotCurve
-
-    #: Somebody who worked out the model's side while the campaign was identified.
-    Ahead = Callable[["CompareSettings", Identification], ModelSide | None]
 
 
 #: Pivot models that are compared, in the order of the tables.
@@ -80,9 +77,16 @@ class CompareSettings:
     def __repr__(self) -> str:
         return changed(self)
 
-    def asked(self) -> Asked:
-        """What the model is asked for."""
-        return Asked.of(self.variants, self.thermal, self.effects, self.from_measured)
+    def effects_with(self, pivots: str) -> tuple[Effect, ...]:
+        """Effects switched on with a pivot model.
+
+        Parameters
+        ----------
+        pivots : str
+            Name of the pivot model.
+        """
+        counts_twice = pivots == "measured" and not self.from_measured
+        return beside_measured(self.effects) if counts_twice else self.effects
 
 
 @dataclass(frozen=True)
@@ -166,7 +170,7 @@ def compare_campaign(
     bearing: Bearing,
     settings: CompareSettings | None = None,
     progress: Progress | None = None,
-    ahead: Ahead | None = None,
+    model: Callable[[], ModelSide | None] | None = None,
 ) -> Comparison:
     """Identify a campaign, measure its pivots, locus and clearance, and predict the same with every pivot model.
 
@@ -178,8 +182,8 @@ def compare_campaign(
     settings : CompareSettings, optional
     progress : callable, optional
         Called as progress(text, done, total).
-    ahead : callable, optional
-        Is told the settings and what was identified, and gives what was found meanwhile; None: nothing was.
+    model : callable, optional
+        Gives what `model_side` found for the campaign's points while it was identified here; None: nothing was.
 
     Raises
     ------
@@ -188,58 +192,108 @@ def compare_campaign(
     rigdata.problem.RigDataError
         Records that are not what they claim to be.
     """
-    from tpjb_ident.dynamic.identify import identify  # late: another process may be at work meanwhile
+    from tpjb_ident.dynamic.identify import identify
     from tpjb_ident.dynamic.settings import IdentifySettings
 
     settings = settings or CompareSettings()
     _check(campaign, settings)
-    tell = progress or (lambda text, done, total: None)
+    report = progress or _no_progress
     least = min(pad.assembled_clearance for pad in bearing.pads)
     chosen = settings.identify or IdentifySettings()
     chosen = replace(chosen, clearance=chosen.clearance or least)
-    identification = identify(campaign, chosen, _labelled(tell, "identifying"))
+    identification = identify(campaign, chosen, _labelled(report, "identifying"))
     points = tuple(p.point for p in identification.points)
-    tell("waiting for the model", 0, 1)
-    side = ahead(settings, identification) if ahead is not None else None
-    if side is None or not all(set(points) <= found.keys() for found in side.predicted.values()):
-        side = model_side(campaign, bearing, settings.asked(), points, tell)
-    return joined(campaign, bearing, settings, identification, side)
+    report("waiting for the model", 0, 1)
+    side = None if model is None else model()
+    if side is None or not all(set(points) <= predicted.keys() for predicted in side.predicted.values()):
+        side = model_side(campaign, bearing, settings, points, report)
+    return _joined(campaign, bearing, settings, identification, side)
 
 
-def joined(
+def _no_progress(text: str, done: int, total: int) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class ModelSide:
+    """Static tests, and predictions with every pivot model: what of a comparison needs no identification."""
+
+    static: StaticTests
+    remarks: tuple[str, ...]
+    predicted: dict[str, dict[OperatingPoint, PointPrediction]]
+
+
+def model_side(
+    campaign: Campaign,
+    bearing: Bearing,
+    settings: CompareSettings,
+    points: tuple[OperatingPoint, ...] | None = None,
+    progress: Progress | None = None,
+) -> ModelSide:
+    """Measure the static tests and predict points (default: all that the manifest names) and locus."""
+    from tpjb_ident.compare.static_tests import measure_static
+
+    report = progress or _no_progress
+    if points is None:
+        points = tuple(sorted({run.point for run in campaign.of_kind("dynamic")}))
+    report("fitting pivot curves, clearance and locus", 0, 1)
+    static = measure_static(campaign, bearing, "measured" in settings.variants)
+    names, remarks = _possible_variants(settings.variants, static.curves, bearing)
+    stations = () if static.locus is None else tuple(p.point for p in static.locus.points)
+    wanted = tuple(dict.fromkeys(points + stations))
+    predicted = {}
+    for name in names:
+        pivots = measured_laws(static.curves, len(bearing.pads), campaign.id) if name == "measured" else name
+        model = ModelSettings(pivots, settings.thermal, settings.effects_with(name))
+        predictions = predict_points(bearing, wanted, model, _labelled(report, f"predicting with {name} pivots"))
+        predicted[name] = {p.point: p for p in predictions}
+    return ModelSide(static, tuple(remarks), predicted)
+
+
+def _possible_variants(
+    variants: tuple[str, ...], curves: tuple[PivotCurve, ...], bearing: Bearing
+) -> tuple[list[str], list[str]]:
+    """Pivot models that a campaign and a bearing allow, and remarks about the others."""
+    names, remarks = list(variants), []
+    missing = sorted(set(range(1, len(bearing.pads) + 1)) - {c.pad for c in curves})
+    if "measured" in names and missing:
+        names.remove("measured")
+        pads = ", ".join(f"#{n}" for n in missing)
+        remarks.append(f"Measured pivots are left out: no dry test of pad {pads}.")
+    if bearing.pivot.kind == "rigid":
+        printed = [name for name in names if name.startswith("kirk")]
+        names = [name for name in names if name not in printed]
+        if printed:
+            remarks.append("The bearing file says rigid pivots: there is no printed formula to compare.")
+    return names or ["rigid"], remarks
+
+
+def _joined(
     campaign: Campaign, bearing: Bearing, settings: CompareSettings, identification: Identification, side: ModelSide
 ) -> Comparison:
     """Set what was identified beside the model's side."""
-    static, names = side.static, list(side.predicted)
-    clearance, locus = static.clearance, static.locus
-    remarks = [*side.remarks, *(condition.sentence() for condition in static.left_out)]
-    remarks += _left_out(settings, names) + _not_run(clearance, locus)
+    static = side.static
     points = tuple(p.point for p in identification.points)
-    stations = () if locus is None else tuple(p.point for p in locus.points)
+    stations = () if static.locus is None else tuple(p.point for p in static.locus.points)
     variants = tuple(
-        Variant(name, tuple(found[p] for p in points), tuple(found[p] for p in stations))
-        for name, found in side.predicted.items()
+        Variant(name, tuple(predicted[p] for p in points), tuple(predicted[p] for p in stations))
+        for name, predicted in side.predicted.items()
     )
-    return Comparison(
-        campaign, bearing, settings, identification, static.curves, clearance, locus, variants, tuple(remarks)
-    )
-
-
-def _not_run(clearance: ClearancePolygon | None, locus: Locus | None) -> list[str]:
-    """What is said of runs that a campaign lacks."""
-    said = ["No clearance run: positions cannot be given from the bearing centre."] if clearance is None else []
-    return said + (["No locus runs: the shaft centre locus is not compared."] if locus is None else [])
-
-
-def _left_out(settings: CompareSettings, names: list[str]) -> list[str]:
-    """What is said of effects that measured pivots hold already."""
+    remarks = [*side.remarks, *(condition.sentence() for condition in static.left_out)]
     twice = counted_twice(settings.effects)
-    if "measured" not in names or not twice or settings.from_measured:
-        return []
-    return [
-        f"Measured pivots are predicted without {' and '.join(twice)}: their dry tests hold that already, and it would "
-        "count twice."
-    ]
+    if "measured" in side.predicted and twice and not settings.from_measured:
+        remarks.append(
+            f"Measured pivots are predicted without {' and '.join(twice)}: their dry tests hold that already, and it "
+            "would count twice."
+        )
+    if static.clearance is None:
+        remarks.append("No clearance run: positions cannot be given from the bearing centre.")
+    if static.locus is None:
+        remarks.append("No locus runs: the shaft centre locus is not compared.")
+    return Comparison(
+        campaign, bearing, settings, identification, static.curves, static.clearance, static.locus, variants,
+        tuple(remarks),
+    )  # fmt: skip
 
 
 def _check(campaign: Campaign, settings: CompareSettings) -> None:
@@ -355,15 +409,14 @@ def compare_table(
 ) -> Comparison:
     """Predict the operating points of a table of coefficients with every pivot model but measured ones."""
     settings = settings or CompareSettings()
-    tell = progress or (lambda text, done, total: None)
     points = tuple(_point(row) for row in read_coefficients(path, reading_error))
-    names, remarks = possible_variants(tuple(v for v in settings.variants if v != "measured"), (), bearing)
+    names, remarks = _possible_variants(tuple(v for v in settings.variants if v != "measured"), (), bearing)
     if "measured" in settings.variants:
         remarks.append("Measured pivots are left out: a table holds no dry tests.")
     variants = []
     for name in names:
         model = ModelSettings(name, settings.thermal, settings.effects)
-        found = predict_points(bearing, [p.point for p in points], model, tell)
+        found = predict_points(bearing, [p.point for p in points], model, progress)
         variants.append(Variant(name, found))
     identification = Identification(path.stem, METHOD, points, np.zeros((0, 8 * len(points))))
     source = TableSource(path.stem)

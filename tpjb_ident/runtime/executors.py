@@ -13,6 +13,7 @@ with open_workers(count=4) as workers:   # of runtime.workers; or open_workers(s
 from __future__ import annotations
 
 import collections
+import functools
 import gc
 import multiprocessing
 import os
@@ -24,8 +25,9 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for_end
 from typing import Any, Protocol
 
@@ -324,3 +326,41 @@ def _shared_memory(forked: bool) -> Iterator[None]:
     finally:
         if ours:
             gc.unfreeze()
+
+
+@contextmanager
+def background_job(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
+    """Run one job in a process of its own while the block goes on, and end that process with the block.
+
+    Gives what waits for the job's value. None where there is no second core, the job had an error, or its process was
+    lost: whoever needs the value computes it again, and finds what was wrong.
+    """
+    if cores() < 2:
+        yield lambda: None
+        return
+    context: Any = multiprocessing.get_context("fork" if forks() else "spawn")  # a copy need not import anything again
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_send_outcome, args=(sender, task, job))
+    with one_thread_each():
+        process.start()
+    sender.close()
+    try:
+        yield functools.cache(lambda: _received_value(receiver))
+    finally:
+        process.kill()
+        process.join()
+        receiver.close()
+
+
+def _send_outcome(sender: Connection, task: Task, job: Job) -> None:
+    begin_worker()
+    with suppress(ConnectionError):  # nobody waits for it any more
+        sender.send(attempt(task, None, job))
+
+
+def _received_value(receiver: Connection) -> Any | None:
+    try:
+        outcome: Outcome = receiver.recv()
+    except (EOFError, ConnectionError):
+        return None
+    return outcome.get() if outcome.error is None else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -37,7 +36,6 @@ from tpjb_ident.runtime.tables import write_table
 
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import CompareSettings, Comparison
-    from tpjb_ident.report.comparison_beside import OtherHalf, ReportOrder
 
 Pivots = Annotated[
     str, typer.Option("--pivots", help='Pivot models to compare: some of "rigid, kirk, kirk-secant, measured".')
@@ -99,16 +97,15 @@ def _compared(
         then = next_command(result, data.typed, data.given)
         write_report(folder, result, options, inputs, then)
         return result, then
-    from tpjb_ident.compare.comparison import compare_campaign
-    from tpjb_ident.report.comparison_beside import ReportOrder, comparison_beside
+    from tpjb_ident.compare.comparison import compare_campaign, model_side
+    from tpjb_ident.runtime.executors import background_job
 
-    next_one = functools.partial(next_command, source=data.typed, bearing=data.given)
-    order = ReportOrder(folder, named(options), inputs, next_one)
-    with comparison_beside(source, data.bearing, settings.asked(), order) as other, progress("comparing") as show:
+    with background_job(model_side, source, data.bearing, settings) as model, progress("comparing") as show:
         settings = replace(settings, identify=identify_settings(source, options["method"], options["norm"]))
-        result = compare_campaign(source, data.bearing, settings, show, other.side)
-        write_comparison(order, result, other, show)
-    return result, next_one(result)
+        result = compare_campaign(source, data.bearing, settings, show, model)
+        then = next_command(result, data.typed, data.given)
+        write_comparison(folder, result, named(options), inputs, then, show)
+    return result, then
 
 
 def _variants(text: str) -> tuple[str, ...]:
@@ -122,13 +119,15 @@ def _variants(text: str) -> tuple[str, ...]:
     return names
 
 
-def write_comparison(order: ReportOrder, result: Comparison, other: OtherHalf, show: Progress) -> None:
-    """Write every table and pivots.toml, and the report unless the other process has written it."""
+def write_comparison(
+    folder: Path, result: Comparison, settings: dict[str, Any], inputs: dict[str, str], then: str, show: Progress
+) -> None:
+    """Write every table, pivots.toml, and the report."""
     from tpjb_ident.compare.comparison import comparison_frame, locus_frame
     from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.pivot import pivot_table, write_pivots
+    from tpjb_ident.report.comparison_page import write_report
 
-    folder = order.folder
     show("writing tables", 0, 2)
     write_identification(folder, result.identification)
     write_table(folder, "comparison", comparison_frame(result))
@@ -142,8 +141,7 @@ def write_comparison(order: ReportOrder, result: Comparison, other: OtherHalf, s
         write_table(folder, "locus", result.locus.to_frame())
         write_table(folder, "locus_comparison", locus_frame(result))
     show("drawing figures", 1, 2)
-    if not other.reported():
-        order.carry_out(result)
+    write_report(folder, result, settings, inputs, then)
 
 
 def show_comparison(result: Comparison, then: str = "") -> None:

@@ -31,9 +31,9 @@ def demo(out: Out = None) -> None:
     """
     from model.bearing_file import parse_bearing
     from rigdata import load_campaign
-    from tpjb_ident.compare.comparison import CompareSettings, compare_campaign
+    from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, model_side
     from tpjb_ident.compare.predictions import prediction_frame
-    from tpjb_ident.report.comparison_beside import ReportOrder, comparison_beside
+    from tpjb_ident.runtime.executors import background_job
 
     path = sample("demo.h5")
     target = out_folder(out, "demo")
@@ -41,17 +41,15 @@ def demo(out: Out = None) -> None:
     with output_folder(target, "demo") as folder:
         campaign = load_campaign(path)
         bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
-        order = ReportOrder(folder, named(options), campaign.fingerprint())
-        asked = CompareSettings().asked()
-        with comparison_beside(campaign, bearing, asked, order) as other, progress("demo") as show:
+        with background_job(model_side, campaign, bearing, CompareSettings()) as model, progress("demo") as show:
             from tpjb_ident.check.campaign import check_campaign  # late: the other process is at work meanwhile
 
             show("reading and checking every record", 0, 1)
             summary = check_summary(path, check_campaign(path), campaign)
             write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")
-            result = compare_campaign(campaign, bearing, progress=show, ahead=other.side)
+            result = compare_campaign(campaign, bearing, progress=show, model=model)
             write_table(folder, "prediction", prediction_frame(result.variant("measured").points))
-            write_comparison(order, result, other, show)
+            write_comparison(folder, result, named(options), campaign.fingerprint(), "", show)
         write_record(folder, target, "demo", options, summary["files_sha256"])
     counts = summary["counts"]
     print_line(

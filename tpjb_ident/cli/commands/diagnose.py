@@ -132,13 +132,12 @@ def _static_tests_beside(data: Data, workers: int | None) -> Iterator[Ahead]:
     """Measure the static tests in a copy of this process while it identifies; None where there is no second core."""
     from tpjb_ident.compare.coefficient_table import TableSource
     from tpjb_ident.compare.static_tests import measure_static
-    from tpjb_ident.runtime.beside import beside
-    from tpjb_ident.runtime.executors import cores, forks
+    from tpjb_ident.runtime.executors import background_job, cores, forks
 
     if isinstance(data.source, TableSource) or workers == 1 or cores() < 2 or not forks():
         yield None
         return
-    with beside(measure_static, data.source, data.bearing) as ahead:
+    with background_job(measure_static, data.source, data.bearing) as ahead:
         yield ahead
 
 

@@ -29,8 +29,7 @@ from tpjb_ident.cli.common.quantities import MAX_VALUES, parse_value, parse_valu
 from tpjb_ident.cli.common.run_record import write_record
 from tpjb_ident.cli.common.terminal import Progress, print_line, progress, table
 from tpjb_ident.errors import BadInputError, NotTrustedError
-from tpjb_ident.runtime.beside import beside
-from tpjb_ident.runtime.executors import cores, forks
+from tpjb_ident.runtime.executors import background_job, cores, forks
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_table
@@ -155,7 +154,7 @@ def _predicted(bearing: Bearing, points: list[OperatingPoint], settings: ModelSe
     """Table of all points. A few are solved in a copy of this process while pandas is loaded in this one."""
     rows = None
     if len(points) <= FEW and cores() > 1 and forks():
-        with beside(_rows, bearing, points, settings) as ahead, progress("predicting"):
+        with background_job(_rows, bearing, points, settings) as ahead, progress("predicting"):
             import pandas as pd
             import pyarrow.parquet  # noqa: F401  (what the table is written with)
 
