@@ -24,7 +24,6 @@ KERNELS = (
     "compilation.py",
     "film/cavitation.py",
     "film/cavitation_matrix.py",
-    "film/cavitation_slopes.py",
     "film/cross_energy.py",
     "film/cross_film.py",
     "film/cross_march.py",

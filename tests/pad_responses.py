@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from model.arrays import FloatArray
 from model.bearing import Bearing, Pad
 from model.errors import ModelError
-from model.pad.heat import conduct
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, SectorMesh, sector_mesh
+from model.pad.operators import conduct
 from model.pad.solid import PadSolid, solid_of
 
 

@@ -81,8 +81,7 @@ def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid, cooled: bool = F
 @lru_cache(maxsize=8)
 def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes, cooled: bool) -> PadDeformation:
     # rigid pads need no solid, and need not wait for its algebra
-    from model.pad.convection import pad_operators_between
-    from model.pad.operators import pad_operators
+    from model.pad.operators import pad_operators, pad_operators_between
     from model.pad.solid import solid_of
 
     angle, z, area = (np.frombuffer(raw, dtype=float) for raw in (angles, zs, areas))

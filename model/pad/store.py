@@ -18,7 +18,7 @@ from model.arrays import FloatArray
 
 _LOG = logging.getLogger(__name__)
 _KEEP = 40  # files of 3 to 4 MB each
-_SOURCES = ("line", "mesh", "elasticity", "heat", "operators", "block_cholesky")
+_SOURCES = ("line", "mesh", "operators", "block_cholesky")
 
 
 def cache_folder() -> Path | None:

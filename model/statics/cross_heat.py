@@ -1,7 +1,7 @@
 """Temperatures of films, pads, journal and grooves together, with the temperature across the films (`thermal="thd"`).
 
 - Film: `model.film.cross_energy`; its viscosity across the film acts on the pressure (`model.film.cross_film`).
-- Pads conduct, `model.pad.heat`: film temperature and heat flux are those of the face, free faces lose heat to the oil.
+- Pads conduct, `model.pad.operators`: film temperature and heat flux are those of the face, free faces cool in the oil.
 - Journal: one temperature, at which it keeps no heat over a turn.
 - Grooves: the flow balance of `model.statics.heat_paths`, oil of one temperature enters.
 

@@ -12,9 +12,9 @@ from scipy.integrate import quad
 from model.bearing import BABBITT, STEEL, Bearing, Material
 from model.bearing_file import load_bearing
 from model.pad.block_cholesky import BlockCholesky, factor_rows
-from model.pad.elasticity import ElasticSector
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PivotFace, SectorMesh
+from model.pad.operators import ElasticSector
 from tests.pad_responses import PadResponse, pad_solid
 
 BEARINGS = Path(__file__).parents[2] / "model" / "bearings"

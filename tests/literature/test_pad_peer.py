@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from model.bearing_file import load_bearing
-from model.pad.elasticity import ElasticSector
 from model.pad.mesh import MeshDensity, PadGeometry, sector_mesh
+from model.pad.operators import ElasticSector
 
 BEARINGS = Path(__file__).parents[2] / "model" / "bearings"
 DENSITY = MeshDensity(arc=8, face=1, half_length=4, backing=2, rim=0.1, edge=0.2)

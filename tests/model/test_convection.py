@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from model.bearing_file import load_bearing
-from model.pad.convection import LARGEST, pad_operators_between
 from model.pad.mesh import MeshDensity, PadGeometry
-from model.pad.operators import operators_at, pad_operators
+from model.pad.operators import LARGEST, operators_at, pad_operators, pad_operators_between
 
 COARSE = MeshDensity(2, 1, 3, 1)
 

@@ -9,7 +9,7 @@ import pytest
 
 from model.bearing import Bearing
 from model.bearing_file import load_bearing
-from model.dynamics.flexing_pads import flexing_impedance
+from model.dynamics.reduction import flexing_impedance
 from model.effects import Effect
 from model.errors import OptionError
 from model.options import Options

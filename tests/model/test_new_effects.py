@@ -10,8 +10,7 @@ import pytest
 
 from model.bearing import Bearing
 from model.bearing_file import load_bearing
-from model.dynamics.pivot_friction import describing, friction_impedance
-from model.dynamics.reduction import bearing_impedance
+from model.dynamics.reduction import bearing_impedance, describing, friction_impedance
 from model.effects import Effect, EffectError, apply_effects, known_effects
 from model.measured_pivot import MeasuredPivot
 from model.options import Options

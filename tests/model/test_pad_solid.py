@@ -13,10 +13,9 @@ from model.bearing import STEEL, Bearing, Material, Oil, Pad, Pivot
 from model.pad import operators as operators_module
 from model.pad import store as pad_store
 from model.pad.block_cholesky import BlockCholesky, factor_rows, forward_rows
-from model.pad.heat import conduct
 from model.pad.line import Line, graded
 from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, pivot_face, sector_mesh
-from model.pad.operators import pad_operators
+from model.pad.operators import conduct, pad_operators
 from tests.pad_responses import PadResponse, pad_solid
 
 COARSE = MeshDensity(arc=6, face=1, half_length=3, backing=2)
