@@ -36,7 +36,9 @@ class Answer:
     """One dynamic run: force and displacement phasors."""
 
     seen: Observation
+    #: (2,) complex, N: X, Y
     force: ComplexArray
+    #: (2,) complex: of the two displacement channels, SI
     readings: ComplexArray
     channels: tuple[Channel, ...]
 

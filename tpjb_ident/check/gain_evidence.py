@@ -34,14 +34,21 @@ _LEVER_KNOWN = 0.25
 class PointReadings:
     """Readings of the n runs of one operating point, SI."""
 
+    #: (n, 2) complex, m
     probes: ComplexArray
+    #: (n, 2) complex, N
     cells: ComplexArray
+    #: (n, 2) complex, N: housing mass times acceleration, X and Y
     inertia: ComplexArray
+    #: (n, 2), m
     probe_means: FloatArray
+    #: (n, 2), N
     cell_means: FloatArray
+    #: `probe_plane`, `cell_plane` (2, 2): from the two readings to X and Y
     probe_plane: FloatArray
     cell_plane: FloatArray
     centre: tuple[float | None, float | None] = (None, None)
+    #: (n, 4)
     noise: FloatArray | None = None
 
     @property
@@ -59,8 +66,11 @@ class PointReadings:
 class Difference:
     """How one run differs from what the others foretell, with its covariance."""
 
+    #: (m,)
     rest: FloatArray
+    #: (m, m): covariance that the others' scatter tells
     noise: FloatArray
+    #: (m, m): covariance of what honest runs differ by beyond it
     honest: FloatArray
     spare: int
 
@@ -122,6 +132,8 @@ def dynamic_difference(
     """Force of run `one` minus H of the `others` times its displacement: Re X, Re Y, Im X, Im Y [N].
 
     H is their `common_stiffness`; None where they leave no scatter.
+
+    `stiffness` (2, 2) [N/m].
     """
     spare = 2 * (2 * len(others) - 4)
     if spare < 4:
@@ -180,7 +192,10 @@ def common_stiffness(readings: PointReadings, runs: Sequence[int]) -> ComplexArr
 
 
 def stiffness_of(displacement: ComplexArray, force: ComplexArray) -> ComplexArray | None:
-    """H (2, 2) of F = H D, every run weighted by one over its displacement; None where they move along one line."""
+    """H (2, 2) of F = H D, every run weighted by one over its displacement; None where they move along one line.
+
+    `displacement`, `force` (n, 2) [m], [N].
+    """
     sizes = np.linalg.norm(displacement, axis=1)
     if len(sizes) < 2 or not np.all(sizes > 0) or not np.all(np.isfinite(sizes)):
         return None
@@ -203,6 +218,8 @@ def static_difference(
 
     A load that misses its set point shows in the cells and, over the stiffness, in the probes; what positions wander by
     besides is their scatter. None where the stiffness cannot carry a load.
+
+    `stiffness` (2, 2) [N/m].
     """
     if len(others) < 2 or np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
         return None
@@ -231,7 +248,10 @@ def static_difference(
 
 
 def dynamic_pattern(readings: PointReadings, one: int, channel: int, stiffness: ComplexArray) -> FloatArray:
-    """What a channel (probes 0 and 1, cells 2 and 3) contributes to force minus H times displacement, as `_stacked`."""
+    """What a channel (probes 0 and 1, cells 2 and 3) contributes to force minus H times displacement, as `_stacked`.
+
+    `stiffness` (2, 2) [N/m].
+    """
     if channel < 2:
         return _stacked(-stiffness @ readings.probe_plane[:, channel] * readings.probes[one, channel])
     return _stacked(readings.cell_plane[:, channel - 2] * readings.cells[one, channel - 2])

@@ -39,16 +39,20 @@ _LONGEST = 2**16
 class RecordLines:
     """What the fit found, for m channels."""
 
+    #: (m,)
     mean: FloatArray
+    #: (m,) complex: at the first of the frequencies; ``Re(phasor exp(i omega t))``
     phasor: ComplexArray
+    #: (m,): amplitude that lines beside it reach by noise alone
     floor: FloatArray
+    #: (m,): standard deviation of what is left
     scatter: FloatArray
 
 
 def fit_lines(
     time: FloatArray, values: FloatArray, frequencies: Sequence[float], inexact: Sequence[float] = ()
 ) -> RecordLines:
-    """Fit mean, drift and lines to every column."""
+    """Fit mean, drift and lines to every column; `time` (n,), `values` (n, m)."""
     span = max(float(time[-1] - time[0]), 1e-300)
     kept: list[float] = []
     for frequency in frequencies:
@@ -129,6 +133,8 @@ def band_lines(
 
     What channels owe one another (two planes of probes, cells and accelerometers) holds at every line, so a few that
     stand clear of the noise, away from shaft and mains, serve the checks as the one line of a sine does.
+
+    `values` (n, m).
     """
     none = np.empty((0, values.shape[1]), complex), np.full(values.shape[1], np.nan)
     known = np.isfinite(values)
@@ -151,7 +157,10 @@ def band_lines(
 
 
 def turning_frequency(time: FloatArray, values: FloatArray, stated: float, lines: Sequence[float]) -> float:
-    """Frequency of the 1X line [Hz], from the peak of a Hann spectrum summed over the channels."""
+    """Frequency of the 1X line [Hz], from the peak of a Hann spectrum summed over the channels.
+
+    `time` (n,), `values` (n, m).
+    """
     count = min(len(time), _LONGEST)
     span = float(time[count - 1] - time[0])
     known = np.isfinite(values[:count]).all(axis=0)

@@ -37,6 +37,7 @@ class ApartChannels:
 
     quantity: str
     names: tuple[str, ...]
+    #: (m,): least changes of their gains that make them agree
     gains: FloatArray = field(repr=False)
 
     def uncertainty(self) -> dict[str, float]:

@@ -28,12 +28,12 @@ def plane_of(channels: Sequence[Channel]) -> FloatArray:
 
 
 def to_plane(channels: Sequence[Channel], readings: AnyArray) -> AnyArray:
-    """X, Y from one value per channel; complex stays complex."""
+    """X, Y from one value per channel; complex stays complex; `readings` (m,) and (m, n)."""
     return np.asarray(plane_of(channels) @ readings)
 
 
 def plane_vector(seen: Observation, quantity: str, values: AnyArray) -> AnyArray | None:
-    """X, Y of one value per channel of `quantity`; None where its channels do not span the plane."""
+    """X, Y of one value per channel of `quantity`; None where its channels do not span the plane; `values` (m,)."""
     where = seen.pick(quantity)
     if len(where) < 2:
         return None

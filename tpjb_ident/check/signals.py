@@ -98,7 +98,7 @@ def _temperature(report: Reporter, channel: Channel, seen: ChannelStatistics) ->
 
 
 def check_clock(report: Reporter, time: FloatArray) -> None:
-    """Judge the times of a run."""
+    """Judge the times of a run; `time` (n,)."""
     rate = report.run.sample_rate
     _check_length(report, len(time), rate)
     if len(time) < 3:

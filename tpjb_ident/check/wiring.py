@@ -26,7 +26,10 @@ def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple
 
 
 def guess_wiring(channels: Sequence[Channel], readings: FloatArray, wanted: FloatArray, within: float = 8.0) -> str:
-    """Say which fault would turn the readings into the direction `wanted`; "" where not just one would."""
+    """Say which fault would turn the readings into the direction `wanted`; "" where not just one would.
+
+    `readings` (m,), `wanted` (2,).
+    """
     if len(channels) != 2 or not np.all(np.isfinite(readings)):
         return ""
     inverse = inverse_directions(tuple(float(c.axis or 0.0) for c in channels))

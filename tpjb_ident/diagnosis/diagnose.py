@@ -53,6 +53,7 @@ class Diagnosis:
     verdict: Verdict
     problem: Problem = field(repr=False)
     found: Search = field(repr=False)
+    #: (n,): what the model predicts with exactly the effects that are named
     after: FloatArray = field(repr=False)
 
     @property

@@ -309,7 +309,10 @@ def ranked(tests: Sequence[Separation]) -> tuple[Separation, ...]:
 
 
 def apart(seen: Observations, columns: FloatArray, difference: FloatArray) -> float:
-    """Whitened length of a difference of two predictions [standard deviations]."""
+    """Whitened length of a difference of two predictions [standard deviations].
+
+    `columns` (n, m), `difference` (n,).
+    """
     return float(np.linalg.norm(np.linalg.solve(usual_factor(seen, columns), difference)))
 
 

@@ -37,7 +37,9 @@ class CampaignPlan:
     """What a layout can tell."""
 
     candidates: tuple[Candidate, ...]
+    #: (k,): whitened size of every candidate's typical step
     detectable: FloatArray = field(repr=False)
+    #: (k, k)
     separation: FloatArray = field(repr=False)
 
     @property
@@ -120,7 +122,9 @@ class Signatures:
     """What every candidate does to the observation vector of a layout, beside what hides it."""
 
     observations: Observations
+    #: (n, m): columns per standard deviation
     nuisances: FloatArray = field(repr=False)
+    #: (n, k): change by a typical size of every candidate
     columns: FloatArray = field(repr=False)
 
     def factor(self, free: bool = True) -> FloatArray:

@@ -30,7 +30,10 @@ NOISE_FREE = 0.5  # share of repeated readings, apart from the longest stretch: 
 
 
 def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Both vectors of a slow record on one time base, and which samples are good."""
+    """Both vectors of a slow record on one time base, and which samples are good.
+
+    Gives time (n,) and force, displacement (n, 2) and good (n,).
+    """
     refuse_flat_channels(run)
     force, displacement = run.vector("force"), run.vector("displacement")
     n = min(len(force), len(displacement))
@@ -45,7 +48,7 @@ def piece_means(values: FloatArray, first: IntArray, last: IntArray) -> FloatArr
 
 
 def good_samples(values: FloatArray, longest: int = 60) -> BoolArray:
-    """Samples that are neither missing nor part of a glitch."""
+    """Samples that are neither missing nor part of a glitch, (n,); `values` (n, d)."""
     finite = np.asarray(np.isfinite(values).all(axis=1))
     good = finite.copy()
     index = np.flatnonzero(finite)

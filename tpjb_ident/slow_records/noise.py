@@ -43,7 +43,7 @@ class NoiseModel:
     drift: float
 
     def covariance(self, time: FloatArray, duration: FloatArray) -> FloatArray:
-        """Covariance of block averages."""
+        """Covariance of block averages, (m, m); `time`, `duration` (m,) [s]."""
         centred = time - np.mean(time)
         span = max(float(np.ptp(time)), 1e-300)
         bent = BEND * (centred**2 - np.mean(centred**2)) / span * 2.0
@@ -62,7 +62,10 @@ class NoiseModel:
 
 
 def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> FloatArray:
-    """Covariance (m, m) of 1/f noise of unit power density at 1 Hz; of averages where `duration` is given."""
+    """Covariance (m, m) of 1/f noise of unit power density at 1 Hz; of averages where `duration` is given.
+
+    `time` (m,) [s], `duration` (m,) [s].
+    """
     apart = np.abs(time[:, None] - time[None, :])
     kernel = np.zeros_like(apart)
     for tau in FLICKER_TIMES:
@@ -79,9 +82,12 @@ def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> Floa
 class NoiseSeries:
     """One series from which noise is learnt."""
 
+    #: `time`, `duration` (m,), s: blocks
     time: FloatArray
     duration: FloatArray
+    #: (m,), m: block averages
     values: FloatArray
+    #: (m, p)
     mean: FloatArray
 
 

@@ -107,7 +107,7 @@ class Candidate:
         return {**table, **self.fixed}
 
     def effect(self, amplitudes: FloatArray | float) -> Effect:
-        """Build the effect with these amplitudes (clipped to their bounds)."""
+        """Build the effect with these amplitudes (clipped to their bounds); `amplitudes` (k,)."""
         return Effect(self.name, **self.values(np.atleast_1d(np.asarray(amplitudes, float))))
 
     def refined(self) -> Candidate:

@@ -36,10 +36,15 @@ class NoEquilibriumError(TpjbError):
 class Solved:
     """What a bearing alone does at one static point, before structure and instruments."""
 
+    #: (n, 2, 2) complex, N/m
     h: ComplexArray
+    #: (2,), m
     position: FloatArray
+    #: (2,), N: static load
     force: FloatArray
+    #: (n_pads,), degC
     temperature: FloatArray
+    #: (n_pads,), N
     pad_load: FloatArray
 
     def read(self, setup: Setup, lines: tuple[float, ...]) -> Reading:
@@ -131,7 +136,7 @@ class Forward:
     _shares: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)
 
     def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
-        """Predict."""
+        """Predict, (n,)."""
         setup = apply_effects(self.setup, effects)
         if change is not None:
             setup = change(setup)

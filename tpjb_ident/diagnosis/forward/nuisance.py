@@ -37,6 +37,7 @@ class Nuisance:
     unit: str
     place: str = ""
     change: Callable[[Setup, float], Setup] | None = None
+    #: (n,): change of the observation vector per `sigma`
     column: FloatArray | None = field(default=None, repr=False, compare=False)
     twins: frozenset[str] = frozenset()
 
@@ -118,7 +119,7 @@ def _readings(elements: Sequence[Element], known: Tolerances) -> list[Nuisance]:
 def columns_of(
     forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], at: FloatArray, base: FloatArray
 ) -> FloatArray:
-    """Change of the observation vector per standard deviation of every nuisance, (n, m)."""
+    """Change of the observation vector per standard deviation of every nuisance, (n, m); `at` (m,), `base` (n,)."""
     return np.column_stack([column_of(forward, effects, known, at, base, i) for i in range(len(known))])
 
 
@@ -134,7 +135,7 @@ def column_of(
     forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], at: FloatArray, base: FloatArray,
     index: int,
 ) -> FloatArray:  # fmt: skip
-    """One column of `columns_of`."""
+    """One column of `columns_of`; `at` (m,), `base` (n,)."""
     if known[index].column is not None:
         return np.asarray(known[index].column)
     # towards zero: there the model surely has an equilibrium
@@ -147,7 +148,7 @@ def column_of(
 def predict(
     forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], size: FloatArray
 ) -> FloatArray:
-    """Predict with effects and with nuisances of given sizes (in standard deviations), (n,)."""
+    """Predict with effects and with nuisances of given sizes (in standard deviations), (n,); `size` (m,)."""
     shift = Shift(tuple(known), tuple(map(float, size)))
     return forward(effects, shift if np.any(size) else None) + shift.readings
 

@@ -25,6 +25,7 @@ class Fold:
     """Points that are left out together."""
 
     name: str
+    #: (m,): elements
     members: IntArray = field(repr=False)
     beyond: bool = False
 

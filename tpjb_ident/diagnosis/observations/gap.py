@@ -12,7 +12,7 @@ from tpjb_ident.diagnosis.observations.observe import Element, Observations
 
 
 def residuals(observations: Observations, prediction: FloatArray) -> FloatArray:
-    """(measured - predicted) / sigma, positions and clearances seen from one common centre.
+    """(measured - predicted) / sigma, positions and clearances seen from one common centre; `prediction` (n,).
 
     The centre from which positions are counted is a convention (the clearance polygon's, by some rule) and says
     nothing about the bearing: the shift that fits best is taken off.
@@ -37,7 +37,7 @@ def centre_shifts(elements: Sequence[Element]) -> FloatArray:
 
 
 def gap(observations: Observations, prediction: FloatArray, chosen: BoolArray | None = None) -> float:
-    """Root mean square of `residuals`; NaN where nothing is chosen."""
+    """Root mean square of `residuals`; NaN where nothing is chosen; `prediction` (n,), `chosen` (n,)."""
     z = residuals(observations, prediction)
     z = z if chosen is None else z[chosen]
     return float(np.sqrt(np.mean(z**2))) if len(z) else float("nan")

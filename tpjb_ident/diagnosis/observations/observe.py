@@ -110,8 +110,11 @@ class Observations:
     """A campaign as one vector."""
 
     layout: Layout
+    #: (n,): SI; dry compliances as logarithms, loads as ratios to the set point
     value: FloatArray
+    #: (n, n): random part, from identification
     covariance: FloatArray = field(repr=False)
+    #: (n,): stated model tolerance of every element
     sigma: FloatArray = field(repr=False)
     elements: tuple[Element, ...] = field(repr=False)
 
@@ -280,7 +283,7 @@ HARMONICS = 3
 
 
 def moved_by_miss(locus: Locus, identification: Identification) -> list[FloatArray]:
-    """Change of every position with the load's size and direction."""
+    """Change of every position with the load's size and direction, (2, 2)."""
     out = []
     for p in locus.points:
         along = np.array([math.cos(p.point.static_load_direction), math.sin(p.point.static_load_direction)])

@@ -38,6 +38,7 @@ FOUND = 0.05
 class Basis:
     """What every assessment of a campaign shares; all in units of `total_sigma`."""
 
+    #: (n, n): covariance of identification
     noise: FloatArray = field(repr=False)
     components: tuple[Component, ...] = field(repr=False)
     folds: tuple[Fold, ...] = field(repr=False)
@@ -53,7 +54,7 @@ class Basis:
         return Basis(self.noise + np.eye(len(self.noise)), self.components, self.folds)
 
     def covariance(self, scales: FloatArray) -> FloatArray:
-        """Noise and model error at scales t_k, (n, n)."""
+        """Noise and model error at scales t_k, (n, n); `scales` (c,)."""
         own = np.array(scales, float)
         for one, scale in zip(self.components, scales, strict=True):
             own[list(one.made_of)] += scale
@@ -79,8 +80,11 @@ class Basis:
 class Linear:
     """A model, linear about where it was fitted; all in units of `total_sigma`."""
 
+    #: (n,)
     residual: FloatArray = field(repr=False)
+    #: (n, k): J and N side by side
     columns: FloatArray = field(repr=False)
+    #: (k,): standard deviations of their priors
     width: FloatArray = field(repr=False)
 
     @property
@@ -99,8 +103,10 @@ class Linear:
 class Assessment:
     """What a model is worth."""
 
+    #: (c,): t_k
     scales: FloatArray
     evidence: float
+    #: (n, n): of the whole covariance
     inverse: FloatArray = field(repr=False)
     linear: Linear = field(repr=False)
     folds: tuple[Fold, ...] = field(repr=False)

@@ -33,7 +33,9 @@ class Component:
     """One way to be wrong."""
 
     name: str
+    #: (m,)
     rows: IntArray = field(repr=False)
+    #: (m, m)
     matrix: FloatArray = field(repr=False)
     lowest: float = LOWEST
     highest: float = 0.0
@@ -79,7 +81,10 @@ USUAL = 0.2
 
 
 def usual_factor(observations: Observations, columns: FloatArray) -> FloatArray:
-    """Cholesky factor of the covariance to expect: identification, model error and nuisances, (n, n)."""
+    """Cholesky factor of the covariance to expect: identification, model error and nuisances, (n, n).
+
+    `columns` (n, m).
+    """
     scale = observations.total_sigma
     share = observations.sigma / scale
     total = (observations.covariance + columns @ columns.T) / np.outer(scale, scale)

@@ -24,7 +24,9 @@ class Course:
     everywhere.
     """
 
+    #: (m,): amplitudes, counted from the neutral one, which is among them; rising
     at: FloatArray
+    #: (n, 2 m): changes of the prediction there, then its derivatives
     columns: FloatArray
 
     def weights(self, amplitudes: FloatArray) -> FloatArray:
@@ -33,7 +35,7 @@ class Course:
         return self._pieces(inside, _VALUE) + (amplitudes - inside)[:, None] * self.slope_weights(inside)
 
     def slope_weights(self, amplitudes: FloatArray) -> FloatArray:
-        """Weights of the columns in the derivative at some amplitudes, (k, 2 m)."""
+        """Weights of the columns in the derivative at some amplitudes, (k, 2 m); `amplitudes` (k,)."""
         return self._pieces(self._inside(amplitudes), _SLOPE)
 
     def slope(self, amplitude: float) -> FloatArray:
@@ -78,7 +80,7 @@ _SLOPE = np.array([[0.0, 0, 1, 0], [-6, 6, -4, -2], [6, -6, 3, 3], [0, 0, 0, 0]]
 
 
 def course_through(amplitudes: Sequence[float], changes: Sequence[FloatArray]) -> Course:
-    """Lay a course through what the model said."""
+    """Lay a course through what the model said; `changes` (n,) each."""
     order = np.argsort([0.0, *amplitudes])
     at = np.array([0.0, *amplitudes])[order]
     values = np.array([np.zeros_like(changes[0]), *changes])[order]

@@ -31,7 +31,7 @@ class Place:
     prediction: FloatArray
 
     def cost(self, problem: Problem, weight: FloatArray) -> float:
-        """Squared misfit under noise and model error, plus that of all priors."""
+        """Squared misfit under noise and model error, plus that of all priors; `weight` (n, n)."""
         z = problem.scaled(problem.observations.value - self.prediction)
         return float(z @ weight @ z + np.sum((self.start.free / self.start.width) ** 2))
 
@@ -67,11 +67,12 @@ class Weighing:
     """What a step is judged by."""
 
     basis: Basis
+    #: (c,): of the model's error
     scales: FloatArray
     slack: float = 1.0
 
     def assess(self, problem: Problem, start: Start, y: FloatArray) -> Assessment:
-        """What a place is worth."""
+        """What a place is worth; `y` (n,)."""
         return assess(self.basis, linear(problem, start, y, self.slack), self.scales, fixed=True)
 
 
@@ -136,7 +137,10 @@ def attempt(forward: ForwardModel, problem: Problem, start: Start) -> FloatArray
 
 
 def slope(forward: ForwardModel, problem: Problem, start: Start, y: FloatArray, index: int, share: float) -> FloatArray:
-    """Change of the prediction per unit of one amplitude, by a one-sided difference that stays inside the bounds."""
+    """Change of the prediction per unit of one amplitude, by a one-sided difference that stays inside the bounds.
+
+    `y` (n,).
+    """
     flat = np.concatenate(start.amplitudes)
     size = share * np.concatenate([c.steps for c in start.candidates])[index]
     for signed in (size, -size, 0.1 * size, -0.1 * size):

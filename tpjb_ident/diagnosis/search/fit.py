@@ -16,7 +16,7 @@ from tpjb_ident.diagnosis.search.problem import Problem
 
 
 def build(candidates: Sequence[Candidate], amplitudes: Sequence[FloatArray]) -> tuple[Effect, ...]:
-    """Effects of candidates at amplitudes."""
+    """Effects of candidates at amplitudes; `amplitudes` (k_i,) each."""
     return tuple(c.effect(a) for c, a in zip(candidates, amplitudes, strict=True))
 
 
@@ -25,9 +25,13 @@ class Start:
     """Where a model stands: where a fit begins, or a step leads."""
 
     candidates: tuple[Candidate, ...]
+    #: (k_i,): in the nearly linear forms
     amplitudes: tuple[FloatArray, ...]
+    #: (n, k): per unit of every amplitude, as known from nearby; steps correct it
     jacobian: FloatArray = field(repr=False)
+    #: (m,): where nuisances stand while amplitudes move, in standard deviations
     nuisance: FloatArray = field(repr=False)
+    #: (n, m): per standard deviation of every nuisance
     columns: FloatArray = field(repr=False)
 
     @property
@@ -42,7 +46,7 @@ class Start:
         return np.concatenate([*(c.width for c in self.candidates), np.ones(len(self.nuisance))])
 
     def split(self, flat: FloatArray) -> tuple[FloatArray, ...]:
-        """Amplitudes by candidate, inside their bounds."""
+        """Amplitudes by candidate, inside their bounds; `flat` (k,)."""
         out, at = [], 0
         for c in self.candidates:
             low, high = c.limits
@@ -55,6 +59,7 @@ class Start:
 class Fit(Start):
     """Effects fitted together, nuisances beside them."""
 
+    #: (n,): where the model stands, readings included
     prediction: FloatArray = field(repr=False)
     assessment: Assessment = field(repr=False)
     settled: bool = field(default=False, repr=False)
@@ -108,13 +113,13 @@ class Fit(Start):
         return False
 
     def at(self, free: FloatArray) -> FloatArray:
-        """Prediction at other free numbers, to first order, (n,)."""
+        """Prediction at other free numbers, to first order, (n,); `free` (k + m,)."""
         columns = np.column_stack([self.jacobian, self.columns])
         return self.prediction + columns @ (free - self.free)
 
 
 def linear(problem: Problem, start: Start, prediction: FloatArray, slack: float = 1.0) -> Linear:
-    """Linear model about a prediction."""
+    """Linear model about a prediction; `prediction` (n,)."""
     columns = problem.scaled(np.column_stack([start.jacobian, start.columns]))
     width = start.width.copy()
     width[start.jacobian.shape[1] :] *= slack
@@ -123,6 +128,6 @@ def linear(problem: Problem, start: Start, prediction: FloatArray, slack: float 
 
 
 def fitted(problem: Problem, start: Start, prediction: FloatArray, scales: FloatArray | None = None) -> Fit:
-    """A fit where a model stands, assessed."""
+    """A fit where a model stands, assessed; `prediction` (n,), `scales` (c,)."""
     found = assess(problem.basis, linear(problem, start, prediction), scales)
     return Fit(start.candidates, start.amplitudes, start.jacobian, start.nuisance, start.columns, prediction, found)

@@ -24,8 +24,10 @@ class Problem:
     """A campaign beside a baseline."""
 
     observations: Observations
+    #: (n,): prediction of the baseline
     base: FloatArray = field(repr=False)
     nuisances: tuple[Nuisance, ...] = field(repr=False)
+    #: (n, m): what they do at the baseline, per standard deviation
     columns: FloatArray = field(repr=False)
     pool: tuple[Candidate, ...] = field(repr=False)
 
@@ -61,7 +63,7 @@ class Problem:
 
 
 def loosened(observations: Observations, shares: FloatArray, tolerance: Tolerance) -> Observations:
-    """Trust no temperature of a pad that hardly carries in the baseline."""
+    """Trust no temperature of a pad that hardly carries in the baseline; `shares` (n,)."""
     idle = np.nan_to_num(shares, nan=1.0) < HARDLY
     noise = np.where(idle, tolerance.idle_temperature, 0.0)
     return replace(observations, covariance=observations.covariance + np.diag(noise**2))

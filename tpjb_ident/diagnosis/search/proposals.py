@@ -46,11 +46,12 @@ class Proposals:
     problem: Problem
     settings: DiagnoseSettings
     drawn: Fit
+    #: (n, k): derivatives of every candidate there
     first: Columns = field(repr=False)
     courses: Courses = field(repr=False)
 
     def extended(self, model: Fit, table: Columns) -> list[Fit]:
-        """Fits of a model with one candidate more, best first."""
+        """Fits of a model with one candidate more, best first; `table` (n, k) each."""
         free = self._free(model, table)
         ranked = self._promising(scores(self.problem, model, free, courses=self.courses))
         known = {s.candidates for s in ranked}
@@ -59,7 +60,10 @@ class Proposals:
         return self.fits(starts)
 
     def afresh(self, drawn: Fit, table: Columns) -> list[Fit]:
-        """Fits of one candidate more where everything else is as drawn; those too that close most by themselves."""
+        """Fits of one candidate more where everything else is as drawn; those too that close most by themselves.
+
+        `table` (n, k) each.
+        """
         free = self._free(drawn, table)
         every = scores(self.problem, drawn, free, courses=self.courses)
         ranked = self._promising(every)

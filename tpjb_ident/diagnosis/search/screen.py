@@ -30,6 +30,7 @@ class Score:
 
     candidates: tuple[Candidate, ...]
     gain: float
+    #: (k,): at which they promise it
     amplitudes: tuple[FloatArray, ...]
 
 
@@ -41,7 +42,9 @@ Courses = Mapping[Candidate, Course]
 class Survey:
     """What every candidate does beside a model, for itself."""
 
+    #: (n, k)
     secants: Columns
+    #: (n, k): the same at the model itself where the curvature is known
     slopes: Columns
     courses: Courses
 
@@ -113,7 +116,7 @@ def _column(
 def scores(
     problem: Problem, model: Fit, table: Columns, pairs: bool = False, courses: Courses | None = None
 ) -> list[Score]:  # fmt: skip
-    """Score candidates, or all pairs of them, beside a model; best first."""
+    """Score candidates, or all pairs of them, beside a model; best first; `table` (n, k) each."""
     levels = [_Level(problem, model, table, share, courses or {}) for share in SHARES]
     pool = list(table)
     chosen: list[tuple[Candidate, ...]] = [(c,) for c in pool]
@@ -129,6 +132,8 @@ def alone(problem: Problem, model: Fit, table: Columns, courses: Courses) -> lis
     In units of noise and stated tolerance, element by element. What a large effect does is known between the sizes that
     were asked for to some per cent only, and where a pad comes out of contact to less: correlated errors far below that
     would hold it against the effect, and nuisances, linear as they are, would take up what it does.
+
+    `table` (n, k) each.
     """
     gap = problem.scaled(problem.observations.value - model.prediction)
     return sorted((_closing(problem, gap, c, table[c], courses.get(c)) for c in table), key=lambda s: -s.gain)
@@ -226,6 +231,8 @@ def instead(problem: Problem, model: Fit, table: Columns, beyond: float) -> list
     """Starts in which an effect takes over from what is off further than its tolerance allows and does the same.
 
     Oil that is three tolerances too thin has the evidence of an effect, and no residual that would ask for it.
+
+    `table` (n, k) each.
     """
     size = model.assessment.free[model.jacobian.shape[1] :]
     out = []
@@ -244,7 +251,10 @@ def instead(problem: Problem, model: Fit, table: Columns, beyond: float) -> list
 
 
 def visible(problem: Problem, model: Fit, candidate: Candidate, column: FloatArray) -> float:
-    """Size of a typical step of a candidate beside a model, in standard deviations of everything else."""
+    """Size of a typical step of a candidate beside a model, in standard deviations of everything else.
+
+    `column` (n, k).
+    """
     one = problem.scaled(column) @ candidate.steps
     return math.sqrt(max(float(one @ model.assessment.inverse @ one), 0.0))
 

@@ -31,6 +31,7 @@ class Search:
     model: Fit
     effects: Fit
     worth: tuple[Worth, ...]
+    #: (n, k): what every candidate does at the baseline, per unit of its amplitudes
     first: Columns = field(repr=False)
     singles: tuple[Fit, ...] = field(repr=False)
     rivals: tuple[tuple[Fit, ...], ...] = field(repr=False)

@@ -28,7 +28,7 @@ def unseen(problem: Problem, fitted: Fit) -> FloatArray:
 
 
 def effects_unseen(problem: Problem, fitted: Fit, exact: FloatArray) -> FloatArray:
-    """The model with its effects alone, every fold with the amplitudes that all others tell."""
+    """The model with its effects alone, every fold with the amplitudes that all others tell; `exact` (n,)."""
     count = fitted.jacobian.shape[1]
     out = exact.copy()
     for fold in problem.folds:

@@ -113,7 +113,7 @@ def _alike(found: Search, settings: DiagnoseSettings) -> tuple[tuple[str, ...], 
 def decide(
     problem: Problem, found: Search, settings: DiagnoseSettings, exact: FloatArray | None = None
 ) -> Verdict:  # fmt: skip
-    """Turn a search into a verdict."""
+    """Turn a search into a verdict; `exact` (n,)."""
     observations, held = problem.observations, problem.held
     judged = judge(problem, found, settings)
     named = judged.named

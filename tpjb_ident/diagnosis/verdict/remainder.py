@@ -23,7 +23,7 @@ MOST = 12
 
 
 def localise(observations: Observations, prediction: FloatArray) -> tuple[Disagreement, ...]:
-    """Split the squared gap by observable and region, largest share first."""
+    """Split the squared gap by observable and region, largest share first; `prediction` (n,)."""
     z = residuals(observations, prediction)
     total = float(np.sum(z**2))
     rows: list[Disagreement] = []

@@ -21,17 +21,17 @@ Basis = Callable[[FloatArray], ComplexArray]
 
 
 def k_c(w: FloatArray) -> ComplexArray:
-    """Stiffness and damping."""
+    """Stiffness and damping; `w` (n,)."""
     return np.stack([np.ones_like(w), 1j * w], axis=1)
 
 
 def k_c_m(w: FloatArray) -> ComplexArray:
-    """Stiffness, damping and mass."""
+    """Stiffness, damping and mass; `w` (n,)."""
     return np.stack([np.ones_like(w), 1j * w, -(w**2)], axis=1)
 
 
 def complex_h(w: FloatArray) -> ComplexArray:
-    """One complex h for all rows: its real and its imaginary part."""
+    """One complex h for all rows: its real and its imaginary part; `w` (n,)."""
     return np.stack([np.ones_like(w), 1j * np.ones_like(w)], axis=1)
 
 
@@ -42,9 +42,13 @@ class RunSums:
     Q = 2 m columns of phi, the two displacements of each power together.
     """
 
+    #: (q, q) complex: sum of zeta* phi^T
     A: ComplexArray
+    #: (2, q) complex: sum of F zeta^H
     B: ComplexArray
+    #: (q, 2) complex: sum of zeta* D^T: what a change of h does to B
     A0: ComplexArray
+    #: (q, q) complex: sum of zeta* zeta^T, in the weight that the noise of one row has
     Z: ComplexArray
     residual: Callable[[FloatArray], ComplexArray]
     dof: float

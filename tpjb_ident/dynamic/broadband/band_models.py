@@ -33,12 +33,18 @@ class BandPart:
     """h in a part of the band, by the lines of that part alone; a model only says how h changes within it."""
 
     omega: float
+    #: (2, 2) complex, N/m
     h: ComplexArray
+    #: (8, 8)
     covariance: FloatArray = field(repr=False)
+    #: (8,)
     dof: FloatArray = field(repr=False)
+    #: (n, 8), N/m: change in every draw of what lines share
     moved: FloatArray = field(repr=False)
     span: tuple[float, float]
+    #: (8,), N/m
     bracket: FloatArray = field(repr=False)
+    #: (8,), N/m: h of the part less that of the model
     off: FloatArray = field(repr=False)
 
 
@@ -47,9 +53,13 @@ class BandModel:
     """One model over the lines of a band."""
 
     model: str
+    #: (p,)
     parameters: FloatArray
+    #: (p, p): random part
     covariance: FloatArray = field(repr=False)
+    #: (p,): degrees of freedom of its variances
     dof: FloatArray = field(repr=False)
+    #: (p, p): what all lines share
     systematic: FloatArray = field(repr=False)
     chi_square: float
     spare: int
@@ -77,7 +87,7 @@ class BandModel:
         return np.hypot(random, stdtrit(np.inf, quantile) * np.sqrt(np.diag(self.systematic)))
 
     def h(self, omega: FloatArray) -> ComplexArray:
-        """Dynamic stiffness of the model, (n, 2, 2) [N/m]."""
+        """Dynamic stiffness of the model, (n, 2, 2) [N/m]; `omega` (n,) [rad/s]."""
         K, C, M = (*self.parameters.reshape(-1, 2, 2), np.zeros((2, 2)))[:3]
         w = np.asarray(omega, dtype=float)[:, None, None]
         return np.asarray(K - w**2 * M + 1j * w * C)
@@ -87,7 +97,9 @@ class BandModel:
 class Shared:
     """What lines share, as draws."""
 
+    #: (n_lines, n, 8), N/m: change of Re and Im of h at every line
     lines: FloatArray
+    #: (n, n_runs): relative change of every run's force
     runs: FloatArray
 
 

@@ -79,7 +79,10 @@ class BandPoint:
         return np.array([s.mean_load for s in self.spectra])
 
     def rows(self, k: int, miss: LoadMiss | None = None, slope: ComplexArray | None = None) -> LineRows:
-        """Rows of line `k`, without the rig's own stiffness, and at the set load where the slope over load is known."""
+        """Rows of line `k`, without the rig's own stiffness, and at the set load where the slope over load is known.
+
+        `slope` (2, 2) [N/m].
+        """
         rows = line_rows(self.spectra, self.plan, k, self.group.kind in OPEN_ENDS)
         F = rows.F
         rig = self.baseline.at(rows.omega)

@@ -34,6 +34,7 @@ class BandLine:
     frequency: float
     by_method: dict[str, DynamicStiffness] = field(repr=False)
     method: str
+    #: (2,): of the force along X and Y with the displacements
     coherence: FloatArray
     n_rows: int
 

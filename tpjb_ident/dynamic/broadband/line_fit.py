@@ -18,8 +18,11 @@ from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
 class RunsApart:
     """How far every run's force is from what h gives, along that force."""
 
+    #: (n_runs,) complex, N^2
     left: ComplexArray
+    #: (n_runs, 2, 2) complex, N^2: sum of f f^H over the rows, f the force that h gives
     force: ComplexArray
+    #: (n_runs,), N^4: of `left`, by the line's noise
     variance: FloatArray
 
     @property
@@ -36,13 +39,19 @@ def _nothing_apart() -> RunsApart:
 class LineFit:
     """Estimate of h at one line."""
 
+    #: (2, 2) complex
     h: ComplexArray
+    #: (n_runs, 2, 2) complex, 1/m^2: sum of g g^H over the rows of each run
     leverage: ComplexArray = field(repr=False)
+    #: (n_runs, 2, 2) complex, N^2: covariance of the equation noise in one row of each run
     noise: ComplexArray = field(repr=False)
+    #: (n_runs,): complex degrees of freedom behind each
     dof: FloatArray = field(repr=False)
     condition: float
+    #: (k, 2, 2) complex
     slopes: ComplexArray = field(repr=False)
     strength: float = np.inf
+    #: (n_runs, 2, 2) complex
     share: ComplexArray = field(default_factory=lambda: np.empty((0, 2, 2), complex), repr=False)
     apart: RunsApart = field(default_factory=_nothing_apart, repr=False)
 
@@ -52,11 +61,14 @@ class LineFit:
         return bool(np.isfinite(self.h).all() and np.isfinite(self.noise).all() and (self.dof > 0).all())
 
     def covariance(self, noise: ComplexArray | None = None) -> FloatArray:
-        """Random covariance (8, 8) of [Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...] [N^2/m^2]."""
+        """Random covariance (8, 8) of [Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...] [N^2/m^2].
+
+        `noise` (n_runs, 2, 2).
+        """
         return np.asarray(np.sum(self.by_run(noise), axis=0))
 
     def by_run(self, noise: ComplexArray | None = None) -> FloatArray:
-        """What every run's noise adds to the covariance, (n_runs, 8, 8) [N^2/m^2]."""
+        """What every run's noise adds to the covariance, (n_runs, 8, 8) [N^2/m^2]; `noise` (n_runs, 2, 2)."""
         sigma = self.noise if noise is None else noise
         return np.array([_real_covariance(outer_matrix(s, a)) for s, a in zip(sigma, self.leverage)])
 
@@ -79,7 +91,10 @@ def by_runs(D: ComplexArray, g: ComplexArray, run: IntArray, n_runs: int) -> tup
 
 
 def runs_apart(given: ComplexArray, left: ComplexArray, noise: ComplexArray, run: IntArray) -> RunsApart:
-    """How far every run's force is from what h gives."""
+    """How far every run's force is from what h gives.
+
+    `given`, `left` (n, 2) [N], `noise` (n_runs, 2, 2) [N^2], `run` (n,).
+    """
     rows = [(given[run == r], left[run == r]) for r in range(len(noise))]
     return RunsApart(
         np.array([np.sum(f.conj() * rest) for f, rest in rows]),
@@ -95,7 +110,10 @@ def no_fit(n_runs: int) -> LineFit:
 
 
 def outer_matrix(a: ComplexArray, b: ComplexArray) -> ComplexArray:
-    """Kronecker product of two square matrices, for small ones some times quicker than numpy's."""
+    """Kronecker product of two square matrices, for small ones some times quicker than numpy's.
+
+    `a`, `b` (n, n) and (m, m).
+    """
     return (a[:, None, :, None] * b[None, :, None, :]).reshape(len(a) * len(b), -1)
 
 
@@ -106,7 +124,10 @@ def _real_covariance(gamma: ComplexArray) -> FloatArray:
 
 
 def satterthwaite(variances: FloatArray, dof: FloatArray) -> FloatArray:
-    """Effective degrees of freedom of sums of variances over the first axis (Satterthwaite 1946)."""
+    """Effective degrees of freedom of sums of variances over the first axis (Satterthwaite 1946).
+
+    `variances` (k, ...), `dof` (k, ...).
+    """
     total = variances.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):  # no variance at all is known exactly
         found = total**2 / (variances**2 / dof).sum(axis=0)

@@ -23,7 +23,7 @@ ENDS_ORDER = 2
 
 
 def local_fit(rows: LineRows, instrument: ComplexArray | None = None, order: int = H_ORDER) -> LineFit:
-    """Regress force on displacement over the bins of one line."""
+    """Regress force on displacement over the bins of one line; `instrument` (n, 2)."""
     powers = rows.place[:, None] ** np.arange(order + 1)
     ends = ends_columns(rows)
     d_scale, f_scale = _size(rows.D), _size(rows.F)
@@ -81,7 +81,7 @@ def ends_columns(rows: LineRows) -> ComplexArray:
 
 
 def remainder(columns: ComplexArray) -> ComplexArray:
-    """Projection on what the columns do not span, (n, n)."""
+    """Projection on what the columns do not span, (n, n); `columns` (n, k)."""
     q = np.linalg.qr(columns)[0]
     return np.asarray(np.eye(len(q)) - q @ q.conj().T)
 

@@ -23,7 +23,7 @@ MAX_SLIP = 0.01
 
 
 def find_period(samples: Samples, band: tuple[float, float], disturbed: BoolArray) -> float | None:
-    """Period in samples of what excites the band, None where it does not repeat."""
+    """Period in samples of what excites the band, None where it does not repeat; `disturbed` (n // 2 + 1,)."""
     least, most = int(2 * samples.rate / band[0]), samples.length // MIN_PERIODS
     best = _first_peak(_correlation(samples, band, disturbed), least // 2, most + 1)
     if best is None:

@@ -39,15 +39,23 @@ class RunSpectra:
     """Phasors of one run over the band."""
 
     phasors: RunPhasors
+    #: (n_windows, n_bins, 2) complex, m
     D: ComplexArray
+    #: (n_windows, n_bins, 2) complex, N
     F: ComplexArray
+    #: (n_windows, n_bins, 2) complex, m/s^2
     A: ComplexArray
+    #: (n_windows, n_bins, 2) complex
     command: ComplexArray | None
+    #: (n_bins,), Hz
     frequencies: FloatArray
+    #: (n_bins,): bins that lines of shaft or mains may have spoiled
     taken: BoolArray
     disturbances: tuple[Disturbance, ...]
     period: float | None
+    #: (2,), N
     mean_load: FloatArray
+    #: (2,), m
     position: FloatArray
     temperatures: dict[int, float]
     start: float = 0.0

@@ -27,8 +27,11 @@ class Samples:
     """One run in memory, SI."""
 
     rate: float
+    #: (2, n): X and Y by quantity; acceleration only where it is measured
     values: dict[str, FloatArray]
+    #: (2, n): along X and Y, in units of its own
     command: FloatArray | None
+    #: (n,), rad: of the shaft, by its tachometer or keyphasor
     angle: FloatArray | None
     conditions: tuple[Condition, ...] = ()
 
@@ -120,7 +123,7 @@ def _bridged_speed(values: FloatArray) -> tuple[FloatArray, int]:
 
 
 def interpolated(rows: FloatArray, at: FloatArray) -> FloatArray:
-    """Rows (k, n) at the places `at` [samples]."""
+    """Rows (k, n) at the places `at` [samples]; `at` (m,)."""
     base = np.floor(at).astype(int)
     share = at - base
     out = np.zeros((len(rows), len(at)))

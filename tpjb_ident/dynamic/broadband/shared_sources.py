@@ -42,6 +42,7 @@ class RunScatter:
     """How runs differ."""
 
     size: float
+    #: (n, n_runs): standard normal numbers, one per run
     draws: FloatArray
     conditions: tuple[Condition, ...] = ()
 
@@ -64,6 +65,7 @@ class SharedSources:
 
     gains: GainDraws
     others: SystematicSources
+    #: (n, 2, 4): standard normal numbers for how K and C follow the load
     load: FloatArray
 
     def conditions(self) -> tuple[Condition, ...]:

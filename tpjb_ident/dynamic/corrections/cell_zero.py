@@ -45,7 +45,7 @@ class CellZero:
 
 
 def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0) -> CellZero:
-    """Zero of the cells from all runs."""
+    """Zero of the cells from all runs; `means` (n,), `set_points` (n,) [N]."""
     good = np.isfinite(means) & (np.abs(set_points) > 0)
     y, x = means[good], set_points[good]
     if len(y) < MIN_RUNS or (np.ptp(np.abs(x)) < MIN_RANGE * np.abs(x).max() and _one_direction(x)):

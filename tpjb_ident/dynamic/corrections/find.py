@@ -42,6 +42,7 @@ class Correction:
     """Corrections of one operating point."""
 
     miss: LoadMiss
+    #: (2, 2) complex: dH/d(ln W), where the campaign tells it
     slope: ComplexArray | None
     turn: Turn | None
     mains: MainsFit | None
@@ -84,7 +85,7 @@ def find_corrections(
     zero_uncertainty: float = 0.0,
     mains_forces: Sequence[ComplexArray | None] = (),
 ) -> list[Correction]:
-    """Work out the corrections of all points of a campaign."""
+    """Work out the corrections of all points of a campaign; `probe_axes` (m,) [rad]."""
     zero = campaign_zero(points, zero_uncertainty)
     misses, common = load_misses(points, zero.force)
     slopes = load_slopes(points, first)

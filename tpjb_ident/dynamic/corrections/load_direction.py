@@ -43,8 +43,11 @@ ROUNDING = 1e-9
 class RunRatios:
     """Force per displacement of a point's runs, one robust mean over each run's windows."""
 
+    #: (n_runs, 2) complex: displacement of unit length
     shape: ComplexArray
+    #: (n_runs, 2) complex, N/m: oil force that goes with it
     force: ComplexArray
+    #: (n_runs,), rad: how far the static load's direction was off
     sideways: FloatArray
     load: float
     direct: tuple[float, float]
@@ -55,8 +58,11 @@ class RunRatios:
 class Turn:
     """dH/d(direction) at one point."""
 
+    #: (2, 2) complex, N/m per rad
     slope: ComplexArray
+    #: (8, 8), (N/m)^2: covariance that its own uncertainty leaves on H
     left: FloatArray = field(repr=False)
+    #: (8, 8), (N/m per rad)^2: covariance of the slope itself
     doubt: FloatArray = field(repr=False, default_factory=lambda: np.zeros((8, 8)))
 
 
@@ -169,6 +175,8 @@ def common_turn(h: ComplexArray, turn: Turn | None, angle: float) -> FloatArray:
     """Covariance (8, 8) of H when the direction of all loads is known to `angle` [rad] only [N^2/m^2].
 
     Where the runs do not tell how H turns with the load, it is taken to turn with it as a whole: J H - H J.
+
+    `h` (2, 2) [N/m].
     """
     quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
     slope = quarter @ h - h @ quarter if turn is None else turn.slope

@@ -39,13 +39,15 @@ _PRIOR_DOF = 8.0
 class Pickup:
     """Mains pick-up of the displacement probes, known but for angles."""
 
+    #: (m, 2) complex
     patterns: ComplexArray
+    #: (probes,), m: amplitude per probe
     size: FloatArray
     runs: int
 
 
 def mains_pickup(lines: Sequence[ComplexArray | None], axes: FloatArray) -> Pickup | None:
-    """Size of the mains line in every probe, from runs where nothing else sits on it."""
+    """Size of the mains line in every probe, from runs where nothing else sits on it; `axes` (m,) [rad]."""
     along = directions(axes)
     seen = [along @ line for line in lines if line is not None]
     if len(seen) < MIN_RUNS:
@@ -64,8 +66,11 @@ def mains_pickup(lines: Sequence[ComplexArray | None], axes: FloatArray) -> Pick
 class MainsFit:
     """Pick-up of every run of a point, found together with H."""
 
+    #: (n_runs, 2) complex, m: X and Y share of the measured displacement at the best minimum
     pickup: ComplexArray
+    #: (8,), N/m
     shift: FloatArray
+    #: (8, 8), N^2/m^2: what not knowing the angles leaves in H
     covariance: FloatArray
     dof: float
     chi_square: float
@@ -166,7 +171,10 @@ def force_pickup(lines: Iterable[ComplexArray | None]) -> FloatArray:
 
 
 def force_pickup_spread(data: PointData, size: FloatArray) -> FloatArray:
-    """Covariance (8, 8) that mains in the cells leaves in H: its phase is another one in every run [N^2/m^2]."""
+    """Covariance (8, 8) that mains in the cells leaves in H: its phase is another one in every run [N^2/m^2].
+
+    `size` (2,).
+    """
     means = _direction_means(data)
     if means is None:
         return np.zeros((8, 8))

@@ -20,7 +20,9 @@ class Minimum:
     """One local minimum."""
 
     cost: float
+    #: (n,): unknowns
     x: FloatArray
+    #: (8, 8), N^2/m^2: of the entries of H
     covariance: FloatArray
     log_volume: float
 
@@ -29,9 +31,13 @@ class Minimum:
 class MainsEquations:
     """F_g = H (D_g - sum_k patterns_k exp(i angle_gk)), for H (8 real numbers) and the angles."""
 
+    #: (g, 2) complex, m
     D: ComplexArray
+    #: (g, 2) complex, N
     F: ComplexArray
+    #: (m, 2) complex, m
     patterns: ComplexArray
+    #: (g,), N: of a run's force residual
     sigma: FloatArray
 
     @property
@@ -40,24 +46,24 @@ class MainsEquations:
         return float(np.linalg.norm(self.F) / np.linalg.norm(self.D))
 
     def h(self, x: FloatArray) -> ComplexArray:
-        """H of the unknowns, (2, 2) [N/m]."""
+        """H of the unknowns, (2, 2) [N/m]; `x` (8 + g m,)."""
         return np.asarray((x[:4] + 1j * x[4:8]).reshape(2, 2) * self.scale, dtype=complex)
 
     def entries(self, x: FloatArray) -> FloatArray:
-        """The eight real entries of H [N/m]."""
+        """The eight real entries of H [N/m]; `x` (8 + g m,)."""
         return x[:8] * self.scale
 
     def vectors(self, x: FloatArray) -> ComplexArray:
-        """Disturbance of every run in X, Y, (g, 2) [m]."""
+        """Disturbance of every run in X, Y, (g, 2) [m]; `x` (8 + g m,)."""
         return np.asarray(np.exp(1j * x[8:].reshape(len(self.D), -1)) @ self.patterns)
 
     def residual(self, x: FloatArray) -> FloatArray:
-        """Weighted residuals, (4 g,)."""
+        """Weighted residuals, (4 g,); `x` (8 + g m,)."""
         r = (self.F - (self.D - self.vectors(x)) @ self.h(x).T) / self.sigma[:, None]
         return np.sqrt(2.0) * np.concatenate([r.real.ravel(), r.imag.ravel()])
 
     def jacobian(self, x: FloatArray) -> FloatArray:
-        """D residual / d x, (4 g, 8 + g m)."""
+        """D residual / d x, (4 g, 8 + g m); `x` (8 + g m,)."""
         g, m = len(self.D), len(self.patterns)
         h, clean = self.h(x), self.D - self.vectors(x)
         slope = np.zeros((g, 2, 8 + g * m), dtype=complex)
@@ -75,7 +81,7 @@ class MainsEquations:
         return np.sqrt(2.0) * np.concatenate([flat.real, flat.imag])
 
     def start(self, h: ComplexArray) -> FloatArray:
-        """Unknowns for a given H: the angles are those of what H leaves of the displacements."""
+        """Unknowns for a given H: the angles are those of what H leaves of the displacements; `h` (2, 2) [N/m]."""
         scaled = h.ravel() / self.scale
         return np.concatenate([scaled.real, scaled.imag, self._angles(h).ravel()])
 

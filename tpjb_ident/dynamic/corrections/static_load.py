@@ -41,7 +41,9 @@ CONTRADICTS_TURN = 0.5
 class LoadMiss:
     """Relative deviation of each run's static load from its set point."""
 
+    #: (n_runs,)
     size: FloatArray
+    #: (n_runs,), rad: the same across it
     sideways: FloatArray
     uncertainty: float = 0.0
     turn_uncertainty: float = 0.0
@@ -167,7 +169,7 @@ def _borrowed(i: int, points: Sequence[Loaded], slopes: list[ComplexArray | None
 
 
 def to_set_point(data: PointData, miss: LoadMiss, slope: ComplexArray | None) -> PointData:
-    """The point's windows with forces as they would be at the set point."""
+    """The point's windows with forces as they would be at the set point; `slope` (2, 2)."""
     if slope is None or np.abs(miss.size).max(initial=0.0) > MAX_MISS:
         return data
     change = miss.size[data.run_index][:, None] * (data.D @ slope.T)

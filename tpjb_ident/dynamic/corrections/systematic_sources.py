@@ -29,6 +29,7 @@ class GainDraws:
     and the covariance over all points carries the correlation.
     """
 
+    #: `displacement`, `force`, `acceleration` (n, 2, 2)
     displacement: FloatArray
     force: FloatArray
     acceleration: FloatArray
@@ -93,9 +94,13 @@ def apparent_change(data: PointData, stiffness: DynamicStiffness, draws: GainDra
 class SystematicSources:
     """Draws of what the manifest states."""
 
+    #: (m,), rad: stated axes of the channels of each quantity
     axes: dict[str, FloatArray]
+    #: (n, m), rad
     turns: dict[str, FloatArray]
+    #: (n, m), s
     delays: dict[str, FloatArray]
+    #: (n,)
     mass: FloatArray
 
     def changes(self, data: PointData, stiffness: DynamicStiffness) -> dict[str, FloatArray]:

@@ -45,8 +45,10 @@ class Repeats:
     """Direction means and the noise of a single window, from good windows only."""
 
     means: DirectionMeans
+    #: (4, 4) complex: covariance of one window's (X, Y, Fx, Fy) about its direction
     noise: ComplexArray
     spare: float
+    #: (n,): final window weights
     weights: FloatArray
     wandering: int = 0
 
@@ -55,15 +57,19 @@ class Repeats:
 class EivFit:
     """Result of the fit in the table's scale."""
 
+    #: (2, 2) complex
     h: ComplexArray
+    #: (8, 8)
     covariance: FloatArray
+    #: (8,)
     dof: FloatArray
     chi_square: float
+    #: (2,)
     attenuation: FloatArray
 
 
 def repeats(table: PhasorTable, weights: FloatArray, rounds: int = 2) -> Repeats | None:
-    """Average each direction's good windows and pool their noise."""
+    """Average each direction's good windows and pool their noise; `weights` (n,)."""
     good = (weights > 0.2).astype(float)
     z, wandering = aligned(np.concatenate([table.D, table.F], axis=1), table.direction, good)
     state = _pooled(z, table, good, 1.0)
@@ -189,10 +195,12 @@ def _score_iteration(
 
 
 def aligned(z: ComplexArray, direction: IntArray, weights: FloatArray) -> tuple[ComplexArray, int]:
-    """Turn windows to their direction's common phase where the phase wanders.
+    """Turn windows to their direction's common phase where the phase wanders, (n, m).
 
     Repeats are repeats of one phasor only while the actuators' generator is locked to the recorder. Where it is not,
     each window's phasors turn by a common angle, which F = H D does not see, but an average does.
+
+    `z` (n, m), `direction` (n,), `weights` (n,).
     """
     result, wandering = z, 0
     for d in range(int(direction.max()) + 1):
@@ -214,7 +222,7 @@ def aligned(z: ComplexArray, direction: IntArray, weights: FloatArray) -> tuple[
 
 
 def readmitted(table: PhasorTable, weights: FloatArray) -> FloatArray:
-    """Window weights with consistent directions taken back.
+    """Window weights with consistent directions taken back; `weights` (n,).
 
     Runs differ a little from one another (their static load does), by more than the noise inside a run. A robust joint
     fit over few runs can then take two or three of them for the truth and reject a sound run with all its windows. A

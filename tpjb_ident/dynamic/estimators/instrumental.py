@@ -21,8 +21,10 @@ from tpjb_ident.errors import ArgumentError
 class InstrumentalFit:
     """Result in the table's scale."""
 
+    #: (2, 2) complex
     h: ComplexArray
     explained: PhasorTable
+    #: (n,)
     weights: FloatArray
     conditions: tuple[Condition, ...]
 

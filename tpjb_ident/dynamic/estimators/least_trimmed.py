@@ -56,11 +56,11 @@ class Regression:
         return B
 
     def residual(self, B: ComplexArray) -> ComplexArray:
-        """Y - X B', (n, q)."""
+        """Y - X B', (n, q); `B` (q, 2)."""
         return np.asarray(self.Y - self.X @ B.T)
 
     def terms(self, B: ComplexArray) -> FloatArray:
-        """`products` of the residual, (..., q^2, n)."""
+        """`products` of the residual, (..., q^2, n); `B` (..., q, 2)."""
         return products(self._y - B @ self._x)
 
 
@@ -84,7 +84,7 @@ def products(rows: ComplexArray) -> FloatArray:
 
 
 def scatter(terms: FloatArray, weights: FloatArray, q: int) -> ComplexArray:
-    """Weighted mean of r r^H, (..., q, q), from `products`."""
+    """Weighted mean of r r^H, (..., q, q), from `products`; `terms` (..., q^2, n), `weights` (..., n)."""
     sums = (terms @ weights[..., None])[..., 0] / weights.sum(axis=-1)[..., None]
     first, second = _pairs(q)
     result = np.zeros((*sums.shape[:-1], q, q), dtype=complex)
@@ -96,7 +96,10 @@ def scatter(terms: FloatArray, weights: FloatArray, q: int) -> ComplexArray:
 
 
 def distance2(terms: FloatArray, inner: ComplexArray) -> FloatArray:
-    """2 r^H S^-1 r of every window, (..., n), from `products` and the scatter S."""
+    """2 r^H S^-1 r of every window, (..., n), from `products` and the scatter S.
+
+    `terms` (..., q^2, n), `inner` (..., q, q).
+    """
     inverse = np.linalg.inv(inner)
     q = inner.shape[-1]
     first, second = _pairs(q)
@@ -110,13 +113,15 @@ def distance2(terms: FloatArray, inner: ComplexArray) -> FloatArray:
 class Start:
     """A robust first answer."""
 
+    #: (q, 2) complex
     coefficients: ComplexArray
+    #: (q, q) complex: residual covariance of the windows that belong together
     scatter: ComplexArray
     exact: bool = False
 
 
 def robust_start(regression: Regression, direction: IntArray, seed: int) -> Start:
-    """Find coefficients and scatter of the majority, or of a tighter core.
+    """Find coefficients and scatter of the majority, or of a tighter core; `direction` (n,).
 
     With 40 % of the windows bad on average, a draw can well have more than half. Bad windows that scatter, or
     share a disturbance that no H explains, give themselves away: a smaller core that is several times tighter

@@ -30,15 +30,18 @@ _MAX_ITERATIONS = 200
 class RobustFit:
     """Y = X B' with robust weights."""
 
+    #: (q, p) complex: B: y = B x per window
     coefficients: ComplexArray
+    #: (q, q) complex
     scatter: ComplexArray
+    #: (n,), 0, 1: in
     weights: FloatArray
     iterations: int
     conditions: tuple[Condition, ...]
 
 
 def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1, tolerance: float = 1e-12) -> RobustFit:
-    """Robust multivariate complex regression of Y on X."""
+    """Robust multivariate complex regression of Y on X; `X` (n, 2), `Y` (n, q), `direction` (n,)."""
     n, q = len(Y), Y.shape[1]
     if n < max(MIN_WINDOWS, 2 * (q + 1) + 2):
         return _least_squares_only(X, Y)

@@ -112,20 +112,26 @@ def _shared_block(R: ComplexArray, f: ComplexArray) -> tuple[ComplexArray, Compl
 
 
 def real_rows(R: ComplexArray, f: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Write a complex system as a real one twice the size, for solvers that know real numbers only."""
+    """Write a complex system as a real one twice the size, for solvers that know real numbers only.
+
+    `R` (m, p), `f` (m,), gives (2 m, 2 p) and (2 m,).
+    """
     real = np.block([[R.real, -R.imag], [R.imag, R.real]])
     return real, np.concatenate([f.real, f.imag])
 
 
 def ols_fit(D: ComplexArray, F: ComplexArray) -> ComplexArray:
-    """Solve F = H D in the least-squares sense."""
+    """Solve F = H D in the least-squares sense, (2, 2); `D`, `F` (n, 2)."""
     return np.asarray(np.linalg.lstsq(D, F, rcond=None)[0], dtype=complex).T
 
 
 def phasor_table(
     D: ArrayLike, F: ArrayLike, direction: ArrayLike | None = None, reference: ArrayLike | None = None
 ) -> PhasorTable:
-    """Build Eq. (15) from the windows, and check, scale and label them."""
+    """Build Eq. (15) from the windows, and check, scale and label them.
+
+    `D`, `F` (n, 2) [m], [N], `direction` (n,), `reference` (n, 2).
+    """
     displacement, force = _shared_block(*r_matrix(D, F))
     n = len(displacement)
     labels = np.arange(n) if direction is None else np.asarray(direction).ravel()
@@ -162,7 +168,10 @@ def _scale(phasors: ComplexArray) -> float:
 
 
 def displacement_condition(D: ComplexArray, weights: FloatArray | None = None) -> float:
-    """Condition number of the displacement directions: largest over smallest singular value of D."""
+    """Condition number of the displacement directions: largest over smallest singular value of D.
+
+    `D` (n, 2), `weights` (n,).
+    """
     rows = D if weights is None else D * np.sqrt(weights)[:, None]
     if len(rows) < 2:
         return np.inf

@@ -50,8 +50,11 @@ NormValues = tuple[FloatArray, FloatArray, FloatArray]
 class RlmSolution:
     """One real robust regression: what statsmodels' ``RLM(...).fit(conv="coefs")`` tells of it."""
 
+    #: (p,)
     params: FloatArray
+    #: (p, p): H1, scaled
     covariance: FloatArray
+    #: (m,)
     weights: FloatArray
     scale: float
     iterations: int
@@ -74,7 +77,7 @@ class RlmSettings:
 
 
 def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | None = None) -> RlmSolution:
-    """Run statsmodels' RLM on a real system, guarded."""
+    """Run statsmodels' RLM on a real system, guarded; `design` (m, p), `response` (m,)."""
     settings = settings or RlmSettings()
     if np.iscomplexobj(design) or np.iscomplexobj(response):
         raise ComplexInputError(
@@ -138,15 +141,19 @@ def _mass_scale(model: Any, residual: FloatArray) -> float:
 class RlmFit:
     """H from two real robust regressions, one per force axis."""
 
+    #: (2, 2) complex
     h: ComplexArray
+    #: (8, 8)
     covariance: FloatArray
+    #: (8,)
     dof: FloatArray
+    #: (n, 2)
     weights: FloatArray
     conditions: tuple[Condition, ...]
 
 
 def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = None) -> RlmFit:
-    """Solve Eq. (15) axis by axis with statsmodels."""
+    """Solve Eq. (15) axis by axis with statsmodels; `D`, `F` (n, 2)."""
     n = len(D)
     h = np.zeros((2, 2), dtype=complex)
     covariance = np.zeros((8, 8))
@@ -166,7 +173,10 @@ def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = Non
 def robust_fit(
     design: FloatArray, response: FloatArray, norm: str, max_iterations: int, tolerance: float
 ) -> RlmSolution:  # fmt: skip
-    """Robust regression by iteratively reweighted least squares with the MAD scale."""
+    """Robust regression by iteratively reweighted least squares with the MAD scale.
+
+    `design` (m, p), `response` (m,).
+    """
     norm_of = QUICK_NORMS[norm]
     inverse = np.linalg.pinv(design)
     params, weights = inverse.dot(response), np.ones(len(response))

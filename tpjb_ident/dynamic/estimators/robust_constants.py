@@ -20,7 +20,7 @@ _BEGIN, _END = 0.99, 0.9999
 
 
 def bisquare_weight(u: FloatArray, c: float) -> FloatArray:
-    """Tukey's weight psi(u) / u."""
+    """Tukey's weight psi(u) / u; `u` (n,)."""
     return np.asarray(np.maximum(1 - (u / c) ** 2, 0.0) ** 2)
 
 
@@ -73,6 +73,6 @@ def _density(x: FloatArray, dimension: int) -> FloatArray:
 
 
 def trimming_weight(u2: FloatArray, lower: float, upper: float) -> FloatArray:
-    """One up to `lower`, falling smoothly to zero at `upper` (no window tips the answer by a hair)."""
+    """One up to `lower`, falling smoothly to zero at `upper` (no window tips the answer by a hair); `u2` (n,)."""
     v = np.clip((u2 - lower) / (upper - lower), 0.0, 1.0)
     return np.asarray((1 - v) ** 2 * (1 + 2 * v))

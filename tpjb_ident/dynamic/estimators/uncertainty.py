@@ -28,8 +28,10 @@ CLEAR = 1e-3
 class DirectionMeans:
     """What the directions say, each averaged over its good windows."""
 
+    #: `D`, `F` (g, 2) complex
     D: ComplexArray
     F: ComplexArray
+    #: (g,): effective number of windows behind each
     count: FloatArray
 
     def __len__(self) -> int:
@@ -37,7 +39,7 @@ class DirectionMeans:
 
 
 def complex_to_real_covariance(hermitian: ComplexArray, pseudo: ComplexArray | None = None) -> FloatArray:
-    """Covariance of [Re h, Im h] from E[e e^H] and E[e e^T]."""
+    """Covariance of [Re h, Im h] from E[e e^H] and E[e e^T], (2 m, 2 m); `hermitian` (m, m), `pseudo` (m, m)."""
     P = np.zeros_like(hermitian) if pseudo is None else pseudo
     real = 0.5 * np.block(
         [
@@ -49,12 +51,18 @@ def complex_to_real_covariance(hermitian: ComplexArray, pseudo: ComplexArray | N
 
 
 def information(D: ComplexArray, D_star: ComplexArray, inverse: ComplexArray) -> ComplexArray:
-    """Sum over directions of V_g^-1 (x) conj(D*_g) D_g^T, for h ordered xx, xy, yx, yy."""
+    """Sum over directions of V_g^-1 (x) conj(D*_g) D_g^T, for h ordered xx, xy, yx, yy.
+
+    `D`, `D_star` (g, 2), `inverse` (g, 2, 2).
+    """
     return np.einsum("gac,gb,gd->abcd", inverse, D_star.conj(), D).reshape(4, 4)
 
 
 def direction_effect(residual: ComplexArray, means: DirectionMeans, noise: ComplexArray) -> tuple[ComplexArray, float]:
-    """Between-direction covariance per unit |D|^2, by moments, never negative."""
+    """Between-direction covariance per unit |D|^2, by moments, never negative.
+
+    `residual` (g, 2), `noise` (2, 2), gives T (2, 2).
+    """
     g = len(means)
     if g <= 2:
         return np.zeros((2, 2), dtype=complex), np.nan
@@ -76,7 +84,7 @@ def direction_effect(residual: ComplexArray, means: DirectionMeans, noise: Compl
 
 
 def direction_covariances(means: DirectionMeans, noise: ComplexArray, T: ComplexArray) -> ComplexArray:
-    """V_g = noise / count_g + T |D_g|^2, shape (g, 2, 2)."""
+    """V_g = noise / count_g + T |D_g|^2, shape (g, 2, 2); `noise` (2, 2), `T` (2, 2)."""
     power = np.einsum("ga,ga->g", means.D, means.D.conj()).real
     return noise / means.count[:, None, None] + T * power[:, None, None]
 
@@ -85,10 +93,14 @@ def direction_covariances(means: DirectionMeans, noise: ComplexArray, T: Complex
 class DirectionShares:
     """What every direction contributes to the estimating equations of h, and what their repeats say."""
 
+    #: (g, 4) complex: to the equations
     score: ComplexArray
+    #: (g, 4, 4) complex: to their matrix
     parts: ComplexArray
+    #: (4, 4) complex
     repeat: ComplexArray
     dof_repeat: float
+    #: (8, 8)
     pooled: FloatArray | None = None
 
 
@@ -99,6 +111,8 @@ def spread_of(shares: DirectionShares, chi_square: float, known_effect: bool = F
     more than another. So its share is not modelled but taken from the directions themselves
     (delete-one jackknife, i.e. cluster-robust with its small-sample correction), as far as the
     chi-square of the direction means says that there is any.
+
+    Gives covariance (8, 8) and dof (8,).
     """
     score, parts, pooled, dof_repeat = shares.score, shares.parts, shares.pooled, shares.dof_repeat
     known = _positive(complex_to_real_covariance(shares.repeat))
@@ -138,7 +152,10 @@ def _positive(covariance: FloatArray) -> FloatArray:
 
 
 def pooled_effect(residual: ComplexArray, means: DirectionMeans) -> FloatArray:
-    """Covariance of H from one relative variance of the directions' residuals, pooled over directions and axes."""
+    """Covariance of H from one relative variance of the directions' residuals, pooled over directions and axes.
+
+    `residual` (g, 2).
+    """
     power = np.einsum("ga,ga->g", means.F, means.F.conj()).real
     share = float((np.abs(residual) ** 2 / power[:, None]).sum() / (2 * (len(means) - 2)))
     weighted = means.D.conj() * means.count[:, None]
@@ -148,7 +165,10 @@ def pooled_effect(residual: ComplexArray, means: DirectionMeans) -> FloatArray:
 
 
 def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_between: FloatArray) -> FloatArray:
-    """Welch-Satterthwaite degrees of freedom of variances made of two parts."""
+    """Welch-Satterthwaite degrees of freedom of variances made of two parts.
+
+    `total`, `repeat` (8,), `dof_between` (8,).
+    """
     between = np.maximum(total - repeat, 0.0)
     spread = repeat**2 / max(dof_repeat, 1.0) + between**2 / dof_between
     with np.errstate(divide="ignore", invalid="ignore"):  # no spread at all: the next line says what then
@@ -159,7 +179,10 @@ def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_betw
 def homoscedastic(
     D: ComplexArray, residual: ComplexArray, weights: FloatArray, correction: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Covariance and dof of a (weighted) regression without repeats: residuals are all there is."""
+    """Covariance and dof of a (weighted) regression without repeats: residuals are all there is.
+
+    `D`, `residual` (n, 2), `weights` (n,), gives (8, 8) and (8,).
+    """
     spare = max(float(weights.sum()) - 2.0, 1e-12)
     scatter = (weights[:, None] * residual).T @ residual.conj() / spare
     inverse = np.linalg.inv((weights[:, None] * D.conj()).T @ D)

@@ -29,8 +29,11 @@ FAR = 4.0
 class ZeroAmplitude:
     """How H changes with the square of the motion at one point."""
 
+    #: (2, 2) complex, N/m: G: by which H is larger at the runs' mean square motion than at none
     change: ComplexArray
+    #: (n_runs,): square of every run's motion over its mean
     square: FloatArray
+    #: (8, 8), (N/m)^2: covariance that the uncertainty of G leaves on H
     left: FloatArray = field(repr=False)
     share: float
 
@@ -40,7 +43,7 @@ class ZeroAmplitude:
         return replace(data, F=data.F - more)
 
     def uncertain(self, h: ComplexArray) -> float:
-        """Half the width of the 95 % interval of what is left of the change, as a share of H."""
+        """Half the width of the 95 % interval of what is left of the change, as a share of H; `h` (2, 2) [N/m]."""
         return float(1.96 * np.sqrt(np.diag(self.left).max()) / (np.linalg.norm(h) / np.sqrt(2)))
 
     def conditions(self) -> tuple[Condition, ...]:
@@ -112,6 +115,8 @@ def zero_amplitude(data: PointData, h: ComplexArray, expected: float) -> ZeroAmp
     together by a regression of the runs' means; the windows' forces are then brought to zero amplitude, as static loads
     to their set point. The film's second harmonic says beforehand how large G can be: that keeps it small where the
     runs tell little.
+
+    `h` (2, 2) [N/m].
     """
     weights = _beside_repeats(data)
     slope = amplitude_slope(data, h, weights)

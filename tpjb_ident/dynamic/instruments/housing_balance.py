@@ -46,7 +46,9 @@ class BalanceRun:
     """Means of one run at its excitation line."""
 
     frequency: float
+    #: (2,) complex, N
     cells: ComplexArray
+    #: (2,) complex, m/s^2
     acceleration: ComplexArray
     inertia: float
     mass: float = 0.0

@@ -100,7 +100,7 @@ def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: Meas
 
 
 def slower_channel(readings: FloatArray, export_rate: float) -> SlowerChannel | None:
-    """Tell whether a channel was filled up, from the beginning of its readings.
+    """Tell whether a channel was filled up, from the beginning of its readings; `readings` (n,).
 
     Logger programs write groups of different rates into one table by interpolation. A sine comes out of that smaller
     (and late, where values are held), by a factor that the two rates alone determine: it is taken out of the phasors as

@@ -123,8 +123,11 @@ class _Work:
 class _Times:
     """Times of some windows."""
 
+    #: (n,), s: of every window
     start: FloatArray
+    #: (n, length): of every sample, where they are not on an even grid
     stamps: FloatArray | None
+    #: (m,): windows that are to be fitted by their stamps
     uneven: IntArray
 
 

@@ -30,14 +30,20 @@ _ROUNDS = 12
 class RobustLines:
     """A fit, and which samples it rests on."""
 
+    #: (q, n_columns): of every channel; NaN where too few samples are left
     coefficients: FloatArray
+    #: (q,): robust standard deviation of the residuals
     scale: FloatArray
+    #: (n,): samples neither missing nor glitched, of all channels together
     kept: BoolArray
     lost: float
 
 
 def beside(outlying: BoolArray) -> IntArray:
-    """Samples that are outlying, or next to such a one: a glitch's flanks lie below the limit."""
+    """Samples that are outlying, or next to such a one: a glitch's flanks lie below the limit, (m,).
+
+    `outlying` (q, n).
+    """
     return np.flatnonzero(np.convolve(outlying.any(axis=0), np.ones(2 * GLITCH_MARGIN + 1), mode="same") > 0)
 
 
@@ -46,6 +52,8 @@ def fit_without_glitches(design: FloatArray, values: FloatArray, usual: FloatArr
 
     Least absolute deviations (by reweighting) stand a quarter of the samples being wrong; bisquare
     steps with no more than the run's usual scale sharpen that into a clear verdict per sample.
+
+    `design` (n, n_columns), `values` (n, q), `usual` (q,).
     """
     present = np.asarray(np.isfinite(values).all(axis=1))
     q = values.shape[1]

@@ -14,7 +14,9 @@ from tpjb_ident.dynamic.records.run_data import RunPhasors
 class LineMean:
     """One line of a run."""
 
+    #: (2,) complex, m
     displacement: ComplexArray
+    #: (2,) complex, N
     force: ComplexArray
     displacement_error: float
     force_error: float
@@ -82,5 +84,5 @@ def _shared(run: RunPhasors, index: int) -> bool:
 
 
 def complex_median(z: ComplexArray) -> ComplexArray:
-    """Median of real and imaginary parts over the first axis."""
+    """Median of real and imaginary parts over the first axis; `z` (n, ...)."""
     return np.asarray(np.median(z.real, axis=0) + 1j * np.median(z.imag, axis=0))

@@ -52,7 +52,7 @@ def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
 
 
 def frequency_slip(phasors: ComplexArray, start: FloatArray, noise: float) -> float:
-    """Frequency error that the phase advance of window phasors shows [Hz]."""
+    """Frequency error that the phase advance of window phasors shows [Hz]; `phasors` (n, 2), `start` (n,) [s]."""
     good = np.isfinite(phasors).all(axis=1)
     if good.sum() < 3:
         return 0.0
@@ -146,7 +146,7 @@ def _drifting(result: RunPhasors, rate: float) -> ShaftCourse | None:
 
 
 def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, float] | None:
-    """Shaft speed in every window from the turning of its 1X phasor.
+    """Shaft speed in every window from the turning of its 1X phasor; gives speeds (n,).
 
     Runout and unbalance draw the same 1X from window to window; between the middles of two windows its phase
     advances by what the shaft is ahead of the frequency fitted.

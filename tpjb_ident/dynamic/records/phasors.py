@@ -73,9 +73,13 @@ class WaveBlocks:
 class PhasorBlock:
     """Phasors of one vector quantity in some windows of one run."""
 
+    #: (n_windows, n_lines, 2) complex: X and Y at every line, SI; NaN where a window gave none
     phasors: ComplexArray
+    #: (n_windows, 2): mean of the quantity, SI
     mean: FloatArray
+    #: (n_windows, 2): robust standard deviation of what the lines leave
     noise: FloatArray
+    #: (n_windows,): share of the samples left out (glitches, missing values)
     lost: FloatArray
 
 
@@ -93,7 +97,7 @@ class LineFitter:
         self._stride = max(1, length // 512)
 
     def fit(self, rows: FloatArray, start: FloatArray, usual: FloatArray | None = None) -> PhasorBlock:
-        """Fit windows of a vector record."""
+        """Fit windows of a vector record; `rows` (2, n_windows, length), `start` (n_windows,), `usual` (2,)."""
         n = rows.shape[1]
         stack = rows.reshape(2 * n, self.length)
         offset = _mean_of_present(stack[:, :: self._stride])
@@ -137,6 +141,8 @@ class LineFitter:
         """Leave the few outlying samples out of a long window's fit until no verdict changes; None where it cannot.
 
         Their rows are taken off the normal equations: no need to go through all samples again.
+
+        `residual` (2, length), `coefficients` (2, n_columns), `scale`, `usual` (2,), gives (2, n_columns) and (2,).
         """
         if self._blocks is None or not (scale <= SCALE_LIMIT * usual).all():
             return None
@@ -173,7 +179,7 @@ def _by_window(values: FloatArray) -> FloatArray:
 
 
 def usual_scale(scale: FloatArray) -> FloatArray:
-    """Median over the windows with a scale, X and Y; infinite where none has."""
+    """Median over the windows with a scale, X and Y; infinite where none has; `scale` (n_windows, 2)."""
     known = scale[np.isfinite(scale).all(axis=1)]
     return np.median(known, axis=0) if len(known) else np.full(2, np.inf)
 
@@ -191,7 +197,10 @@ def _to_run_origin(local: ComplexArray, frequencies: FloatArray, start: FloatArr
 
 
 def fit_uneven(values: FloatArray, time: FloatArray, frequencies: FloatArray, origin: float) -> PhasorBlock:
-    """Fit one window with its own time stamps (jitter, gaps)."""
+    """Fit one window with its own time stamps (jitter, gaps).
+
+    `values` (n, 2), `time` (n,) [s], `frequencies` (n_lines,) [Hz].
+    """
     offset = _mean_of_present(values.T)[:, 0]
     local_time = time - time[0]
     coefficients, scale, lost = _refit(line_design(local_time, frequencies), values - offset, np.full(2, np.inf))

@@ -80,14 +80,17 @@ class RunPhasors:
     point: OperatingPoint
     direction: float | None
     lines: LineSet
+    #: (n,), s: start of every window
     start: FloatArray
     length: float
     displacement: PhasorBlock
     cell_force: PhasorBlock
     acceleration: PhasorBlock | None
     housing_mass: float
+    #: (n,)
     speeds: FloatArray
     conditions: tuple[Condition, ...] = ()
+    #: (n_lines,) complex
     shaft_phase: ComplexArray = field(default_factory=lambda: np.empty(0, complex))
 
     @property
@@ -114,7 +117,7 @@ class RunPhasors:
 
 
 def oil_force(cell_force: ComplexArray, housing_acceleration: ComplexArray | None, housing_mass: float) -> ComplexArray:
-    """Oil-film force phasors.
+    """Oil-film force phasors, (..., 2) [N]; `cell_force` (..., 2) [N], `housing_acceleration` (..., 2).
 
     Housing balance: F_oil = F_cell + m_h a_h, with F_cell the force with which the housing pushes the cells and a_h the
     absolute acceleration of the housing.

@@ -28,7 +28,9 @@ LOOK = 2**17
 class ShaftCourse:
     """Shaft speed over a run, whatever windows it was found in: a second fit may cut the run otherwise."""
 
+    #: (n,), s: middle of the windows in which it was found
     time: FloatArray
+    #: (n,)
     speed: FloatArray
 
     def at(self, time: FloatArray) -> FloatArray:
@@ -52,7 +54,7 @@ def shaft_speed(run: MeasuredRun) -> tuple[float, tuple[Condition, ...]]:
 
 
 def window_speeds(speed: FloatArray | None, count: int, nominal: float) -> FloatArray:
-    """Mean speed in `count` equal windows [Hz]; NaN where the tachometer gives nothing usable."""
+    """Mean speed in `count` equal windows [Hz]; NaN where the tachometer gives nothing usable; `speed` (n,)."""
     if speed is None:
         return np.full(count, np.nan)
     # the mean of a window with a missing value is NaN, which is what it shall be

@@ -45,7 +45,10 @@ class RecordTooShortError(TpjbError):
 def line_design(
     time: FloatArray, frequencies: FloatArray, drift_order: int = 1, growing: FloatArray | None = None
 ) -> FloatArray:
-    """Columns of the joint least-squares problem."""
+    """Columns of the joint least-squares problem, (n, 2 n_lines + drift_order + 1 + 2 m).
+
+    `time` (n,), `frequencies` (n_lines,) [Hz], `growing` (m,).
+    """
     phase = 2 * np.pi * np.multiply.outer(time, frequencies)
     middle, half = 0.5 * (time[0] + time[-1]), 0.5 * (time[-1] - time[0]) or 1.0
     slow = np.polynomial.legendre.legvander((time - middle) / half, drift_order)
@@ -60,7 +63,7 @@ def line_design(
 
 
 def variance_inflation(frequencies: FloatArray, n_driven: int, length: float, rate: float) -> float:
-    """Worst variance of an excitation phasor against a fit of that line alone."""
+    """Worst variance of an excitation phasor against a fit of that line alone; `frequencies` (n_lines,)."""
     n = round(length * rate)
     if n <= 2 * len(frequencies) + 2:
         return math.inf

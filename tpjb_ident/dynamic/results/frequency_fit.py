@@ -30,9 +30,13 @@ class FrequencyFit:
     """One model over the frequencies of one load."""
 
     model: str
+    #: (2, 2), N/m
     K: FloatArray
+    #: (2, 2), N s/m
     C: FloatArray
+    #: (2, 2), kg
     M: FloatArray
+    #: (p, p)
     covariance: FloatArray = field(repr=False)
     chi_square: float
     dof: int
@@ -58,7 +62,7 @@ class FrequencyFit:
         return np.sqrt(np.diag(self.covariance) * inflation)
 
     def h(self, omega: float | FloatArray) -> np.ndarray:
-        """Dynamic stiffness of the model, (2, 2) or (n, 2, 2) complex [N/m]."""
+        """Dynamic stiffness of the model, (2, 2) or (n, 2, 2) complex [N/m]; `omega` (n,) [rad/s]."""
         w = np.asarray(omega, dtype=float)[..., None, None]
         return np.asarray(self.K - w**2 * self.M + 1j * w * self.C)
 

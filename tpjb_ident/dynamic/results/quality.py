@@ -21,7 +21,10 @@ KNOWN_SCATTERS = 1.5
 
 
 def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatArray) -> float:
-    """Multiple coherence of the forces with the displacements, smaller axis."""
+    """Multiple coherence of the forces with the displacements, smaller axis.
+
+    `D`, `F` (n, 2), `h` (2, 2), `weights` (n,).
+    """
     good = np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1) & (weights > 0)
     if not good.any() or not np.isfinite(h).all():
         return float("nan")
@@ -32,7 +35,7 @@ def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatA
 
 
 def amplitude(data: PointData, weights: FloatArray) -> float:
-    """Largest displacement amplitude (major half-axis of the orbit) of any run's mean phasor [m]."""
+    """Largest displacement amplitude (major half-axis of the orbit) of any run's mean phasor [m]; `weights` (n,)."""
     largest = 0.0
     for i in range(len(data.runs)):
         mine = (data.run_index == i) & (weights > 0) & np.isfinite(data.D).all(axis=1)
@@ -44,7 +47,7 @@ def amplitude(data: PointData, weights: FloatArray) -> float:
 
 
 def rejected_windows(data: PointData, h: ComplexArray, weights: FloatArray) -> tuple[WindowVerdict, ...]:
-    """Windows without weight, each with the reason that shows in its own numbers."""
+    """Windows without weight, each with the reason that shows in its own numbers; `h` (2, 2) [N/m], `weights` (n,)."""
     found = []
     answered = bool(np.isfinite(h).all())
     for i in np.flatnonzero(weights < REJECTED_WEIGHT):
@@ -125,7 +128,7 @@ def feeds_motion(stiffness: DynamicStiffness) -> tuple[Condition, ...]:
 
 
 def directional_pattern(data: PointData, weights: FloatArray) -> Condition | None:
-    """Point out rejected windows that gather in some directions: physics may do that, glitches do not.
+    """Point out rejected windows that gather in some directions: physics may do that, glitches do not; `weights` (n,).
 
     A binomial test per run: more rejected windows than chance gives once in a thousand, in a run
     with at least three of them.

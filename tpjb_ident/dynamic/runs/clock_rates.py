@@ -27,6 +27,7 @@ MIN_WINDOWS = 4
 class RateSamples:
     """Rate differences that single runs show."""
 
+    #: `force`, `acceleration` (n, 3), rad
     force: FloatArray
     acceleration: FloatArray
 

@@ -23,11 +23,16 @@ class PointData:
     point: OperatingPoint
     runs: tuple[RunPhasors, ...]
     lines: tuple[int, ...]
+    #: (n, 2) complex, m
     D: ComplexArray
+    #: (n, 2) complex, N
     F: ComplexArray
+    #: (n, 2) complex, m/s^2
     A: ComplexArray
+    #: (n,): windows of one run are repeats of one excitation
     run_index: IntArray
     found: float = 0.0
+    #: (n_runs,) complex
     shaft: ComplexArray | None = None
 
     @property
@@ -57,7 +62,7 @@ class PointData:
 
 
 def finite_mean(rows: FloatArray) -> FloatArray:
-    """Mean of the complete rows, (2,); NaN where there is none."""
+    """Mean of the complete rows, (2,); NaN where there is none; `rows` (n, 2)."""
     good = rows[np.isfinite(rows).all(axis=1)]
     return good.mean(axis=0) if len(good) else np.full(2, np.nan)
 
