@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 from rigdata.calibration import Channel
 from tpjb_ident.check import redundant_channels
 from tpjb_ident.check.lines import band_lines
-from tpjb_ident.check.redundant_channels import channels_apart, widened
+from tpjb_ident.check.redundant_channels import inconsistent_channels, widened
 
 AXES = {"PXA": 45.0, "PYA": 135.0, "PXB": 45.0, "PYB": 135.0}
 
@@ -61,27 +61,27 @@ def every_run_is_excited(monkeypatch):
 
 
 def test_probes_that_agree_are_not_apart():
-    assert channels_apart(runs()) == ()
+    assert inconsistent_channels(runs()) == ()
 
 
 def test_stated_uncertainties_may_differ_by_what_they_state():
-    assert channels_apart(runs((1.008, 1.0, 0.995, 1.0))) == ()
+    assert inconsistent_channels(runs((1.008, 1.0, 0.995, 1.0))) == ()
 
 
 def test_a_difference_is_halved_between_the_two_planes():
-    (apart,) = channels_apart(runs((1.05, 1.0, 1.0, 1.0), noise=0.0))
+    (apart,) = inconsistent_channels(runs((1.05, 1.0, 1.0, 1.0), noise=0.0))
     assert -apart.gains == pytest.approx([0.025, 0.0, -0.025, 0.0], abs=1e-3)
     assert apart.sentence().startswith("PXA reads 4.9% more at the excitation than PXB")
 
 
 def test_two_pairs_are_told_apart():
-    (apart,) = channels_apart(runs((1.05, 1.0, 1.0, 0.92), noise=0.0))
+    (apart,) = inconsistent_channels(runs((1.05, 1.0, 1.0, 0.92), noise=0.0))
     assert -apart.gains == pytest.approx([0.025, 0.04, -0.025, -0.04], abs=3e-3)
 
 
 def test_the_widened_interval_of_the_mean_holds_either_end():
     """The mean is off by half the difference where one probe alone is wrong."""
-    (apart,) = channels_apart(runs((1.05, 1.0, 1.0, 1.0), noise=0.0))
+    (apart,) = inconsistent_channels(runs((1.05, 1.0, 1.0, 1.0), noise=0.0))
     channels = {c.name: c for c in runs()[0].channels}
     wide = widened(channels, apart.uncertainty())
     of_the_mean = 0.5 * np.hypot(wide["PXA"].uncertainty, wide["PXB"].uncertainty)
@@ -91,15 +91,15 @@ def test_the_widened_interval_of_the_mean_holds_either_end():
 
 
 def test_scatter_is_no_gain():
-    assert channels_apart(runs((1.03, 1.0, 1.0, 1.0), noise=1e-6, n=4)) == ()
+    assert inconsistent_channels(runs((1.03, 1.0, 1.0, 1.0), noise=1e-6, n=4)) == ()
 
 
 def test_two_probes_have_nothing_to_be_held_against():
-    assert channels_apart(runs((1.5, 1.0), axes={"X": 0.0, "Y": 90.0})) == ()
+    assert inconsistent_channels(runs((1.5, 1.0), axes={"X": 0.0, "Y": 90.0})) == ()
 
 
 def test_three_probes_are_held_against_each_other():
-    (apart,) = channels_apart(runs((1.1, 1.0, 1.0), axes={"A": 0.0, "B": 120.0, "C": 240.0}))
+    (apart,) = inconsistent_channels(runs((1.1, 1.0, 1.0), axes={"A": 0.0, "B": 120.0, "C": 240.0}))
     assert apart.sentence().startswith("A reads")
 
 
@@ -118,7 +118,7 @@ def test_planes_of_probes_are_held_against_each_other_over_a_band(gain):
         run = SimpleNamespace(band=(12.0, 90.0), sample_rate=rate)
         rows, _ = band_lines(run, values, [4], [22.0])
         made += [Seen(Lines(row), tuple(channels)) for row in rows]
-    found = channels_apart(made)
+    found = inconsistent_channels(made)
     assert [a.quantity for a in found] == ([] if gain == 1.0 else ["displacement"])
     if found:
         assert found[0].names[int(np.argmin(found[0].gains))] in ("PXA", "PXB")

@@ -15,9 +15,9 @@ from tpjb_ident.diagnosis.diagnose import pose
 from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.diagnosis.planned import around, dry, dynamic, planned_observations
-from tpjb_ident.diagnosis.search.course import course_through
-from tpjb_ident.diagnosis.search.descend import fit
-from tpjb_ident.diagnosis.search.fit import Start
+from tpjb_ident.diagnosis.search.amplitude_path import path_through
+from tpjb_ident.diagnosis.search.fit import InitialFit
+from tpjb_ident.diagnosis.search.minimise import fit
 from tpjb_ident.diagnosis.search.search import baseline_fit
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 
@@ -25,8 +25,8 @@ NODES = (0.8, -0.8, 1.6, -1.6, 3.0, -3.0)
 SPEED = 2 * math.pi * 22
 
 
-def course(function):
-    return course_through(NODES, [np.atleast_1d(function(x) - function(0.0)) for x in NODES])
+def path(function):
+    return path_through(NODES, [np.atleast_1d(function(x) - function(0.0)) for x in NODES])
 
 
 def values(known, at):
@@ -34,33 +34,33 @@ def values(known, at):
 
 
 def test_course_passes_through_what_was_asked():
-    known = course(lambda x: np.array([np.sin(x), np.exp(-x)]))
+    known = path(lambda x: np.array([np.sin(x), np.exp(-x)]))
     told = values(known, NODES)
     assert told == pytest.approx(np.array([[np.sin(x), np.exp(-x) - 1] for x in NODES]), abs=1e-12)
 
 
 def test_course_follows_a_smooth_one_between():
-    known = course(np.tanh)
+    known = path(np.tanh)
     x = np.linspace(-2.5, 2.5, 41)
     assert values(known, x)[:, 0] == pytest.approx(np.tanh(x), abs=0.02)
 
 
 def test_a_jump_is_not_overshot():
-    known = course(lambda x: np.where(x > 1.0, 5.0, 0.0))
+    known = path(lambda x: np.where(x > 1.0, 5.0, 0.0))
     told = values(known, np.linspace(-3.0, 3.0, 241))
     assert told.min() >= -1e-9
     assert told.max() <= 5.0 + 1e-9
 
 
 def test_course_goes_on_straight_beyond_its_ends():
-    known = course(lambda x: x**2)
+    known = path(lambda x: x**2)
     a, b, c = values(known, [3.0, 3.5, 4.0])[:, 0]
     assert c - b == pytest.approx(b - a)
     assert values(known, [-3.5])[0, 0] == pytest.approx(b)
 
 
 def test_slopes_are_those_of_the_course():
-    known = course(lambda x: np.array([x**3, np.cos(x)]))
+    known = path(lambda x: np.array([x**3, np.cos(x)]))
     x, step = np.array([-2.0, -0.3, 0.5, 2.2]), 1e-6
     numeric = (values(known, x + step) - values(known, x - step)) / (2 * step)
     assert known.slope_weights(x) @ known.columns.T == pytest.approx(numeric, abs=1e-6)
@@ -68,8 +68,8 @@ def test_slopes_are_those_of_the_course():
 
 
 def test_neutral_slope_is_a_parabolas():
-    assert course(lambda x: 2.0 * x + x**2).neutral_slope == pytest.approx([2.0])
-    one_sided = course_through((0.8, 1.6), [np.array([0.8 * 2 + 0.64]), np.array([1.6 * 2 + 2.56])])
+    assert path(lambda x: 2.0 * x + x**2).neutral_slope == pytest.approx([2.0])
+    one_sided = path_through((0.8, 1.6), [np.array([0.8 * 2 + 0.64]), np.array([1.6 * 2 + 2.56])])
     assert one_sided.neutral_slope == pytest.approx([2.0])
 
 
@@ -90,6 +90,6 @@ def test_a_fit_finds_its_way_past_pads_that_come_out_of_contact(start):
     growth = next(c for c in problem.pool if c.name == "thermal_growth")
     nothing = baseline_fit(problem)
     slope = (forward.fresh()([growth.effect(1e-7)]) - problem.base) / 1e-7
-    begin = Start((growth,), (np.array([start]),), slope[:, None], nothing.nuisance, nothing.columns)
+    begin = InitialFit((growth,), (np.array([start]),), slope[:, None], nothing.nuisance, nothing.columns)
     found = fit(forward.fresh(), problem, begin)
     assert found.amplitudes[0][0] == pytest.approx(1.1e-5, abs=3e-7)

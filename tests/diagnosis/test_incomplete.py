@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tpjb_ident.diagnosis.campaign import unknown_centre
-from tpjb_ident.diagnosis.observations.observe import UNSEEN_DIFFERENCE, _struck_by_mains, observe
+from tpjb_ident.diagnosis.observations.observe import UNSEEN_DIFFERENCE, _mains_on_excitation, observe
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 
 
@@ -36,8 +36,8 @@ def test_without_a_polygon_the_centre_may_lie_anywhere_near_the_probes_zero():
 
 
 def test_a_point_struck_by_mains_is_left_out_unless_it_was_corrected():
-    assert _struck_by_mains(point("mains on excitation line"))
-    assert not _struck_by_mains(point("mains on excitation line", "mains corrected"))
+    assert _mains_on_excitation(point("mains on excitation line"))
+    assert not _mains_on_excitation(point("mains on excitation line", "mains corrected"))
     seen = observe(SimpleNamespace(points=(point(), point("mains on excitation line", load=6000.0))))
     assert {e.place("load") for e in seen.elements} == {5000.0}
     only = observe(SimpleNamespace(points=(point("mains on excitation line"),)))

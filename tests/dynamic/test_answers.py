@@ -17,12 +17,12 @@ from tpjb_ident.dynamic.estimators.uncertainty import complex_to_real_covariance
 OMEGA = 160.0
 
 
-def windows(seed, g=6, n=12, noise=0.02, struck=()):
-    """Displacements [m] of metres and forces [N] of newtons, H of order one; directions in `struck` lie elsewhere."""
+def windows(seed, g=6, n=12, noise=0.02, coincident=()):
+    """Displacements [m] and forces [N], H of order one; directions in `coincident` lie elsewhere."""
     rng = np.random.default_rng(seed)
     D = np.repeat(complex_normal(rng, g, 2), n, axis=0)
     label = np.repeat(np.arange(g), n)
-    F = D @ H.T + noise * complex_normal(rng, g * n, 2) + 5.0 * np.isin(label, struck)[:, None]
+    F = D @ H.T + noise * complex_normal(rng, g * n, 2) + 5.0 * np.isin(label, coincident)[:, None]
     return D + noise * complex_normal(rng, g * n, 2), F, label
 
 
@@ -59,7 +59,7 @@ def test_without_repeats_the_residuals_tell_the_noise(method, n, efficiency):
 
 
 def test_directions_that_were_rejected_are_no_spare_equations():
-    est = estimate_dynamic_stiffness(*_with_omega(windows(4, g=8, struck=(2,))))
+    est = estimate_dynamic_stiffness(*_with_omega(windows(4, g=8, coincident=(2,))))
     assert (est.weights[24:36] == 0.0).all()
     assert est.spare_equations == 4 * (7 - 2)
     np.testing.assert_allclose(est.h, H, atol=0.05)

@@ -15,8 +15,8 @@ from tests.dynamic.test_load_direction import OMEGA, WINDOWS, law
 from tests.dynamic.test_load_direction import run as run_at
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.identify import assemble
+from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun
 from tpjb_ident.dynamic.runs.finished_runs import digest
-from tpjb_ident.dynamic.runs.left_out import LeftOut
 from tpjb_ident.dynamic.runs.run_store import RunResult
 from tpjb_ident.dynamic.settings import IdentifySettings
 
@@ -113,7 +113,7 @@ def test_without_corrections_the_misses_are_told_and_nothing_is_taken_off(runs, 
 
 def test_progress_and_what_is_missing_are_told(runs):
     said = []
-    lost = LeftOut("gone", OperatingPoint(5e3, -math.pi / 2, 138.0, OMEGA), ValueError("torn\nand more"))
+    lost = ExcludedRun("gone", OperatingPoint(5e3, -math.pi / 2, 138.0, OMEGA), ValueError("torn\nand more"))
     bare = [*CHANNELS[:3], Channel("LV", "force", axis=math.pi / 2)]
     made = found(runs[:5], (lost,), bare, lambda *one: said.append(one))
     assert said == [("estimating", 0, 1), ("estimating", 1, 1)]

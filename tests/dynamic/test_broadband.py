@@ -17,7 +17,7 @@ from tests.rigs.band_rig import BandRig, band_plans, stiffness
 from tests.studies.band_coverage import true_parameters
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.dynamic.broadband.band_equations import line_sums
-from tpjb_ident.dynamic.broadband.band_models import Shared, fit_band
+from tpjb_ident.dynamic.broadband.band_models import SharedErrors, fit_band
 from tpjb_ident.dynamic.broadband.line_estimates import h1_fit, h2_fit, hv_fit, periods_fit
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
 from tpjb_ident.dynamic.broadband.local_regression import local_fit
@@ -152,7 +152,7 @@ def test_a_model_over_the_band_is_free_of_the_lines_bias():
         lines.append(
             LineRows(300.0 + k, noisy, F + 20.0 * _complex(rng, F.shape), 0 * D, None, run, np.zeros(12), True, False)
         )
-    none = Shared(np.zeros((100, 2, 8)), np.zeros((2, 2)))
+    none = SharedErrors(np.zeros((100, 2, 8)), np.zeros((2, 2)))
     constant = fit_band([replace(line, omega=300.0 + 1e-3 * k) for k, line in enumerate(lines)], "K-C", "periods", none)
     z = (constant.parameters[:4] - H.real.ravel()) / constant.standard_error[:4]
     assert np.abs(z).max() < 4

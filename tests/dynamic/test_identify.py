@@ -67,15 +67,15 @@ def test_direct_coefficients_are_within_one_per_cent(result):
 
 
 def test_mains_on_the_excitation_line_is_flagged_and_taken_off(campaign, result):
-    struck = result.points[-1]
-    assert struck.point.excitation_hz == 50
-    assert "mains on excitation line" in struck.quality
-    assert "mains corrected" in struck.quality
+    coincident = result.points[-1]
+    assert coincident.point.excitation_hz == 50
+    assert "mains on excitation line" in coincident.quality
+    assert "mains corrected" in coincident.quality
     assert "mains on excitation line" not in result.points[1].quality
     (plain,) = identify(only(campaign, "d-05000-50"), IdentifySettings(correct=False, methods=())).points
     assert "mains corrected" not in plain.quality
-    truth = true_vector(struck.point)
-    with_it, without = (np.linalg.norm(p.stiffness.vector - truth) for p in (plain, struck))
+    truth = true_vector(coincident.point)
+    with_it, without = (np.linalg.norm(p.stiffness.vector - truth) for p in (plain, coincident))
     assert without < 0.7 * with_it
 
 

@@ -153,11 +153,11 @@ def test_every_kind_of_line_has_its_place_and_order():
     assert known_lines((25.0, 25.0), 0.0, 1000.0, LineSettings(mains=0.0)).frequencies.tolist() == [25.0, 50.0]
 
 
-@pytest.mark.parametrize(("speed", "struck"), [(24.93, True), (24.91, False), (25.08, True), (25.09, False)])
-def test_a_shaft_within_its_wander_strikes_the_excitation(speed, struck):
+@pytest.mark.parametrize(("speed", "coincident"), [(24.93, True), (24.91, False), (25.08, True), (25.09, False)])
+def test_a_shaft_within_its_wander_strikes_the_excitation(speed, coincident):
     found = known_lines((25.0,), speed, 1000.0)
-    assert (found.conditions == ("1X on excitation line",)) is struck
-    assert ("1X" in [name for name, _ in lines_of(found)]) is (not struck)
+    assert (found.conditions == ("1X on excitation line",)) is coincident
+    assert ("1X" in [name for name, _ in lines_of(found)]) is (not coincident)
 
 
 @pytest.mark.parametrize(

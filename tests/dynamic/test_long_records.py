@@ -12,10 +12,10 @@ from rigdata.virtual_rig import Timing, write_campaign
 from tests.dynamic.test_identify import rig
 from tests.rigs.held_run import HeldRun
 from tpjb_ident.dynamic.records.extraction import extract
-from tpjb_ident.dynamic.records.kept_readings import SHORT, ShortRecord
 from tpjb_ident.dynamic.records.line_tuning import retuned
 from tpjb_ident.dynamic.records.lines import known_lines
 from tpjb_ident.dynamic.records.phasors import BLOCK, LineFitter, WaveBlocks
+from tpjb_ident.dynamic.records.reading_cache import SHORT, ShortRecord
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.dynamic.records.windows import WindowSettings, line_design
 
@@ -120,9 +120,9 @@ def test_frequencies_are_put_right_without_reading_again(run):
     off = extract(ShortRecord(run), 30.0, settings, known_lines((25.002,), 22.0, run.sample_rate))
     size = np.abs(right.displacement.phasors[:, 0]).max()
     assert np.abs(off.displacement.phasors[:, 0] - right.displacement.phasors[:, 0]).max() > 0.05 * size
-    mended = retuned(off, exact)
+    corrected = retuned(off, exact)
     np.testing.assert_allclose(
-        mended.displacement.phasors[:, 0], right.displacement.phasors[:, 0], rtol=0, atol=1e-3 * size
+        corrected.displacement.phasors[:, 0], right.displacement.phasors[:, 0], rtol=0, atol=1e-3 * size
     )
     assert retuned(off, known_lines((24.9,), 22.0, run.sample_rate)) is None
 

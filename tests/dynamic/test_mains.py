@@ -14,7 +14,7 @@ from tests.dynamic.phasor_cases import complex_normal
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections import mains_angles
 from tpjb_ident.dynamic.corrections.find import Correction, find_corrections
-from tpjb_ident.dynamic.corrections.load_direction import Turn
+from tpjb_ident.dynamic.corrections.load_direction import DirectionSensitivity
 from tpjb_ident.dynamic.corrections.mains import (
     LOCKED,
     MAINS_CORRECTED,
@@ -51,14 +51,14 @@ def _few_starts(monkeypatch):
     monkeypatch.setattr(mains_angles, "_POLISHED", 6)
 
 
-def shaken(n=6, per_run=4, seed=1, h=H, load=5000.0, struck=False, noise=1e-13, force=500.0):
+def shaken(n=6, per_run=4, seed=1, h=H, load=5000.0, coincident=False, noise=1e-13, force=500.0):
     """Runs in n directions, F = H D in every window but for next to no noise."""
     rng = np.random.default_rng(seed)
     angle = np.arange(n) * math.pi / n
     F = force * np.stack([np.cos(angle), np.sin(angle)], axis=1) * np.exp(2j * math.pi * rng.random(n))[:, None]
     index = np.repeat(np.arange(n), per_run)
     D = np.linalg.solve(h, F.T).T[index] + noise * complex_normal(rng, n * per_run, 2)
-    conditions = (Condition(MAINS_ON_LINE),) if struck else ()
+    conditions = (Condition(MAINS_ON_LINE),) if coincident else ()
     runs = tuple(SimpleNamespace(run=f"r{k}", conditions=conditions) for k in range(n))
     point = OperatingPoint(load, -math.pi / 2, 138.0, OMEGA)
     return PointData(point, runs, (0,) * n, D, F[index], np.zeros_like(D), index)
@@ -294,7 +294,7 @@ def test_typical_scatter_of_runs_is_that_of_their_means():
         F = data.F + off[data.run_index]
         points.append(replace(data, F=F))
         sizes.append(np.mean(np.abs(off) ** 2 / np.linalg.norm(F[::4], axis=1)[:, None] ** 2) * (5 + k) / (3 + k))
-    others = [shaken(struck=True, force=1.0), shaken(n=2), shaken()]
+    others = [shaken(coincident=True, force=1.0), shaken(n=2), shaken()]
     first = [stiff()] * 5 + [stiff(np.full((2, 2), np.nan))]
     others[0] = replace(others[0], F=9 * others[0].F)
     assert relative_scatter([*points, *others], first) == pytest.approx(math.sqrt(np.median(sizes)), rel=1e-4)
@@ -322,10 +322,12 @@ def test_a_correction_takes_off_what_size_direction_and_mains_have_done():
     data, vectors = with_pickup(replace(clean, F=loaded), SINGLE)
     mains = MainsFit(vectors, np.ones(8), 5.0 * np.eye(8), 18.0, 1.0)
     named = (MAINS_CORRECTED, "static-load-off")
-    both = Correction(miss, slope, Turn(turn, 7.0 * np.eye(8)), mains, tuple(Condition(c) for c in named))
-    mended = both.apply(data)
-    np.testing.assert_allclose(mended.F, clean.F, atol=1e-9)
-    np.testing.assert_allclose(mended.D, clean.D, atol=1e-18)
+    both = Correction(
+        miss, slope, DirectionSensitivity(turn, 7.0 * np.eye(8)), mains, tuple(Condition(c) for c in named)
+    )
+    corrected = both.apply(data)
+    np.testing.assert_allclose(corrected.F, clean.F, atol=1e-9)
+    np.testing.assert_allclose(corrected.D, clean.D, atol=1e-18)
     narrow = stiff(covariance=np.eye(8))
     wide = both.widened(narrow)
     shift = 0.002 * np.concatenate([slope.real.ravel(), slope.imag.ravel()])
@@ -346,14 +348,14 @@ def _off_diagonal(shift):
     return np.outer(shift, shift) - np.diag(shift**2)
 
 
-def campaign(struck):
+def campaign(coincident):
     """Three loads, H a power law of them that turns with their direction; misses of the size that rigs have."""
     rng = np.random.default_rng(11)
     points, truths = [], []
     for load in (3000.0, 5000.0, 8000.0):
         h = H * (load / 5000.0) ** 0.5
-        hit = struck and load == 5000.0
-        data = shaken(h=h, load=load, struck=hit, seed=round(load))
+        hit = coincident and load == 5000.0
+        data = shaken(h=h, load=load, coincident=hit, seed=round(load))
         size, aside = 0.005 * rng.standard_normal((2, 6))
         size, aside = size - size.mean(), aside - aside.mean()
         k = float(np.mean(np.diag(h.real)))
@@ -366,9 +368,9 @@ def campaign(struck):
     return points, truths
 
 
-@pytest.mark.parametrize("struck", [False, True])
-def test_a_whole_campaign_is_brought_to_its_set_points(struck):
-    points, truths = campaign(struck)
+@pytest.mark.parametrize("coincident", [False, True])
+def test_a_whole_campaign_is_brought_to_its_set_points(coincident):
+    points, truths = campaign(coincident)
     first = []
     for p in points:
         data = p.load()
@@ -376,16 +378,16 @@ def test_a_whole_campaign_is_brought_to_its_set_points(struck):
     lines = [0.3 * PATTERN * np.exp(0.3j * k) for k in range(8)]
     corrections = find_corrections(points, lines, AXES, first)
     for k, (p, found, (clean, h)) in enumerate(zip(points, corrections, truths, strict=True)):
-        mended = found.apply(p.load())
+        corrected = found.apply(p.load())
         size = np.linalg.norm(clean.F, axis=1).max()
         before = np.abs(p.load().F - clean.F).max() / size
-        assert np.abs(mended.F - clean.F).max() / size < 0.12 * before
+        assert np.abs(corrected.F - clean.F).max() / size < 0.12 * before
         assert found.turn is not None
-        np.testing.assert_allclose(found.slope, 0.5 * h, atol=(0.1 if struck else 0.02) * np.abs(h).max())
-        assert (found.mains is not None) is (struck and k == 1)
-        assert found.conditions == ((MAINS_CORRECTED,) if struck and k == 1 else ())
+        np.testing.assert_allclose(found.slope, 0.5 * h, atol=(0.1 if coincident else 0.02) * np.abs(h).max())
+        assert (found.mains is not None) is (coincident and k == 1)
+        assert found.conditions == ((MAINS_CORRECTED,) if coincident and k == 1 else ())
         if found.mains is not None:
-            np.testing.assert_allclose(mended.D, clean.D, atol=0.02 * np.abs(PATTERN).max())
+            np.testing.assert_allclose(corrected.D, clean.D, atol=0.02 * np.abs(PATTERN).max())
     # the pick-up's size is not known where no run shows it
     assert all(c.mains is None for c in find_corrections(points, [None] * 8, AXES, first))
 

@@ -11,7 +11,7 @@ from scipy.stats import f as fisher_f
 
 from tests.dynamic.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.estimators import least_trimmed
-from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, readmitted, repeats
+from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, repeats, windows_used_again
 from tpjb_ident.dynamic.estimators.least_trimmed import Regression, distance2, robust_start
 from tpjb_ident.dynamic.estimators.mm import MANY_WINDOWS, mm_fit
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
@@ -233,7 +233,7 @@ def test_how_far_off_a_direction_may_lie_whatever_the_noise(sizes, discord, fact
     reach = np.sqrt(2.0 * limit / (aim.conj() @ np.linalg.solve(spread, aim)).real)
     exact = fit.h @ table.D[mine].mean(axis=0) - table.F[mine].mean(axis=0)
     placed = dataclasses.replace(table, F=table.F + np.outer(mine, exact + factor * reach * aim))
-    assert bool(readmitted(placed, weights)[mine].sum() > 0.6 * mine.sum()) is heard
+    assert bool(windows_used_again(placed, weights)[mine].sum() > 0.6 * mine.sum()) is heard
 
 
 @pytest.mark.parametrize(("factor", "heard"), [(0.93, True), (1.07, False)])
@@ -247,7 +247,7 @@ def test_a_window_belongs_to_its_direction_up_to_twice_the_distance_of_one_in_te
     reach = np.sqrt(2.0 * chi2.ppf(0.9999, 8) / (2.0 * aim.conj() @ np.linalg.solve(others.noise, aim)).real)
     z[mine[:3]] += factor * reach * aim
     placed = dataclasses.replace(table, D=z[:, :2], F=z[:, 2:])
-    found = readmitted(placed, rejected(placed))[mine]
+    found = windows_used_again(placed, rejected(placed))[mine]
     np.testing.assert_array_equal(found[:3], float(heard))
     np.testing.assert_array_equal(found[3:], 1.0)
 
@@ -258,14 +258,14 @@ def test_windows_struck_alike_do_not_draw_the_others_along(way):
     odd = np.flatnonzero(table.direction == 3)[:4]
     F = table.F.copy()
     F[odd] += way
-    found = readmitted(dataclasses.replace(table, F=F), rejected(table))[table.direction == 3]
+    found = windows_used_again(dataclasses.replace(table, F=F), rejected(table))[table.direction == 3]
     np.testing.assert_array_equal(found, np.arange(10) >= 4)
 
 
 @pytest.mark.parametrize(("n", "looked_at"), [(2, False), (3, True)])
 def test_three_windows_are_enough_to_be_looked_at(n, looked_at):
     table = directions(4, (12, 12, 12, n, 12, 12, 12))
-    found = readmitted(table, rejected(table))
+    found = windows_used_again(table, rejected(table))
     assert (found[table.direction == 3] == float(looked_at)).all()
 
 
@@ -273,10 +273,10 @@ def test_a_direction_heard_by_less_than_a_fifth_is_doubtful():
     table = directions(5, (12,) * 7)
     weights = rejected(table)
     weights[np.flatnonzero(table.direction == 3)[:2]] = 1.0
-    assert (readmitted(table, weights)[table.direction == 3] == 1.0).all()
+    assert (windows_used_again(table, weights)[table.direction == 3] == 1.0).all()
 
 
 def test_where_the_others_have_too_few_repeats_nothing_is_changed():
     table = directions(6, (3, 3, 3))
     weights = rejected(table, 1)
-    np.testing.assert_array_equal(readmitted(table, weights), weights)
+    np.testing.assert_array_equal(windows_used_again(table, weights), weights)

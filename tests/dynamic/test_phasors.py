@@ -109,9 +109,9 @@ def test_uneven_times_are_fitted_where_they_are():
 def test_lines_that_coincide_are_merged_or_reported():
     lines = known_lines((25.0,), 22.0, RATE)
     assert [line.name for line in lines.nuisance] == ["1X", "2X", "mains"]  # 2 x 25 Hz is the mains line
-    struck = known_lines((50.0,), 22.0, RATE)
-    assert struck.conditions == ("mains on excitation line",)
-    assert "move the excitation" in struck.conditions[0].detail
+    coincident = known_lines((50.0,), 22.0, RATE)
+    assert coincident.conditions == ("mains on excitation line",)
+    assert "move the excitation" in coincident.conditions[0].detail
     assert known_lines((50.0,), 22.0, RATE, LineSettings(mains=60.0)).conditions == ()
     with pytest.raises(ValueError, match="between 0 and 450 Hz"):
         known_lines((600.0,), 22.0, RATE)

@@ -9,7 +9,14 @@ import pytest
 from scipy.stats import chi2
 
 from tests.dynamic.phasor_cases import H, complex_normal
-from tpjb_ident.dynamic.estimators.errors_in_variables import LOCKED, Repeats, aligned, eiv_fit, readmitted, repeats
+from tpjb_ident.dynamic.estimators.errors_in_variables import (
+    LOCKED,
+    Repeats,
+    aligned,
+    eiv_fit,
+    repeats,
+    windows_used_again,
+)
 from tpjb_ident.dynamic.estimators.least_trimmed import (
     Regression,
     distance2,
@@ -23,7 +30,7 @@ from tpjb_ident.dynamic.estimators.r_matrix import displacement_condition, phaso
 from tpjb_ident.dynamic.estimators.uncertainty import (
     CLEAR,
     DirectionMeans,
-    DirectionShares,
+    VarianceByDirection,
     complex_to_real_covariance,
     direction_effect,
     information,
@@ -52,7 +59,7 @@ def test_leaving_directions_out_gives_the_variance_of_a_mean():
     score = 0.01 * balanced_scores(g)
     parts = np.broadcast_to(np.eye(4, dtype=complex), (g, 4, 4))
     repeat = 1e-14 * np.eye(4, dtype=complex)
-    covariance, dof = spread_of(DirectionShares(score, parts, repeat, 100.0), 2.0, known_effect=True)
+    covariance, dof = spread_of(VarianceByDirection(score, parts, repeat, 100.0), 2.0, known_effect=True)
     expected = 0.01**2 / (g * (g - 1)) * g * np.eye(8)
     np.testing.assert_allclose(covariance, expected, rtol=1e-6, atol=1e-12)
     # all directions say the same of the variance: as many degrees of freedom as a mean has
@@ -64,14 +71,16 @@ def test_repeat_noise_is_what_remains_where_directions_agree_better_than_it():
     parts = np.broadcast_to(np.eye(4, dtype=complex), (g, 4, 4))
     repeat = hermitian(np.random.default_rng(1), 4)
     known = complex_to_real_covariance(repeat)
-    covariance, dof = spread_of(DirectionShares(1e-6 * balanced_scores(g), parts, repeat, 40.0), 3.0, known_effect=True)
+    covariance, dof = spread_of(
+        VarianceByDirection(1e-6 * balanced_scores(g), parts, repeat, 40.0), 3.0, known_effect=True
+    )
     np.testing.assert_allclose(covariance, known, rtol=1e-9)
     np.testing.assert_allclose(dof, 40.0, rtol=1e-6)
     for chi_square in (0.3, 1.0, np.nan):
-        covariance, dof = spread_of(DirectionShares(100 * balanced_scores(g), parts, repeat, 40.0), chi_square)
+        covariance, dof = spread_of(VarianceByDirection(100 * balanced_scores(g), parts, repeat, 40.0), chi_square)
         np.testing.assert_array_equal(covariance, known)
         np.testing.assert_array_equal(dof, 40.0)
-    two = DirectionShares(balanced_scores(16)[:2], parts[:2], repeat, 0.2)
+    two = VarianceByDirection(balanced_scores(16)[:2], parts[:2], repeat, 0.2)
     covariance, dof = spread_of(two, 9.0, known_effect=True)
     np.testing.assert_array_equal(covariance, known)
     np.testing.assert_array_equal(dof, 1.0)
@@ -85,7 +94,7 @@ def test_what_directions_add_grows_with_the_doubt_and_is_whole_at_its_95_per_cen
     sure = chi2.ppf(0.95, 4 * (g - 2)) / (4 * (g - 2))
 
     def added(chi_square, known_effect=False):
-        shares = DirectionShares(0.3 * balanced_scores(g), parts, repeat, 40.0)
+        shares = VarianceByDirection(0.3 * balanced_scores(g), parts, repeat, 40.0)
         return spread_of(shares, chi_square, known_effect)[0] - known
 
     whole = added(sure)
@@ -399,28 +408,28 @@ def moved(table, direction, by):
 
 def test_a_sound_direction_that_was_rejected_is_taken_back():
     table = windows(19, g=7, n=12)
-    weights = readmitted(table, rejected(table, [3]))
+    weights = windows_used_again(table, rejected(table, [3]))
     assert (weights[table.direction == 3] == 1.0).mean() > 0.9
     np.testing.assert_array_equal(weights[table.direction != 3], 1.0)
 
 
 def test_one_that_lies_elsewhere_stays_out_unless_nobody_can_say():
     table = moved(windows(19, g=7, n=12), 3, 0.5)
-    np.testing.assert_array_equal(readmitted(table, rejected(table, [3])), rejected(table, [3]))
+    np.testing.assert_array_equal(windows_used_again(table, rejected(table, [3])), rejected(table, [3]))
     few = moved(windows(19, g=4, n=12), 3, 0.5)
-    assert (readmitted(few, rejected(few, [3]))[few.direction == 3] == 1.0).all()
+    assert (windows_used_again(few, rejected(few, [3]))[few.direction == 3] == 1.0).all()
 
 
 def test_windows_that_disagree_among_themselves_are_not_taken_back():
     table = windows(19, g=7, n=12)
     scattered = table.F + 3.0 * (table.direction == 3)[:, None] * complex_normal(np.random.default_rng(3), 84, 2)
     torn = dataclasses.replace(table, F=scattered)
-    np.testing.assert_array_equal(readmitted(torn, rejected(torn, [3])), rejected(torn, [3]))
+    np.testing.assert_array_equal(windows_used_again(torn, rejected(torn, [3])), rejected(torn, [3]))
     # three windows out of twelve that disagree do not matter, and are not taken back
     odd = np.flatnonzero(table.direction == 3)[:3]
     F = table.F.copy()
     F[odd] += 4.0j
-    mostly = readmitted(dataclasses.replace(table, F=F), rejected(table, [3]))
+    mostly = windows_used_again(dataclasses.replace(table, F=F), rejected(table, [3]))
     np.testing.assert_array_equal(mostly[odd], 0.0)
     assert mostly[table.direction == 3].sum() >= 8
 
@@ -429,10 +438,10 @@ def test_directions_that_were_heard_in_part_or_are_too_short_are_left_as_they_ar
     table = windows(19, g=7, n=12)
     third = rejected(table, [3])
     third[np.flatnonzero(table.direction == 3)[:3]] = 1.0
-    assert readmitted(table, third) is third
+    assert windows_used_again(table, third) is third
     short = windows(19, g=7, n=2)
-    assert readmitted(short, rejected(short, [3])) is not None
-    np.testing.assert_array_equal(readmitted(short, rejected(short, [3])), rejected(short, [3]))
+    assert windows_used_again(short, rejected(short, [3])) is not None
+    np.testing.assert_array_equal(windows_used_again(short, rejected(short, [3])), rejected(short, [3]))
 
 
 def test_information_of_unit_weights_is_the_gram_matrix():
@@ -491,7 +500,7 @@ def test_six_tenths_of_a_direction_must_agree(spoilt, heard):
     F = table.F.copy()
     odd = np.flatnonzero(table.direction == 3)[:spoilt]
     F[odd] += 4.0 * np.exp(2j * np.pi * np.arange(spoilt) / spoilt)[:, None]
-    weights = readmitted(dataclasses.replace(table, F=F), rejected(table, [3]))
+    weights = windows_used_again(dataclasses.replace(table, F=F), rejected(table, [3]))
     assert bool(weights[table.direction == 3].sum() >= 7) is heard
 
 
@@ -519,7 +528,7 @@ def test_how_far_off_a_direction_may_lie(discord, factor, heard):
     reach = np.sqrt(2.0 * limit / (aim.conj() @ np.linalg.solve(spread, aim)).real)
     exact = fit.h @ D[mine].mean(axis=0) - F[mine].mean(axis=0)
     placed = dataclasses.replace(table, F=F + np.outer(mine, exact + factor * reach * aim))
-    found = readmitted(placed, weights)
+    found = windows_used_again(placed, weights)
     assert bool(found[mine].sum() > 8) is heard
 
 
@@ -572,14 +581,14 @@ def test_who_is_looked_at_once_more_and_who_can_judge():
     table = windows(19, g=7, n=10)
     fifth = rejected(table, [3])
     fifth[np.flatnonzero(table.direction == 3)[:2]] = 1.0
-    assert readmitted(table, fifth) is fifth
+    assert windows_used_again(table, fifth) is fifth
     faint = np.where(table.direction == 3, 0.3, 1.0)
-    assert readmitted(table, faint) is faint
+    assert windows_used_again(table, faint) is faint
     F = table.F.copy()
     F[np.flatnonzero(table.direction == 3)[:4]] += 4.0 * np.exp(0.5j * np.pi * np.arange(4))[:, None]
-    assert readmitted(dataclasses.replace(table, F=F), rejected(table, [3]))[table.direction == 3].sum() == 6
+    assert windows_used_again(dataclasses.replace(table, F=F), rejected(table, [3]))[table.direction == 3].sum() == 6
     five = moved(windows(19, g=5, n=12), 3, 2.0)
-    np.testing.assert_array_equal(readmitted(five, rejected(five, [3])), rejected(five, [3]))
+    np.testing.assert_array_equal(windows_used_again(five, rejected(five, [3])), rejected(five, [3]))
 
 
 def test_directions_that_contradict_one_another_a_million_times_have_wide_intervals():
@@ -587,6 +596,6 @@ def test_directions_that_contradict_one_another_a_million_times_have_wide_interv
     rng = np.random.default_rng(3)
     score, parts = complex_normal(rng, 6, 4), np.tile(np.eye(4, dtype=complex), (6, 1, 1))
     repeat = np.diag([1e-7, 1e-7, 1e-7, -1e-9]).astype(complex)
-    covariance, _ = spread_of(DirectionShares(score, parts, repeat, 200.0), 1e6)
+    covariance, _ = spread_of(VarianceByDirection(score, parts, repeat, 200.0), 1e6)
     assert np.linalg.eigvalsh(covariance)[0] > 0
     assert np.sqrt(np.diag(covariance)).min() > 0.05  # as far as the directions differ

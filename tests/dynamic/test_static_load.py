@@ -169,9 +169,9 @@ def test_forces_are_brought_to_the_set_point_exactly():
     slope = np.array([[0.5 + 1j, 2.0], [-1j, 3.0]])
     size = np.array([0.01, -0.02, MAX_MISS, 0.0])
     data = windows(lambda k: H + size[k] * slope)
-    mended = to_set_point(data, LoadMiss(size, np.zeros(4)), slope)
-    np.testing.assert_allclose(mended.F, data.D @ H.T, atol=1e-12)
-    np.testing.assert_array_equal(mended.D, data.D)
+    corrected = to_set_point(data, LoadMiss(size, np.zeros(4)), slope)
+    np.testing.assert_allclose(corrected.F, data.D @ H.T, atol=1e-12)
+    np.testing.assert_array_equal(corrected.D, data.D)
     assert to_set_point(data, LoadMiss(size, np.zeros(4)), None) is data
     # a run far off tells of a wrong set point, not of scatter
     for far in (1.1 * MAX_MISS, -1.1 * MAX_MISS):
@@ -350,7 +350,7 @@ def test_the_regression_is_hubers_with_its_scale_and_a_ridge():
 def test_forces_of_a_turned_load_are_taken_off():
     data = windows(H)
     miss = LoadMiss(np.zeros(4), np.array([0.01, -0.02, 0.03, 0.0]))
-    turn = load_direction.Turn(np.array([[1.0, 2j], [3.0, 4.0]]), np.zeros((8, 8)))
+    turn = load_direction.DirectionSensitivity(np.array([[1.0, 2j], [3.0, 4.0]]), np.zeros((8, 8)))
     by_hand = [miss.sideways[k] * (turn.slope @ d) for k, d in zip(data.run_index, data.D, strict=True)]
     np.testing.assert_allclose(turned_back(data, miss, turn), by_hand)
     np.testing.assert_array_equal(turned_back(data, miss, None), np.zeros_like(data.F))
@@ -364,6 +364,6 @@ def test_a_direction_that_all_loads_miss_alike_turns_the_whole_film():
     shift = np.concatenate([change.real.ravel(), change.imag.ravel()])
     size = np.abs(shift).max()
     np.testing.assert_allclose(load_direction.common_turn(H, None, small), np.outer(shift, shift), atol=5e-3 * size**2)
-    slope = load_direction.Turn(np.array([[1.0, 2j], [3.0, 4.0]]), np.zeros((8, 8)), 7.0 * np.eye(8))
+    slope = load_direction.DirectionSensitivity(np.array([[1.0, 2j], [3.0, 4.0]]), np.zeros((8, 8)), 7.0 * np.eye(8))
     own = np.array([1.0, 0, 3.0, 4.0, 0, 2.0, 0, 0])
     np.testing.assert_allclose(load_direction.common_turn(H, slope, 0.5), 0.25 * (np.outer(own, own) + 7 * np.eye(8)))

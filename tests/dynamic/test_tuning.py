@@ -88,12 +88,12 @@ def test_phasors_are_turned_to_other_frequencies_as_a_new_fit_would():
     rows = wave.reshape(2, WINDOWS, -1)
     fits = [LineFitter(400, RATE, lines.frequencies).fit(rows, START) for lines in (LINES, true)]
     run = RunPhasors("r", POINT, 0.0, LINES, START, LENGTH, fits[0], fits[0], fits[0], 30.0, np.full(WINDOWS, 22.0))
-    mended = retuned(run, true)
+    corrected = retuned(run, true)
     assert np.abs(fits[0].phasors - fits[1].phasors)[:, 0].max() > 0.1
-    for found in (mended.displacement, mended.cell_force, mended.acceleration):
+    for found in (corrected.displacement, corrected.cell_force, corrected.acceleration):
         np.testing.assert_allclose(found.phasors[:, 0], fits[1].phasors[:, 0], atol=2e-3)
         np.testing.assert_array_equal(found.phasors[:, 1], fits[0].phasors[:, 1])
-    assert mended.lines is true
+    assert corrected.lines is true
     assert retuned(replace(run, acceleration=None), true).acceleration is None
     for share, done in ((0.99, True), (1.01, False), (-1.01, False)):
         other = known_lines((25.0 + share * MAX_RETUNED / LENGTH,), 22.0, RATE)
@@ -166,8 +166,8 @@ def test_a_runout_below_ten_times_its_noise_tells_no_speed(noise, told):
 
 
 def test_where_there_is_no_runout_line_the_tachometer_is_asked():
-    struck = known_lines((22.0,), 22.0, RATE)
-    few = replace(run_of(), lines=struck)
+    coincident = known_lines((22.0,), 22.0, RATE)
+    few = replace(run_of(), lines=coincident)
     assert speeds_from_runout(few, RATE) is None
     short = run_of()
     short.displacement.phasors[2:] = np.nan

@@ -32,7 +32,7 @@ _MIN_RUNS, _MOST = 4, 1 / 3
 
 
 @dataclass(frozen=True)
-class Answer:
+class RunResponse:
     """One dynamic run: force and displacement phasors."""
 
     seen: Observation
@@ -53,7 +53,7 @@ class Answer:
         return to_plane(self.channels, self.readings)
 
 
-def answer_of(seen: Observation, mass: float) -> Answer | None:
+def response_of(seen: Observation, mass: float) -> RunResponse | None:
     """Take the phasors of a run; None where it does not show them, or its force is in doubt already."""
     where = seen.pick("displacement")
     force = oil_force(seen, mass)
@@ -62,22 +62,22 @@ def answer_of(seen: Observation, mass: float) -> Answer | None:
     readings = seen.lines.phasor[where]
     if not np.all(np.isfinite(readings)) or not np.any(np.abs(readings) > 8 * seen.lines.floor[where]):
         return None
-    return Answer(seen, force, readings, tuple(seen.channels[i] for i in where))
+    return RunResponse(seen, force, readings, tuple(seen.channels[i] for i in where))
 
 
-def _solve_stiffness(answers: Sequence[Answer]) -> ComplexArray | None:
+def _solve_stiffness(responses: Sequence[RunResponse]) -> ComplexArray | None:
     """H of ``F = H D``, least squares; None where the runs excite one direction only."""
-    return stiffness_of(np.stack([a.displacement for a in answers]), np.stack([a.force for a in answers]))
+    return stiffness_of(np.stack([a.displacement for a in responses]), np.stack([a.force for a in responses]))
 
 
-def misfit_of(answer: Answer, stiffness: ComplexArray, repair: FloatArray | None = None) -> float:
+def misfit_of(response: RunResponse, stiffness: ComplexArray, repair: FloatArray | None = None) -> float:
     """Share of the force that H does not explain, after a repair (2, 2) of the displacement readings."""
-    readings = answer.readings if repair is None else repair @ answer.readings
-    predicted = stiffness @ to_plane(answer.channels, readings)
-    return float(np.linalg.norm(answer.force - predicted) / np.linalg.norm(answer.force))
+    readings = response.readings if repair is None else repair @ response.readings
+    predicted = stiffness @ to_plane(response.channels, readings)
+    return float(np.linalg.norm(response.force - predicted) / np.linalg.norm(response.force))
 
 
-def robust_stiffness(group: Sequence[Answer]) -> ComplexArray | None:
+def robust_stiffness(group: Sequence[RunResponse]) -> ComplexArray | None:
     """H with the least median misfit among all pairs of runs, so that a faulty run cannot pull it."""
     best: tuple[float, ComplexArray] | None = None
     for pair in combinations(group[:24], 2):
@@ -95,7 +95,7 @@ def robust_stiffness(group: Sequence[Answer]) -> ComplexArray | None:
 
 
 def check_agreement(
-    group: Sequence[Answer], stiffness: ComplexArray, readings: PointReadings | None = None
+    group: Sequence[RunResponse], stiffness: ComplexArray, readings: PointReadings | None = None
 ) -> set[int]:
     """Name runs that answer otherwise than the others at their operating point; their places in the group."""
     if len(group) < _MIN_RUNS:
@@ -115,7 +115,7 @@ def check_agreement(
     return outliers
 
 
-def _apart(group: Sequence[Answer], known: set[int]) -> set[int]:
+def _apart(group: Sequence[RunResponse], known: set[int]) -> set[int]:
     """Runs beyond chance of the others' matrix, the worst first, until none is left or too many are."""
     apart: set[int] = set(known)
     while len(apart) + 1 <= _MOST * len(group):
@@ -130,7 +130,7 @@ def _apart(group: Sequence[Answer], known: set[int]) -> set[int]:
     return apart
 
 
-def _distance(one: Answer, others: Sequence[Answer]) -> tuple[float, float]:
+def _distance(one: RunResponse, others: Sequence[RunResponse]) -> tuple[float, float]:
     """How far a run is from the others' matrix: over what chance allows, and as a share of its force.
 
     With s^2 the others' variance per equation and d the run's displacement, its residual r has the variance
@@ -156,27 +156,27 @@ def _as_if(name: str, gain: float) -> str:
     return f"; as if {name} read {abs(gain - 1):.0%} too {'much' if gain > 1 else 'little'}"
 
 
-def _tell(answer: Answer, stiffness: ComplexArray, gain: str) -> None:
-    misfit = misfit_of(answer, stiffness)
-    hint = _name_misfit(answer, stiffness, misfit) or gain
+def _tell(response: RunResponse, stiffness: ComplexArray, gain: str) -> None:
+    misfit = misfit_of(response, stiffness)
+    hint = _name_misfit(response, stiffness, misfit) or gain
     severity: Severity = "error" if misfit > 0.5 or (hint and misfit > 0.2) else "warning"
     share = f"{misfit:.0%}" if misfit > 0.1 else f"{misfit:.1%}"
     what = f"differs by {share} from the other runs at this operating point{hint}"
     cure = "Check this run's channels and set points; leave it out or repeat it"
-    answer.seen.report.say("disagrees", severity, "displacement and force", what, cure)
+    response.seen.report.say("disagrees", severity, "displacement and force", what, cure)
 
 
-def _name_misfit(answer: Answer, stiffness: ComplexArray, misfit: float) -> str:
+def _name_misfit(response: RunResponse, stiffness: ComplexArray, misfit: float) -> str:
     """Name the one wiring fault of probes or cells that explains a run apart from the others."""
-    tried = [(misfit_of(answer, stiffness, m), w) for w, m in repairs(answer.channels, scales=True)]
-    seen, where = answer.seen, answer.seen.pick("force")
+    tried = [(misfit_of(response, stiffness, m), w) for w, m in repairs(response.channels, scales=True)]
+    seen, where = response.seen, response.seen.pick("force")
     cells = [seen.channels[i] for i in where]
     if len(cells) == 2 and seen.lines is not None:
         phasors = seen.lines.phasor[where]
         for words, matrix in repairs(cells, scales=True):
             # The inertia part of the force stays: only the cells are supposed to be at fault.
-            force = answer.force + to_plane(cells, matrix @ phasors - phasors)
-            tried.append((misfit_of(replace(answer, force=force), stiffness), words))
+            force = response.force + to_plane(cells, matrix @ phasors - phasors)
+            tried.append((misfit_of(replace(response, force=force), stiffness), words))
     tried.sort()
     clear = tried[0][0] < misfit / 4 and tried[0][0] < tried[1][0] / 2
     return f"; as if {tried[0][1]}" if clear else ""

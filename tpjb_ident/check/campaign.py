@@ -14,7 +14,7 @@ from tpjb_ident.arguments import as_campaign
 from tpjb_ident.check.consistency import check_housing, check_load_ratios, check_positions
 from tpjb_ident.check.findings import Finding, merge
 from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.check.redundant_channels import report_apart
+from tpjb_ident.check.redundant_channels import report_inconsistent_channels
 from tpjb_ident.check.response import check_accelerometers, check_responses
 from tpjb_ident.check.set_points import check_excitation, check_speed, check_static_loads
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_shaft_follows, check_sweeps
@@ -73,7 +73,7 @@ def judged(campaign: Campaign, seen: Sequence[Observation]) -> list[Observation]
     check_responses(of_kind["dynamic"], campaign.housing_mass, of_kind["clearance"])
     check_accelerometers(dynamic)
     check_housing(of_kind["dynamic"])
-    report_apart(dynamic)
+    report_inconsistent_channels(dynamic)
     check_shaft_follows(of_kind["dry_pivot"])
     check_sweeps(of_kind["clearance"])
     check_locus(of_kind["locus"])

@@ -32,7 +32,7 @@ RECTANGLE = math.sqrt(2.0 / 3.0)
 
 
 @dataclass(frozen=True)
-class ApartChannels:
+class InconsistentChannels:
     """Channels of one quantity that do not tell the same vector."""
 
     quantity: str
@@ -55,7 +55,7 @@ class ApartChannels:
         )
 
 
-def channels_apart(runs: Sequence[Observation]) -> tuple[ApartChannels, ...]:
+def inconsistent_channels(runs: Sequence[Observation]) -> tuple[InconsistentChannels, ...]:
     """Find the quantities whose channels contradict each other in all runs alike."""
     found = []
     for quantity in ("displacement", "force"):
@@ -72,7 +72,7 @@ def channels_apart(runs: Sequence[Observation]) -> tuple[ApartChannels, ...]:
     return tuple(found)
 
 
-def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) -> ApartChannels | None:
+def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) -> InconsistentChannels | None:
     """Judge the phasors (n, m) of one set of channels: one of every sine, several of an excitation over a band."""
     along = directions([float(c.axis or 0.0) for c in channels])
     if len(phasors) < MIN_RUNS or np.linalg.matrix_rank(along) < 2:
@@ -93,13 +93,13 @@ def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) ->
     allowed = np.sqrt(np.diag((inverse @ real) @ np.diag(stated**2) @ (inverse @ real).T))
     if not (np.abs(gains) > np.maximum(CLEAR * allowed, SEEN * noise)).any():
         return None
-    return ApartChannels(quantity, tuple(c.name for c in channels), -np.asarray(gains))
+    return InconsistentChannels(quantity, tuple(c.name for c in channels), -np.asarray(gains))
 
 
-def report_apart(runs: Sequence[Observation]) -> None:
+def report_inconsistent_channels(runs: Sequence[Observation]) -> None:
     """Warn of channels that contradict each other, and note what that adds to the uncertainty of their gains."""
     cure = "Calibrate them against each other, or state the `uncertainty` of their gains"
-    for apart in channels_apart(runs):
+    for apart in inconsistent_channels(runs):
         for report in {seen.run.id: seen.report for seen in runs if seen.pick(apart.quantity)}.values():
             report.gains.update(apart.uncertainty())
             place = f"channels {', '.join(apart.names)}"

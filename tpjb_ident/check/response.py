@@ -14,7 +14,7 @@ import numpy as np
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
 from tpjb_ident.arrays import AnyArray, ComplexArray, FloatArray
-from tpjb_ident.check.agreement import Answer, answer_of, check_agreement, misfit_of, robust_stiffness
+from tpjb_ident.check.agreement import RunResponse, check_agreement, misfit_of, response_of, robust_stiffness
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.run_gains import check_gains, point_readings, probe_centres
 from tpjb_ident.check.set_points import excited, plane_of, to_plane
@@ -29,15 +29,15 @@ _MAX_ANISOTROPY = 6.0
 
 def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[Observation] = ()) -> None:
     """Compare the dynamic runs of every operating point with each other and with what a film can do."""
-    groups: dict[object, list[Answer]] = {}
+    groups: dict[object, list[RunResponse]] = {}
     for seen in runs:
         point = seen.run.point
         if shaft_order(point.excitation_hz, point.shaft_speed_hz):  # runout answers there too, as no film does
             continue
-        answer = answer_of(seen, mass)
-        if answer is not None:
-            names = tuple(c.name for c in answer.channels)
-            groups.setdefault((seen.run.point, names), []).append(answer)
+        response = response_of(seen, mass)
+        if response is not None:
+            names = tuple(c.name for c in response.channels)
+            groups.setdefault((seen.run.point, names), []).append(response)
     centres = probe_centres(sweeps)
     for group in groups.values():
         stiffness = robust_stiffness(group)
@@ -66,7 +66,7 @@ def mirrored(channels: Sequence[Channel], repair: FloatArray) -> FloatArray:
     return np.asarray(plane @ repair @ np.linalg.inv(plane))
 
 
-def _check_signs(group: Sequence[Answer], stiffness: ComplexArray) -> None:
+def _check_signs(group: Sequence[RunResponse], stiffness: ComplexArray) -> None:
     """Positive stiffness and damping; most of the runs must agree, else there is no one answer to judge."""
     if np.median([misfit_of(a, stiffness) for a in group]) > _NO_ANSWER:
         return
@@ -78,14 +78,14 @@ def _check_signs(group: Sequence[Answer], stiffness: ComplexArray) -> None:
     hint = name_fault(channels, lambda repair: _film_like(stiffness @ np.linalg.inv(mirrored(channels, repair))))
     damping = float(np.linalg.eigvalsh((stiffness.imag + stiffness.imag.T) / 2)[0])
     kind = "damping" if definiteness(stiffness.real) > _DEFINITE else "stiffness"
-    for answer in group:
+    for response in group:
         what = f"answer the force with negative {kind}, which a film does not have{hint}"
         cure = "Check axis, polarity and cables of the probes (and of the cells)"
         severity: Severity = "error" if hint or damping < 0 else "warning"
-        answer.seen.report.say(f"signs {names}{hint}", severity, f"channels {names}", what, cure)
+        response.seen.report.say(f"signs {names}{hint}", severity, f"channels {names}", what, cure)
 
 
-def _check_scales(group: Sequence[Answer], stiffness: ComplexArray, names: str) -> None:
+def _check_scales(group: Sequence[RunResponse], stiffness: ComplexArray, names: str) -> None:
     """A film is not many times stiffer along one probe than along the other."""
     channels = group[0].channels
     sizes = np.linalg.norm(stiffness @ plane_of(channels), axis=0)
@@ -96,9 +96,9 @@ def _check_scales(group: Sequence[Answer], stiffness: ComplexArray, names: str) 
         f"{large} moves {sizes.max() / sizes.min():.0f} times more per force than {small}; "
         "as if one sensitivity were ten times off"
     )
-    for answer in group:
+    for response in group:
         cure = "Check the sensitivities of the two probes"
-        answer.seen.report.say(f"scales {names}", "warning", f"channels {names}", what, cure)
+        response.seen.report.say(f"scales {names}", "warning", f"channels {names}", what, cure)
 
 
 def check_accelerometers(runs: Sequence[Observation]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigdata.calibration import Channel
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.check.agreement import Answer
+from tpjb_ident.check.agreement import RunResponse
 from tpjb_ident.check.gain_evidence import PointReadings
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.one_gain import WrongGain, wrong_gains
@@ -21,13 +21,13 @@ _MEDIAN = math.sqrt(2 * math.log(2))
 _SECTORS, _MET = 36, 0.9
 
 
-def check_gains(group: Sequence[Answer], known_outliers: Collection[int], readings: PointReadings) -> None:
+def check_gains(group: Sequence[RunResponse], known_outliers: Collection[int], readings: PointReadings) -> None:
     """Name runs with one wrong gain."""
     for found in wrong_gains(readings, known_outliers):
         _tell(group[found.run], found, [group[0].names[i] for i in found.channels])
 
 
-def point_readings(group: Sequence[Answer], centres: dict[str, float]) -> PointReadings | None:
+def point_readings(group: Sequence[RunResponse], centres: dict[str, float]) -> PointReadings | None:
     """Phasors and means of all runs of a point, by channel.
 
     None where they have not the same two cells, or no means.
@@ -88,9 +88,9 @@ def swept_centre(load: FloatArray, reading: FloatArray) -> float | None:
     return float(np.mean(middles)) if len(middles) >= _MET * _SECTORS else None
 
 
-def _tell(answer: Answer, found: WrongGain, names: Sequence[str]) -> None:
+def _tell(response: RunResponse, found: WrongGain, names: Sequence[str]) -> None:
     cure = "Check this channel's amplifier, range and cable in this run; leave it out or repeat it"
-    answer.seen.report.say(f"gain {names[0]}", "warning", f"channel {names[0]}", gain_in_words(found, names), cure)
+    response.seen.report.say(f"gain {names[0]}", "warning", f"channel {names[0]}", gain_in_words(found, names), cure)
 
 
 def gain_in_words(found: WrongGain, names: Sequence[str]) -> str:

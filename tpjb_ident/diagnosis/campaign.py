@@ -18,7 +18,7 @@ from tpjb_ident.compare.measured_pivots import measured_laws
 from tpjb_ident.compare.static_tests import measure_static
 from tpjb_ident.diagnosis.diagnose import Diagnosis, before_and_after, diagnose, median_deviations
 from tpjb_ident.diagnosis.forward.forward import SENSOR
-from tpjb_ident.diagnosis.forward.tolerances import Stated, Tolerances
+from tpjb_ident.diagnosis.forward.tolerances import StatedTolerance, Tolerances
 from tpjb_ident.diagnosis.observations.from_table import observe_table
 from tpjb_ident.diagnosis.observations.observe import observe
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
@@ -228,7 +228,7 @@ def _stated_tolerances(campaign: Campaign, bearing: Bearing, known: Tolerances) 
         found = replace(found, probe_axes=(float(probes[0].axis or 0.0), float(probes[1].axis or 0.0)))
     if cells:
         gain = max(float(c.uncertainty or 0.0) for c in cells)
-        found = replace(found, cell_gain=Stated(gain, "manifest"))
+        found = replace(found, cell_gain=StatedTolerance(gain, "manifest"))
     return found
 
 

@@ -86,14 +86,14 @@ class ChangedForward(Forward):
 
 def designs(setup: Setup, layout: Layout) -> tuple[Design, ...]:
     """List tests on this rig that go beyond a campaign's own."""
-    at = _Measured.of(layout, len(setup.bearing.pads))
+    at = _OperatingRange.of(layout, len(setup.bearing.pads))
     return (
         *_other_lines(at), *_other_points(at), *_other_rigs(setup, at), *_static(at), *_dry(layout, at.pads)
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class _Measured:
+class _OperatingRange:
     """Where a campaign has been: middle, top and lowest load [N], direction, speed, lines [rad/s], pads."""
 
     load: float
@@ -105,7 +105,7 @@ class _Measured:
     pads: int
 
     @classmethod
-    def of(cls, layout: Layout, pads: int) -> _Measured:
+    def of(cls, layout: Layout, pads: int) -> _OperatingRange:
         points = [(t.load, t.direction, t.speed) for t in layout.dynamic] or [(5000.0, -math.pi / 2, 22.0 * HZ)]
         load, direction, speed = sorted(points)[len(points) // 2]
         lines = tuple(sorted({w for t in layout.dynamic for w in t.excitation})) or (speed,)
@@ -122,7 +122,7 @@ class _Measured:
         return dynamic(loads, lines, faster * self.speed, self.direction, pads)
 
 
-def _other_lines(at: _Measured) -> list[Design]:
+def _other_lines(at: _OperatingRange) -> list[Design]:
     sweep = [HZ * f for f in (10.0, 20.0, 30.0, 40.0, 50.0)]
     far = [HZ * f for f in (60.0, 90.0, 120.0, 150.0)]
     return [
@@ -136,7 +136,7 @@ def _other_lines(at: _Measured) -> list[Design]:
     ]
 
 
-def _other_points(at: _Measured) -> list[Design]:
+def _other_points(at: _OperatingRange) -> list[Design]:
     between = replace(at, direction=at.direction + math.pi / at.pads)
     loads = [at.low, at.load, at.top]
     out = [
@@ -158,7 +158,7 @@ def _other_points(at: _Measured) -> list[Design]:
     ]
 
 
-def _other_rigs(setup: Setup, at: _Measured) -> list[Design]:
+def _other_rigs(setup: Setup, at: _OperatingRange) -> list[Design]:
     """Tests for which the rig is changed."""
     sweep = Layout(at.tests([at.low, at.load, at.top], at.lines[:1], True))
     out = [
@@ -187,7 +187,7 @@ def _hotter(setup: Setup, by: float) -> Setup:
     return setup.change(supply_change=setup.supply_change + by)
 
 
-def _static(at: _Measured) -> list[Design]:
+def _static(at: _OperatingRange) -> list[Design]:
     return [
         *(
             Design(f"a shaft locus over 20 load directions at {w:.0f} N", Layout((), around(w, 20, at.speed)))

@@ -29,7 +29,7 @@ from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.identify_point import Completion, first_estimate, own_method, point_figures, point_result
 from tpjb_ident.dynamic.instruments.amplitude import ZeroAmplitude, zero_amplitude
-from tpjb_ident.dynamic.instruments.findings import InstrumentFindings, film_change_at, look_at_instruments
+from tpjb_ident.dynamic.instruments.findings import InstrumentFindings, film_change_at, inspect_instruments
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions, change_spread
 from tpjb_ident.dynamic.records.mains_frequency import mains_frequency
 from tpjb_ident.dynamic.results.gains import Pairs, channel_pairs, gain_doubts, swept_probes, with_probe_doubts
@@ -37,12 +37,12 @@ from tpjb_ident.dynamic.results.identification import Identification, with_syste
 from tpjb_ident.dynamic.results.point_result import PointResult, lost_points, named_at_points
 from tpjb_ident.dynamic.runs.baseline import measured_baseline
 from tpjb_ident.dynamic.runs.checked_runs import check_conditions, check_finished
+from tpjb_ident.dynamic.runs.excluded_runs import named_runs
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
-from tpjb_ident.dynamic.runs.left_out import named_runs
 from tpjb_ident.dynamic.runs.point_source import PointSource, point_sources
 from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore
-from tpjb_ident.dynamic.runs.synchronous import freed
+from tpjb_ident.dynamic.runs.synchronous import without_synchronous
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.executors import InProcessWorkers, Workers, in_order
@@ -145,7 +145,7 @@ def assemble(
     workers = workers or InProcessWorkers()
     checked = check_finished(campaign, finished)
     digests = finished.digests
-    findings, sources = look_at_instruments(point_sources(finished), _delays_stated(campaign))
+    findings, sources = inspect_instruments(point_sources(finished), _delays_stated(campaign))
     baseline = measured_baseline(campaign, settings.phasors, own_method(settings.method))
     sources = [replace(source, baseline=baseline) for source in sources]
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
@@ -179,7 +179,7 @@ def assemble(
 
 
 def _first(settings: IdentifySettings, source: PointSource) -> DynamicStiffness:
-    return first_estimate(freed(source.load()), settings)
+    return first_estimate(without_synchronous(source.load()), settings)
 
 
 def _finished(work: _Points, source: PointSource, correction: Correction) -> tuple[PointResult, FloatArray]:
@@ -204,9 +204,9 @@ class _Points:
         """One point with all its uncertainties, and what the draws of the systematic ones do to it."""
         settings, recorded = self.settings, source.load()
         used = correction if settings.correct else correction.measured_only()
-        data, corrected = freed(recorded), freed(used.apply(recorded))
-        struck = source.found(MAINS_ON_LINE)
-        mains = float(np.linalg.norm(self.mains_force)) if struck else 0.0
+        data, corrected = without_synchronous(recorded), without_synchronous(used.apply(recorded))
+        coincident = source.found(MAINS_ON_LINE)
+        mains = float(np.linalg.norm(self.mains_force)) if coincident else 0.0
         figures = point_figures(corrected, settings, self.differ, mains)
         first = figures.by_method[settings.method]
         film = film_change_at(source, first)
@@ -221,7 +221,7 @@ class _Points:
         changes = {"calibration": apparent_change(data, best, self.draws), **self.sources.changes(data, best)}
         systematic = {name: np.cov(change.T, bias=True) for name, change in changes.items()}
         systematic |= self.findings.spreads(data, best) | source.baseline.spread(data) | amplitude_part
-        if struck and self.mains_force.any():
+        if coincident and self.mains_force.any():
             systematic["mains on the cells"] = force_pickup_spread(data, self.mains_force)
         if not settings.keep_weights:
             by_method = {name: _counted_only(est) for name, est in by_method.items()}

@@ -31,10 +31,10 @@ from tpjb_ident.diagnosis.forward.forward import (
     _PLAIN,
     SENSOR,
     Forward,
-    Memory,
+    ModelCache,
     NoEquilibriumError,
     Reading,
-    Solved,
+    SolvedPoint,
     StaticPoint,
 )
 from tpjb_ident.diagnosis.observations.observe import Layout
@@ -145,7 +145,7 @@ def _follow(spline: CubicSpline, value: float) -> FloatArray:
 
 
 @dataclass
-class Emulated(Memory):
+class Emulated(ModelCache):
     """Stands where the model's memory stands, and never solves anything."""
 
     base: Setup | None = None
@@ -179,7 +179,7 @@ class Emulated(Memory):
         return self._last[1]
 
 
-def _latent(found: Solved) -> FloatArray:
+def _latent(found: SolvedPoint) -> FloatArray:
     """Direct coefficients as logarithms where they are positive, cross ones against them."""
     h = found.h
     direct = np.stack([h[:, 0, 0].real, h[:, 1, 1].real, h[:, 0, 0].imag, h[:, 1, 1].imag])
@@ -192,7 +192,7 @@ def _latent(found: Solved) -> FloatArray:
 _SCALE = 3e7
 
 
-def _solved(latent: FloatArray, point: StaticPoint, lines: int) -> Solved:
+def _solved(latent: FloatArray, point: StaticPoint, lines: int) -> SolvedPoint:
     direct = _SCALE * np.sinh(latent[: 4 * lines].reshape(4, lines))
     cross = _SCALE * latent[4 * lines : 8 * lines].reshape(4, lines)
     h = np.empty((lines, 2, 2), complex)
@@ -200,7 +200,7 @@ def _solved(latent: FloatArray, point: StaticPoint, lines: int) -> Solved:
     h[:, 0, 1], h[:, 1, 0] = cross[0] + 1j * cross[2], cross[1] + 1j * cross[3]
     rest = latent[8 * lines :]
     force = point[0] * np.array([math.cos(point[1]), math.sin(point[1])])
-    return Solved(h, rest[:2] / 1e5, force, rest[2:7], rest[7:12] * 1e3)
+    return SolvedPoint(h, rest[:2] / 1e5, force, rest[2:7], rest[7:12] * 1e3)
 
 
 def emulate(forward: Forward, more: Layout, kept: Path | None = None) -> Emulated:
@@ -230,13 +230,13 @@ def _asked(*layouts: Layout) -> Iterator[tuple[StaticPoint, tuple[float, ...]]]:
 
 def solve(forward: Forward, setup: Setup, points: Any) -> FloatArray:
     """Answers of the model itself, in the emulator's numbers."""
-    memory = Memory({}, dict(forward.memory.start))
+    cache = ModelCache({}, dict(forward.cache.start))
     key = setup.change(**_PLAIN)
     sensors = (SENSOR,) * len(setup.bearing.pads)
     out = []
     for point, lines in points:
-        memory.ask(key, point, lines, sensors)
-        out.append(_latent(memory.solved[key][(point, lines, sensors)]))
+        cache.ask(key, point, lines, sensors)
+        out.append(_latent(cache.solved[key][(point, lines, sensors)]))
     return np.concatenate(out)
 
 

@@ -107,12 +107,12 @@ def bench(name: str, folder: Path | None, skip: frozenset[str] = SKIPPED) -> Ben
     observations = planned_observations(setup, layout)
     model = Forward(setup, layout, observations.elements)
     model()
-    memory = model.memory
+    cache = model.cache
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        memory = emulate(model, new, folder / f"{name}.table")
-    forward = Forward(setup, layout, observations.elements, memory)
-    elsewhere = Forward(setup, new, planned_observations(setup, new).elements, memory)
+        cache = emulate(model, new, folder / f"{name}.table")
+    forward = Forward(setup, layout, observations.elements, cache)
+    elsewhere = Forward(setup, new, planned_observations(setup, new).elements, cache)
     problem = pose(observations, forward, DiagnoseSettings(workers=1, skip=skip))
     base = baseline_fit(problem)
     seen = {}
@@ -257,7 +257,9 @@ def run(one: Bench, kind: str, seed: int, settings: DiagnoseSettings) -> dict[st
     return {
         "kind": kind, "seed": seed, **hidden(drawn), **said(verdict), "gap": verdict.gap,
         "remainder": verdict.remainder.sigma, "p": verdict.remainder.p, "reasons": list(verdict.reasons),
-        "worth": [(c.label, w.unseen, w.beside) for c, w in zip(found.model.candidates, found.worth, strict=True)],
+        "worth": [
+            (c.label, w.unseen, w.beside) for c, w in zip(found.model.candidates, found.effect_gain, strict=True)
+        ],
         "singles": [(f.label, f.evidence - found.baseline.evidence) for f in found.singles[:5]],
         "elsewhere": _elsewhere(one, drawn, found.effects.effects if verdict.effects else ()),
         "seconds": time.process_time() - began,

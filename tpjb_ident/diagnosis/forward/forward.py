@@ -33,7 +33,7 @@ class NoEquilibriumError(TpjbError):
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolvedPoint:
     """What a bearing alone does at one static point, before structure and instruments."""
 
     #: (n, 2, 2) complex, N/m
@@ -59,7 +59,7 @@ class Solved:
 
 @dataclass(frozen=True)
 class Reading:
-    """What the records of a static point would show; arrays as of `Solved`."""
+    """What the records of a static point would show; arrays as of `SolvedPoint`."""
 
     h: ComplexArray
     position: FloatArray
@@ -69,16 +69,16 @@ class Reading:
 
 
 @dataclass
-class Memory:
+class ModelCache:
     """Solved points of one bearing, and the equilibria from which others start."""
 
-    solved: dict[Setup, dict[Key, Solved]] = field(default_factory=dict, repr=False)
+    solved: dict[Setup, dict[Key, SolvedPoint]] = field(default_factory=dict, repr=False)
     start: dict[StaticPoint, Equilibrium] = field(default_factory=dict, repr=False)
-    _last: tuple[Setup, Setup, dict[Key, Solved]] | None = field(default=None, repr=False)
+    _last: tuple[Setup, Setup, dict[Key, SolvedPoint]] | None = field(default=None, repr=False)
 
-    def copy(self) -> Memory:
+    def copy(self) -> ModelCache:
         """Return a memory of its own that begins with the same knowledge."""
-        return Memory({setup: dict(known) for setup, known in self.solved.items()}, dict(self.start))
+        return ModelCache({setup: dict(known) for setup, known in self.solved.items()}, dict(self.start))
 
     def ask(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]) -> Reading:
         """Look a point up, or solve it."""
@@ -93,7 +93,9 @@ class Memory:
             found = known[key] = self._solve(plain, point, lines, sensors)
         return found.read(setup, lines)
 
-    def _solve(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]) -> Solved:
+    def _solve(
+        self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]
+    ) -> SolvedPoint:
         load, direction, speed = point
         force = load * np.array([math.cos(direction), math.sin(direction)])
         running, found = solve_as_it_runs(setup, force, speed, self.start.get(point))
@@ -103,7 +105,7 @@ class Memory:
         h = bearing_impedance(running, found, np.array(lines)) if lines else np.zeros((0, 2, 2), complex)
         warm = np.array([film.temperature_at(place) for film, place in zip(found.films, sensors, strict=True)])
         loads = np.array([film.forces.force[0] if film.forces is not None else 0.0 for film in found.films])
-        return Solved(h, found.position, force, warm, loads)
+        return SolvedPoint(h, found.position, force, warm, loads)
 
 
 __all__ = ["Forward", "ForwardModel", "NoEquilibriumError"]
@@ -132,7 +134,7 @@ class Forward:
     setup: Setup
     layout: Layout
     elements: tuple[Element, ...] = field(repr=False)
-    memory: Memory = field(default_factory=Memory, repr=False)
+    cache: ModelCache = field(default_factory=ModelCache, repr=False)
     _shares: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)
 
     def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
@@ -140,7 +142,7 @@ class Forward:
         setup = apply_effects(self.setup, effects)
         if change is not None:
             setup = change(setup)
-        table = _Answers(setup)
+        table = _PredictedTable(setup)
         for test in self.layout.dynamic:
             point = (test.load, test.direction, test.speed)
             reading = self._solve(setup, point, test.excitation)
@@ -158,7 +160,7 @@ class Forward:
 
     def fresh(self) -> Forward:
         """Return a copy that knows what this one knows now, whatever this one goes on to solve."""
-        return Forward(self.setup, self.layout, self.elements, self.memory.copy(), dict(self._shares))
+        return Forward(self.setup, self.layout, self.elements, self.cache.copy(), dict(self._shares))
 
     def pad_shares(self) -> FloatArray:
         """Share of the static load on the pad of every temperature element at the last call; NaN elsewhere, (n,)."""
@@ -175,14 +177,14 @@ class Forward:
         return (*given, *(SENSOR for _ in range(len(self.setup.bearing.pads) - len(given))))
 
     def _solve(self, setup: Setup, point: StaticPoint, excitation: Sequence[float]) -> Reading:
-        return self.memory.ask(setup, point, tuple(excitation), self._sensors)
+        return self.cache.ask(setup, point, tuple(excitation), self._sensors)
 
 
 _ROW = {"xx": (0, 0), "xy": (0, 1), "yx": (1, 0), "yy": (1, 1)}
 
 
 @dataclass
-class _Answers:
+class _PredictedTable:
     setup: Setup
     table: dict[tuple[object, ...], float] = field(default_factory=dict)
 

@@ -39,7 +39,7 @@ class Nuisance:
     change: Callable[[Setup, float], Setup] | None = None
     #: (n,): change of the observation vector per `sigma`
     column: FloatArray | None = field(default=None, repr=False, compare=False)
-    twins: frozenset[str] = frozenset()
+    aliases: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -79,27 +79,31 @@ def nuisances(
     for pad in pads:
         offset = functools.partial(_offset, pad=pad)
         scatter = known["clearance_scatter"], "m", f"pad {pad}", offset
-        found.append(Nuisance("clearance_scatter", *scatter, twins=frozenset({f"pad_offset pad {pad}", "uneven_pads"})))
-        softer = functools.partial(_softer, pad=pad)
-        twin = frozenset({f"soft_pivot pad {pad}"})
         found.append(
-            Nuisance("pivot_stiffness_scatter", known["pivot_stiffness_scatter"], "1", f"pad {pad}", softer, twins=twin)
+            Nuisance("clearance_scatter", *scatter, aliases=frozenset({f"pad_offset pad {pad}", "uneven_pads"}))
+        )
+        softer = functools.partial(_softer, pad=pad)
+        alias = frozenset({f"soft_pivot pad {pad}"})
+        found.append(
+            Nuisance(
+                "pivot_stiffness_scatter", known["pivot_stiffness_scatter"], "1", f"pad {pad}", softer, aliases=alias
+            )
         )
     for i in range(2):
         gain = functools.partial(_probe, axes=known.probe_axes, index=i)
         found.append(Nuisance("probe_gain", known["probe_gain"], "1", f"probe {i + 1}", gain,
-                              twins=frozenset({"probe_gain"})))  # fmt: skip
+                              aliases=frozenset({"probe_gain"})))  # fmt: skip
         cell = functools.partial(_cell, index=i)
         found.append(Nuisance("cell_gain", known.cell_gain.value, "1", f"cell {'xy'[i]}", cell,
-                              twins=frozenset({"loadcell_gain"})))  # fmt: skip
+                              aliases=frozenset({"loadcell_gain"})))  # fmt: skip
     found += _readings(elements, known)
     return tuple(one for one in found if one.sigma > 0.0)
 
 
 def _whole(
-    name: str, unit: str, change: Callable[[Setup, float], Setup], known: Tolerances, *twins: str
+    name: str, unit: str, change: Callable[[Setup, float], Setup], known: Tolerances, *aliases: str
 ) -> Nuisance:  # fmt: skip
-    return Nuisance(name, known[name], unit, "", change, twins=frozenset(twins))
+    return Nuisance(name, known[name], unit, "", change, aliases=frozenset(aliases))
 
 
 def _readings(elements: Sequence[Element], known: Tolerances) -> list[Nuisance]:

@@ -17,7 +17,7 @@ from tpjb_ident.errors import BadInputError
 
 
 @dataclass(frozen=True)
-class Stated:
+class StatedTolerance:
     """One stated tolerance: one standard deviation in SI, and where it comes from."""
 
     value: float
@@ -44,9 +44,9 @@ DEFAULTS: dict[str, tuple[float, str]] = {
 class Tolerances:
     """Everything that may be off without being a finding."""
 
-    stated: Mapping[str, Stated] = field(default_factory=lambda: dict(_defaults()))
+    stated: Mapping[str, StatedTolerance] = field(default_factory=lambda: dict(_defaults()))
     probe_axes: tuple[float, float] = (math.pi / 4, 3 * math.pi / 4)
-    cell_gain: Stated = Stated(0.002)
+    cell_gain: StatedTolerance = StatedTolerance(0.002)
     centre: float = 10e-6
 
     def __getitem__(self, name: str) -> float:
@@ -68,7 +68,7 @@ class Tolerances:
                 raise BadInputError(f"tolerance {name} ({source}): {error}") from error
             if not 0.0 <= number < math.inf:
                 raise BadInputError(f"tolerance {name} ({source}): must be zero or more, got {value!r}.")
-            table[name] = Stated(number, source)
+            table[name] = StatedTolerance(number, source)
         return Tolerances(table, self.probe_axes, self.cell_gain, self.centre)
 
     def layered(self, bearing: Bearing) -> Tolerances:
@@ -77,5 +77,5 @@ class Tolerances:
         return self.states(dict(bearing.tolerances), "bearing file").states(typed, "command line")
 
 
-def _defaults() -> dict[str, Stated]:
-    return {name: Stated(value) for name, (value, _) in DEFAULTS.items()}
+def _defaults() -> dict[str, StatedTolerance]:
+    return {name: StatedTolerance(value) for name, (value, _) in DEFAULTS.items()}

@@ -174,7 +174,7 @@ def observe(
 
 def _add_dynamic(builder: _Builder, identification: Identification, tolerance: Tolerance) -> tuple[DynamicTest, ...]:
     tests: dict[tuple[float, float, float], list[int]] = {}
-    points = [p for p in identification.points if not _struck_by_mains(p)] or list(identification.points)
+    points = [p for p in identification.points if not _mains_on_excitation(p)] or list(identification.points)
     for i, p in enumerate(points):
         key = (p.point.static_load, p.point.static_load_direction, p.point.shaft_speed)
         tests.setdefault(key, []).append(i)
@@ -195,7 +195,7 @@ def _add_dynamic(builder: _Builder, identification: Identification, tolerance: T
     return tuple(out)
 
 
-def _struck_by_mains(result: PointResult) -> bool:
+def _mains_on_excitation(result: PointResult) -> bool:
     """Whether mains hum lies on the excitation and could not be taken off: no interval covers that."""
     return MAINS_ON_LINE in result.quality and MAINS_CORRECTED not in result.quality
 

@@ -21,7 +21,7 @@ def build(candidates: Sequence[Candidate], amplitudes: Sequence[FloatArray]) -> 
 
 
 @dataclass(frozen=True)
-class Start:
+class InitialFit:
     """Where a model stands: where a fit begins, or a step leads."""
 
     candidates: tuple[Candidate, ...]
@@ -56,18 +56,18 @@ class Start:
 
 
 @dataclass(frozen=True)
-class Fit(Start):
+class Fit(InitialFit):
     """Effects fitted together, nuisances beside them."""
 
     #: (n,): where the model stands, readings included
     prediction: FloatArray = field(repr=False)
     assessment: Assessment = field(repr=False)
-    settled: bool = field(default=False, repr=False)
+    converged: bool = field(default=False, repr=False)
 
     @property
-    def start(self) -> Start:
+    def start(self) -> InitialFit:
         """Where it stands, without what it is worth: little to send to another process."""
-        return Start(self.candidates, self.amplitudes, self.jacobian, self.nuisance, self.columns)
+        return InitialFit(self.candidates, self.amplitudes, self.jacobian, self.nuisance, self.columns)
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -118,7 +118,7 @@ class Fit(Start):
         return self.prediction + columns @ (free - self.free)
 
 
-def linear(problem: Problem, start: Start, prediction: FloatArray, slack: float = 1.0) -> Linear:
+def linear(problem: Problem, start: InitialFit, prediction: FloatArray, slack: float = 1.0) -> Linear:
     """Linear model about a prediction; `prediction` (n,)."""
     columns = problem.scaled(np.column_stack([start.jacobian, start.columns]))
     width = start.width.copy()
@@ -127,7 +127,7 @@ def linear(problem: Problem, start: Start, prediction: FloatArray, slack: float 
     return Linear(residual, columns, width)
 
 
-def fitted(problem: Problem, start: Start, prediction: FloatArray, scales: FloatArray | None = None) -> Fit:
+def fitted(problem: Problem, start: InitialFit, prediction: FloatArray, scales: FloatArray | None = None) -> Fit:
     """A fit where a model stands, assessed; `prediction` (n,), `scales` (c,)."""
     found = assess(problem.basis, linear(problem, start, prediction), scales)
     return Fit(start.candidates, start.amplitudes, start.jacobian, start.nuisance, start.columns, prediction, found)

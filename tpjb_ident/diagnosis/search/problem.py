@@ -56,10 +56,10 @@ class Problem:
         """A vector (n,) or columns (n, k) in units of `sigma`."""
         return np.asarray(vector / (self.sigma if vector.ndim == 1 else self.sigma[:, None]))
 
-    def twins(self, candidate: Candidate) -> list[int]:
+    def aliases(self, candidate: Candidate) -> list[int]:
         """Nuisances that do what a candidate does."""
         names = {candidate.name, candidate.label}
-        return [i for i, one in enumerate(self.nuisances) if names & one.twins]
+        return [i for i, one in enumerate(self.nuisances) if names & one.aliases]
 
 
 def loosened(observations: Observations, shares: FloatArray, tolerance: Tolerance) -> Observations:

@@ -11,12 +11,14 @@ import numpy as np
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.candidates import Candidate
 from tpjb_ident.diagnosis.forward.workers import Map
-from tpjb_ident.diagnosis.search.descend import attempt, fit
-from tpjb_ident.diagnosis.search.fit import Fit, Start, fitted
+from tpjb_ident.diagnosis.search.converge import converge
+from tpjb_ident.diagnosis.search.effect_gain import STAND_IN
+from tpjb_ident.diagnosis.search.fit import Fit, InitialFit, fitted
+from tpjb_ident.diagnosis.search.minimise import attempt, fit
 from tpjb_ident.diagnosis.search.problem import Problem
 from tpjb_ident.diagnosis.search.screen import (
+    AmplitudePaths,
     Columns,
-    Courses,
     Score,
     alone,
     columns,
@@ -25,8 +27,6 @@ from tpjb_ident.diagnosis.search.screen import (
     with_model,
 )
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
-from tpjb_ident.diagnosis.search.settle import settle
-from tpjb_ident.diagnosis.search.worth import STAND_IN
 
 #: How often a model takes derivatives of its own while the search goes on.
 ROUNDS_ON_THE_WAY = 2
@@ -48,14 +48,14 @@ class Proposals:
     drawn: Fit
     #: (n, k): derivatives of every candidate there
     first: Columns = field(repr=False)
-    courses: Courses = field(repr=False)
+    paths: AmplitudePaths = field(repr=False)
 
     def extended(self, model: Fit, table: Columns) -> list[Fit]:
         """Fits of a model with one candidate more, best first; `table` (n, k) each."""
         free = self._free(model, table)
-        ranked = self._promising(scores(self.problem, model, free, courses=self.courses))
+        ranked = self._promising(scores(self.problem, model, free, paths=self.paths))
         known = {s.candidates for s in ranked}
-        starts = [with_model(model, s, free, self.courses) for s in ranked]
+        starts = [with_model(model, s, free, self.paths) for s in ranked]
         starts += [s for s in instead(self.problem, model, free, STAND_IN) if s.candidates[-1:] not in known]
         return self.fits(starts)
 
@@ -65,13 +65,13 @@ class Proposals:
         `table` (n, k) each.
         """
         free = self._free(drawn, table)
-        every = scores(self.problem, drawn, free, courses=self.courses)
+        every = scores(self.problem, drawn, free, paths=self.paths)
         ranked = self._promising(every)
         # a fit of a large effect may end on either side of a hill: it begins at both sizes that were proposed
-        first = alone(self.problem, drawn, free, self.courses)[:ALONE]
+        first = alone(self.problem, drawn, free, self.paths)[:ALONE]
         names = {s.candidates for s in first} - {s.candidates for s in ranked}
         ranked = [*ranked, *first, *(s for s in every if s.candidates in names)]
-        return best_of(self.fits([with_model(drawn, s, free, self.courses) for s in ranked]))
+        return best_of(self.fits([with_model(drawn, s, free, self.paths) for s in ranked]))
 
     def _free(self, model: Fit, table: Columns) -> Columns:
         """Derivatives of the candidates that a model has not."""
@@ -99,7 +99,7 @@ class Proposals:
         ranked = scores(self.problem, self.drawn, table, pairs=True)[:PAIRS]
         return self.fits([with_model(self.drawn, s, table) for s in ranked])
 
-    def fits(self, starts: Sequence[Start]) -> list[Fit]:
+    def fits(self, starts: Sequence[InitialFit]) -> list[Fit]:
         """Fits from their starts, best first."""
         found = self.run(fit, [(start,) for start in starts])
         return sorted((f for f in found if f is not None), key=lambda f: -f.evidence)
@@ -115,14 +115,14 @@ class Proposals:
                 amplitudes.append(np.append(a, [new.about.get("direction", 0.0)] * more))
             model = replace(model, candidates=swapped, amplitudes=tuple(amplitudes), jacobian=np.column_stack(parts))
             model = fitted(self.problem, model.start, model.prediction, model.assessment.scales)
-        return settle(self.run, self.problem, model, ROUNDS_ON_THE_WAY)
+        return converge(self.run, self.problem, model, ROUNDS_ON_THE_WAY)
 
     def renewed(self, model: Fit) -> dict[Candidate, FloatArray]:
         """Derivatives at a model: new ones for the candidates that rank best by those of the baseline."""
         labels = {c.label for c in model.candidates}
         table = {c: v for c, v in self.first.items() if c.label not in labels}
         best = [
-            s.candidates[0] for s in scores(self.problem, model, table, courses=self.courses)[: 2 * self.settings.tried]
+            s.candidates[0] for s in scores(self.problem, model, table, paths=self.paths)[: 2 * self.settings.tried]
         ]
         return table | columns(self.run, model, best)
 
@@ -138,7 +138,7 @@ class Proposals:
         left = [self.problem.scaled(self.problem.observations.value - f.prediction) for f in afresh]
         order = np.argsort([float(z @ z) for z in left])[:FAR]
         found = self.run.together([functools.partial(self.refined, afresh[i]) for i in order])
-        return [settle(self.run, self.problem, f) for f in found if f.evidence > least]
+        return [converge(self.run, self.problem, f) for f in found if f.evidence > least]
 
 
 def best_of(fits: Sequence[Fit]) -> list[Fit]:

@@ -12,10 +12,10 @@ from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.candidates import Candidate
 from tpjb_ident.diagnosis.forward.forward import ForwardModel
 from tpjb_ident.diagnosis.forward.workers import Map
+from tpjb_ident.diagnosis.search.amplitude_path import NODES, AmplitudePath, path_through
 from tpjb_ident.diagnosis.search.assessment import Linear, assess
-from tpjb_ident.diagnosis.search.course import NODES, Course, course_through
-from tpjb_ident.diagnosis.search.descend import attempt, slope
-from tpjb_ident.diagnosis.search.fit import Fit, Start
+from tpjb_ident.diagnosis.search.fit import Fit, InitialFit
+from tpjb_ident.diagnosis.search.minimise import attempt, slope
 from tpjb_ident.diagnosis.search.problem import Problem
 
 #: Shares of a model's own error scales at which candidates are scored: with the right effect added they fall.
@@ -35,7 +35,7 @@ class Score:
 
 
 Columns = Mapping[Candidate, FloatArray]
-Courses = Mapping[Candidate, Course]
+AmplitudePaths = Mapping[Candidate, AmplitudePath]
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Survey:
     secants: Columns
     #: (n, k): the same at the model itself where the curvature is known
     slopes: Columns
-    courses: Courses
+    paths: AmplitudePaths
 
 
 def survey(run: Map, model: Fit, pool: Sequence[Candidate]) -> Survey:
@@ -59,27 +59,27 @@ def survey(run: Map, model: Fit, pool: Sequence[Candidate]) -> Survey:
     order = sorted(pool, key=lambda c: c.name not in SLOW)
     found = dict(zip(order, run(_surveyed, [(model.start, model.prediction, c) for c in order]), strict=True))
     secants, slopes = ({c: found[c][i] for c in pool} for i in range(2))
-    return Survey(secants, slopes, {c: course for c in pool if (course := found[c][2]) is not None})
+    return Survey(secants, slopes, {c: path for c in pool if (path := found[c][2]) is not None})
 
 
 def _surveyed(
-    forward: ForwardModel, problem: Problem, model: Start, y: FloatArray, candidate: Candidate
-) -> tuple[FloatArray, FloatArray, Course | None]:
+    forward: ForwardModel, problem: Problem, model: InitialFit, y: FloatArray, candidate: Candidate
+) -> tuple[FloatArray, FloatArray, AmplitudePath | None]:
     """Secants, slopes, and the course where it can be told."""
     if len(candidate.steps) == 1 and candidate.name not in SLOW:
-        course = _course(forward, problem, model, y, candidate)
-        if course is not None:
-            nearest = int(np.argmin(np.where(course.at == 0.0, np.inf, np.abs(course.at - NODES[0] * candidate.step))))
-            secant = course.columns[:, nearest] / course.at[nearest]
-            return secant[:, None], course.neutral_slope[:, None], course
+        path = _path(forward, problem, model, y, candidate)
+        if path is not None:
+            nearest = int(np.argmin(np.where(path.at == 0.0, np.inf, np.abs(path.at - NODES[0] * candidate.step))))
+            secant = path.columns[:, nearest] / path.at[nearest]
+            return secant[:, None], path.neutral_slope[:, None], path
     parts = [_column(forward, problem, model, y, candidate, i) for i in range(len(candidate.steps))]
     found = np.column_stack(parts)
     return found, found, None
 
 
-def _course(
-    forward: ForwardModel, problem: Problem, model: Start, y: FloatArray, candidate: Candidate
-) -> Course | None:  # fmt: skip
+def _path(
+    forward: ForwardModel, problem: Problem, model: InitialFit, y: FloatArray, candidate: Candidate
+) -> AmplitudePath | None:  # fmt: skip
     """What the model says beside the neutral amplitude; None where it has no equilibrium near it."""
     low, high = (float(v[0]) for v in candidate.limits)
     around, step = candidate.neutral, candidate.step
@@ -94,7 +94,7 @@ def _course(
         if other is not None:
             asked.append(share * step)
             changes.append(other - y)
-    return course_through(asked, changes) if len(changes) > 1 else None
+    return path_through(asked, changes) if len(changes) > 1 else None
 
 
 def columns(run: Map, model: Fit, pool: Sequence[Candidate]) -> dict[Candidate, FloatArray]:
@@ -105,7 +105,7 @@ def columns(run: Map, model: Fit, pool: Sequence[Candidate]) -> dict[Candidate, 
 
 
 def _column(
-    forward: ForwardModel, problem: Problem, model: Start, y: FloatArray, candidate: Candidate, index: int
+    forward: ForwardModel, problem: Problem, model: InitialFit, y: FloatArray, candidate: Candidate, index: int
 ) -> FloatArray:
     start = replace(model, candidates=(*model.candidates, candidate), amplitudes=(*model.amplitudes, candidate.origin))
     at = sum(len(a) for a in model.amplitudes) + index
@@ -114,10 +114,10 @@ def _column(
 
 
 def scores(
-    problem: Problem, model: Fit, table: Columns, pairs: bool = False, courses: Courses | None = None
+    problem: Problem, model: Fit, table: Columns, pairs: bool = False, paths: AmplitudePaths | None = None
 ) -> list[Score]:  # fmt: skip
     """Score candidates, or all pairs of them, beside a model; best first; `table` (n, k) each."""
-    levels = [_Level(problem, model, table, share, courses or {}) for share in SHARES]
+    levels = [_Level(problem, model, table, share, paths or {}) for share in SHARES]
     pool = list(table)
     chosen: list[tuple[Candidate, ...]] = [(c,) for c in pool]
     if pairs:
@@ -126,7 +126,7 @@ def scores(
     return sorted(found, key=lambda s: -s.gain)
 
 
-def alone(problem: Problem, model: Fit, table: Columns, courses: Courses) -> list[Score]:
+def alone(problem: Problem, model: Fit, table: Columns, paths: AmplitudePaths) -> list[Score]:
     """Score candidates by how much of the squared gap they close with nothing else moved, best first.
 
     In units of noise and stated tolerance, element by element. What a large effect does is known between the sizes that
@@ -136,19 +136,19 @@ def alone(problem: Problem, model: Fit, table: Columns, courses: Courses) -> lis
     `table` (n, k) each.
     """
     gap = problem.scaled(problem.observations.value - model.prediction)
-    return sorted((_closing(problem, gap, c, table[c], courses.get(c)) for c in table), key=lambda s: -s.gain)
+    return sorted((_closing(problem, gap, c, table[c], paths.get(c)) for c in table), key=lambda s: -s.gain)
 
 
-def _closing(problem: Problem, gap: FloatArray, c: Candidate, column: FloatArray, course: Course | None) -> Score:
+def _closing(problem: Problem, gap: FloatArray, c: Candidate, column: FloatArray, path: AmplitudePath | None) -> Score:
     low, high = ((v - c.origin) / c.width for v in c.limits)
-    if course is None:
+    if path is None:
         unit = problem.scaled(column) * c.width
         moved = np.linalg.solve(unit.T @ unit + np.eye(unit.shape[1]), unit.T @ gap)
         tried = np.clip(moved, np.maximum(low, -1.0), np.minimum(high, 1.0))[None, :]
         change = tried @ unit.T
     else:
         tried = _grid(low[0], high[0])[:, None]
-        change = course.weights(tried[:, 0] * c.width[0]) @ problem.scaled(course.columns).T
+        change = path.weights(tried[:, 0] * c.width[0]) @ problem.scaled(path.columns).T
     left = np.sum((gap - change) ** 2, axis=1) + np.sum(tried**2, axis=1)
     best = int(np.argmin(left))
     return Score((c,), 0.5 * float(gap @ gap - left[best]), (c.origin + tried[best] * c.width,))
@@ -162,7 +162,7 @@ def _grid(low: float, high: float) -> FloatArray:
 class _Level:
     """Scores at one level of the error scales."""
 
-    def __init__(self, problem: Problem, model: Fit, table: Columns, share: float, courses: Courses) -> None:
+    def __init__(self, problem: Problem, model: Fit, table: Columns, share: float, paths: AmplitudePaths) -> None:
         known = model.assessment.linear
         found = assess(problem.basis, known, np.maximum(model.assessment.scales * share, 1e-5), fixed=True)
         self.offset = found.evidence - model.evidence
@@ -178,25 +178,25 @@ class _Level:
         weighted = found.inverse @ unit
         self.gram, self.toward = unit.T @ weighted, weighted.T @ residual
         self.width = np.concatenate(width)
-        self.courses: dict[Candidate, tuple[Course, FloatArray, FloatArray]] = {}
-        for c in table.keys() & courses.keys():
-            whole = problem.scaled(courses[c].columns)
+        self.paths: dict[Candidate, tuple[AmplitudePath, FloatArray, FloatArray]] = {}
+        for c in table.keys() & paths.keys():
+            whole = problem.scaled(paths[c].columns)
             weighed = found.inverse @ whole
-            self.courses[c] = courses[c], weighed.T @ residual, whole.T @ weighed
+            self.paths[c] = paths[c], weighed.T @ residual, whole.T @ weighed
 
     def _along(self, c: Candidate) -> Score:
         """Score of one amplitude along its course: the best of a grid, and the Gaussian there."""
         width = self.width[self.at[c].start]
-        known, toward, gram = self.courses[c]
+        known, toward, gram = self.paths[c]
         t = _grid(*((float(v[0]) - c.neutral) / width for v in c.limits))
-        course, slopes = known.weights(t * width), known.slope_weights(t * width) * width
-        gain = course @ toward - 0.5 * (t**2 + np.einsum("ti,ij,tj->t", course, gram, course))
+        path, slopes = known.weights(t * width), known.slope_weights(t * width) * width
+        gain = path @ toward - 0.5 * (t**2 + np.einsum("ti,ij,tj->t", path, gram, path))
         gain -= 0.5 * np.log1p(np.einsum("ti,ij,tj->t", slopes, gram, slopes))
         best = int(np.argmax(gain))
         return Score((c,), float(gain[best]) + self.offset, (np.array([c.neutral + t[best] * width]),))
 
     def score(self, chosen: tuple[Candidate, ...]) -> Score:
-        if len(chosen) == 1 and chosen[0] in self.courses:
+        if len(chosen) == 1 and chosen[0] in self.paths:
             return self._along(chosen[0])
         rows = np.concatenate([np.arange(self.at[c].start, self.at[c].stop) for c in chosen])
         inner = self.gram[np.ix_(rows, rows)] + np.eye(len(rows))
@@ -216,18 +216,18 @@ class _Level:
         return Score(chosen, gain + self.offset, tuple(amplitudes))
 
 
-def with_model(model: Fit, score: Score, table: Columns, courses: Courses | None = None) -> Start:
+def with_model(model: Fit, score: Score, table: Columns, paths: AmplitudePaths | None = None) -> InitialFit:
     """Start of a fit of a model with what was scored."""
     parts = []
     for c, amplitudes in zip(score.candidates, score.amplitudes, strict=True):
-        course = (courses or {}).get(c)
-        parts.append(table[c] if course is None else course.slope(amplitudes[0] - c.neutral)[:, None])
+        path = (paths or {}).get(c)
+        parts.append(table[c] if path is None else path.slope(amplitudes[0] - c.neutral)[:, None])
     jacobian = np.column_stack([model.jacobian, *parts])
-    return Start((*model.candidates, *score.candidates), (*model.amplitudes, *score.amplitudes), jacobian,
+    return InitialFit((*model.candidates, *score.candidates), (*model.amplitudes, *score.amplitudes), jacobian,
                  model.nuisance, model.columns)  # fmt: skip
 
 
-def instead(problem: Problem, model: Fit, table: Columns, beyond: float) -> list[Start]:
+def instead(problem: Problem, model: Fit, table: Columns, beyond: float) -> list[InitialFit]:
     """Starts in which an effect takes over from what is off further than its tolerance allows and does the same.
 
     Oil that is three tolerances too thin has the evidence of an effect, and no residual that would ask for it.
@@ -237,7 +237,7 @@ def instead(problem: Problem, model: Fit, table: Columns, beyond: float) -> list
     size = model.assessment.free[model.jacobian.shape[1] :]
     out = []
     for c, column in table.items():
-        for i in problem.twins(c):
+        for i in problem.aliases(c):
             if abs(size[i]) <= beyond or column.shape[1] != 1:
                 continue
             own, other = problem.scaled(column)[:, 0], problem.scaled(model.columns)[:, i] * size[i]
@@ -246,7 +246,9 @@ def instead(problem: Problem, model: Fit, table: Columns, beyond: float) -> list
             nuisance = model.nuisance.copy()
             nuisance[i] = 0.0
             jacobian = np.column_stack([model.jacobian, column])
-            out.append(Start((*model.candidates, c), (*model.amplitudes, amplitude), jacobian, nuisance, model.columns))
+            out.append(
+                InitialFit((*model.candidates, c), (*model.amplitudes, amplitude), jacobian, nuisance, model.columns)
+            )
     return out
 
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tpjb_ident.diagnosis.forward.workers import Map
-from tpjb_ident.diagnosis.search.fit import Fit, Start, fitted
+from tpjb_ident.diagnosis.search.converge import converge
+from tpjb_ident.diagnosis.search.effect_gain import EffectGain
+from tpjb_ident.diagnosis.search.fit import Fit, InitialFit, fitted
 from tpjb_ident.diagnosis.search.problem import Problem
 from tpjb_ident.diagnosis.search.proposals import Proposals
 from tpjb_ident.diagnosis.search.screen import Columns, survey
 from tpjb_ident.diagnosis.search.selection import CLEARLY, Progress, Selection
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
-from tpjb_ident.diagnosis.search.settle import settle
-from tpjb_ident.diagnosis.search.worth import Worth
 
 #: How often another explanation may take the place of one effect of the model.
 SWAPS = 2
@@ -30,7 +30,7 @@ class Search:
     baseline: Fit
     model: Fit
     effects: Fit
-    worth: tuple[Worth, ...]
+    effect_gain: tuple[EffectGain, ...]
     #: (n, k): what every candidate does at the baseline, per unit of its amplitudes
     first: Columns = field(repr=False)
     singles: tuple[Fit, ...] = field(repr=False)
@@ -45,15 +45,15 @@ def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Pro
     first = survey(run, drawn, problem.pool)
     # what is off by two tolerances at once acts no longer to first order: a bearing that is merely off must not need
     # an effect for that
-    baseline = settle(run, problem, drawn)
-    proposals = Proposals(run, problem, settings, drawn, first.slopes, first.courses)
+    baseline = converge(run, problem, drawn)
+    proposals = Proposals(run, problem, settings, drawn, first.slopes, first.paths)
     selection = Selection(run, problem, settings, proposals, [baseline])
     model, singles, rivals = _selected(selection, say)
     if model.assessment.scales[-1] > WRONG:
         again = _selected(selection, say, afar=True)
         if again[0].evidence > model.evidence + CLEARLY:
             model, singles, rivals = again
-    values = tuple(selection.worth_in(model, i) for i in range(len(model.candidates)))
+    values = tuple(selection.effect_gain_in(model, i) for i in range(len(model.candidates)))
     effects = selection.named(model)
     return Search(selection.baseline, model, effects, values, first.secants, singles, rivals)
 
@@ -72,7 +72,7 @@ def _selected(
             break
         model = selection.backward(selection.proposed.refined(better))
     if model.candidates:
-        model = selection.kept(settle(selection.run, selection.problem, model))
+        model = selection.kept(converge(selection.run, selection.problem, model))
     if model.candidates:
         return model, singles, rivals
     return selection.baseline, singles, ()
@@ -81,4 +81,4 @@ def _selected(
 def baseline_fit(problem: Problem) -> Fit:
     """The model with nothing added, nuisances to first order."""
     n, m = problem.columns.shape
-    return fitted(problem, Start((), (), np.zeros((n, 0)), np.zeros(m), problem.columns), problem.base)
+    return fitted(problem, InitialFit((), (), np.zeros((n, 0)), np.zeros(m), problem.columns), problem.base)

@@ -10,14 +10,14 @@ import numpy as np
 
 from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.forward.workers import Map
-from tpjb_ident.diagnosis.search.descend import fit
-from tpjb_ident.diagnosis.search.fit import Fit, Start
+from tpjb_ident.diagnosis.search.converge import converge
+from tpjb_ident.diagnosis.search.effect_gain import EffectGain, effect_gain
+from tpjb_ident.diagnosis.search.fit import Fit, InitialFit
+from tpjb_ident.diagnosis.search.minimise import fit
 from tpjb_ident.diagnosis.search.problem import Problem
 from tpjb_ident.diagnosis.search.proposals import ROUNDS_ON_THE_WAY, Proposals, best_of
 from tpjb_ident.diagnosis.search.screen import scores, with_model
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
-from tpjb_ident.diagnosis.search.settle import settle
-from tpjb_ident.diagnosis.search.worth import Worth, worth
 
 Progress = Callable[[str, float], None]
 #: Log evidence [nats] below which two fits of the same candidates are one.
@@ -44,7 +44,7 @@ class Selection:
     settings: DiagnoseSettings
     proposed: Proposals
     _nothing: list[Fit]
-    _known: dict[tuple[int, int], tuple[Fit, Worth]] = field(default_factory=dict, repr=False)
+    _known: dict[tuple[int, int], tuple[Fit, EffectGain]] = field(default_factory=dict, repr=False)
     _less: dict[tuple[int, int], tuple[Fit, Fit | None]] = field(default_factory=dict, repr=False)
     _places: dict[str, Fit] = field(default_factory=dict, repr=False)
 
@@ -86,11 +86,11 @@ class Selection:
                     break
                 # one effect more only showed where the others have their place
                 again.add(model.label)
-                model = settle(self.run, self.problem, likelier)
+                model = converge(self.run, self.problem, likelier)
                 table = self.proposed.renewed(model)
                 continue
             chosen = chosen if any(chosen is f for f in near) else self.proposed.refined(chosen)
-            model = self.backward(settle(self.run, self.problem, chosen))
+            model = self.backward(converge(self.run, self.problem, chosen))
             if len(model.candidates) <= count:
                 break
             table = self.proposed.renewed(model)
@@ -144,33 +144,33 @@ class Selection:
         """Whether unseen points want every candidate that is new in a fit."""
         new = [c for c in found.candidates if c not in model.candidates]
         if len(new) == 1 and set(found.candidates) - set(new) == set(model.candidates):
-            if not self._enough(worth(self.problem, found, model, new[0])):
+            if not self._enough(effect_gain(self.problem, found, model, new[0])):
                 return False
-            return self._enough(self.worth_in(found, found.candidates.index(new[0])))
-        return all(self._enough(self.worth_in(found, i)) for i in range(len(found.candidates)))
+            return self._enough(self.effect_gain_in(found, found.candidates.index(new[0])))
+        return all(self._enough(self.effect_gain_in(found, i)) for i in range(len(found.candidates)))
 
-    def _enough(self, value: Worth) -> bool:
+    def _enough(self, value: EffectGain) -> bool:
         """Whether an effect is worth its place."""
         return value.unseen > self.settings.wanted and value.beside > self.settings.exceeds
 
-    def worth_in(self, model: Fit, index: int) -> Worth:
+    def effect_gain_in(self, model: Fit, index: int) -> EffectGain:
         """What one candidate of a model is worth: the others are fitted again without it."""
         known = self._known.get((id(model), index))
         if known is None:
             # the model is kept with the answer: its number must not be given to another one
-            known = self._known[(id(model), index)] = model, self._worth_in(model, index)
+            known = self._known[(id(model), index)] = model, self._effect_gain_in(model, index)
         return known[1]
 
-    def _worth_in(self, model: Fit, index: int) -> Worth:
+    def _effect_gain_in(self, model: Fit, index: int) -> EffectGain:
         less = self.without(model, index)
         if less is None:
-            return Worth(np.inf, np.inf)
-        value = worth(self.problem, model, less, model.candidates[index])
+            return EffectGain(np.inf, np.inf)
+        value = effect_gain(self.problem, model, less, model.candidates[index])
         if self._enough(value) and less is not self.baseline and value.beside < HOPELESS:
             # what may be off does without the effect all that it can, not to first order only, and from where it
             # stands beside the effect too: else an effect is named for what a tolerance does
-            less = settle(self.run, self.problem, less, ROUNDS_ON_THE_WAY)
-            value = worth(self.problem, model, less, model.candidates[index])
+            less = converge(self.run, self.problem, less, ROUNDS_ON_THE_WAY)
+            value = effect_gain(self.problem, model, less, model.candidates[index])
         return value
 
     def without(self, model: Fit, index: int) -> Fit | None:
@@ -182,7 +182,7 @@ class Selection:
 
     def _without(self, model: Fit, index: int) -> Fit | None:
         keep = [i for i in range(len(model.candidates)) if i != index]
-        start = Start(
+        start = InitialFit(
             tuple(model.candidates[i] for i in keep), tuple(model.amplitudes[i] for i in keep),
             np.column_stack([model.jacobian[:, :0], *(model.jacobian[:, model.slices[i]] for i in keep)]),
             model.nuisance, model.columns,
@@ -195,13 +195,13 @@ class Selection:
         if model.evidence - max(less.evidence, self.baseline.evidence) > HOPELESS:
             return self.baseline
         # the way from an effect back to nothing may end at a better place than the way from the drawing
-        self._nothing[:] = best_of([self.baseline, settle(self.run, self.problem, less)])[:1]
+        self._nothing[:] = best_of([self.baseline, converge(self.run, self.problem, less)])[:1]
         return self.baseline
 
     def kept(self, model: Fit) -> Fit:
         """The model itself, or less of it where its last derivatives take an effect's worth away."""
         model = self.backward(model)
-        if len(model.candidates) == 1 and not self._enough(self.worth_in(model, 0)):
+        if len(model.candidates) == 1 and not self._enough(self.effect_gain_in(model, 0)):
             return self.baseline
         return model
 
@@ -214,19 +214,19 @@ class Selection:
             return self.baseline
         for i in reversed(terms):
             model = self.without(model, i) or model
-        return settle(self.run, self.problem, model)
+        return converge(self.run, self.problem, model)
 
     def backward(self, model: Fit) -> Fit:
         """Drop what unseen points do not want once the others are there."""
         while len(model.candidates) > 1:
-            values = [self.worth_in(model, i) for i in range(len(model.candidates))]
+            values = [self.effect_gain_in(model, i) for i in range(len(model.candidates))]
             weak = [i for i, v in enumerate(values) if not self._enough(v)]
             if not weak:
                 return model
             less = self.without(model, min(weak, key=lambda i: values[i].unseen))
             if less is None:
                 return model
-            model = settle(self.run, self.problem, less)
+            model = converge(self.run, self.problem, less)
         return model
 
     def rivals(self, model: Fit, singles: Sequence[Fit]) -> tuple[tuple[Fit, ...], ...]:
@@ -241,10 +241,8 @@ class Selection:
                 continue
             used = {gone.label, *(o.label for o in rest.candidates)}
             table = {c: v for c, v in self.proposed.first.items() if c.label not in used}
-            best = [s for s in scores(self.problem, rest, table, courses=self.proposed.courses) if s.gain > 0.0][
-                :RIVALS
-            ]
-            found = self.proposed.fits([with_model(rest, s, table, self.proposed.courses) for s in best])
+            best = [s for s in scores(self.problem, rest, table, paths=self.proposed.paths) if s.gain > 0.0][:RIVALS]
+            found = self.proposed.fits([with_model(rest, s, table, self.proposed.paths) for s in best])
             if gone.name in TERMS:  # an effect that lies off its grid does not do what free numbers do
                 found = self.run.together([functools.partial(self.proposed.refined, f) for f in found])
             out.append(tuple(found))

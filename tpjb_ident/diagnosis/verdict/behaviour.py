@@ -14,10 +14,10 @@ import numpy as np
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.search.assessment import Linear, assess
+from tpjb_ident.diagnosis.search.effect_gain import STAND_IN
 from tpjb_ident.diagnosis.search.fit import Fit
 from tpjb_ident.diagnosis.search.problem import Problem
 from tpjb_ident.diagnosis.search.search import Search
-from tpjb_ident.diagnosis.search.worth import STAND_IN
 
 #: A smaller principal value below this share of the larger one makes a term one of one direction.
 ONE_WAY = 0.2

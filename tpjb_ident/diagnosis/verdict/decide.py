@@ -33,7 +33,7 @@ from tpjb_ident.diagnosis.verdict.verdict import (
 
 
 @dataclass(frozen=True)
-class Judged:
+class Evidence:
     """What the evidence says before it is put in words."""
 
     name: VerdictName
@@ -44,7 +44,7 @@ class Judged:
     reasons: tuple[str, ...]
 
 
-def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Judged:
+def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Evidence:
     """Weigh a search: the dominant causes first, then what they leave."""
     baseline, effects = found.baseline, found.effects
     before = excess(problem, baseline)
@@ -53,19 +53,19 @@ def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Judged
     if not found.model.candidates:
         if before.p >= settings.alarm:
             told = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"
-            return Judged("consistent", baseline, closed, before, (), (told,))
+            return Evidence("consistent", baseline, closed, before, (), (told,))
         told = (
             f"something is the matter (p = {before.p:.1g}, most in {before.where}), and unseen points want no effect "
             "of the library"
         )
-        return Judged("unexplained", baseline, closed, before, (), (told,))
+        return Evidence("unexplained", baseline, closed, before, (), (told,))
     left = excess(problem, effects)
     reasons = _refusals(found, closed, left, settings)
     if reasons and before.p >= settings.alarm:
         told = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"
-        return Judged("consistent", baseline, closed, before, (), (told,))
+        return Evidence("consistent", baseline, closed, before, (), (told,))
     if reasons:
-        return Judged("unexplained", baseline, closed, before, (), reasons)
+        return Evidence("unexplained", baseline, closed, before, (), reasons)
     alike = _alike(found, settings)
     share = f"{100 * closed.closed:.0f} % of the squared gap on unseen points is closed"
     if math.isnan(closed.closed):
@@ -74,9 +74,9 @@ def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Judged
         told = (
             f"{share}; what is left is more than noise and stated tolerances (p = {left.p:.1g}), most in {left.where}"
         )
-        return Judged("partly-explained", effects, closed, left, alike, (told,))
+        return Evidence("partly-explained", effects, closed, left, alike, (told,))
     told = f"{share}; what is left is within noise and stated tolerances (p = {left.p:.2g})"
-    return Judged("ambiguous" if alike else "named", effects, closed, left, alike, (told,))
+    return Evidence("ambiguous" if alike else "named", effects, closed, left, alike, (told,))
 
 
 def _refusals(found: Search, closed: Closure, left: Excess, settings: DiagnoseSettings) -> tuple[str, ...]:
@@ -115,17 +115,17 @@ def decide(
 ) -> Verdict:  # fmt: skip
     """Turn a search into a verdict; `exact` (n,)."""
     observations, held = problem.observations, problem.held
-    judged = judge(problem, found, settings)
-    named = judged.named
+    evidence = judge(problem, found, settings)
+    named = evidence.named
     if exact is None:
         exact = found.effects.prediction - found.effects.columns @ found.effects.nuisance
     after = exact if named.candidates else problem.base
     unseen_after = effects_unseen(problem, named, after) if named.candidates else problem.base
     worst = localise(observations, unseen(problem, named))
     return Verdict(
-        verdict=judged.name,
-        effects=_effects(problem, found, judged),
-        indistinguishable=judged.alike if judged.name in {"ambiguous", "partly-explained"} else (),
+        verdict=evidence.name,
+        effects=_effects(problem, found, evidence),
+        indistinguishable=evidence.alike if evidence.name in {"ambiguous", "partly-explained"} else (),
         below_floor=_below_floor(problem, found, settings),
         next_test="",
         candidates=_ranked(problem, found),
@@ -136,45 +136,45 @@ def decide(
             "after": gap(observations, after),
             "heldout_before": gap(observations, problem.base, held),
             "heldout_after": gap(observations, unseen_after, held),
-            "within_tolerances": judged.closed.after if named.candidates else judged.closed.before,
-            "closed": judged.closed.closed if named.candidates else math.nan,
+            "within_tolerances": evidence.closed.after if named.candidates else evidence.closed.before,
+            "closed": evidence.closed.closed if named.candidates else math.nan,
             "noise_floor": noise_floor(observations),
         },
         remainder=_remainder(
-            problem, judged, worst[0].observable + " at " + worst[0].where if worst else "", settings.alarm
+            problem, evidence, worst[0].observable + " at " + worst[0].where if worst else "", settings.alarm
         ),
-        behaves_like=behaviours(problem, found, judged.left.p < settings.alarm),
-        drift=_drifts(problem, found, judged),
+        behaves_like=behaviours(problem, found, evidence.left.p < settings.alarm),
+        drift=_drifts(problem, found, evidence),
         assumptions=_assumptions(problem, found, settings),
-        reasons=judged.reasons,
+        reasons=evidence.reasons,
     )
 
 
-def _remainder(problem: Problem, judged: Judged, where: str, alarm: float) -> Remainder:
+def _remainder(problem: Problem, evidence: Evidence, where: str, alarm: float) -> Remainder:
     """What is left on unseen points once everything that may be off is at its likeliest."""
-    left = judged.closed.after if judged.named.candidates else judged.closed.before
+    left = evidence.closed.after if evidence.named.candidates else evidence.closed.before
     floor, before = noise_floor(problem.observations) ** 2, gap(problem.observations, problem.base) ** 2
     share = max(left**2 - floor, 0.0) / (before - floor) if before > floor else 0.0
-    return Remainder(left, min(share, 1.0), judged.left.where if judged.left.p < alarm else where, judged.left.p)
+    return Remainder(left, min(share, 1.0), evidence.left.where if evidence.left.p < alarm else where, evidence.left.p)
 
 
-def _drifts(problem: Problem, found: Search, judged: Judged) -> tuple[Drift, ...]:
-    if judged.name == "consistent":
+def _drifts(problem: Problem, found: Search, evidence: Evidence) -> tuple[Drift, ...]:
+    if evidence.name == "consistent":
         return ()
-    if judged.named.candidates:
+    if evidence.named.candidates:
         return drifts(problem, found.model)
     return drifts(problem, found.singles[0]) if found.singles else ()
 
 
-def _effects(problem: Problem, found: Search, judged: Judged) -> tuple[FoundEffect, ...]:
-    if not judged.named.candidates:
+def _effects(problem: Problem, found: Search, evidence: Evidence) -> tuple[FoundEffect, ...]:
+    if not evidence.named.candidates:
         return ()
     rows = []
     for index, candidate in enumerate(found.model.candidates):
         if candidate.name in TERMS:
             continue
         parameters = parameters_of(found.model, index)
-        order = found.worth[index].unseen
+        order = found.effect_gain[index].unseen
         rows.append((order, FoundEffect(candidate.name, parameters, _stands_in(problem, candidate.name, parameters))))
     return tuple(e for _, e in sorted(rows, key=lambda row: -row[0]))
 

@@ -94,7 +94,7 @@ class BandModel:
 
 
 @dataclass(frozen=True)
-class Shared:
+class SharedErrors:
     """What lines share, as draws."""
 
     #: (n_lines, n, 8), N/m: change of Re and Im of h at every line
@@ -113,7 +113,7 @@ class _Solution:
     noise: list[list[ComplexArray]]
 
 
-def fit_band(rows: Sequence[LineRows], model: str, instrument: str, shared: Shared) -> BandModel | None:
+def fit_band(rows: Sequence[LineRows], model: str, instrument: str, shared: SharedErrors) -> BandModel | None:
     """Fit one model to the lines of a band; None where they are too few."""
     if instrument in ("displacement", "force"):
         rows = [replace(line, command=line.D if instrument == "displacement" else line.F) for line in rows]
@@ -205,7 +205,7 @@ def _covariance(sums: list[list[RunSums]], found: _Solution) -> tuple[FloatArray
     return np.sum(parts, axis=0), satterthwaite(each, np.array(dof)[:, None])
 
 
-def _moved(sums: list[list[RunSums]], found: _Solution, shared: Shared) -> FloatArray:
+def _moved(sums: list[list[RunSums]], found: _Solution, shared: SharedErrors) -> FloatArray:
     """Change of Theta, row by row, in every draw of what lines share, (n, 2 q)."""
     q = len(sums[0][0].A)
     right = np.zeros((len(shared.runs), 2 * q))
@@ -220,7 +220,7 @@ def _moved(sums: list[list[RunSums]], found: _Solution, shared: Shared) -> Float
 
 
 def _parts(
-    rows: Sequence[LineRows], model: tuple[_Solution, float, Basis], instrument: str, shared: Shared
+    rows: Sequence[LineRows], model: tuple[_Solution, float, Basis], instrument: str, shared: SharedErrors
 ) -> tuple[BandPart, ...]:
     """H in parts of the band; none where one of them cannot be solved."""
     found, middle, basis = model

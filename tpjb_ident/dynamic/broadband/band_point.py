@@ -24,7 +24,7 @@ from tpjb_ident.dynamic.broadband.run_spectra import (
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.instruments.housing_balance import BalanceRun, balances
 from tpjb_ident.dynamic.runs.baseline import Baseline
-from tpjb_ident.dynamic.runs.left_out import LeftOut
+from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun
 from tpjb_ident.errors import BadInputError
 
 #: Kinds that excite every frequency again and again: what a sweep does once tells nothing of clocks.
@@ -95,7 +95,7 @@ class BandPoint:
 
 def read_point(
     group: BandGroup, housing_mass: float, settings: BandSettings, baseline: Baseline
-) -> tuple[BandPoint | None, list[LeftOut]]:
+) -> tuple[BandPoint | None, list[ExcludedRun]]:
     """Transform the runs of a group, and name those that cannot be used; None where there is no other."""
     spectra: list[RunSpectra] = []
     left = []
@@ -104,7 +104,7 @@ def read_point(
         try:
             spectra.append(run_spectra(run, housing_mass, chosen))
         except RigDataError as error:
-            left.append(LeftOut(run.id, run.point, error))
+            left.append(ExcludedRun(run.id, run.point, error))
     if not spectra:
         return None, left
     late, told = _band_balance(_alike(spectra))

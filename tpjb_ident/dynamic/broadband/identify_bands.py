@@ -14,7 +14,7 @@ from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.check.redundant_channels import widened
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.broadband.band_models import MODELS, BandModel, Shared, between, fit_band, supported
+from tpjb_ident.dynamic.broadband.band_models import MODELS, BandModel, SharedErrors, between, fit_band, supported
 from tpjb_ident.dynamic.broadband.band_point import BandPoint, BandSettings, band_groups, is_broadband, read_point
 from tpjb_ident.dynamic.broadband.band_result import BandLine, BandResult, band_points
 from tpjb_ident.dynamic.broadband.line_estimates import STRONG, LineEstimates, estimate_line
@@ -33,7 +33,7 @@ from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, 
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.checked_runs import campaign_verdicts, check_conditions
-from tpjb_ident.dynamic.runs.left_out import LISTED, LeftOut, named_runs
+from tpjb_ident.dynamic.runs.excluded_runs import LISTED, ExcludedRun, named_runs
 
 Progress = Callable[[str, int, int], None]
 #: Share of the lines that must be told from noise.
@@ -61,7 +61,7 @@ def identify_bands(
     runs = tuple(run for run in campaign.of_kind("dynamic") if is_broadband(run))
     seen = list(_observed(runs, progress))
     checked = campaign_verdicts(campaign, seen)
-    left = [LeftOut(r.id, r.point, RigDataError(checked.unusable[r.id])) for r in runs if r.id in checked.unusable]
+    left = [ExcludedRun(r.id, r.point, RigDataError(checked.unusable[r.id])) for r in runs if r.id in checked.unusable]
     points: list[BandPoint] = []
     for group in band_groups(tuple(run for run in runs if run.id not in checked.unusable)):
         point, bad = read_point(group, campaign.housing_mass, settings, baseline or Baseline())
@@ -95,13 +95,13 @@ def _observed(runs: tuple[Run, ...], progress: Progress) -> Iterator[Observation
         yield observe(run)
 
 
-def _without(point: BandPoint, left: Sequence[LeftOut]) -> tuple[Condition, ...]:
+def _without(point: BandPoint, left: Sequence[ExcludedRun]) -> tuple[Condition, ...]:
     """Name the runs of a point that take no part."""
     mine = [one.run for one in left if replace(one.point, excitation=0.0) == point.point]
     return (Condition("run-left-out", f"without {', '.join(mine)}, which cannot be used"),) if mine else ()
 
 
-def _lost(points: Sequence[BandPoint], left: Sequence[LeftOut]) -> tuple[Condition, ...]:
+def _lost(points: Sequence[BandPoint], left: Sequence[ExcludedRun]) -> tuple[Condition, ...]:
     """Name the operating points that have no run left."""
     kept = [point.point for point in points]
     lost = [one for one in left if replace(one.point, excitation=0.0) not in kept]
@@ -158,7 +158,7 @@ def _finish(
     # a model takes all lines with an answer: which of them stand clear of the noise is chance in part
     used = [(rows, line) for _, rows, line in estimates if line.usable or (line.fit.found and line.method != "hv")]
     both = [_line(point, rows, line, (miss, slopes is not None), sources, scatter) for rows, line in used]
-    shared = Shared(np.array([change for _, change in both]), scatter.gains)
+    shared = SharedErrors(np.array([change for _, change in both]), scatter.gains)
     models = _models([rows for rows, _ in used], good[0].method, shared) if good else {}
     lines = [finished for (finished, _), (_, line) in zip(both, used) if line.usable]
     bare = [
@@ -182,7 +182,7 @@ def _finish(
     )
 
 
-def _models(rows: list[LineRows], method: str, shared: Shared) -> dict[str, BandModel]:
+def _models(rows: list[LineRows], method: str, shared: SharedErrors) -> dict[str, BandModel]:
     """Models over the band by name; without an instrument, the middle between H1 and H2, and an interval over both."""
     found: dict[str, BandModel] = {}
     instrument = {"periods": "periods", "iv": "command"}.get(method)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
-from tpjb_ident.dynamic.broadband.line_fit import LineFit, by_runs, no_fit, runs_apart
+from tpjb_ident.dynamic.broadband.line_fit import LineFit, by_runs, inconsistent_runs, no_fit
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
 from tpjb_ident.dynamic.broadband.local_regression import H_ORDER, local_fit, without_slopes
 
@@ -115,7 +115,7 @@ def periods_fit(rows: LineRows) -> LineFit:
     leverage = leverage / counts[:, None, None]
     equation = np.concatenate([-h, np.eye(2)], axis=1)
     noise = np.einsum("ia,rab,kb->rik", equation, spreads, equation.conj())
-    apart = runs_apart(fitted[:, :2] * scale[0] @ h.T, means @ equation.T, noise / counts[:, None, None], every)
+    apart = inconsistent_runs(fitted[:, :2] * scale[0] @ h.T, means @ equation.T, noise / counts[:, None, None], every)
     strength = _strength(fitted[:, :2] * scale[0], spreads[:, :2, :2], counts)
     slopes = np.empty((0, 2, 2), complex)
     return LineFit(h, leverage, noise, counts - 1, float(condition), slopes, strength, share, apart)

@@ -15,7 +15,7 @@ from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
-class RunsApart:
+class InconsistentRuns:
     """How far every run's force is from what h gives, along that force."""
 
     #: (n_runs,) complex, N^2
@@ -31,8 +31,8 @@ class RunsApart:
         return np.asarray(np.einsum("rii->r", self.force).real)
 
 
-def _nothing_apart() -> RunsApart:
-    return RunsApart(np.empty(0, complex), np.empty((0, 2, 2), complex), np.empty(0))
+def _nothing_apart() -> InconsistentRuns:
+    return InconsistentRuns(np.empty(0, complex), np.empty((0, 2, 2), complex), np.empty(0))
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class LineFit:
     strength: float = np.inf
     #: (n_runs, 2, 2) complex
     share: ComplexArray = field(default_factory=lambda: np.empty((0, 2, 2), complex), repr=False)
-    apart: RunsApart = field(default_factory=_nothing_apart, repr=False)
+    apart: InconsistentRuns = field(default_factory=_nothing_apart, repr=False)
 
     @property
     def found(self) -> bool:
@@ -90,13 +90,13 @@ def by_runs(D: ComplexArray, g: ComplexArray, run: IntArray, n_runs: int) -> tup
     return leverage, share
 
 
-def runs_apart(given: ComplexArray, left: ComplexArray, noise: ComplexArray, run: IntArray) -> RunsApart:
+def inconsistent_runs(given: ComplexArray, left: ComplexArray, noise: ComplexArray, run: IntArray) -> InconsistentRuns:
     """How far every run's force is from what h gives.
 
     `given`, `left` (n, 2) [N], `noise` (n_runs, 2, 2) [N^2], `run` (n,).
     """
     rows = [(given[run == r], left[run == r]) for r in range(len(noise))]
-    return RunsApart(
+    return InconsistentRuns(
         np.array([np.sum(f.conj() * rest) for f, rest in rows]),
         np.array([np.einsum("ni,nk->ik", f, f.conj()) for f, _ in rows]),
         np.array([np.einsum("ni,ik,nk->", f.conj(), spread, f).real for (f, _), spread in zip(rows, noise)]),

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
-from tpjb_ident.dynamic.broadband.line_fit import LineFit, by_runs, no_fit, runs_apart
+from tpjb_ident.dynamic.broadband.line_fit import LineFit, by_runs, inconsistent_runs, no_fit
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
 
 #: Highest power of frequency, of h over the bins of a line,
@@ -45,7 +45,7 @@ def local_fit(rows: LineRows, instrument: ComplexArray | None = None, order: int
     # the force that the instrument explains: noise of the displacements is not in it, as it is in the residual
     basis = np.linalg.qr(Z)[0]
     explained = basis @ (basis.conj().T @ (rows.F - residual))
-    apart = runs_apart(explained, residual, noise, rows.run)
+    apart = inconsistent_runs(explained, residual, noise, rows.run)
     h = theta[: 2 * (order + 1)].reshape(order + 1, 2, 2).transpose(0, 2, 1) * (f_scale / d_scale)
     condition, strength = _excited(rows, W, ends)
     return LineFit(h[0], leverage, noise, dof, condition, h[1:], strength, share, apart)

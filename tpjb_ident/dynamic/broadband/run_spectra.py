@@ -22,7 +22,7 @@ from tpjb_ident.dynamic.broadband.disturbing_lines import (
 from tpjb_ident.dynamic.broadband.period import find_period, resampled
 from tpjb_ident.dynamic.broadband.samples import Samples, read_samples
 from tpjb_ident.dynamic.instruments.findings import START
-from tpjb_ident.dynamic.records.compensation import compensated, look_at_readings
+from tpjb_ident.dynamic.records.compensation import compensated, inspect_readings
 from tpjb_ident.dynamic.records.lines import Line, LineSet
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import RunPhasors, oil_force
@@ -88,7 +88,7 @@ def run_clocks(run: Run, settings: SpectraSettings) -> dict[str, ClockRate]:
 def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> RunSpectra:
     """Read one run and transform it."""
     with run.kept_open():
-        slower, told = look_at_readings(run)
+        slower, told = inspect_readings(run)
         samples = read_samples(run, settings.seconds)
         temperatures = mean_temperatures(run)
     if settings.band[1] >= 0.45 * samples.rate:

@@ -9,7 +9,13 @@ import numpy as np
 
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.corrections.load_direction import Turn, common_turn, direction_slopes, run_ratios, turned_back
+from tpjb_ident.dynamic.corrections.load_direction import (
+    DirectionSensitivity,
+    common_turn,
+    direction_slopes,
+    run_ratios,
+    turned_back,
+)
 from tpjb_ident.dynamic.corrections.mains import (
     MAINS_CORRECTED,
     MAINS_ON_LINE,
@@ -44,7 +50,7 @@ class Correction:
     miss: LoadMiss
     #: (2, 2) complex: dH/d(ln W), where the campaign tells it
     slope: ComplexArray | None
-    turn: Turn | None
+    turn: DirectionSensitivity | None
     mains: MainsFit | None
     conditions: tuple[Condition, ...]
 
@@ -91,15 +97,15 @@ def find_corrections(
     slopes = load_slopes(points, first)
     turns = _turns(points, first, misses, slopes)
     in_cells = force_pickup(mains_forces)
-    struck = [source.found(MAINS_ON_LINE) for source in points]
-    pickup = mains_pickup(mains_lines, probe_axes) if any(struck) else None
+    coincident = [source.found(MAINS_ON_LINE) for source in points]
+    pickup = mains_pickup(mains_lines, probe_axes) if any(coincident) else None
     at_set_point = (
         _at_set_point(p.load(), miss, slope, turn)
         for p, miss, slope, turn in zip(points, misses, slopes, turns, strict=True)
     )
     scatter = relative_scatter(at_set_point, first) if pickup is not None else np.nan
     result = []
-    for source, miss, slope, turn, hit in zip(points, misses, slopes, turns, struck, strict=True):
+    for source, miss, slope, turn, hit in zip(points, misses, slopes, turns, coincident, strict=True):
         mains = None
         if hit and pickup is not None:
             data = _at_set_point(source.load(), miss, slope, turn)
@@ -121,7 +127,7 @@ def _turns(
     first: list[DynamicStiffness],
     misses: list[LoadMiss],
     slopes: list[ComplexArray | None],
-) -> list[Turn | None]:
+) -> list[DirectionSensitivity | None]:
     """How H turns with the load, from windows whose load's size is put right; what mains struck tells nothing."""
     ratios = [
         run_ratios(to_set_point(source.load(), miss, slope), miss, est, not source.found(MAINS_ON_LINE))
@@ -131,7 +137,9 @@ def _turns(
     return direction_slopes(families, ratios)
 
 
-def _at_set_point(data: PointData, miss: LoadMiss, slope: ComplexArray | None, turn: Turn | None) -> PointData:
+def _at_set_point(
+    data: PointData, miss: LoadMiss, slope: ComplexArray | None, turn: DirectionSensitivity | None
+) -> PointData:
     """The point's windows with forces as under the set load in its set direction."""
     return to_set_point(replace(data, F=data.F - turned_back(data, miss, turn)), miss, slope)
 

@@ -55,7 +55,7 @@ class RunRatios:
 
 
 @dataclass(frozen=True)
-class Turn:
+class DirectionSensitivity:
     """dH/d(direction) at one point."""
 
     #: (2, 2) complex, N/m per rad
@@ -95,13 +95,15 @@ def _ratio(displacement: ComplexArray, force: ComplexArray) -> tuple[ComplexArra
     return np.asarray(shape / length, complex), np.asarray(complex_median(f / d[:, [large]]) / length, complex)
 
 
-def direction_slopes(families: Iterable[tuple[float, ...]], ratios: Sequence[RunRatios | None]) -> list[Turn | None]:
+def direction_slopes(
+    families: Iterable[tuple[float, ...]], ratios: Sequence[RunRatios | None]
+) -> list[DirectionSensitivity | None]:
     """dH/d(direction) at every point of a campaign."""
     members: dict[tuple[float, ...], list[int]] = {}
     for i, (family, ratio) in enumerate(zip(families, ratios, strict=True)):
         if ratio is not None:
             members.setdefault(family, []).append(i)
-    out: list[Turn | None] = [None] * len(ratios)
+    out: list[DirectionSensitivity | None] = [None] * len(ratios)
     for places in members.values():
         known = [r for i in places if (r := ratios[i]) is not None]
         for i, turn in zip(places, _family(known), strict=True):
@@ -109,7 +111,7 @@ def direction_slopes(families: Iterable[tuple[float, ...]], ratios: Sequence[Run
     return out
 
 
-def _family(ratios: list[RunRatios]) -> Sequence[Turn | None]:
+def _family(ratios: list[RunRatios]) -> Sequence[DirectionSensitivity | None]:
     """Fit one family; the two rows of H are two regressions with one design."""
     middle = float(np.mean([np.log(r.load) for r in ratios]))
     blocks = [_basis(r, np.log(r.load) - middle) for r in ratios]
@@ -158,7 +160,7 @@ def _ridge(design: FloatArray, answer: FloatArray) -> tuple[FloatArray, FloatArr
     return found, np.asarray(covariance, dtype=float)
 
 
-def _turn(ratio: RunRatios, basis: ComplexArray, fits: list[tuple[FloatArray, FloatArray]]) -> Turn:
+def _turn(ratio: RunRatios, basis: ComplexArray, fits: list[tuple[FloatArray, FloatArray]]) -> DirectionSensitivity:
     # a slope that is off by dS moves H by dS M^T: the misses of the runs, as the fit of H averages them
     mixing = np.linalg.pinv(ratio.shape) @ (ratio.sideways[:, None] * ratio.shape)
     moved = mixing @ basis
@@ -168,10 +170,10 @@ def _turn(ratio: RunRatios, basis: ComplexArray, fits: list[tuple[FloatArray, Fl
         for total, part in ((left, moved), (doubt, basis)):
             both = np.concatenate([part.real, part.imag])
             total[np.ix_(at, at)] = both @ covariance @ both.T
-    return Turn(np.array([basis @ found for found, _ in fits]), left, doubt)
+    return DirectionSensitivity(np.array([basis @ found for found, _ in fits]), left, doubt)
 
 
-def common_turn(h: ComplexArray, turn: Turn | None, angle: float) -> FloatArray:
+def common_turn(h: ComplexArray, turn: DirectionSensitivity | None, angle: float) -> FloatArray:
     """Covariance (8, 8) of H when the direction of all loads is known to `angle` [rad] only [N^2/m^2].
 
     Where the runs do not tell how H turns with the load, it is taken to turn with it as a whole: J H - H J.
@@ -184,7 +186,7 @@ def common_turn(h: ComplexArray, turn: Turn | None, angle: float) -> FloatArray:
     return np.asarray(angle**2 * (np.outer(shift, shift) + (0.0 if turn is None else turn.doubt)))
 
 
-def turned_back(data: PointData, miss: LoadMiss, turn: Turn | None) -> ComplexArray:
+def turned_back(data: PointData, miss: LoadMiss, turn: DirectionSensitivity | None) -> ComplexArray:
     """Force (n, 2) that a point's windows have because their loads point aside [N]."""
     if turn is None:
         return np.zeros_like(data.F)

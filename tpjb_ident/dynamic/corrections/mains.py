@@ -152,8 +152,8 @@ def relative_scatter(points: Iterable[PointData], first: list[DynamicStiffness])
     """Typical force residual of a run's mean, relative to its force, where no mains disturbs."""
     sizes = []
     for data, est in zip(points, first):
-        struck = any(MAINS_ON_LINE in run.conditions for run in data.runs)
-        if struck or not np.isfinite(est.h).all() or len(data.runs) < 3:
+        coincident = any(MAINS_ON_LINE in run.conditions for run in data.runs)
+        if coincident or not np.isfinite(est.h).all() or len(data.runs) < 3:
             continue
         means = _direction_means(data)
         if means is None:

@@ -49,7 +49,7 @@ class LoadMiss:
     turn_uncertainty: float = 0.0
 
 
-class Loaded(Protocol):
+class LoadCase(Protocol):
     """Where a point was run, and the mean cell force of its runs (n_runs, 2) [N]: `PointData`, `PointSource`."""
 
     @property
@@ -61,7 +61,7 @@ class Loaded(Protocol):
         """Mean cell force of every run, (n_runs, 2) [N]."""
 
 
-def load_ratio(data: Loaded, zero: complex = 0.0) -> ComplexArray:
+def load_ratio(data: LoadCase, zero: complex = 0.0) -> ComplexArray:
     """Measured mean load (less the cells' zero) over set point for every run: size and direction, complex."""
     loads = data.mean_loads
     set_point = _set_point(data)
@@ -70,11 +70,11 @@ def load_ratio(data: Loaded, zero: complex = 0.0) -> ComplexArray:
     return np.asarray((loads[:, 0] + 1j * loads[:, 1] - zero) / set_point)
 
 
-def _set_point(data: Loaded) -> complex:
+def _set_point(data: LoadCase) -> complex:
     return complex(data.point.static_load * np.exp(1j * data.point.static_load_direction))
 
 
-def campaign_zero(points: Sequence[Loaded], stated: float = 0.0) -> CellZero:
+def campaign_zero(points: Sequence[LoadCase], stated: float = 0.0) -> CellZero:
     """Zero of the cells from all runs of a campaign; see `cell_zero`."""
     loads = [data.mean_loads for data in points]
     means = np.concatenate([each[:, 0] + 1j * each[:, 1] for each in loads] or [np.empty(0)])
@@ -82,7 +82,7 @@ def campaign_zero(points: Sequence[Loaded], stated: float = 0.0) -> CellZero:
     return cell_zero(means, set_points, stated)
 
 
-def load_misses(points: Sequence[Loaded], zero: complex = 0.0) -> tuple[list[LoadMiss], complex]:
+def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[LoadMiss], complex]:
     """Misses of all runs relative to the campaign, and the campaign's own ratio (cell gain, rotation).
 
     The ratio is the mean over the runs without outliers; what it is uncertain by, all misses are. Cells that show
@@ -109,7 +109,7 @@ def load_misses(points: Sequence[Loaded], zero: complex = 0.0) -> tuple[list[Loa
     return misses, common
 
 
-def load_slopes(points: Sequence[Loaded], first: list[DynamicStiffness]) -> list[ComplexArray | None]:
+def load_slopes(points: Sequence[LoadCase], first: list[DynamicStiffness]) -> list[ComplexArray | None]:
     """Slope dH/d(ln W) at every point from the campaign's other loads; None where there are none.
 
     Stiffness and damping slopes are found at the excitation that was run at several loads and
@@ -130,7 +130,7 @@ def load_slopes(points: Sequence[Loaded], first: list[DynamicStiffness]) -> list
 
 
 def _slopes_over_load(
-    members: list[int], points: Sequence[Loaded], first: list[DynamicStiffness]
+    members: list[int], points: Sequence[LoadCase], first: list[DynamicStiffness]
 ) -> list[ComplexArray]:
     members.sort(key=lambda i: points[i].point.static_load)
     log_load = np.log([points[i].point.static_load for i in members])
@@ -148,7 +148,7 @@ def _log_gradient(values: FloatArray, log_load: FloatArray) -> FloatArray:
     return np.where(one_sign, power, plain)
 
 
-def _borrowed(i: int, points: Sequence[Loaded], slopes: list[ComplexArray | None]) -> ComplexArray | None:
+def _borrowed(i: int, points: Sequence[LoadCase], slopes: list[ComplexArray | None]) -> ComplexArray | None:
     """Slope of the nearest excitation at the same load; K and C each keep theirs."""
     p = points[i].point
     same = [

@@ -18,7 +18,7 @@ from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable
 from tpjb_ident.dynamic.estimators.robust_constants import trimming_limits, trimming_weight
 from tpjb_ident.dynamic.estimators.uncertainty import (
     DirectionMeans,
-    DirectionShares,
+    VarianceByDirection,
     direction_covariances,
     direction_effect,
     information,
@@ -137,7 +137,7 @@ def eiv_fit(repeats: Repeats, directions_differ: bool = False) -> EivFit:
     parts = np.einsum("gac,gb,gd->gabcd", inverse, D_true.conj(), D_true).reshape(-1, 4, 4)
     pooled = pooled_effect(residual, means) if len(means) > 2 else None
     repeat = bread @ meat @ bread.conj().T
-    shares = DirectionShares(score, parts, repeat, 2 * repeats.spare, pooled)
+    shares = VarianceByDirection(score, parts, repeat, 2 * repeats.spare, pooled)
     covariance, dof = spread_of(shares, chi_square, directions_differ)
     return EivFit(h, covariance, dof, chi_square, _attenuation(means, noise))
 
@@ -221,7 +221,7 @@ def aligned(z: ComplexArray, direction: IntArray, weights: FloatArray) -> tuple[
     return result, wandering
 
 
-def readmitted(table: PhasorTable, weights: FloatArray) -> FloatArray:
+def windows_used_again(table: PhasorTable, weights: FloatArray) -> FloatArray:
     """Window weights with consistent directions taken back; `weights` (n,).
 
     Runs differ a little from one another (their static load does), by more than the noise inside a run. A robust joint

@@ -11,7 +11,7 @@ import numpy as np
 from rigdata.near_names import unknown_name
 from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, readmitted, repeats
+from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, repeats, windows_used_again
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
 from tpjb_ident.dynamic.estimators.mm import mm_fit
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, displacement_condition, ols_fit, phasor_table
@@ -165,7 +165,7 @@ def _mm(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
 
 def _mm_eiv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
     start = mm_fit(table.D, table.F, table.direction, tolerance=1e-7)  # tells which windows are good, no more
-    repeated = repeats(table, readmitted(table, start.weights))
+    repeated = repeats(table, windows_used_again(table, start.weights))
     if repeated is None:
         plain = _mm(table, omega, name)
         missing = Condition(

@@ -110,7 +110,7 @@ def distance2(terms: FloatArray, inner: ComplexArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Start:
+class InitialFit:
     """A robust first answer."""
 
     #: (q, 2) complex
@@ -120,7 +120,7 @@ class Start:
     exact: bool = False
 
 
-def robust_start(regression: Regression, direction: IntArray, seed: int) -> Start:
+def robust_start(regression: Regression, direction: IntArray, seed: int) -> InitialFit:
     """Find coefficients and scatter of the majority, or of a tighter core; `direction` (n,).
 
     With 40 % of the windows bad on average, a draw can well have more than half. Bad windows that scatter, or
@@ -131,12 +131,12 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Star
     seeds = _first_fits(regression, _start_pairs(direction, seed))
     B, exact = _concentrated(regression, seeds, 0.5)
     if exact:
-        return Start(B, np.zeros((regression.q, regression.q), dtype=complex), True)
-    majority = Start(*_reweighted(regression, B, 0.5))
+        return InitialFit(B, np.zeros((regression.q, regression.q), dtype=complex), True)
+    majority = InitialFit(*_reweighted(regression, B, 0.5))
     B, exact = _concentrated(regression, seeds, _SMALL_CORE)
     if exact:
         return majority
-    core = Start(*_reweighted(regression, B, _SMALL_CORE))
+    core = InitialFit(*_reweighted(regression, B, _SMALL_CORE))
     limit = trimming_limits(2 * regression.q)[0]
     accepted = distance2(regression.terms(core.coefficients), core.scatter) <= limit
     everywhere = len(np.unique(direction[accepted])) == len(np.unique(direction))

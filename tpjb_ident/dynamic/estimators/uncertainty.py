@@ -90,7 +90,7 @@ def direction_covariances(means: DirectionMeans, noise: ComplexArray, T: Complex
 
 
 @dataclass(frozen=True)
-class DirectionShares:
+class VarianceByDirection:
     """What every direction contributes to the estimating equations of h, and what their repeats say."""
 
     #: (g, 4) complex: to the equations
@@ -104,7 +104,9 @@ class DirectionShares:
     pooled: FloatArray | None = None
 
 
-def spread_of(shares: DirectionShares, chi_square: float, known_effect: bool = False) -> tuple[FloatArray, FloatArray]:
+def spread_of(
+    shares: VarianceByDirection, chi_square: float, known_effect: bool = False
+) -> tuple[FloatArray, FloatArray]:
     """Repeat noise as known, plus what leaving out one direction at a time shows beyond it.
 
     A direction effect is no circular noise: a static load that is off changes K and hardly C, one entry
@@ -216,7 +218,7 @@ def with_repeats(
     meat = information(scaled, scaled, np.broadcast_to(small, (len(means), 2, 2)))
     score = np.einsum("ga,gb->gab", mean[kept, 4:] * means.count[:, None], means.D.conj()).reshape(-1, 4)
     pooled = pooled_effect(mean[kept, 4:], means) if kept.sum() > 2 else None
-    shares = DirectionShares(score, parts[kept], bread @ meat @ bread.conj().T, 2 * spare, pooled)
+    shares = VarianceByDirection(score, parts[kept], bread @ meat @ bread.conj().T, 2 * spare, pooled)
     return (*spread_of(shares, chi_square, table.directions_differ), chi_square)
 
 

@@ -49,7 +49,7 @@ class InstrumentFindings:
         return self.balances.get(frequency_key(data.runs[0].lines.excitation[data.lines[0]].frequency), Balance())
 
 
-def look_at_instruments(
+def inspect_instruments(
     sources: list[PointSource], delays_stated: bool = False
 ) -> tuple[InstrumentFindings, list[PointSource]]:
     """Findings, and the sources as they are to be read from then on: with one clock."""

@@ -154,7 +154,7 @@ def _sharpened(bent: FloatArray, rate: float, export_rate: float) -> float:
     return rate + turn * export_rate / (n / 2)
 
 
-def look_at_readings(run: MeasuredRun) -> tuple[dict[str, SlowerChannel], tuple[Condition, ...]]:
+def inspect_readings(run: MeasuredRun) -> tuple[dict[str, SlowerChannel], tuple[Condition, ...]]:
     """Channels that were sampled slower than the export, by name, and what to say of them.
 
     What a single channel's device did is lost once two channels are turned into a vector: that it was driven into its

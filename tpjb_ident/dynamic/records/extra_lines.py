@@ -49,12 +49,12 @@ def unexpected_lines(run: MeasuredRun, result: RunPhasors) -> tuple[tuple[float,
         return (), ()
     conditions = [Condition("unexpected lines", f"lines at {', '.join(f'{f:.4g}' for f in extra)} Hz; fitted along")]
     for line in result.lines.excitation:
-        struck = [f for f in extra if abs(2 * f - line.frequency) < 0.05]
-        if struck:
+        coincident = [f for f in extra if abs(2 * f - line.frequency) < 0.05]
+        if coincident:
             conditions.append(
                 Condition(
                     "harmonic on excitation line",
-                    f"the second harmonic of the line at {struck[0]:.4g} Hz falls on the excitation",
+                    f"the second harmonic of the line at {coincident[0]:.4g} Hz falls on the excitation",
                 )
             )
     return extra, tuple(conditions)

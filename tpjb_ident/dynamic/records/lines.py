@@ -82,14 +82,14 @@ def known_lines(
     others = [Line("found", f, 1e-6) for f in extra]
     for n in range(settings.shaft_harmonics + 1, settings.named_harmonics + 1):
         line = Line(f"{n}X", n * speed)
-        struck = [e for e in driven if speed > 0 and abs(e.frequency - n * speed) <= n * settings.speed_wander]
-        conditions += [_on_excitation(line, e) for e in struck[:1]]
+        coincident = [e for e in driven if speed > 0 and abs(e.frequency - n * speed) <= n * settings.speed_wander]
+        conditions += [_on_excitation(line, e) for e in coincident[:1]]
     for line in _candidates(driven, speed, settings) + others:
         if not 0.0 < line.frequency < top:
             continue
-        struck = [e for e in driven if abs(e.frequency - line.frequency) <= line.wander]
-        if struck:
-            conditions.append(_on_excitation(line, struck[0]))
+        coincident = [e for e in driven if abs(e.frequency - line.frequency) <= line.wander]
+        if coincident:
+            conditions.append(_on_excitation(line, coincident[0]))
         elif all(abs(o.frequency - line.frequency) > max(o.wander, line.wander) for o in nuisance):
             nuisance.append(line)
     return LineSet(driven, tuple(nuisance), tuple(conditions), speed)

@@ -32,13 +32,13 @@ def mains_frequency(campaign: Campaign, usual: float) -> float:
     if stated is not None:
         return float(stated)
     dynamic = campaign.of_kind("dynamic")
-    struck = [c for c in MAINS_FREQUENCIES if any(abs(run.point.excitation_hz - c) < NEAR for run in dynamic)]
-    if not struck or usual not in MAINS_FREQUENCIES:
+    coincident = [c for c in MAINS_FREQUENCIES if any(abs(run.point.excitation_hz - c) < NEAR for run in dynamic)]
+    if not coincident or usual not in MAINS_FREQUENCIES:
         return usual
     votes = {c: _votes(campaign.runs, c) for c in MAINS_FREQUENCIES}
     best = max(MAINS_FREQUENCIES, key=lambda c: (votes[c], c == usual))
-    if votes[best] == 0 and len(struck) == 1:
-        return struck[0]  # it cannot be ruled out, and must be named
+    if votes[best] == 0 and len(coincident) == 1:
+        return coincident[0]  # it cannot be ruled out, and must be named
     return best
 
 

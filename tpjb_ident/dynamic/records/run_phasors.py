@@ -10,12 +10,12 @@ from dataclasses import replace
 
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.records.compensation import compensated, look_at_readings
+from tpjb_ident.dynamic.records.compensation import compensated, inspect_readings
 from tpjb_ident.dynamic.records.extra_lines import unexpected_lines
 from tpjb_ident.dynamic.records.extraction import extract
-from tpjb_ident.dynamic.records.kept_readings import SHORT, ShortRecord
 from tpjb_ident.dynamic.records.line_tuning import DRIFT, retuned, tuned
 from tpjb_ident.dynamic.records.lines import LineSet, known_lines
+from tpjb_ident.dynamic.records.reading_cache import SHORT, ShortRecord
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, PhasorSettings, RunPhasors
 from tpjb_ident.dynamic.records.shaft import shaft_speed
 from tpjb_ident.dynamic.records.windows import RecordTooShortError
@@ -29,7 +29,7 @@ def run_phasors(run: MeasuredRun, housing_mass: float, settings: PhasorSettings 
         what = f"is excited by {kind}; coefficients come from sines, one frequency per run"
         cure = "Excite with sines, or leave the run out"
         raise RigDataError(Problem("error", getattr(run, "file", ""), "excitation", what, cure, run.id))
-    slower, told = look_at_readings(run)
+    slower, told = inspect_readings(run)
     result = compensated(_fitted(run, housing_mass, settings), run, slower)
     return replace(result, conditions=merged(result.conditions, told)) if told else result
 
@@ -37,11 +37,11 @@ def run_phasors(run: MeasuredRun, housing_mass: float, settings: PhasorSettings 
 def _fitted(run: MeasuredRun, housing_mass: float, settings: PhasorSettings) -> RunPhasors:
     """The run's phasors as recorded."""
     if run.length <= SHORT:
-        return _looked_at(ShortRecord(run), housing_mass, settings)
+        return _inspected(ShortRecord(run), housing_mass, settings)
     try:
         lines, conditions = _known_from_the_beginning(run, housing_mass, settings)
     except RecordTooShortError:  # the beginning is not enough; all of it may be
-        return _looked_at(run, housing_mass, settings)
+        return _inspected(run, housing_mass, settings)
     result = extract(run, housing_mass, settings, lines)
     driven = settings.excitation_lines or (run.point.excitation_hz,)
     better = tuned(run, result, driven, lines.speed, settings)
@@ -56,12 +56,12 @@ def _known_from_the_beginning(
     run: MeasuredRun, housing_mass: float, settings: PhasorSettings
 ) -> tuple[LineSet, tuple[Condition, ...]]:
     """Lines of a long run as its first samples show them, so that reading all of it once is enough."""
-    first = _looked_at(ShortRecord(run, SHORT), housing_mass, settings)
+    first = _inspected(ShortRecord(run, SHORT), housing_mass, settings)
     own = tuple(c for c in first.conditions if c not in first.lines.conditions and c != DRIFT)
     return first.lines, own
 
 
-def _looked_at(run: MeasuredRun, housing_mass: float, settings: PhasorSettings) -> RunPhasors:
+def _inspected(run: MeasuredRun, housing_mass: float, settings: PhasorSettings) -> RunPhasors:
     """Fit, look for lines that nobody mentioned and for wrong frequencies, fit again where there are any."""
     speed, conditions = shaft_speed(run)
     driven = settings.excitation_lines or (run.point.excitation_hz,)

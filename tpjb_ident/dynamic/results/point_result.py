@@ -11,7 +11,7 @@ from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.amplitude import AmplitudeSlope
-from tpjb_ident.dynamic.runs.left_out import LISTED, LeftOut
+from tpjb_ident.dynamic.runs.excluded_runs import LISTED, ExcludedRun
 
 
 @dataclass(frozen=True)
@@ -96,13 +96,15 @@ class PointResult:
 
 
 def named_at_points(
-    points: Sequence[PointResult], left: Sequence[LeftOut], any_excitation: bool
+    points: Sequence[PointResult], left: Sequence[ExcludedRun], any_excitation: bool
 ) -> tuple[PointResult, ...]:
     """The points, each saying which of its runs were left out."""
     return tuple(_named(point, [one.run for one in left if _same(one, point, any_excitation)]) for point in points)
 
 
-def lost_points(points: Sequence[PointResult], left: Sequence[LeftOut], any_excitation: bool) -> tuple[Condition, ...]:
+def lost_points(
+    points: Sequence[PointResult], left: Sequence[ExcludedRun], any_excitation: bool
+) -> tuple[Condition, ...]:
     """Name the operating points that have no run left."""
     lost = [one for one in left if not any(_same(one, point, any_excitation) for point in points)]
     places = dict.fromkeys(f"{one.point.static_load / 1e3:g} kN, {one.point.excitation_hz:g} Hz" for one in lost)
@@ -119,7 +121,7 @@ def _named(point: PointResult, runs: list[str]) -> PointResult:
     return replace(point, quality=merged(point.quality, (condition,)))
 
 
-def _same(one: LeftOut, result: PointResult, any_excitation: bool) -> bool:
+def _same(one: ExcludedRun, result: PointResult, any_excitation: bool) -> bool:
     mine, other = one.point, result.point
     alike = (mine.static_load, mine.static_load_direction_deg, mine.shaft_speed_hz) == (
         other.static_load,

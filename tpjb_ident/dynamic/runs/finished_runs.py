@@ -21,7 +21,7 @@ from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.line_means import LineMean, mains_force, mains_line, second_harmonics
 from tpjb_ident.dynamic.records.run_data import RunPhasors
-from tpjb_ident.dynamic.runs.left_out import DEAD_ACCELEROMETER, LeftOut
+from tpjb_ident.dynamic.runs.excluded_runs import DEAD_ACCELEROMETER, ExcludedRun
 from tpjb_ident.dynamic.runs.point_data import finite_mean
 from tpjb_ident.dynamic.runs.run_store import RunResult, RunStore
 
@@ -94,7 +94,7 @@ class FinishedRuns:
         self._runs, self._mass, self._again, self._store = runs, housing_mass, again, store
         self._room = ROOM if room is None else room
         self._digests: dict[int, RunDigest] = {}
-        self._left: dict[int, LeftOut] = {}
+        self._left: dict[int, ExcludedRun] = {}
         self._memory: dict[int, RunPhasors] = {}
         self._marks: dict[int, str] = {}
         self._folder: tempfile.TemporaryDirectory[str] | None = None
@@ -130,11 +130,11 @@ class FinishedRuns:
         return len(self._memory) == len(self._digests)
 
     @property
-    def left_out(self) -> tuple[LeftOut, ...]:
+    def left_out(self) -> tuple[ExcludedRun, ...]:
         """Runs that take no part, in the campaign's order."""
         return tuple(self._left[i] for i in sorted(self._left))
 
-    def leave_out(self, index: int, why: LeftOut) -> None:
+    def leave_out(self, index: int, why: ExcludedRun) -> None:
         """Note that a run takes no part."""
         self._left[index] = why
         self._digests.pop(index, None)
@@ -149,14 +149,14 @@ class FinishedRuns:
                 (dead_one,) = (c for c in self._digests[i].conditions if c == DEAD_ACCELEROMETER)
                 cure = "Check sensor, cable and amplifier; repeat the run"
                 problem = Problem("error", run.file, "", dead_one.detail, cure, run.id)
-                self.leave_out(i, LeftOut(run.id, run.point, RigDataError(problem)))
+                self.leave_out(i, ExcludedRun(run.id, run.point, RigDataError(problem)))
 
     def leave_out_unusable(self, errors: Mapping[str, Problem]) -> None:
         """Leave out runs in which the checks found an error of their own."""
         for i in self.places:
             run = self._runs[i]
             if run.id in errors:
-                self.leave_out(i, LeftOut(run.id, run.point, RigDataError(errors[run.id])))
+                self.leave_out(i, ExcludedRun(run.id, run.point, RigDataError(errors[run.id])))
 
     def put(self, index: int, result: RunResult | None, mark: str = "") -> None:
         """Put a finished run away."""

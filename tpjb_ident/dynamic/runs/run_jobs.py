@@ -17,14 +17,14 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.records.kept_readings import beginning_of, with_kept_beginning
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
+from tpjb_ident.dynamic.records.reading_cache import beginning_of, with_kept_beginning
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.dynamic.records.shaft import shaft_phases
 from tpjb_ident.dynamic.records.windows import RecordTooShortError
+from tpjb_ident.dynamic.runs.excluded_runs import DEAD_ACCELEROMETER, ExcludedRun
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
-from tpjb_ident.dynamic.runs.left_out import DEAD_ACCELEROMETER, LeftOut
 from tpjb_ident.dynamic.runs.point_data import mean_temperatures, point_of
 from tpjb_ident.dynamic.runs.run_store import RunResult, RunStore, fingerprint, of_run
 from tpjb_ident.runtime.executors import InProcessWorkers, Workers, each_finished
@@ -53,10 +53,10 @@ def all_runs(
     kept = FinishedRuns(runs, mass, lambda run: one_run(run, mass, settings), store)
     done = 0
 
-    def finished(index: int, answer: tuple[str, RunResult | LeftOut | None]) -> None:
+    def finished(index: int, answer: tuple[str, RunResult | ExcludedRun | None]) -> None:
         nonlocal done
         mark, result = answer
-        if isinstance(result, LeftOut):
+        if isinstance(result, ExcludedRun):
             kept.leave_out(index, result)
         else:
             if store is not None and result is not None and mark:
@@ -79,7 +79,7 @@ def all_runs(
 
 def unless_known(
     run: Run, housing_mass: float, settings: PhasorSettings, known: str | None
-) -> tuple[str, RunResult | LeftOut | None]:
+) -> tuple[str, RunResult | ExcludedRun | None]:
     """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
 
     The fingerprint is "" where the record changed while it was read: such a result must not be kept. Where nothing
@@ -88,7 +88,7 @@ def unless_known(
     try:
         return _unless_known(run, housing_mass, settings, known)
     except (RigDataError, RecordTooShortError) as error:
-        return "", LeftOut(run.id, run.point, error)
+        return "", ExcludedRun(run.id, run.point, error)
 
 
 def _unless_known(
@@ -152,8 +152,8 @@ def _seen(run: Run, kept: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
 def _mended(run: Run) -> tuple[Condition, ...]:
     """What the reader had to mend in the record."""
     problems = run.reader.problems() if hasattr(run, "reader") else ()
-    mended = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
-    return (Condition("record-damaged", "; ".join(mended)),) if mended else ()
+    corrected = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
+    return (Condition("record-damaged", "; ".join(corrected)),) if corrected else ()
 
 
 def _dead_accelerometers(run: Run, phasors: RunPhasors) -> tuple[Condition, ...]:

@@ -50,7 +50,7 @@ def without_shaft(data: PointData) -> PointData:
     return replace(_saying(data, name, Condition(FITTED, told)), D=moved, shaft=s)
 
 
-def freed(data: PointData) -> PointData:
+def without_synchronous(data: PointData) -> PointData:
     """Combinations of the runs, window by window, in which what turns with the shaft cancels.
 
     They are orthonormal, so the noise of their windows is that of the runs' own; there is one less of them than runs.

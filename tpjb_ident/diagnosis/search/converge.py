@@ -10,8 +10,8 @@ from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.forward import ForwardModel, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import column_of
 from tpjb_ident.diagnosis.forward.workers import Map
-from tpjb_ident.diagnosis.search.descend import SETTLED, Place, attempt, slope
-from tpjb_ident.diagnosis.search.fit import Fit, Start, build, fitted
+from tpjb_ident.diagnosis.search.fit import Fit, InitialFit, build, fitted
+from tpjb_ident.diagnosis.search.minimise import CONVERGED, SearchState, attempt, slope
 from tpjb_ident.diagnosis.search.problem import Problem
 
 #: How often a fit takes derivatives of its own.
@@ -20,11 +20,11 @@ ROUNDS = 3
 STEPS_BETWEEN = 4
 
 
-def settle(run: Map, problem: Problem, found: Fit, rounds: int = ROUNDS) -> Fit:
+def converge(run: Map, problem: Problem, found: Fit, rounds: int = ROUNDS) -> Fit:
     """Give a fit derivatives of its own, those of the nuisances too, and move all of them together."""
-    if found.settled:
+    if found.converged:
         return found
-    here = Place(found.start, found.prediction)
+    here = SearchState(found.start, found.prediction)
     scales = found.assessment.scales
     for number in range(rounds):
         if number:
@@ -40,11 +40,11 @@ def settle(run: Map, problem: Problem, found: Fit, rounds: int = ROUNDS) -> Fit:
             found = fitted(problem, here.start, here.prediction, scales)
             scales = found.assessment.scales
         if number and not moved:
-            return replace(found, settled=True)
+            return replace(found, converged=True)
     return found
 
 
-def _learnt(problem: Problem, here: Place, there: Place) -> Place:
+def _learnt(problem: Problem, here: SearchState, there: SearchState) -> SearchState:
     """Correct all derivatives by what a step showed, in units of the priors' widths (Broyden, as in `fit`)."""
     count, width = here.start.jacobian.shape[1], here.start.width
     step = (there.start.free - here.start.free) / width
@@ -59,32 +59,32 @@ def _learnt(problem: Problem, here: Place, there: Place) -> Place:
     return replace(there, start=replace(there.start, jacobian=columns[:, :count], columns=columns[:, count:]))
 
 
-def _stepped(run: Map, problem: Problem, here: Place, found: Fit) -> tuple[Place, bool]:
+def _stepped(run: Map, problem: Problem, here: SearchState, found: Fit) -> tuple[SearchState, bool]:
     """Take the step that a linear model proposes, or a part of it; whether it was one worth taking."""
     weight: FloatArray = np.asarray(np.linalg.inv(problem.basis.covariance(found.assessment.scales)), float)
     free = found.assessment.free
     now = here.start.free
     errors = np.sqrt(np.maximum(np.diag(found.assessment.covariance), 1e-300))
-    if np.all(np.abs(free - now) < SETTLED * errors):
+    if np.all(np.abs(free - now) < CONVERGED * errors):
         return here, False
     cost = here.cost(problem, weight)
     for share in (1.0, 0.4, 0.1):
         start = _moved(here.start, now + share * (free - now))
         (y,) = tuple(run(attempt, [(start,)]))
         if y is not None:
-            there = Place(start, y)
+            there = SearchState(start, y)
             if there.cost(problem, weight) < cost:
                 return there, True
     return here, False
 
 
-def _moved(start: Start, free: FloatArray) -> Start:
+def _moved(start: InitialFit, free: FloatArray) -> InitialFit:
     count = start.jacobian.shape[1]
     origin = np.concatenate([c.origin for c in start.candidates]) if start.candidates else np.zeros(0)
     return replace(start, amplitudes=start.split(origin + free[:count]), nuisance=free[count:])
 
 
-def _renewed(run: Map, problem: Problem, start: Start, y: FloatArray) -> Start:
+def _renewed(run: Map, problem: Problem, start: InitialFit, y: FloatArray) -> InitialFit:
     """Take all derivatives anew; what acts on readings has its own."""
     count = start.jacobian.shape[1]
     asked = [*range(count), *(count + i for i, one in enumerate(problem.nuisances) if one.column is None)]
@@ -94,7 +94,7 @@ def _renewed(run: Map, problem: Problem, start: Start, y: FloatArray) -> Start:
     return replace(start, jacobian=every[:, :count], columns=every[:, count:])
 
 
-def _column(forward: ForwardModel, problem: Problem, start: Start, y: FloatArray, index: int) -> FloatArray:
+def _column(forward: ForwardModel, problem: Problem, start: InitialFit, y: FloatArray, index: int) -> FloatArray:
     count = start.jacobian.shape[1]
     if index < count:
         return slope(forward, problem, start, y, index, 0.1)

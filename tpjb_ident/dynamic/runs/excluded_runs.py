@@ -19,7 +19,7 @@ LISTED = 6
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class ExcludedRun:
     """A dynamic run that takes no part."""
 
     run: str
@@ -32,7 +32,7 @@ class LeftOut:
         return str(self.error).partition("\n")[0]
 
 
-def named_runs(left: Sequence[LeftOut], of: int) -> tuple[Condition, ...]:
+def named_runs(left: Sequence[ExcludedRun], of: int) -> tuple[Condition, ...]:
     """What the campaign has to say: which of its `of` dynamic runs take no part, and why."""
     if not left:
         return ()

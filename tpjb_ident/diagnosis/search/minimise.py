@@ -10,24 +10,24 @@ from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.forward import ForwardModel, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import predict
 from tpjb_ident.diagnosis.search.assessment import Assessment, Basis, assess
-from tpjb_ident.diagnosis.search.fit import Fit, Start, build, fitted, linear
+from tpjb_ident.diagnosis.search.fit import Fit, InitialFit, build, fitted, linear
 from tpjb_ident.diagnosis.search.problem import Problem
 
 MAX_STEPS = 4
 #: Share of their tolerances that nuisances have at first.
 TIGHT = 0.2
 #: A fit is settled when a step would move every amplitude by less than this share of its standard error.
-SETTLED = 0.1
+CONVERGED = 0.1
 #: A step that loses less than this [nats] is not tried shorter: it loses by its derivative, which is better known after
 #: it, and not by its length.
 HARDLY = 0.3
 
 
 @dataclass(frozen=True)
-class Place:
+class SearchState:
     """Where all free numbers stand, and what the model predicts there, (n,)."""
 
-    start: Start
+    start: InitialFit
     prediction: FloatArray
 
     def cost(self, problem: Problem, weight: FloatArray) -> float:
@@ -36,7 +36,7 @@ class Place:
         return float(z @ weight @ z + np.sum((self.start.free / self.start.width) ** 2))
 
 
-def fit(forward: ForwardModel, problem: Problem, start: Start) -> Fit | None:
+def fit(forward: ForwardModel, problem: Problem, start: InitialFit) -> Fit | None:
     """Fit amplitudes; nuisances follow to first order.
 
     First the effects alone have to do it: far from the answer nuisances, linear as they are here, would bend the way.
@@ -51,11 +51,11 @@ def fit(forward: ForwardModel, problem: Problem, start: Start) -> Fit | None:
     if y is None:
         return None
     coarse, basis = problem.basis.coarse, problem.basis
-    here = _descended(forward, problem, Place(start, y), Weighing(coarse, basis.stated, TIGHT))
-    here = _descended(forward, problem, here, Weighing(basis, basis.stated, TIGHT))
-    here = _descended(forward, problem, here, Weighing(basis, basis.stated))
+    here = _minimised(forward, problem, SearchState(start, y), Objective(coarse, basis.stated, TIGHT))
+    here = _minimised(forward, problem, here, Objective(basis, basis.stated, TIGHT))
+    here = _minimised(forward, problem, here, Objective(basis, basis.stated))
     found = fitted(problem, here.start, here.prediction)
-    there = _descended(forward, problem, here, Weighing(basis, found.assessment.scales))
+    there = _minimised(forward, problem, here, Objective(basis, found.assessment.scales))
     if there is here:
         return found
     other = fitted(problem, there.start, there.prediction, found.assessment.scales)
@@ -63,7 +63,7 @@ def fit(forward: ForwardModel, problem: Problem, start: Start) -> Fit | None:
 
 
 @dataclass(frozen=True)
-class Weighing:
+class Objective:
     """What a step is judged by."""
 
     basis: Basis
@@ -71,21 +71,21 @@ class Weighing:
     scales: FloatArray
     slack: float = 1.0
 
-    def assess(self, problem: Problem, start: Start, y: FloatArray) -> Assessment:
+    def assess(self, problem: Problem, start: InitialFit, y: FloatArray) -> Assessment:
         """What a place is worth; `y` (n,)."""
         return assess(self.basis, linear(problem, start, y, self.slack), self.scales, fixed=True)
 
 
-def _descended(forward: ForwardModel, problem: Problem, here: Place, weighing: Weighing) -> Place:
+def _minimised(forward: ForwardModel, problem: Problem, here: SearchState, objective: Objective) -> SearchState:
     """Steps at fixed scales of the model's error until no amplitude moves."""
     for _ in range(MAX_STEPS if here.start.jacobian.shape[1] else 0):
-        found = weighing.assess(problem, here.start, here.prediction)
+        found = objective.assess(problem, here.start, here.prediction)
         now = np.concatenate(here.start.amplitudes)
         step = np.concatenate(here.start.split(_targets(here.start, found))) - now
         errors = np.sqrt(np.maximum(np.diag(found.covariance)[: len(now)], 0.0))
-        if np.all(np.abs(step) < SETTLED * errors):
+        if np.all(np.abs(step) < CONVERGED * errors):
             break
-        moved = _improved(forward, problem, here, step, (weighing, found))
+        moved = _improved(forward, problem, here, step, (objective, found))
         if moved is None:
             break
         here = moved
@@ -93,10 +93,10 @@ def _descended(forward: ForwardModel, problem: Problem, here: Place, weighing: W
 
 
 def _improved(
-    forward: ForwardModel, problem: Problem, here: Place, step: FloatArray, judged: tuple[Weighing, Assessment]
-) -> Place | None:
+    forward: ForwardModel, problem: Problem, here: SearchState, step: FloatArray, evidence: tuple[Objective, Assessment]
+) -> SearchState | None:
     """The place after a step, or after a part of it, that is better; None if none is."""
-    weighing, found = judged
+    objective, found = evidence
     now = np.concatenate(here.start.amplitudes)
     for share in (1.0, 0.4, 0.1):
         trial = replace(here.start, amplitudes=here.start.split(now + share * step))
@@ -105,20 +105,20 @@ def _improved(
             continue
         taken = np.concatenate(trial.amplitudes) - now
         trial = replace(trial, jacobian=_corrected(here.start, y - here.prediction, taken))
-        told = weighing.assess(problem, trial, y)
+        told = objective.assess(problem, trial, y)
         if told.evidence > found.evidence:
-            return Place(trial, y)
+            return SearchState(trial, y)
         if found.evidence - told.evidence < HARDLY:
             break
     return None
 
 
-def _targets(start: Start, found: Assessment) -> FloatArray:
+def _targets(start: InitialFit, found: Assessment) -> FloatArray:
     count = start.jacobian.shape[1]
     return np.concatenate([c.origin for c in start.candidates]) + found.free[:count]
 
 
-def _corrected(start: Start, change: FloatArray, step: FloatArray) -> FloatArray:
+def _corrected(start: InitialFit, change: FloatArray, step: FloatArray) -> FloatArray:
     """Broyden's update, amplitudes measured in their prior widths."""
     width = np.concatenate([c.width for c in start.candidates])
     scaled = step / width
@@ -128,7 +128,7 @@ def _corrected(start: Start, change: FloatArray, step: FloatArray) -> FloatArray
     return np.asarray(start.jacobian + np.outer(change - start.jacobian @ step, scaled / length) / width)
 
 
-def attempt(forward: ForwardModel, problem: Problem, start: Start) -> FloatArray | None:
+def attempt(forward: ForwardModel, problem: Problem, start: InitialFit) -> FloatArray | None:
     """Predict; None where the model has no equilibrium."""
     try:
         return predict(forward, build(start.candidates, start.amplitudes), problem.nuisances, start.nuisance)
@@ -136,7 +136,9 @@ def attempt(forward: ForwardModel, problem: Problem, start: Start) -> FloatArray
         return None
 
 
-def slope(forward: ForwardModel, problem: Problem, start: Start, y: FloatArray, index: int, share: float) -> FloatArray:
+def slope(
+    forward: ForwardModel, problem: Problem, start: InitialFit, y: FloatArray, index: int, share: float
+) -> FloatArray:
     """Change of the prediction per unit of one amplitude, by a one-sided difference that stays inside the bounds.
 
     `y` (n,).

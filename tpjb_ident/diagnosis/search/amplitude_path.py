@@ -16,7 +16,7 @@ NODES = (0.8, -0.8, 1.6, -1.6, 3.0, -3.0)
 
 
 @dataclass(frozen=True)
-class Course:
+class AmplitudePath:
     """Change of a prediction along one amplitude: cubic pieces between amplitudes at which the model was asked.
 
     Pieces that rise where their ends rise (Fritsch & Carlson, SIAM J. Numer. Anal. 17 (1980) 238): a pad that comes out
@@ -79,9 +79,9 @@ _VALUE = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [-3, 3, -2, -1], [2, -2, 1, 1]]
 _SLOPE = np.array([[0.0, 0, 1, 0], [-6, 6, -4, -2], [6, -6, 3, 3], [0, 0, 0, 0]])
 
 
-def course_through(amplitudes: Sequence[float], changes: Sequence[FloatArray]) -> Course:
+def path_through(amplitudes: Sequence[float], changes: Sequence[FloatArray]) -> AmplitudePath:
     """Lay a course through what the model said; `changes` (n,) each."""
     order = np.argsort([0.0, *amplitudes])
     at = np.array([0.0, *amplitudes])[order]
     values = np.array([np.zeros_like(changes[0]), *changes])[order]
-    return Course(at, np.hstack([values.T, PchipInterpolator(at, values, axis=0).derivative()(at).T]))
+    return AmplitudePath(at, np.hstack([values.T, PchipInterpolator(at, values, axis=0).derivative()(at).T]))

@@ -17,14 +17,14 @@ STAND_IN = 3.0
 
 
 @dataclass(frozen=True)
-class Worth:
+class EffectGain:
     """What an effect is worth in a model."""
 
     unseen: float
     beside: float
 
 
-def worth(problem: Problem, model: Fit, less: Fit, candidate: Candidate) -> Worth:
+def effect_gain(problem: Problem, model: Fit, less: Fit, candidate: Candidate) -> EffectGain:
     """What a candidate is worth in a model, beside the same model without it.
 
     Where the model without it needs something to be off by more than is stated, that stands in for the candidate, and
@@ -32,9 +32,9 @@ def worth(problem: Problem, model: Fit, less: Fit, candidate: Candidate) -> Wort
     """
     at = [f.assessment.free[f.jacobian.shape[1] :] for f in (model, less)]
     stand_in = np.flatnonzero((np.abs(at[1]) > STAND_IN) & (np.abs(at[1]) > np.abs(at[0]) + 1.0))
-    gone = sorted({*problem.twins(candidate), *(int(i) for i in stand_in)})
+    gone = sorted({*problem.aliases(candidate), *(int(i) for i in stand_in)})
     unseen = []
     for one in (model, less):
         told = assess(problem.basis, without(one, gone), one.assessment.scales) if gone else one.assessment
         unseen.append(float(np.sum(told.scores())))
-    return Worth(unseen[0] - unseen[1], model.evidence - less.evidence)
+    return EffectGain(unseen[0] - unseen[1], model.evidence - less.evidence)

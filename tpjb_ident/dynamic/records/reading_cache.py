@@ -65,7 +65,7 @@ class ShortRecord:
         return self._run.kept_open()
 
 
-class KeptReadings:
+class ReadingCache:
     """A run's reader that keeps the first samples of all channels."""
 
     def __init__(self, reader: Any, channels: Sequence[str], samples: int = SHORT) -> None:
@@ -108,7 +108,7 @@ class KeptReadings:
 class Beginning:
     """A run's reader that ends after the first samples."""
 
-    def __init__(self, reader: KeptReadings, samples: int) -> None:
+    def __init__(self, reader: ReadingCache, samples: int) -> None:
         self._reader, self._length = reader, min(samples, reader.samples)
 
     def __getattr__(self, name: str) -> Any:
@@ -124,12 +124,12 @@ def with_kept_beginning(run: Run) -> Run:
     if not isinstance(run, Run):
         return run
     names = [name for name, channel in run.channels.items() if channel.quantity != "time"]
-    return replace(run, reader=KeptReadings(run.reader, names))
+    return replace(run, reader=ReadingCache(run.reader, names))
 
 
 def beginning_of(run: Run) -> Run | None:
     """The first seconds of a run whose readings are kept, as a run of its own; None where they are not."""
     reader = getattr(run, "reader", None)
-    if not isinstance(reader, KeptReadings):
+    if not isinstance(reader, ReadingCache):
         return None
     return replace(run, reader=Beginning(reader, max(LOOK, round(SECONDS * run.sample_rate))))
