@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from rigdata.calibration import (
@@ -14,38 +15,16 @@ from rigdata.calibration import (
     reading_zero,
 )
 from rigdata.channel_response import ChannelResponse, parse_filter, parse_response_table
+from rigdata.manifest.fields import CHANNEL
 from rigdata.manifest.table import Findings, Table, nearest, shown
 from rigdata.problem import RigDataError
 from rigdata.units import UnitError, is_signal
 
-_KEYS = (
-    "like",
-    "quantity",
-    "axis",
-    "unit",
-    "sensitivity",
-    "polarity",
-    "uncertainty",
-    "full_scale",
-    "excitation",
-    "pad",
-    "position",
-    "zero",
-    "axis_uncertainty",
-    "delay",
-    "delay_uncertainty",
-    "filter",
-    "filter_table",
-    "clock",
-    "zero_uncertainty",
-)
+_FIELD = {field.key: field for field in CHANNEL}
 #: Entries that say where a sensor sits: a channel that is `like` another has its own.
 _PLACE = ("axis", "pad", "position")
-_QUANTITIES = (*DIMENSIONS, *UNCALIBRATED, "ignore")
 #: Gives the text of a file of the campaign, by its name in the manifest; raises RigDataError.
 TextFile = Callable[[str, str], str]
-#: Delays beyond this are another run's [s].
-_MAX_DELAY = 10.0
 _MAX_CHANNELS = 4096
 
 
@@ -66,9 +45,9 @@ def read_channels(table: Table, findings: Findings, files: TextFile | None = Non
         own = tables[name]
         if "like" in own.data and not _complete(own, name, tables, channels):
             continue
-        before = len(findings.problems)
+        errors = findings.errors
         channel = _read_channel(name, own, files)
-        if not any(p.severity == "error" for p in findings.problems[before:]) and channel is not None:
+        if channel is not None and findings.errors == errors:
             channels[name] = channel
     channels = {name: channels[name] for name in tables if name in channels}
     if sum(c.quantity == "time" for c in channels.values()) > 1:
@@ -78,7 +57,7 @@ def read_channels(table: Table, findings: Findings, files: TextFile | None = Non
 
 def _complete(own: Table, name: str, tables: dict[str, Table], read: dict[str, Channel]) -> bool:
     """Give a channel the entries of the one that it is `like`, but for its place; whether that can be read."""
-    model = own.text("like")
+    model = own.value(_FIELD["like"])
     if model is None:
         return False
     if model not in tables or model == name or "like" in tables[model].data:
@@ -92,88 +71,66 @@ def _complete(own: Table, name: str, tables: dict[str, Table], read: dict[str, C
 
 
 def _read_channel(name: str, table: Table, files: TextFile | None) -> Channel | None:
-    table.only(_KEYS, f"[channels.{name[:40]}]")
+    where = f"[channels.{name[:40]}]"
     if not name.strip() or len(name) > 200 or not name.isprintable() or _PATH_STEPS & set(name.split("/")):
+        table.only(CHANNEL, where)
         table.findings.error(table.path, f"channel name {shown(name)} cannot be used", "Use letters and digits")
         return None
-    quantity = table.choice("quantity", _QUANTITIES, required=True)
+    quantity = table.value(_FIELD["quantity"])
     if quantity is None or quantity == "ignore":
+        table.only(CHANNEL, where)
         return Channel(name, "ignore") if quantity else None
     plain = quantity in UNCALIBRATED
-    unit = table.text("unit", required=not plain) or ("" if plain else None)
     directed = quantity in VECTOR_QUANTITIES or quantity == "command"
-    axis = table.quantity("axis", "angle", required=directed)
-    polarity = table.data.get("polarity", 1)
-    if isinstance(polarity, bool) or polarity not in (1, -1):
-        table.error("polarity", f"polarity is {shown(polarity)}", "Give 1 or -1, without quotes")
+    needed = (["axis"] if directed else []) + ([] if plain else ["unit"])
+    values = table.read(CHANNEL, where, needed)
+    if isinstance(values["polarity"], bool) or values["polarity"] not in (1, -1):
+        table.error("polarity", f"polarity is {shown(values['polarity'])}", "Give 1 or -1, without quotes")
         return None
-    position = table.quantity("position", "ratio", low=0.0)
-    if position is not None and position > 1.0:
-        table.error("position", f"position is {position:g}", "It is the fraction of the arc, 0 to 1")
-    gain, zero = (1.0, 0.0) if plain else _calibration(table, quantity, unit)
-    if gain is None or zero is None or unit is None:
+    values["polarity"] = int(values["polarity"])
+    if plain:
+        values["unit"] = values["unit"] or ""
+        gain: float | None = 1.0
+        values["zero"] = 0.0
+    else:
+        gain, values["zero"] = _calibration(table, quantity, values["unit"])
+    values["zero_uncertainty"] = _zero_uncertainty(table, quantity)
+    response = _response(table, values, files)
+    if gain is None or values["zero"] is None:
         return None
-    return Channel(
-        name=name,
-        quantity=quantity,
-        unit=unit,
-        gain=gain,
-        zero=zero,
-        polarity=int(polarity),
-        axis=axis,
-        uncertainty=_uncertainty(table),
-        pad=table.integer("pad", low=1, high=100),
-        position=position,
-        axis_uncertainty=table.quantity("axis_uncertainty", "angle", low=0.0) or 0.0,
-        response=_response(table, files),
-        delay_uncertainty=table.quantity("delay_uncertainty", "time", low=0.0) or 0.0,
-        zero_uncertainty=_zero_uncertainty(table, quantity),
-        clock=table.text("clock") or "",
-    )
+    entries = {key: value for key, value in values.items() if key in Channel.__dataclass_fields__}
+    return Channel(name, gain=gain, response=response, **entries)
 
 
 def _zero_uncertainty(table: Table, quantity: str) -> float:
-    if "zero_uncertainty" not in table.data:
-        return 0.0
-    if quantity not in DIMENSIONS:
-        table.error("zero_uncertainty", f"a {quantity} channel has no zero", "Delete zero_uncertainty")
-        return 0.0
-    return table.quantity("zero_uncertainty", DIMENSIONS[quantity], low=0.0) or 0.0
+    field = _FIELD["zero_uncertainty"]
+    if quantity in DIMENSIONS:
+        return float(table.value(replace(field, kind=DIMENSIONS[quantity])))
+    if field.key in table.data:
+        table.error(field.key, f"a {quantity} channel has no zero", "Delete zero_uncertainty")
+    return 0.0
 
 
-def _response(table: Table, files: TextFile | None) -> ChannelResponse:
+def _response(table: Table, values: dict[str, Any], files: TextFile | None) -> ChannelResponse:
     """Filter and delay; what is wrong is noted and left out."""
-    delay = table.quantity("delay", "time") or 0.0
-    if abs(delay) > _MAX_DELAY:
-        table.error("delay", f"delay is {shown(table.data['delay'])}", f"It must be below {_MAX_DELAY:g} s")
-    found: list[Any] = []
-    stated, file = table.text("filter"), table.text("filter_table")
+    responses: list[Any] = []
     try:
-        if stated is not None:
-            found.append(parse_filter(stated))
+        if values["filter"] is not None:
+            responses.append(parse_filter(values["filter"]))
     except UnitError as error:
         table.error("filter", f"filter: {error}", "Or give filter_table, a measured response")
+    file = values["filter_table"]
     if file is not None and files is None:
         table.error("filter_table", "a table cannot be read here", "Give filter, or a campaign in a folder")
     elif file is not None and files is not None:
         try:
-            found.append(parse_response_table(files(file, ".".join(str(p) for p in table.path))))
+            responses.append(parse_response_table(files(file, ".".join(str(p) for p in table.path))))
         except UnitError as error:
             table.error("filter_table", f"{shown(file)}: {error}", "Give lines of frequency_Hz, gain, phase_deg")
         except RigDataError as error:
-            table.findings.problems.extend(error.problems)
-    return ChannelResponse(tuple(found), delay)
-
-
-def _uncertainty(table: Table) -> float | None:
-    value = table.quantity("uncertainty", "ratio", low=0.0)
-    if value is not None and value >= 1.0:
-        table.error(
-            "uncertainty",
-            f"uncertainty is {shown(table.data['uncertainty'])}",
-            'Give e.g. "1 %", below 100 %',
-        )
-    return value
+            for problem in error.problems:
+                table.findings.append(problem)
+    return ChannelResponse(tuple(responses), values["delay"])
 
 
 def _calibration(table: Table, quantity: str, unit: str | None) -> tuple[float | None, float | None]:

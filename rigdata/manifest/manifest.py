@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import tomllib
 from collections.abc import Mapping
@@ -11,20 +10,17 @@ from typing import Any
 
 from rigdata.calibration import Channel
 from rigdata.manifest.channels import TextFile, read_channels
+from rigdata.manifest.fields import ACQUISITION, CSV, HOUSING, MAINS_FREQUENCIES, TOP
 from rigdata.manifest.runs import RunEntry, read_runs
 from rigdata.manifest.table import Findings, Table, key_lines
 from rigdata.problem import Problem, RigDataError, refuse
 
 SCHEMA = "tpjb-rig/1"
-#: Frequencies of the mains in any country [Hz].
-MAINS_FREQUENCIES = (50.0, 60.0)
 #: Larger manifests are refused before they are parsed [bytes].
 MAX_MANIFEST = 4 * 2**20
 #: Longer lines, and lines with more dots outside quotes, are refused.
 MAX_LINE, MAX_DOTS = 40_000, 100
 _QUOTED = re.compile(r'"[^"\\]*"|\'[^\']*\'')
-_TOP = ("schema", "id", "bearing", "description", "housing", "acquisition", "csv", "channels", "runs")
-_CSV = ("delimiter", "decimal", "encoding", "header_line", "units_line", "names")
 
 
 @dataclass(frozen=True)
@@ -61,42 +57,34 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     data = _load_toml(text, file)
     findings = Findings(file, key_lines(text))
     top = Table(data, (), findings)
-    top.only(_TOP, "the manifest")
-    schema = top.text("schema", required=True)
-    if schema is not None and schema != SCHEMA:
-        findings.error(("schema",), f"schema is {schema!r}, not {SCHEMA!r}", "Export in the format tpjb-rig/1")
+    stated = top.read(TOP, "the manifest")
+    if stated["schema"] not in (None, SCHEMA):
+        what = f"schema is {stated['schema']!r}, not {SCHEMA!r}"
+        findings.error(("schema",), what, "Export in the format tpjb-rig/1")
     channels = read_channels(top.subtable("channels"), findings, files)
     runs = read_runs(data.get("runs"), findings)
-    housing = top.subtable("housing")
-    housing.only(("mass", "mass_uncertainty"), "[housing]")
-    mass = housing.quantity("mass", "mass", low=0.0, required=any(r.kind in {"dynamic", "baseline"} for r in runs))
-    acquisition = top.subtable("acquisition")
-    acquisition.only(("sample_rate", "mains"), "[acquisition]")
-    rate = acquisition.quantity("sample_rate", "frequency", above=0.0)
+    excited = any(run.kind in {"dynamic", "baseline"} for run in runs)
+    housing = top.subtable("housing").read(HOUSING, "[housing]", ["mass"] if excited else [])
+    acquisition = top.subtable("acquisition").read(ACQUISITION, "[acquisition]")
+    mains = acquisition["mains"]
+    if mains not in (None, *MAINS_FREQUENCIES):
+        findings.error(("acquisition", "mains"), f"mains is {mains:g} Hz", 'Give "50 Hz" or "60 Hz"')
     manifest = Manifest(
-        id=top.text("id", required=True) or "",
-        bearing=top.text("bearing", required=True) or "",
-        description=top.text("description") or "",
-        housing_mass=math.nan if mass is None else mass,
-        sample_rate=rate,
-        csv=_read_csv(top.subtable("csv"), findings),
+        id=stated["id"] or "",
+        bearing=stated["bearing"] or "",
+        description=stated["description"],
+        housing_mass=housing["mass"],
+        sample_rate=acquisition["sample_rate"],
+        csv=_read_csv(top.subtable("csv")),
         channels=channels,
         runs=runs,
         notes=tuple(p for p in findings.problems if p.severity != "error"),
-        mass_uncertainty=housing.quantity("mass_uncertainty", "mass", low=0.0) or 0.0,
-        mains=_mains(acquisition),
+        mass_uncertainty=housing["mass_uncertainty"],
+        mains=mains,
     )
-    if findings.failed:
+    if findings.errors:
         raise RigDataError(findings.problems)
     return manifest
-
-
-def _mains(table: Table) -> float | None:
-    value = table.quantity("mains", "frequency", low=0.0)
-    if value is not None and value not in MAINS_FREQUENCIES:
-        table.error("mains", f"mains is {value:g} Hz", 'Give "50 Hz" or "60 Hz"')
-        return None
-    return value
 
 
 def _load_toml(text: str, file: str) -> dict[str, Any]:
@@ -117,35 +105,32 @@ def _load_toml(text: str, file: str) -> dict[str, Any]:
         raise refuse(file, "", what, cure) from error
 
 
-def _read_csv(table: Table, findings: Findings) -> CsvSpec:
-    table.only(_CSV, "[csv]")
-    delimiter, decimal = table.text("delimiter"), table.text("decimal")
-    if delimiter in {"\\t", "tab", "TAB"}:
-        delimiter = "\t"
-    for key, value, allowed in (("delimiter", delimiter, None), ("decimal", decimal, ".,")):
-        if value is not None and (len(value) != 1 or (allowed and value not in allowed)):
-            findings.error(("csv", key), f"{key} is {value!r}", "Give one character" + (", . or ," if allowed else ""))
+def _read_csv(table: Table) -> CsvSpec:
+    values = table.read(CSV, "[csv]")
+    if values["delimiter"] in {"\\t", "tab", "TAB"}:
+        values["delimiter"] = "\t"
+    delimiter, decimal = values["delimiter"], values["decimal"]
+    if delimiter is not None and len(delimiter) != 1:
+        table.error("delimiter", f"delimiter is {delimiter!r}", "Give one character")
+    if decimal is not None and decimal not in (".", ","):
+        table.error("decimal", f"decimal is {decimal!r}", "Give one character, . or ,")
     if delimiter is not None and delimiter in '0123456789+-.eE"\r\n':
-        findings.error(("csv", "delimiter"), f"delimiter {delimiter!r} cannot part numbers", 'Give e.g. ";"')
+        table.error("delimiter", f"delimiter {delimiter!r} cannot part numbers", 'Give e.g. ";"')
     if delimiter is not None and delimiter == decimal:
-        findings.error(("csv", "decimal"), f"delimiter and decimal are both {decimal!r}", "They must differ")
-    header, units = table.integer("header_line", low=1), table.integer("units_line", low=1)
+        table.error("decimal", f"delimiter and decimal are both {decimal!r}", "They must differ")
+    header, units = values["header_line"], values["units_line"]
     if header is not None and units is not None and units <= header:
-        findings.error(
-            ("csv", "units_line", "names"),
-            f"units_line {units} is not below header_line {header}",
-            "Lines count from 1",
-        )
-    names = table.data.get("names", [])
+        table.error("units_line", f"units_line {units} is not below header_line {header}", "Lines count from 1")
+    names = values["names"] or []
     if not isinstance(names, list) or not all(isinstance(n, str) and n.strip() for n in names):
-        findings.error(
-            ("csv", "names"), "names is no list of texts", 'Write names = ["time", "X1A", ..], one per column'
-        )
+        table.error("names", "names is no list of texts", 'Write names = ["time", "X1A", ..], one per column')
         names = []
-    return CsvSpec(delimiter, decimal, _codec(table.text("encoding"), findings), header, units, tuple(names))
+    values["names"] = tuple(names)
+    values["encoding"] = _codec(table, values["encoding"])
+    return CsvSpec(**values)
 
 
-def _codec(encoding: str | None, findings: Findings) -> str | None:
+def _codec(table: Table, encoding: str | None) -> str | None:
     if encoding is None:
         return None
     import codecs
@@ -157,8 +142,8 @@ def _codec(encoding: str | None, findings: Findings) -> str | None:
     except (LookupError, TypeError, ValueError, AttributeError):
         usable = False
     if not usable:
-        findings.error(
-            ("csv", "encoding"),
+        table.error(
+            "encoding",
             f"encoding {encoding!r} is not known as a text encoding",
             'Give e.g. "cp1252" or "utf-8", or leave it out: it is then detected',
         )

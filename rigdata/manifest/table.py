@@ -1,12 +1,13 @@
-"""Typed access to a table of the manifest, noting every fault instead of stopping at the first."""
+"""A table of the manifest, read by its declared fields; every fault is noted instead of stopping at the first."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection
 from typing import Any
 
-from rigdata.near_names import nearest_name
+from rigdata.manifest.fields import RAW, Field
+from rigdata.near_names import hint
 from rigdata.problem import Problem, Severity
 from rigdata.units import UnitError, parse_quantity
 
@@ -20,45 +21,42 @@ Path = tuple[str | int, ...]
 
 
 def shown(value: object, length: int = 60) -> str:
-    """`value` as it stands in a message: quoted, short, on one line, controls escaped."""
+    """`value` in a message: quoted, short, on one line, controls escaped."""
     if isinstance(value, str):
-        text = _printable(value)
+        # right-to-left marks and control characters could make a message read otherwise than it is
+        text = repr("".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in value[:200]))
     elif isinstance(value, (dict, list)):  # may be nested too deeply to be printed
         text = "a table" if isinstance(value, dict) else "an array"
+    elif isinstance(value, int) and abs(value) > 10**60:  # may have more digits than Python prints
+        text = "a whole number of many digits"
     else:
         text = ascii(value)
     return text if len(text) <= length else text[: length - 3] + "..."
 
 
-def _printable(text: str) -> str:
-    # Right-to-left marks and control characters could make a message read otherwise than it is.
-    return repr("".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in text[:200]))
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Name the nearest of `known`, as the cure for an unknown `name`."""
-    names = list(known)
-    close = nearest_name(name.lower(), names, cutoff=0.4)
-    return f"Did you mean {close!r}?" if close else f"Known: {', '.join(names)}"
+def nearest(name: str, known: Collection[str]) -> str:
+    """The nearest of `known`, as the remedy for an unknown `name`."""
+    return hint(name.lower(), known, cutoff=0.4)
 
 
 class Findings:
-    """The problems of one manifest, with the lines they stand on."""
+    """The problems of one manifest, with their lines."""
 
     def __init__(self, file: str, lines: dict[Path, int]) -> None:
         self.file = file
         self.lines = lines
         self.problems: list[Problem] = []
-
-    @property
-    def failed(self) -> bool:
-        """Whether any problem is an error."""
-        return any(p.severity == "error" for p in self.problems)
+        self.errors = 0
 
     def add(self, severity: Severity, path: Path, what: str, cure: str, run: str | None = None) -> None:
         """Note a problem of the key at `path`."""
+        self.append(Problem(severity, self.file, _place_of(self.lines, path), what, cure, run))
+
+    def append(self, problem: Problem) -> None:
+        """Note a problem that was found elsewhere."""
+        self.errors += problem.severity == "error"
         if len(self.problems) < _MAX_FINDINGS:
-            self.problems.append(Problem(severity, self.file, _place_of(self.lines, path), what, cure, run))
+            self.problems.append(problem)
 
     def error(self, path: Path, what: str, cure: str, run: str | None = None) -> None:
         """Note an error of the key at `path`."""
@@ -66,7 +64,7 @@ class Findings:
 
 
 class Table:
-    """One TOML table; every getter returns None where the key is absent or wrong (then noted)."""
+    """One TOML table; a value that is missing or wrong (then noted) is its field's default."""
 
     def __init__(self, data: object, path: Path, findings: Findings) -> None:
         self.path = path
@@ -75,85 +73,86 @@ class Table:
         if not isinstance(data, dict):
             findings.error(path, f"is {shown(data)}, not a table", "Write it as a [table] with keys")
 
-    def only(self, known: tuple[str, ...], where: str) -> None:
-        """Note every key that is not in `known`."""
-        for key in self.data:
-            if key not in known:
-                self.findings.error((*self.path, key), f"unknown key {shown(key)} in {where}", nearest(key, known))
-
     def subtable(self, key: str) -> Table:
-        """Give the table under `key`, empty where absent."""
+        """The table under `key`, empty where absent."""
         return Table(self.data.get(key, {}), (*self.path, key), self.findings)
 
     def error(self, key: str, what: str, cure: str) -> None:
         """Note an error of `key`."""
         self.findings.error((*self.path, key), what, cure)
 
-    def _get(self, key: str, required: bool, cure: str) -> Any:
-        if key not in self.data and required:
-            self.error(key, f"{key} is missing", cure)
-        return self.data.get(key)
+    def read(self, fields: tuple[Field, ...], where: str, needed: Collection[str] = ()) -> dict[str, Any]:
+        """The value of every field, SI; keys that are no field are noted."""
+        self.only(fields, where)
+        return {field.key: self.value(field, field.key in needed) for field in fields}
 
-    def text(self, key: str, required: bool = False) -> str | None:
-        """Give a string, not longer than is sane."""
-        value = self._get(key, required, f'Add {key} = "..."')
+    def only(self, fields: tuple[Field, ...], where: str) -> None:
+        """Note every key that is no field."""
+        known = [field.key for field in fields]
+        for key in self.data:
+            if key not in known:
+                self.error(key, f"unknown key {shown(key)} in {where}", nearest(key, known))
+
+    def value(self, field: Field, needed: bool = False) -> Any:
+        """The value of one field, SI."""
+        key, value = field.key, self.data.get(field.key)
         if value is None:
-            return None
+            if needed or field.required:
+                self.error(key, f"{key} is missing", _remedy_of_missing(field))
+            return field.default
+        if field.kind in RAW:
+            return value
+        if field.kind == "whole":
+            checked: Any = self._whole(field, value)
+        elif field.kind in ("text", "choice"):
+            checked = self._text(field, value, needed)
+        else:
+            checked = self._quantity(field, value)
+        return field.default if checked is None else checked
+
+    def _text(self, field: Field, value: object, needed: bool) -> str | None:
+        """A string, not longer than is sane; a choice is one of those known."""
+        key = field.key
         if not isinstance(value, str):
             self.error(key, f"{key} is {shown(value)}, not text", "Put it in quotes")
-            return None
-        if len(value) > _MAX_TEXT or "\0" in value:
+        elif len(value) > _MAX_TEXT or "\0" in value:
             self.error(key, f"{key} is too long or holds a NUL character", "Shorten it")
-            return None
-        if required and not value.strip():
+        elif (needed or field.required) and not value.strip():
             self.error(key, f"{key} is empty", "Give a value")
+        elif field.known and value not in field.known:
+            self.error(key, f"{key} {shown(value)} is unknown", nearest(value, field.known))
+        else:
+            return value
+        return None
+
+    def _whole(self, field: Field, value: object) -> int | None:
+        if isinstance(value, bool) or not isinstance(value, int) or not field.holds(value):
+            advice = f"Give a whole number from {field.low:g} on, without quotes"
+            self.error(field.key, f"{field.key} is {shown(value)}", advice)
             return None
         return value
 
-    def choice(self, key: str, known: tuple[str, ...], required: bool = False) -> str | None:
-        """Give one of the texts `known`."""
-        value = self.text(key, required)
-        if value is not None and value not in known:
-            self.error(key, f"{key} {shown(value)} is unknown", nearest(value, known))
-            return None
-        return value
-
-    def integer(self, key: str, low: int, high: int = 10_000_000) -> int | None:
-        """Give a whole number between `low` and `high`."""
-        value = self.data.get(key)
-        if value is None:
-            return None
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            self.error(key, f"{key} is {shown(value)}", f"Give a whole number from {low} on, without quotes")
-            return None
-        return value
-
-    def quantity(
-        self,
-        key: str,
-        dimension: str,
-        low: float | None = None,
-        above: float | None = None,
-        required: bool = False,
-    ) -> float | None:
-        """Give an SI value not below `low` and greater than `above`."""
-        value = self._get(key, required, f"Add {key}, a {dimension} with its unit")
-        if value is None:
-            return None
+    def _quantity(self, field: Field, value: object) -> float | None:
+        key = field.key
         try:
-            number = parse_quantity(value, dimension)
+            number = parse_quantity(value, field.kind)
         except UnitError as error:
-            self.error(key, f"{key}: {error}", f"Give a {dimension} as number and unit in quotes")
+            self.error(key, f"{key}: {error}", f"Give a {field.kind} as number and unit in quotes")
             return None
-        if (low is not None and number < low) or (above is not None and number <= above):
-            bound = f"not below {low:g}" if low is not None else f"above {above:g}"
-            self.error(key, f"{key} is {shown(value)}", f"It must be {bound}")
+        if not field.holds(number):
+            self.error(key, f"{key} is {shown(value)}", field.advice())
             return None
         return number
 
 
+def _remedy_of_missing(field: Field) -> str:
+    if field.kind in ("text", "choice"):
+        return f'Add {field.key} = "..."'
+    return f"Add {field.key}, a {field.kind} with its unit"
+
+
 def key_lines(text: str) -> dict[Path, int]:
-    """Map the path of every table and key to its line (1-based)."""
+    """Line (1-based) of every table and key, by path."""
     lines: dict[Path, int] = {}
     counts: dict[str, int] = {}
     table: Path = ()
@@ -178,19 +177,19 @@ def key_lines(text: str) -> dict[Path, int]:
 
 
 def _place_of(lines: dict[Path, int], path: Path) -> str:
-    """Say where `path` stands: ``"line 14, [channels.X1A] sensitivity"``."""
-    words = _spell(path)
+    """Where `path` is: ``"line 14, [channels.X1A] sensitivity"``."""
+    spelt = _spell(path)
     at: Path = path
     while at and at not in lines:
         at = at[:-1]
-    return f"line {lines[at]}, {words}" if at else words
+    return f"line {lines[at]}, {spelt}" if at else spelt
 
 
 def _spell(path: Path) -> str:
     if len(path) == 1:
         return str(path[0])
-    if path and path[0] == "runs" and len(path) > 1 and isinstance(path[1], int):
-        rest = "".join(f" {p}" for p in path[2:])
-        return f"[[runs]] no. {path[1] + 1}{rest}"
+    if path and path[0] == "runs" and isinstance(path[1], int):
+        keys = "".join(f" {p}" for p in path[2:])
+        return f"[[runs]] no. {path[1] + 1}{keys}"
     table = ".".join(str(p) for p in path[:-1])
-    return f"[{table}] {path[-1]}" if table not in {"channels"} else f"[channels.{path[-1]}]"
+    return f"[channels.{path[-1]}]" if table == "channels" else f"[{table}] {path[-1]}"

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rigdata.manifest.manifest import MAINS_FREQUENCIES
+from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MAINS_FREQUENCIES, RUN, draft_line
 from rigdata.survey.channel_guess import ChannelGuess, guess_channel, quantity_of_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.run_guess import RunGuess, guess_run, strongest_lines
@@ -173,11 +173,11 @@ def draft_manifest(found: Survey, name: str, bearing: str | None) -> str:
         'description = ""',
         "",
         "[housing]",
-        f'mass = "{MARK} kg"   # stator mass between oil film and load cells',
+        draft_line(HOUSING, "mass", f'"{MARK} kg"'),
         "",
     ]
     if not all(rate > 0 for rate in found.rates):
-        lines += ["[acquisition]", f'sample_rate = "{MARK} Hz"   # some files hold no times', ""]
+        lines += ["[acquisition]", draft_line(ACQUISITION, "sample_rate", f'"{MARK} Hz"'), ""]
     if found.nameless:
         names = ", ".join(_toml_string(f"column{i + 1}") for i in range(found.nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
@@ -220,9 +220,10 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str) -> list[str]:
         ]
     lines = [head, f'quantity = "{guess.quantity}"   # (guess) {guess.why}']
     if guess.quantity in _DIRECTED:
-        known = f'axis = "{guess.axis}"   # (guess) by its name' if guess.axis else f'axis = "{MARK} deg"'
-        where = "direction of the positive quantity, counter-clockwise from horizontal"
-        lines.append(known if guess.axis else f"{known}   # {where}")
+        if guess.axis:
+            lines.append(f'axis = "{guess.axis}"   # (guess) by its name')
+        else:
+            lines.append(draft_line(CHANNEL, "axis", f'"{MARK} deg"'))
     if like:
         lines.append(
             f"like = {_toml_string(like)}   # (guess) a sensor of the same type; or its own unit, sensitivity, .."
@@ -232,18 +233,18 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str) -> list[str]:
         if quantity_of_unit(guess.unit) == "":
             lines.append(f'sensitivity = "{MARK}"   # such as {_EXAMPLE.get(guess.quantity, "1 V per unit")}')
         if guess.quantity == "displacement":
-            lines.append("# polarity = -1   # an eddy-current probe reads less as the shaft comes nearer")
+            lines.append(f"# {draft_line(CHANNEL, 'polarity', '-1')}")
     if guess.quantity == "temperature":
         pad = re.search(r"(?:pad|t|tc|temp\w*?)[-_ #]*(\d{1,2})(?!\d)", name, re.IGNORECASE)
         lines.append(f"pad = {int(pad[1])}   # (guess) by its name" if pad and int(pad[1]) else "# pad = 1")
-        lines.append("# position = 0.75   # fraction of the arc from the leading edge")
+        lines.append(f"# {draft_line(CHANNEL, 'position', '0.75')}")
     return lines
 
 
 def run_lines(export: str, run: RunGuess, found: Survey) -> list[str]:
     """Lines of a run's table."""
     stem = export.rpartition("/")[2].rpartition(".")[0]
-    kind = f'kind = "{MARK}"   # dynamic, dry_pivot, locus, clearance'
+    kind = f'kind = "{MARK}"   # {", ".join(KINDS)}'
     if run.kind:
         kind = f'kind = "{run.kind}"   # (guess) {run.why}'
     lines = ["[[runs]]", f"id = {_toml_string(stem)}", f"file = {_toml_string(export)}", kind]
@@ -252,14 +253,13 @@ def run_lines(export: str, run: RunGuess, found: Survey) -> list[str]:
             lines.append(_line("shaft_speed", run.speed, "Hz", run.why_speed))
         else:
             mains = "; it may be the mains" if _is_mains(found.speed_line) else ""
-            lines.append(_line("shaft_speed", found.speed_line, "Hz", f"this line stands in most records{mains}"))
-        lines.append(_line("static_load", run.load / 1e3, "kN", "by the file's name; per bearing", "per bearing"))
+            lines.append(_line("shaft_speed", found.speed_line, "Hz", f"most records hold this line{mains}"))
+        lines.append(_line("static_load", run.load / 1e3, "kN", "by the file's name"))
     if run.kind == "dry_pivot":
         known = f"pad = {run.pad}   # (guess) by the file's name"
-        lines.append(known if run.pad else f'pad = "{MARK}"   # number of the pad that is loaded, without quotes')
+        lines.append(known if run.pad else draft_line(RUN, "pad", f'"{MARK}"'))
     if run.kind != "clearance":
-        where = "where it pushes the shaft; down is -90 deg"
-        lines.append(_line("static_load_direction", run.direction, "deg", f"by the cells; {where}", where))
+        lines.append(_line("static_load_direction", run.direction, "deg", "by the cells"))
     if run.kind in ("dynamic", ""):
         frequency, why = run.excitation, "by the file's name, and a line of the record"
         if not math.isfinite(frequency):
@@ -269,11 +269,11 @@ def run_lines(export: str, run: RunGuess, found: Survey) -> list[str]:
     return lines
 
 
-def _line(key: str, value: float, unit: str, why: str, otherwise: str = "") -> str:
-    """One line of a run: the guess with its reason, or the mark with what is wanted."""
+def _line(key: str, value: float, unit: str, why: str) -> str:
+    """One line of a run: the guess with its reason, or the mark; and what the key means."""
     if math.isfinite(value):
-        return f'{key} = "{value:.4g} {unit}"   # (guess) {why}'
-    return f'{key} = "{MARK} {unit}"' + (f"   # {otherwise}" if otherwise else "")
+        return draft_line(RUN, key, f'"{value:.4g} {unit}"').replace("# ", f"# (guess) {why}; ", 1)
+    return draft_line(RUN, key, f'"{MARK} {unit}"')
 
 
 def _toml_string(text: str) -> str:

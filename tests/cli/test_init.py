@@ -80,7 +80,8 @@ def test_what_was_changed_by_hand_stays_and_new_records_become_runs(folder):
     record(folder / "dyn-5kN-25Hz.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"))
     tpjb("init", folder)
     manifest = folder / "campaign.toml"
-    edit(manifest, ('static_load = "5 kN"   # (guess) by the file\'s name; per bearing', 'static_load = "4.9 kN"'),
+    load = 'static_load = "5 kN"   # (guess) by the file\'s name; set point, per bearing'
+    edit(manifest, (load, 'static_load = "4.9 kN"'),
          ('mass = "?? kg"   # stator mass between oil film and load cells', 'mass = "31 kg"  # weighed'))  # fmt: skip
     record(folder / "dyn-5kN-30Hz.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"), frequency=30.0)
     result = tpjb("init", folder, "--update")

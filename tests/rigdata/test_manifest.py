@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+import tomllib
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, RUN, markdown
 from rigdata.manifest.manifest import MAX_MANIFEST, parse_manifest
 from rigdata.problem import Problem, RigDataError
+from rigdata.units import SI_UNITS, parse_quantity
 
 GOOD = """\
 schema = "tpjb-rig/1"
@@ -270,3 +273,13 @@ def test_mutated_manifests_parse_or_tell_their_problems(data):
         return
     assert problems
     assert all(p.what and p.cure and p.file for p in problems)
+
+
+def test_every_key_is_in_the_docs(checkout):
+    # python -c "from rigdata.manifest.fields import markdown; print(markdown())"
+    assert markdown() in (checkout / "docs" / "campaigns.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("field", [f for f in CHANNEL + RUN + HOUSING + ACQUISITION if f.kind in SI_UNITS])
+def test_examples_of_quantities_can_be_read(field):
+    assert field.holds(parse_quantity(tomllib.loads(f"x = {field.example}")["x"], field.kind))

@@ -11,7 +11,7 @@ import numpy as np
 
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.channel_statistics import ChannelStatistics
-from rigdata.manifest.manifest import MAINS_FREQUENCIES
+from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.arrays import ComplexArray, FloatArray

@@ -12,7 +12,7 @@ from model.effects import Effect, apply_effects
 from model.instruments import Instruments
 from model.pivots import NAMED_LAWS, pivot_laws
 from model.setup import Setup
-from rigdata.manifest.manifest import MAINS_FREQUENCIES
+from rigdata.manifest.fields import MAINS_FREQUENCIES
 from tpjb_ident.compare.comparison import ComparisonError
 from tpjb_ident.compare.measured_pivots import measured_laws
 from tpjb_ident.compare.static_tests import measure_static

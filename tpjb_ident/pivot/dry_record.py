@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import fft, ndimage
 
-from rigdata.manifest.manifest import MAINS_FREQUENCIES
+from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.pivot.blocks import Blocks, PivotSettings, Samples, cut_blocks

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigdata.campaign import Campaign
-from rigdata.manifest.manifest import MAINS_FREQUENCIES
+from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError
 from rigdata.run import Run
 from tpjb_ident.arrays import FloatArray
