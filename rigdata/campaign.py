@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rigdata.calibration import Channel
-from rigdata.manifest.manifest import MAX_MANIFEST, CsvSpec, Manifest, parse_manifest
+from rigdata.manifest.manifest import MAX_MANIFEST, Manifest, parse_manifest
 from rigdata.manifest.runs import RunEntry
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError, refuse
@@ -188,8 +188,8 @@ def _read_text(path: Path, file: str, limit: int) -> str:
 
 
 def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
+    from rigdata.readers.cached_reader import ReadingCache
     from rigdata.readers.formats.foreign import ForeignReader, is_foreign
-    from rigdata.readers.table_cache import TableCache
     from rigdata.readers.text.csv import CsvReader
 
     text = _read_text(manifest_path, manifest_path.name, MAX_MANIFEST)
@@ -198,7 +198,7 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
     problems: list[Problem] = []
     bearing = _bearing_text(folder, manifest, manifest_path.name, files, problems)
     channels = {n: c for n, c in manifest.channels.items() if c.quantity != "ignore"}
-    cache = TableCache()
+    cache = ReadingCache()
     runs = []
     for entry in manifest.runs:
         place = f"[[runs]] no. {entry.index + 1} file"
@@ -211,9 +211,9 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
         rate = entry.sample_rate or manifest.sample_rate
         reader: RunReader
         if is_foreign(target):
-            reader = ForeignReader(target, entry.file, entry.id, frozenset(manifest.channels), rate, cache)
+            reader = ForeignReader(target, entry.file, entry.id, manifest.channels, rate, cache)
         else:
-            reader = CsvReader(target, entry.file, entry.id, manifest.csv, manifest.channels, rate, cache)
+            reader = CsvReader(target, entry.file, entry.id, manifest.channels, rate, cache, manifest.csv)
         runs.append(_make_run(entry, channels, reader))
     return _finish(manifest, _Opened(folder, bearing, files), channels, runs, problems)
 
@@ -224,14 +224,11 @@ def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
     from rigdata.readers.text.csv import CsvReader
 
     old: Any = run.reader
-    reader: RunReader
-    if isinstance(old, CsvReader) and not is_foreign(path):
+    kind = ForeignReader if is_foreign(path) else CsvReader
+    if isinstance(old, kind):
         reader = replace(old, path=path, file=file, run=run_id)
-    elif is_foreign(path):
-        described = frozenset(old.channels if isinstance(old, CsvReader) else old.described)
-        reader = ForeignReader(path, file, run_id, described, old.stated_rate, old.cache)
     else:
-        reader = CsvReader(path, file, run_id, CsvSpec(), run.channels, old.stated_rate)
+        reader = kind(path, file, run_id, getattr(old, "channels", run.channels), old.stated_rate)
     return replace(run, id=run_id, reader=reader)
 
 

@@ -95,12 +95,12 @@ def undescribed(names: Sequence[str], what: str, file: str, run: str) -> tuple[P
     return (Problem("note", file, what, f"{what} without a description: {listed}", cure, run),)
 
 
-def missing_channel(name: str, known: Iterable[str], held: str) -> tuple[str, str, str]:
+def missing_channel(name: str, names: Iterable[str]) -> tuple[str, str, str]:
     """Place, what is wrong and what to do where a file lacks a channel: the nearest it has, or all of them."""
-    names = list(known)
-    close = nearest_name(name, names)
-    cure = f"Did you mean {close!r}?" if close else f"{held}: {', '.join(names)[:200]}"
-    return f"channel {name}", "is missing in the file", cure
+    held = list(names)
+    close = nearest_name(name, held)
+    remedy = f"Did you mean {close!r}?" if close else f"It holds: {', '.join(held)[:200]}"
+    return f"channel {name}", "is missing in the file", remedy
 
 
 def rate_of_time(time: FloatArray) -> float:

@@ -5,18 +5,19 @@ from __future__ import annotations
 import functools
 import re
 import tempfile
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import Problem, refuse
 from rigdata.readers.base import MAX_REQUEST, rate_of_time
 
-#: Channels larger than this wait in a file without a name, and are read from there in pieces [bytes].
-SET_ASIDE = 2**23
-#: Two clocks whose samples lie this share of a step apart count as one.
+#: Longer channels are in a file without a name, and are read from there in pieces [bytes].
+IN_MEMORY = 2**23
+#: Two clocks whose samples differ by this share of a step count as one.
 _SAME = 0.01
 _WORDS = (
     r"date[ /_-]*time|date and time|datum[ /_+-]*(?:und )?(?:uhr)?zeit|time|zeit(?:stempel)?|temps|tempo|tiempo|uhrzeit"
@@ -63,14 +64,13 @@ class Series:
 class Columns:
     """Channels on one clock."""
 
-    values: dict[str, FloatArray] = field(repr=False)
-    units: dict[str, str]
-    time: FloatArray | None = field(repr=False, default=None)
-    notes: tuple[str, ...] = ()
+    values: dict[str, FloatArray] = field(repr=False)  #: (n,) each
+    time: FloatArray | None = field(repr=False, default=None)  #: (n,), s
+    problems: tuple[Problem, ...] = ()
 
     @property
     def nbytes(self) -> int:
-        """Size of all channels [bytes], in memory or set aside."""
+        """Size of all channels [bytes], in memory or in temporary files."""
         return sum(a.nbytes for a in self.values.values()) + (0 if self.time is None else self.time.nbytes)
 
     @property
@@ -79,9 +79,9 @@ class Columns:
         return len(next(iter(self.values.values()))) if self.values else 0
 
 
-def set_aside(values: FloatArray) -> FloatArray:
-    """Move a long channel out of memory: it is in a file without a name, which goes when nobody holds it any more."""
-    if values.nbytes <= SET_ASIDE or isinstance(values, np.memmap):
+def to_temporary_file(values: FloatArray) -> FloatArray:
+    """Move a long channel (n,) out of memory, to a file without a name, which goes when nobody holds it any more."""
+    if values.nbytes <= IN_MEMORY or isinstance(values, np.memmap):
         return values
     try:
         with tempfile.TemporaryFile(prefix="tpjb-") as file:
@@ -97,68 +97,68 @@ def equidistant(count: int, step: float, start: float = 0.0) -> FloatArray:
     """Seconds of `count` samples, `step` apart."""
     seconds = start + step * np.arange(count, dtype=np.float64)
     seconds.flags.writeable = False
-    return set_aside(seconds)
+    return to_temporary_file(seconds)
 
 
-def without_twins(series: Sequence[Series]) -> list[Series]:
+def with_unique_names(series: Sequence[Series]) -> list[Series]:
     """Give channels of one name in several groups the group's name as a prefix; number what is still alike."""
-    counts: dict[str, int] = {}
-    for one in series:
-        counts[one.name] = counts.get(one.name, 0) + 1
-    named = [replace(s, name=f"{s.group}.{s.name}") if counts[s.name] > 1 and s.group else s for s in series]
-    seen: dict[str, int] = {}
-    out = []
-    for one in named:
-        seen[one.name] = seen.get(one.name, 0) + 1
-        out.append(one if seen[one.name] == 1 else replace(one, name=f"{one.name}_{seen[one.name]}"))
-    return out
+    counts = Counter(channel.name for channel in series)
+    used: Counter[str] = Counter()
+    unique = []
+    for channel in series:
+        name = channel.name
+        if counts[name] > 1 and channel.group:
+            name = f"{channel.group}.{name}"
+        used[name] += 1
+        unique.append(replace(channel, name=name if used[name] == 1 else f"{name}_{used[name]}"))
+    return unique
 
 
 def on_one_clock(series: Sequence[Series], file: str, run: str | None = None) -> Columns:
     """Bring channels of several clocks onto that of the fastest one.
 
-    Slower channels (temperatures beside displacements) are interpolated linearly between their samples and missing
-    (NaN) before their first and after their last one.
+    Slower channels (temperatures compared with displacements) are interpolated linearly between their samples and
+    missing (NaN) before their first and after their last one.
     """
-    chosen = without_twins(series)
-    if not chosen:
-        raise _refuse(file, run, "holds no channel of numbers", "Export the run again, with its channels")
-    timed = [s for s in chosen if s.time is not None and len(s) > 1]
-    lengths = {len(s) for s in chosen}
+    channels = with_unique_names(series)
+    if not channels:
+        raise refuse(file, "", "holds no channel of numbers", "Export the run again, with its channels", run)
+    timed = [channel for channel in channels if channel.time is not None and len(channel) > 1]
     if not timed:
+        lengths = {len(channel) for channel in channels}
         if len(lengths) > 1:
             what = f"has channels of {len(lengths)} different lengths and no times"
-            raise _refuse(file, run, what, "Export with a time channel, or channels of one length")
-        values = {s.name: s.values for s in chosen}
-        return Columns(values, {s.name: s.unit for s in chosen})
-    master = max(timed, key=lambda s: (s.rate, len(s)))
-    clock = _checked(master, file, run)
-    if len(clock) * len(chosen) > MAX_REQUEST:
-        raise _refuse(file, run, f"has {len(clock)} samples of {len(chosen)} channels", "Split the run")
-    values, moved = {}, []
-    for one in chosen:
-        if one.time is None:
-            if len(one) != len(clock):
-                what = f"channel {one.name} has {len(one)} samples and no times, {master.name} has {len(clock)}"
-                raise _refuse(file, run, what, "Export it with its time channel")
-            values[one.name] = one.values
-        elif _alike(one.time, clock):
-            values[one.name] = one.values
-        else:
-            values[one.name] = _interpolated(one, clock, file, run)
-            moved.append(f"{one.name} ({one.rate:.4g} Hz)")
-    notes: tuple[str, ...] = ()
-    if moved:
-        notes = (f"interpolated onto the clock of {master.name} ({master.rate:.6g} Hz): {', '.join(moved[:8])}",)
-    return Columns(values, {s.name: s.unit for s in chosen}, clock, notes)
+            raise refuse(file, "", what, "Export with a time channel, or channels of one length", run)
+        return Columns({channel.name: channel.values for channel in channels})
+    master = max(timed, key=lambda channel: (channel.rate, len(channel)))
+    clock = _rising_times(master, file, run)
+    if len(clock) * len(channels) > MAX_REQUEST:
+        raise refuse(file, "", f"has {len(clock)} samples of {len(channels)} channels", "Split the run", run)
+    values, interpolated = {}, []
+    for channel in channels:
+        values[channel.name] = channel.values
+        if channel.time is None:
+            if len(channel) != len(clock):
+                what = f"channel {channel.name} has {len(channel)} samples and no times"
+                what += f", {master.name} has {len(clock)}"
+                raise refuse(file, "", what, "Export it with its time channel", run)
+        elif not _alike(channel.time, clock):
+            times = _rising_times(channel, file, run)
+            values[channel.name] = _interpolated(times, channel.values, clock)
+            interpolated.append(f"{channel.name} ({channel.rate:.4g} Hz)")
+    problems: tuple[Problem, ...] = ()
+    if interpolated:
+        names = ", ".join(interpolated[:8])
+        what = f"interpolated onto the clock of {master.name} ({master.rate:.6g} Hz): {names}"
+        problems = (Problem("note", file, "", what, "Nothing, if that is meant", run),)
+    return Columns(values, clock, problems)
 
 
-def _checked(one: Series, file: str, run: str | None) -> FloatArray:
-    assert one.time is not None
-    time = np.asarray(one.time, dtype=float)
+def _rising_times(channel: Series, file: str, run: str | None) -> FloatArray:
+    time = np.asarray(channel.time, dtype=float)
     if not np.isfinite(time).all() or np.any(np.diff(time) < 0):
-        what = f"the times of {one.name} have gaps or run backwards"
-        raise _refuse(file, run, what, "Sort or split the run, or export without times and state sample_rate")
+        what = f"the times of {channel.name} have gaps or run backwards"
+        raise refuse(file, "", what, "Sort or split the run, or export without times and state sample_rate", run)
     return time
 
 
@@ -171,16 +171,11 @@ def _alike(time: FloatArray, clock: FloatArray) -> bool:
     return bool(np.all(np.abs(time - clock) <= _SAME * step))
 
 
-def _interpolated(one: Series, clock: FloatArray, file: str, run: str | None) -> FloatArray:
-    time = _checked(one, file, run)
-    known = np.isfinite(one.values)
-    if not known.any():
+def _interpolated(time: FloatArray, values: FloatArray, clock: FloatArray) -> FloatArray:
+    finite = np.isfinite(values)
+    if not finite.any():
         return np.full(len(clock), np.nan)
-    return set_aside(np.interp(clock, time[known], one.values[known], left=np.nan, right=np.nan))
-
-
-def _refuse(file: str, run: str | None, what: str, cure: str) -> RigDataError:
-    return RigDataError(Problem("error", file, "", what, cure, run))
+    return to_temporary_file(np.interp(clock, time[finite], values[finite], left=np.nan, right=np.nan))
 
 
 def is_time(name: str) -> bool:
@@ -193,5 +188,5 @@ def is_time(name: str) -> bool:
 
 
 def seconds(values: FloatArray, unit: str) -> FloatArray:
-    """Times in seconds; an unknown unit counts as seconds."""
+    """Times (n,) in seconds; an unknown unit counts as seconds."""
     return values * _FACTORS.get(unit.strip().strip("[]()"), 1.0)

@@ -11,7 +11,7 @@ import numpy as np
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import FORMATS, TEXT, suffix_hint
 from rigdata.readers.formats.foreign import read_foreign
-from rigdata.readers.series import Series, without_twins
+from rigdata.readers.series import Series, with_unique_names
 from rigdata.readers.text.catman import time_column
 from rigdata.readers.text.head import find_head
 
@@ -61,11 +61,11 @@ def records_below(folder: Path) -> list[Path]:
 def read_export(path: Path, name: str | None = None) -> Export:
     """Read one record file of any known kind, without a manifest."""
     name = name or path.name
-    series = tuple(without_twins(read_foreign(path, name)))
+    series = tuple(with_unique_names(read_foreign(path, name)))
     if path.suffix.lower() not in TEXT:
         return Export(name, series)
     head = find_head(path)
-    if head.dialect.header_line:
+    if head.header_line:
         return Export(name, series, time_column(path))
     times = next((s for s in series if _counts_evenly(s)), None)
     if times is not None:

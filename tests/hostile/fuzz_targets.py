@@ -142,7 +142,7 @@ def csv_target(folder: Path) -> Target:
 
     def feed(data: bytes) -> None:
         record.write_bytes(data)
-        reader = CsvReader(record, "c-1.csv", "c-1", manifest.csv, manifest.channels, manifest.sample_rate)
+        reader = CsvReader(record, "c-1.csv", "c-1", manifest.channels, manifest.sample_rate, spec=manifest.csv)
         length = reader.length()
         reader.read(["X1A", "X1B"], 0, length)
         reader.rate(), reader.time(0, length), reader.problems()

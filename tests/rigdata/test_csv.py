@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import rigdata
 from rigdata.problem import RigDataError
+from rigdata.readers.cached_reader import ReadingCache
 from rigdata.readers.text.cells import MISSING
 from tpjb_ident.check.campaign import check_campaign
 
@@ -256,8 +257,8 @@ def test_no_line_holds_the_names(tmp_path):
     [
         ('[csv]\ndelimiter = ","\n', ["delimiter ','", "';' finds 3", "leave it out"]),
         ('[csv]\ndecimal = "."\n', ["decimal is '.'", "'0,0000'"]),
-        ("[csv]\nheader_line = 3\n", ["line 3", "names stand in line 1"]),
-        ("[csv]\nheader_line = 300\n", ["header_line is 300", "names stand in line 1"]),
+        ("[csv]\nheader_line = 3\n", ["line 3", "names are in line 1"]),
+        ("[csv]\nheader_line = 300\n", ["header_line is 300", "names are in line 1"]),
     ],
 )
 def test_a_manifest_that_contradicts_the_file(tmp_path, csv, says):
@@ -373,13 +374,11 @@ def test_large_files_are_parsed_by_column(tmp_path, monkeypatch):
 
 
 def test_a_cache_lets_go_of_old_runs():
-    from rigdata.readers.text.csv import TableCache
-    from rigdata.readers.text.csv_table import Table
-
-    cache = TableCache(limit=2000)
-    for i in range(5):
-        cache.put((i,), Table({"x": np.zeros(100)}, 100))
-    assert [cache.get((i,)) is not None for i in range(5)] == [False, False, False, True, True]
+    cache = ReadingCache(limit=2000)
+    made = []
+    for i in [0, 1, 2, 3, 4, 4, 3, 0]:
+        cache.get((i,), lambda i=i: made.append(i) or np.zeros(100))
+    assert made == [0, 1, 2, 3, 4, 0]
 
 
 def test_unreadable_file(tmp_path, monkeypatch):
@@ -388,5 +387,5 @@ def test_unreadable_file(tmp_path, monkeypatch):
     def no_rights(*_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("rigdata.readers.text.csv_table.open_ascii", no_rights)
+    monkeypatch.setattr("rigdata.readers.text.csv_table.open_numbers", no_rights)
     refused(run, "Permission denied")

@@ -12,9 +12,9 @@ import pytest
 from rigdata import RigDataError, load_campaign
 from rigdata.readers import series
 from rigdata.readers.base import FORMATS
+from rigdata.readers.cached_reader import ReadingCache
 from rigdata.readers.formats.foreign import ForeignReader, is_foreign, read_foreign
 from rigdata.readers.series import Series, equidistant, is_time, on_one_clock, seconds
-from rigdata.readers.table_cache import TableCache
 from tpjb_ident.check.campaign import check_campaign
 
 RATE, COUNT = 1000.0, 2000
@@ -237,10 +237,10 @@ def test_long_channels_wait_in_files_and_read_as_short_ones_do(tmp_path, monkeyp
     with warnings.catch_warnings():
         warnings.simplefilter("default")
         WRITERS[name](path)
-    short = ForeignReader(path, path.name, "r")
-    monkeypatch.setattr(series, "SET_ASIDE", 1000)
+    short = ForeignReader(path, path.name, "r", {})
+    monkeypatch.setattr(series, "IN_MEMORY", 1000)
     equidistant.cache_clear()
-    long = ForeignReader(path, path.name, "r")
+    long = ForeignReader(path, path.name, "r", {})
     assert any(isinstance(v, np.memmap) for v in long._columns().values.values())
     for start, stop in ((0, COUNT), (17, 400), (COUNT - 3, COUNT)):
         np.testing.assert_array_equal(long.read(["X1A"], start, stop), short.read(["X1A"], start, stop))
@@ -248,14 +248,14 @@ def test_long_channels_wait_in_files_and_read_as_short_ones_do(tmp_path, monkeyp
 
 
 def test_a_campaign_keeps_few_columns_however_many_runs_it_has(tmp_path):
-    cache = TableCache(limit=3 * 8 * COUNT)
+    cache = ReadingCache(limit=3 * 8 * COUNT)
     from scipy.io import savemat
 
     for i in range(6):
         savemat(tmp_path / f"{i}.mat", {"X1A": X + i, "fs": RATE})
-        reader = ForeignReader(tmp_path / f"{i}.mat", f"{i}.mat", "r", cache=cache)
+        reader = ForeignReader(tmp_path / f"{i}.mat", f"{i}.mat", "r", {}, cache=cache)
         assert reader.read(["X1A"], 0, 1)[0][0] == X[0] + i
-    assert sum(t.nbytes for t in cache._tables.values()) <= 3 * 8 * COUNT
+    assert cache.nbytes <= 3 * 8 * COUNT
 
 
 def test_channels_without_times_must_be_of_one_length():
@@ -270,7 +270,7 @@ def test_the_fastest_clock_wins_and_what_is_outside_is_missing():
     assert columns.length == 11
     assert np.isnan(columns.values["b"][[0, 1, 9, 10]]).all()
     np.testing.assert_allclose(columns.values["b"][2:9], np.linspace(0, 1, 7), atol=1e-12)
-    assert "b (" in columns.notes[0]
+    assert "b (" in columns.problems[0].what
 
 
 def test_twins_in_two_groups_get_their_groups_name():
@@ -290,8 +290,8 @@ def test_a_rate_is_asked_for_where_the_file_knows_none(tmp_path):
 
     savemat(tmp_path / "a.mat", {"X1A": X})
     with pytest.raises(RigDataError, match="sample_rate"):
-        ForeignReader(tmp_path / "a.mat", "a.mat", "r").rate()
-    assert ForeignReader(tmp_path / "a.mat", "a.mat", "r", stated_rate=500.0).time(0, 3)[2] == pytest.approx(0.004)
+        ForeignReader(tmp_path / "a.mat", "a.mat", "r", {}).rate()
+    assert ForeignReader(tmp_path / "a.mat", "a.mat", "r", {}, stated_rate=500.0).time(0, 3)[2] == pytest.approx(0.004)
 
 
 @pytest.mark.parametrize("name", ["Zeit", "TIME [s]", "Time  1 - default sample rate", "t", "t [ms]", "Temps"])

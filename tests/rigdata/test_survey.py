@@ -152,7 +152,7 @@ def test_units_are_spelt_as_a_manifest_spells_them():
 def test_the_head_of_an_unknown_text_file_is_found(tmp_path, text, names, units, decimal):
     (tmp_path / "a.txt").write_text(text, encoding="utf-8")
     head = find_head(tmp_path / "a.txt")
-    assert (head.names, head.units, head.dialect.decimal) == (names, units, decimal)
+    assert (head.names, head.units, head.decimal) == (names, units, decimal)
 
 
 def test_a_text_without_numbers_is_no_record(tmp_path):

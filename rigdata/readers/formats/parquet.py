@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rigdata.readers.series import Series, equidistant, is_time, seconds, set_aside
+from rigdata.readers.series import Series, equidistant, is_time, seconds, to_temporary_file
 
 
 def read_series(path: Path) -> list[Series]:
@@ -23,7 +23,7 @@ def read_series(path: Path) -> list[Series]:
     with pq.ParquetFile(path) as table:
         schema, rows = table.schema_arrow, table.metadata.num_rows
         columns = {
-            f.name: set_aside(table.read([f.name]).column(0).cast(pa.float64()).to_numpy())
+            f.name: to_temporary_file(table.read([f.name]).column(0).cast(pa.float64()).to_numpy())
             for f in schema
             if pa.types.is_integer(f.type) or pa.types.is_floating(f.type)
         }

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.readers.series import Series, equidistant, is_time, seconds, set_aside
+from rigdata.readers.series import Series, equidistant, is_time, seconds, to_temporary_file
 
 
 def read_series(path: Path) -> list[Series]:
@@ -38,7 +38,7 @@ def read_series(path: Path) -> list[Series]:
 
 
 def _series(channel: Any, group: str, shared: FloatArray | None) -> Series:
-    values = set_aside(np.asarray(channel[:], dtype=float))
+    values = to_temporary_file(np.asarray(channel[:], dtype=float))
     unit = str(channel.properties.get("unit_string", ""))
     step = channel.properties.get("wf_increment")
     time: FloatArray | None

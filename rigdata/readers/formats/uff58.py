@@ -9,7 +9,7 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.series import Series, equidistant, set_aside
+from rigdata.readers.series import Series, equidistant, to_temporary_file
 
 #: Function types of data set 58 that are records over time.
 _GENERAL, _TIME_RESPONSE = 0, 1
@@ -56,12 +56,12 @@ def read_series(path: Path) -> list[Series]:
 
 
 def _series(data: dict[str, Any], index: int) -> Series:
-    values = set_aside(np.asarray(data["data"], dtype=float))
+    values = to_temporary_file(np.asarray(data["data"], dtype=float))
     known = data.get("x")
     time: FloatArray | None
     step = float(data.get("abscissa_inc") or 0.0)
     if known is not None and len(known) == len(values):
-        time = set_aside(np.asarray(known, dtype=float))
+        time = to_temporary_file(np.asarray(known, dtype=float))
     elif step > 0:
         time = equidistant(len(values), step, float(data.get("abscissa_min") or 0.0))
     else:

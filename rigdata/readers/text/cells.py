@@ -1,7 +1,8 @@
-"""What a cell of a text export says: a number, a missing value, date and time of day in place of seconds."""
+"""What a cell of a text export holds: a number, a missing value, date and time of day in place of seconds."""
 
 from __future__ import annotations
 
+import datetime
 import re
 from collections.abc import Sequence
 
@@ -18,68 +19,12 @@ _DATE = re.compile(r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[./]\d{1,2}[./]\d{4}")
 _DAY = 86400.0
 #: Ways in which loggers and spreadsheets write "no value".
 MISSING = (
-    "",
-    "NaN",
-    "nan",
-    "NAN",
-    "-NaN",
-    "-nan",
-    "-nan(ind)",
-    "-",
-    "--",
-    "---",
-    "----",
-    "-----",
-    "*",
-    "***",
-    "?",
-    "NA",
-    "N/A",
-    "n/a",
-    "#N/A",
-    "#NA",
-    "#NV",
-    "#VALUE!",
-    "#WERT!",
-    "#DIV/0!",
-    "null",
-    "NULL",
-    "None",
-    "none",
-    "1.#QNAN",
-    "-1.#QNAN",
-    "1.#IND",
-    "-1.#IND",
-    "1.#INF",
-    "-1.#INF",
-    "1,#QNAN",
-    "-1,#QNAN",
-    "1,#IND",
-    "-1,#IND",
-    "1,#INF",
-    "-1,#INF",
-    "1.#R",
-    "OVL",
-    "+OVL",
-    "-OVL",
-    "OL",
-    "+OL",
-    "-OL",
-    "OVER",
-    "OVERLOAD",
-    "OVERFLOW",
-    "Overflow",
-    "INVALID",
-    "Invalid",
-    "ERR",
-    "inf",
-    "-inf",
-    "+inf",
-    "Inf",
-    "-Inf",
-    "INF",
-    "-INF",
-)
+    "", "NaN", "nan", "NAN", "-NaN", "-nan", "-nan(ind)", "-", "--", "---", "----", "-----", "*", "***", "?",
+    "NA", "N/A", "n/a", "#N/A", "#NA", "#NV", "#VALUE!", "#WERT!", "#DIV/0!", "null", "NULL", "None", "none",
+    "1.#QNAN", "-1.#QNAN", "1.#IND", "-1.#IND", "1.#INF", "-1.#INF", "1,#QNAN", "-1,#QNAN", "1,#IND", "-1,#IND",
+    "1,#INF", "-1,#INF", "1.#R", "OVL", "+OVL", "-OVL", "OL", "+OL", "-OL", "OVER", "OVERLOAD", "OVERFLOW",
+    "Overflow", "INVALID", "Invalid", "ERR", "inf", "-inf", "+inf", "Inf", "-Inf", "INF", "-INF",
+)  # fmt: skip
 _MISSING = frozenset(MISSING)
 _NUMBER = {
     mark: re.compile(rf"[+-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -102,43 +47,49 @@ def is_date(cell: str) -> bool:
 
 
 def stamp_seconds(cells: Sequence[str | None]) -> tuple[FloatArray, int]:
-    """Seconds from the first stamp of a column, and how many cells hold none where one should be.
+    """Seconds (n,) from the first stamp of a column, and how many cells hold none where one should be.
 
     Stamps coarser than the samples are spread evenly: several samples then bear one stamp, and the straight line
     through them is nearer to the truth than the steps. Midnight between stamps without a date is a day.
     """
-    found = [_STAMP.fullmatch(cell) if cell else None for cell in cells]
-    bad = sum(match is None and bool(cell) for match, cell in zip(found, cells, strict=True))
-    days: dict[tuple[str, ...], float] = {}
-    seconds = np.array([np.nan if match is None else _seconds(match, days) for match in found])
+    matches = [_STAMP.fullmatch(cell) if cell else None for cell in cells]
+    bad = sum(match is None and bool(cell) for match, cell in zip(matches, cells, strict=True))
+    days: dict[str, float] = {}
+    seconds = np.array([np.nan if match is None else _seconds(match, days) for match in matches])
     good = np.isfinite(seconds)
     if not good.any():
         return seconds, bad
-    known = seconds[good]
+    stamped = seconds[good]
     if not days:
-        known = known + _DAY * np.concatenate([[0.0], np.cumsum(np.diff(known) < -0.5 * _DAY)])
-    seconds[good] = _spread(known - known[0])
+        midnights = np.cumsum(np.diff(stamped) < -0.5 * _DAY)
+        stamped = stamped + _DAY * np.concatenate([[0.0], midnights])
+    seconds[good] = _spread(stamped - stamped[0])
     return seconds, bad
 
 
-def _seconds(match: re.Match[str], days: dict[tuple[str, ...], float]) -> float:
-    year, month, day, d1, d2, y2, hour, minute, second, part = match.groups()
+def _seconds(match: re.Match[str], days: dict[str, float]) -> float:
+    """Seconds of a stamp; `days` holds those at which each date began."""
+    *date, hour, minute, second, fraction = match.groups()
     start = 0.0
-    if year or y2:
-        key = (year, month, day) if year else (y2, d2, d1)
-        if key not in days:
-            date = "-".join(f"{int(p):02d}" for p in key)
-            try:
-                days[key] = float(np.datetime64(date).astype("datetime64[s]").astype(np.int64))
-            except ValueError:  # month first
-                swapped = f"{int(key[0]):04d}-{int(key[2]):02d}-{int(key[1]):02d}"
-                try:
-                    days[key] = float(np.datetime64(swapped).astype("datetime64[s]").astype(np.int64))
-                except ValueError:
-                    return float("nan")
+    if any(date):
+        text = "/".join(part for part in date if part)
+        if text not in days:
+            days[text] = _start_of_day(date)
         # counted from the first day: seconds since 1970 would cost the digits below a microsecond
-        start = days[key] - next(iter(days.values()))
-    return start + 3600.0 * int(hour) + 60.0 * int(minute) + int(second) + (float(f"0.{part}") if part else 0.0)
+        start = days[text] - next(iter(days.values()))
+    fraction_seconds = float(f"0.{fraction}") if fraction else 0.0
+    return start + 3600.0 * int(hour) + 60.0 * int(minute) + int(second) + fraction_seconds
+
+
+def _start_of_day(date: Sequence[str]) -> float:
+    """Seconds since 1970 of year, month, day or day, month, year; where that is none, month first."""
+    year, month, day = (int(part) for part in (date[:3] if date[0] else date[:2:-1]))
+    for first, second in ((month, day), (day, month)):
+        try:
+            return (datetime.date(year, first, second) - datetime.date(1970, 1, 1)).total_seconds()
+        except ValueError:
+            continue
+    return float("nan")
 
 
 def _spread(time: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,23 +10,17 @@ from typing import Any
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import MAX_SAMPLES
-from rigdata.readers.text.byte_stream import (
-    AsciiOnly,
-    all_lines,
-    codec_of_bytes,
-    is_ascii_based,
-    open_ascii,
-    skip_to,
-    squeeze_blanks,
-)
+from rigdata.readers.series import Columns
+from rigdata.readers.text.byte_stream import all_lines, is_ascii_based, open_numbers
 from rigdata.readers.text.cells import MISSING, is_missing, is_number, is_stamp, number_pattern, stamp_seconds
-from rigdata.readers.text.dialect import Dialect, split_line
+from rigdata.readers.text.head import Head, split_line
 
 #: Lines longer than this are refused [bytes].
 _BLOCK = 2**22
-_LISTED = 5
+#: Faults that are listed, and odd lines that are counted.
+_LISTED, _MOST_ODD = 5, 1000
 
 
 @dataclass(frozen=True)
@@ -36,213 +30,191 @@ class Source:
     path: Path
     file: str
     run: str | None
-    dialect: Dialect = field(repr=False)
+    head: Head = field(repr=False)
     clock: str = ""
 
-    def problem(self, severity: Any, place: str, what: str, cure: str) -> Problem:
-        """Make a finding about this file."""
-        return Problem(severity, self.file, place, what, cure, self.run)
+    def rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Line number, from 1, and cells of every line of samples that is not blank."""
+        for number, line in enumerate(all_lines(self.path, self.head.encoding), start=1):
+            cells = split_line(line, self.head.delimiter) if number >= self.head.data_line else []
+            if cells:
+                yield number, cells
 
 
-@dataclass(frozen=True)
-class Table:
-    """Parsed columns."""
-
-    columns: dict[str, FloatArray]
-    length: int
-    problems: tuple[Problem, ...] = ()
-
-    @property
-    def nbytes(self) -> int:
-        """Memory of the columns."""
-        return sum(c.nbytes for c in self.columns.values())
-
-
-def read_table(source: Source, names: Sequence[str]) -> Table:
+def read_table(source: Source, names: Sequence[str]) -> Columns:
     """Parse the columns `names`."""
     import pyarrow as pa
 
     try:
-        columns, length, odd = _parse(source, names, numbers=True)
+        columns, odd_lines = _parse(source, names, numbers=True)
     except pa.ArrowInvalid:
-        if not source.dialect.sure:
-            return read_table(replace(source, dialect=replace(source.dialect, decimal=",", sure=True)), names)
-        # Rare spellings of numbers, or text: as text once more, to mend the first and to locate the second.
-        columns, length, odd = _parse(source, names, numbers=False)
-    columns, length = _drop_empty_tail(columns, length, source.clock)
-    problems = _judge_odd_rows(source, odd)
-    if not odd and length and _cut_inside_last_cell(source):
-        columns = {n: c[:-1] for n, c in columns.items()}
+        if not source.head.decimal_certain:
+            head = replace(source.head, decimal=",", decimal_certain=True)
+            return read_table(replace(source, head=head), names)
+        # Rare spellings of numbers, or text: as text once more, to repair the first and to locate the second.
+        columns, odd_lines = _parse(source, names, numbers=False)
+    length = _length_without_empty_tail(columns, source.clock)
+    problems = _judge_odd_lines(source, odd_lines) if odd_lines else ()
+    if not odd_lines and length and _is_cut_inside_last_cell(source):
         length -= 1
         what = "the last line is cut off inside its last number; taken without that line"
-        problems = (source.problem("warning", "last line", what, "Copy the file again from the rig"),)
+        problems = (_cut_off(source, "last line", what),)
+    columns = {name: column[:length] for name, column in columns.items()}
     for column in columns.values():
         column.setflags(write=False)
-    return Table(columns, length, problems)
+    return Columns(columns, problems=problems)
 
 
-def _drop_empty_tail(columns: dict[str, FloatArray], length: int, clock: str) -> tuple[dict[str, FloatArray], int]:
+def _length_without_empty_tail(columns: dict[str, FloatArray], clock: str) -> int:
     """Leave out lines at the end that hold not even a time, as spreadsheets write them."""
-    kept = length
-    while kept > 0 and clock in columns and all(np.isnan(c[kept - 1]) for c in columns.values()):
-        kept -= 1
-    return ({n: c[:kept] for n, c in columns.items()}, kept) if 0 < kept < length else (columns, length)
+    whole = length = len(next(iter(columns.values())))
+    while length > 0 and clock in columns and all(np.isnan(c[length - 1]) for c in columns.values()):
+        length -= 1
+    return length or whole
 
 
-def _options(source: Source, names: Sequence[str], numbers: bool, odd: list[Any]) -> dict[str, Any]:
+def _options(source: Source, names: Sequence[str], numbers: bool, odd_lines: list[int]) -> dict[str, Any]:
     import pyarrow as pa
     import pyarrow.csv as pv
 
-    dialect = source.dialect
-    labels = [f"c{i}" for i in range(len(dialect.names))]  # names of a file need not be unique or present
-    wanted = [labels[dialect.names.index(n)] for n in names]
+    head = source.head
+    labels = [f"c{i}" for i in range(len(head.names))]  # names of a file need not be unique or present
+    types = {}
+    for name in names:
+        index = head.names.index(name)
+        types[labels[index]] = pa.float64() if numbers and index not in head.stamps else pa.string()
 
     def note(row: Any) -> str:
-        if row.text.strip() and len(odd) < 1000:
-            odd.append((row.actual_columns, row.text))
+        if row.text.strip() and len(odd_lines) < _MOST_ODD:
+            odd_lines.append(row.actual_columns)
         return "skip"
 
+    delimiter = "\t" if head.delimiter == " " else head.delimiter
     return {
-        "read_options": pv.ReadOptions(use_threads=numbers, block_size=_BLOCK, column_names=labels),
-        "parse_options": pv.ParseOptions(
-            delimiter="\t" if dialect.delimiter == " " else dialect.delimiter, invalid_row_handler=note
+        "read_options": pv.ReadOptions(
+            use_threads=numbers, block_size=_BLOCK, column_names=labels, skip_rows=head.data_line - 1
         ),
+        "parse_options": pv.ParseOptions(delimiter=delimiter, invalid_row_handler=note),
         "convert_options": pv.ConvertOptions(
-            column_types={
-                w: pa.float64() if numbers and int(w[1:]) not in dialect.stamps else pa.string() for w in wanted
-            },
-            include_columns=wanted,
+            column_types=types,
+            include_columns=list(types),
             null_values=list(MISSING),
             strings_can_be_null=False,
-            decimal_point=dialect.decimal,
+            decimal_point=head.decimal,
             check_utf8=False,
         ),
     }
 
 
-def _parse(
-    source: Source, names: Sequence[str], numbers: bool
-) -> tuple[dict[str, FloatArray], int, list[tuple[int, str]]]:
+def _parse(source: Source, names: Sequence[str], numbers: bool) -> tuple[dict[str, FloatArray], list[int]]:
+    """Columns by name, and the number of cells of each line with a wrong one."""
     import pyarrow as pa
     import pyarrow.compute as pc
     import pyarrow.csv as pv
 
-    odd: list[tuple[int, str]] = []
-    stamps = {i for i, n in enumerate(names) if source.dialect.names.index(n) in source.dialect.stamps}
-    parts: list[list[FloatArray]] = [[] for _ in names]
+    head = source.head
+    stamped = {n for n in names if head.names.index(n) in head.stamps}
+    odd_lines: list[int] = []
+    parts: dict[str, list[Any]] = {n: [np.empty(0)] for n in names}
+    bad: set[str] = set()
     length = 0
-    faults: list[list[str]] = [[] for _ in names]
-    with open_ascii(source.path, source.dialect.encoding) as plain:
-        skip_to(plain, source.dialect.data_offset)
-        stream = AsciiOnly(squeeze_blanks(plain) if source.dialect.delimiter == " " else plain)
+    with open_numbers(source.path, head.encoding, head.delimiter) as stream:
         try:
-            reader = pv.open_csv(stream, **_options(source, names, numbers, odd))
-            for batch in reader:
+            for batch in pv.open_csv(stream, **_options(source, names, numbers, odd_lines)):
                 length += batch.num_rows
-                for index, column in enumerate(batch.columns):
-                    if index in stamps:
-                        parts[index].append(pc.ascii_trim_whitespace(column).to_numpy(zero_copy_only=False))
-                        continue
-                    values = column if numbers else _to_numbers(column, source.dialect.decimal, faults[index])
-                    parts[index].append(values.to_numpy(zero_copy_only=False))
                 if length > MAX_SAMPLES:
-                    raise RigDataError(source.problem("error", "", "has too many lines", "Split the run"))
+                    raise refuse(source.file, "", "has too many lines", "Split the run", source.run)
+                for name, column in zip(names, batch.columns, strict=True):
+                    if name in stamped:
+                        column = pc.ascii_trim_whitespace(column)
+                    elif not numbers:
+                        column, is_sound = _to_numbers(column, head.decimal)
+                        bad |= set() if is_sound else {name}
+                    parts[name].append(column.to_numpy(zero_copy_only=False))
         except pa.ArrowInvalid as error:
             if numbers:
                 raise
             what = f"cannot be parsed ({str(error).splitlines()[0][:160]})"
-            raise RigDataError(source.problem("error", "", what, "Export the run again")) from error
-    for index in stamps:
-        cells = [None if c is None or is_missing(c) else c for part in parts[index] for c in part]
-        seconds, bad = stamp_seconds(cells)
-        parts[index] = [seconds]
-        faults[index] += ["text"] * bad
-    if any(faults):
-        raise RigDataError(_locate_text(source, [n for n, f in zip(names, faults) if f]))
-    empty = np.empty(0)
-    return {n: np.concatenate(p) if p else empty for n, p in zip(names, parts)}, length, odd
+            raise refuse(source.file, "", what, "Export the run again", source.run) from error
+    columns = {name: np.concatenate(column) for name, column in parts.items()}
+    for name in stamped:
+        cells = [None if cell is None or is_missing(cell) else cell for cell in columns[name]]
+        columns[name], count = stamp_seconds(cells)
+        bad |= {name} if count else set()
+    if bad:
+        raise RigDataError(_locate_text(source, [name for name in names if name in bad]))
+    return columns, odd_lines
 
 
-def _to_numbers(column: Any, decimal: str, faults: list[str]) -> Any:
-    """Numbers from cells as text: blanks around them and a leading plus are taken."""
+def _to_numbers(column: Any, decimal: str) -> tuple[Any, bool]:
+    """Numbers from cells as text, blanks around them and a leading plus taken; and whether all others are missing."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
     text = pc.ascii_trim_whitespace(column)
     missing = pc.is_in(text, value_set=pa.array(MISSING))
     good = pc.match_substring_regex(text, number_pattern(decimal))
-    if not pc.all(pc.or_(missing, good)).as_py():
-        faults.append("text")
+    is_sound = pc.all(pc.or_(missing, good)).as_py() is not False
     text = pc.replace_substring(pc.replace_substring_regex(text, r"^\+", ""), decimal, ".")
-    return pc.if_else(good, text, None).cast(pa.float64())
+    return pc.if_else(good, text, None).cast(pa.float64()), is_sound
 
 
 def _locate_text(source: Source, names: Sequence[str]) -> list[Problem]:
-    """Name the first lines on which each of the columns `names` holds text."""
-    dialect = source.dialect
-    found: dict[str, list[tuple[int, str]]] = {n: [] for n in names}
+    """Name the first line on which each of the columns `names` holds text."""
+    head = source.head
+    places: dict[str, tuple[int, str]] = {}
     counts = dict.fromkeys(names, 0)
-    where = {n: dialect.names.index(n) for n in names}
-    codec = codec_of_bytes(dialect.encoding)
-    for number, line in enumerate(all_lines(source.path, dialect.encoding), start=1):
-        if number < dialect.data_line:
+    for number, cells in source.rows():
+        if len(cells) != len(head.names):
             continue
-        cells = split_line(line.decode(codec, "replace"), dialect.delimiter)
-        if len(cells) != len(dialect.names):
-            continue
-        for name, index in where.items():
-            known = is_stamp(cells[index]) if index in dialect.stamps else is_number(cells[index], dialect.decimal)
-            if not (known or is_missing(cells[index])):
+        for name in names:
+            index = head.names.index(name)
+            cell = cells[index]
+            is_good = is_stamp(cell) if index in head.stamps else is_number(cell, head.decimal)
+            if not (is_good or is_missing(cell)):
                 counts[name] += 1
-                if len(found[name]) < _LISTED:
-                    found[name].append((number, cells[index][:40]))
-    cure = "Delete or mend these cells; an empty cell counts as missing"
+                places.setdefault(name, (number, cell[:40]))
+    remedy = "Delete or repair these cells; an empty cell counts as missing"
     problems = []
-    for name, places in found.items():
-        column = f"column {where[name] + 1} ({name})"
-        line_number, text = places[0] if places else (dialect.data_line, "?")
+    for name in names:
+        index = head.names.index(name)
+        number, cell = places.get(name, (head.data_line, "?"))
         more = f", and in {counts[name] - 1} more lines" if counts[name] > 1 else ""
-        kind = "time stamp" if where[name] in dialect.stamps else "number"
-        what = f"{text!r} is not a {kind}{more}"
-        problems.append(source.problem("error", f"line {line_number}, {column}", what, cure))
+        kind = "time stamp" if index in head.stamps else "number"
+        place = f"line {number}, column {index + 1} ({name})"
+        problems.append(Problem("error", source.file, place, f"{cell!r} is not a {kind}{more}", remedy, source.run))
     return problems
 
 
-def _judge_odd_rows(source: Source, odd: list[tuple[int, str]]) -> tuple[Problem, ...]:
-    """Take a file whose last line is cut off, refuse other lines with a wrong number of cells."""
-    if not odd:
-        return ()
-    dialect = source.dialect
-    bad: list[tuple[int, int]] = []
+def _cut_off(source: Source, place: str, what: str) -> Problem:
+    return Problem("warning", source.file, place, what, "Copy the file again from the rig", source.run)
+
+
+def _judge_odd_lines(source: Source, odd_lines: list[int]) -> tuple[Problem, ...]:
+    """Take a file whose last line is cut off, reject other lines with a wrong number of cells."""
+    width = len(source.head.names)
+    wrong: list[tuple[int, int]] = []
     last = 0
-    codec = codec_of_bytes(dialect.encoding)
-    for number, line in enumerate(all_lines(source.path, dialect.encoding), start=1):
-        if number < dialect.data_line:
-            continue
-        cells = split_line(line.decode(codec, "replace"), dialect.delimiter)
-        if not cells:
-            continue
-        last = number
-        if len(cells) != len(dialect.names) and len(bad) < 1000:
-            bad.append((number, len(cells)))
-    expected = len(dialect.names)
-    if len(odd) == 1 and len(bad) == 1 and bad[0][0] == last and bad[0][1] < expected:
-        what = f"the last line is cut off ({bad[0][1]} of {expected} cells); taken without that line"
-        return (source.problem("warning", f"line {last}", what, "Copy the file again from the rig"),)
-    cure = "Check [csv] delimiter and decimal, or mend the line"
-    raise RigDataError(
-        [
-            source.problem("error", f"line {number}", f"has {cells} cells, the names have {expected}", cure)
-            for number, cells in bad[:_LISTED]
-        ]
-        or [source.problem("error", "", f"{len(odd)} lines have a wrong number of cells", cure)]
-    )
+    for last, cells in source.rows():
+        if len(cells) != width and len(wrong) < _MOST_ODD:
+            wrong.append((last, len(cells)))
+    if len(odd_lines) == 1 and len(wrong) == 1 and wrong[0][0] == last and wrong[0][1] < width:
+        what = f"the last line is cut off ({wrong[0][1]} of {width} cells); taken without that line"
+        return (_cut_off(source, f"line {last}", what),)
+    remedy = "Check [csv] delimiter and decimal, or repair the line"
+    problems = []
+    for number, count in wrong[:_LISTED]:
+        what = f"has {count} cells, the names have {width}"
+        problems.append(Problem("error", source.file, f"line {number}", what, remedy, source.run))
+    if not problems:
+        raise refuse(source.file, "", f"{len(odd_lines)} lines have a wrong number of cells", remedy, source.run)
+    raise RigDataError(problems)
 
 
-def _cut_inside_last_cell(source: Source) -> bool:
+def _is_cut_inside_last_cell(source: Source) -> bool:
     """Whether the last line has no end and its last number fewer decimals than the lines before."""
-    dialect = source.dialect
-    if not is_ascii_based(dialect.encoding):
+    head = source.head
+    if not is_ascii_based(head.encoding.removesuffix("-sig")):
         return False
     with source.path.open("rb") as stream:
         size = stream.seek(0, 2)
@@ -250,13 +222,11 @@ def _cut_inside_last_cell(source: Source) -> bool:
         tail = stream.read()
     if not tail or tail.endswith((b"\n", b"\r")):
         return False
-    lines = [t for t in tail.decode(codec_of_bytes(dialect.encoding), "replace").splitlines() if t.strip()][-6:]
-    rows = [split_line(t, dialect.delimiter) for t in lines]
-    rows = [r for r in rows if len(r) == len(dialect.names)]
-    if len(rows) < 3:
-        return False
-    usual = {_decimals(r[-1], dialect.decimal) for r in rows[:-1]}
-    return len(usual) == 1 and _decimals(rows[-1][-1], dialect.decimal) < usual.pop()
+    lines = [line for line in tail.decode(head.encoding, "replace").splitlines() if line.strip()]
+    rows = [split_line(line, head.delimiter) for line in lines[-6:]]
+    decimals = [_decimals(row[-1], head.decimal) for row in rows if len(row) == len(head.names)]
+    *usual, last = decimals or [0]
+    return len(usual) >= 2 and len(set(usual)) == 1 and last < usual[0]
 
 
 def _decimals(cell: str, decimal: str) -> int:

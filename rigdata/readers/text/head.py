@@ -1,110 +1,306 @@
-"""The head of a text file of which nothing is known: delimiter, decimal mark, names, units, first line of numbers."""
+"""The head of a text file: encoding, delimiter, decimal mark, names, units and where the samples begin.
+
+What the manifest gives is held against the file, everything else is detected. The names are in the line that holds the
+manifest's channel names; without a manifest they are above the first lines of numbers.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import csv
 import re
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rigdata.problem import Problem, RigDataError
-from rigdata.readers.text.byte_stream import codec_of_bytes, head_lines, text_encoding
-from rigdata.readers.text.cells import is_date, is_missing, is_number, is_stamp
-from rigdata.readers.text.dialect import Dialect, columns_of, split_line
+from rigdata.manifest.manifest import CsvSpec
+from rigdata.problem import RigDataError, refuse
+from rigdata.readers.text.byte_stream import HEAD, head_lines, text_encoding
+from rigdata.readers.text.cells import is_date, is_missing, is_number, is_stamp, looks_like
 
-DELIMITERS = (";", "\t", ",", "|", " ")
-_UNIT = re.compile(r"[\[(]([^\])]*)[\])]\s*$")
+_DELIMITERS = (";", "\t", ",", "|", " ")
+_UNIT = re.compile(r"\s*[\[(]([^\])]*)[\])]\s*$")
+_BRACKETS = re.compile(r"\s*[\[(].*[\])]\s*$")
+#: Lines that are looked at to find the decimal mark and the columns of times of day.
+_SAMPLE = 200
+_MAX_UNIT_LINES = 5
 #: So many lines in a row must be numbers for a table to begin.
-_RUN = 3
-_SAMPLE = 60
+_TABLE_LINES = 3
 
 
 @dataclass(frozen=True)
-class TextHead:
-    """What the first lines of a file tell."""
+class Head:
+    """How a text file is written, and what its first lines say of its columns."""
 
-    dialect: Dialect
+    encoding: str
+    delimiter: str
+    decimal: str
+    decimal_certain: bool
+    #: Line of the names, from 1; 0 where no line names the columns.
+    header_line: int
+    #: First line of samples, from 1.
+    data_line: int
+    #: One per column, "" where there is none.
+    names: tuple[str, ...]
     units: tuple[str, ...]
+    #: Columns of times of day, and of dates alone.
+    stamps: frozenset[int] = frozenset()
     dates: frozenset[int] = frozenset()
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One per column; "" where there is none."""
-        return self.dialect.names
+
+@dataclass(frozen=True)
+class _NamesLine:
+    line: int
+    delimiter: str
+    names: tuple[str, ...]
+    matched: int = 0
 
 
-def find_head(path: Path) -> TextHead:
-    """Look at the first lines of a text file."""
-    encoding = text_encoding(path, None)
-    raw = head_lines(path, encoding)
-    lines = [line.decode(codec_of_bytes(encoding), "replace") for line, _ in raw]
-    best: tuple[int, int, str, str] | None = None  # columns, first line, delimiter, decimal
-    for delimiter in DELIMITERS:
-        for decimal in ".,":
-            if delimiter == decimal or (delimiter == " " and best is not None):
-                continue  # a blank within a stamp parts no cells where another delimiter does
-            found = _table_start(lines, delimiter, decimal)
-            if found is not None and (best is None or found[1] > best[0]):
-                best = (found[1], found[0], delimiter, decimal)
-    if best is None:
-        problem = Problem("error", path.name, "", "no table of numbers begins in its first lines", "Is it a record?")
-        raise RigDataError(problem)
-    width, first, delimiter, decimal = best
-    sample = [c for c in (_cells(t, delimiter) for t in lines[first : first + _SAMPLE]) if c]
-    header, names = _names(lines, first, width, delimiter)
-    dialect = Dialect(
-        encoding=encoding,
-        delimiter=delimiter,
-        decimal=decimal,
-        header_line=header + 1,
-        data_line=first + 1,
-        data_offset=raw[first][1],
-        names=names,
-        stamps=columns_of(is_stamp, sample),
-    )
-    return TextHead(dialect, _units(lines, header, first, names, delimiter), columns_of(is_date, sample))
+def find_head(
+    path: Path, file: str = "", run: str | None = None, spec: CsvSpec | None = None, channels: Iterable[str] = ()
+) -> Head:
+    """Detect; a contradiction between manifest and file is an error that names both."""
+    return _HeadFinder(path, (file or path.name, run), spec or CsvSpec(), frozenset(channels)).find()
 
 
-def _table_start(lines: list[str], delimiter: str, decimal: str) -> tuple[int, int] | None:
-    """First line of the first run of lines of numbers, and how many columns they have."""
-    run, width = 0, 0
-    for i, line in enumerate(lines):
-        cells = _cells(line, delimiter)
-        good = len(cells) > 1 and all(
-            is_number(c, decimal) or is_missing(c) or is_stamp(c) or is_date(c) for c in cells
+class _HeadFinder:
+    def __init__(self, path: Path, source: tuple[str, str | None], spec: CsvSpec, channels: frozenset[str]) -> None:
+        self.file, self.run = source
+        self.spec = spec
+        self.channels = channels
+        self.encoding = text_encoding(path, spec.encoding)
+        self.lines = head_lines(path, self.encoding)
+        self.is_whole = path.stat().st_size < HEAD
+
+    def _refuse(self, line: int | None, what: str, remedy: str) -> RigDataError:
+        return refuse(self.file, "" if line is None else f"line {line}", what, remedy, self.run)
+
+    def find(self) -> Head:
+        if not any(line.strip() for line in self.lines):
+            what = "the file is empty" if self.is_whole else f"no line ends within the first {HEAD >> 10} kB"
+            raise self._refuse(None, what, "Export the run again")
+        if self.channels or self.spec.names:
+            header = self._header_without_names() if self.spec.names else self._header_by_channels()
+            self._check_duplicates(header)
+            first = self._first_sample(header)
+        else:
+            header, first = self._header_by_numbers()
+        lines = (split_line(line, header.delimiter) for line in self.lines[first : first + _SAMPLE])
+        sample = [cells for cells in lines if cells]
+        if not any(looks_like(cell) or is_missing(cell) for cells in sample for cell in cells):
+            raise self._refuse(header.line, "no samples follow the names", "Export the run again")
+        decimal = self._decimal(sample)
+        names = self._names_of_all_cells(header, sample)
+        return Head(
+            encoding=self.encoding,
+            delimiter=header.delimiter,
+            decimal=decimal or ".",
+            decimal_certain=decimal is not None,
+            header_line=header.line,
+            data_line=first + 1,
+            names=names,
+            units=self._units(header, first, names),
+            stamps=_columns_of(is_stamp, sample),
+            dates=_columns_of(is_date, sample),
         )
-        good = good and any(is_number(c, decimal) for c in cells)
-        run, width = (run + 1, width) if good and len(cells) == width else (int(good), len(cells) if good else 0)
-        last = i == len(lines) - 1
-        if run >= _RUN or (run and last):
-            return i - run + 1, width
-    return None
+
+    def _header_by_channels(self) -> _NamesLine:
+        every_line = range(len(self.lines))
+        best = self._best(_DELIMITERS, every_line)
+        names = sorted(self.channels)
+        wanted = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
+        if best is None:
+            remedy = "Name the manifest's channels as the columns are named"
+            raise self._refuse(None, f"no line holds a channel name of the manifest ({wanted})", remedy)
+        line, delimiter = self.spec.header_line, self.spec.delimiter
+        remedy = f"The names are in line {best.line}; correct [csv] header_line"
+        if line is not None and line > len(self.lines):
+            raise self._refuse(line, f"header_line is {line}, beyond the first {len(self.lines)} lines", remedy)
+        where = every_line if line is None else range(line - 1, line)
+        stated = self._best(_DELIMITERS if delimiter is None else (delimiter,), where)
+        if stated is not None and (delimiter is None or stated.matched >= best.matched or stated.line != best.line):
+            return stated
+        better = best if line is None else self._best(_DELIMITERS, where)
+        if better is None or delimiter is None:
+            raise self._refuse(line, f"holds no channel name ({wanted})", remedy)
+        matched = 0 if stated is None else stated.matched
+        what = f"delimiter {delimiter!r} of the manifest finds {matched} channel names"
+        what += f", {better.delimiter!r} finds {better.matched}"
+        raise self._refuse(better.line, what, f"Set [csv] delimiter = {better.delimiter!r}, or leave it out")
+
+    def _best(self, delimiters: Iterable[str], where: range) -> _NamesLine | None:
+        """Find the line with most of the channel names; of equals the one that numbers follow."""
+        best: _NamesLine | None = None
+        best_rank = (0, True)
+        for number in where:
+            if not any(name in self.lines[number] for name in self.channels):
+                continue
+            for delimiter in delimiters:
+                names = tuple(self._name(cell) for cell in split_line(self.lines[number], delimiter))
+                matched = len(self.channels.intersection(names))
+                if not matched:
+                    continue
+                below = self.lines[number + 1 : number + 2 + _MAX_UNIT_LINES]
+                rank = (matched, any(looks_like(cell) for line in below for cell in split_line(line, delimiter)))
+                if rank > best_rank:
+                    best, best_rank = _NamesLine(number + 1, delimiter, names, matched), rank
+            if best_rank == (len(self.channels), True):
+                break
+        return best
+
+    def _name(self, cell: str) -> str:
+        """Name a column; ``X1A [V]`` counts as ``X1A`` where the manifest knows only that."""
+        short = _BRACKETS.sub("", cell)
+        return short if cell not in self.channels and short in self.channels else cell
+
+    def _header_without_names(self) -> _NamesLine:
+        """The line above the first line of numbers with as many cells as the manifest has names."""
+        width = len(self.spec.names)
+        for number, line in enumerate(self.lines):
+            for delimiter in _DELIMITERS if self.spec.delimiter is None else (self.spec.delimiter,):
+                cells = split_line(line, delimiter)
+                numbers = sum(looks_like(cell) or is_stamp(cell) for cell in cells)
+                if width <= len(cells) <= width + 1 and 0 < numbers >= width - 1:
+                    return _NamesLine(number, delimiter, self.spec.names)
+        what = f"no line holds {width} numbers, as [csv] names has names"
+        remedy = "Give one name per column, or delete [csv] names where the files name them"
+        raise self._refuse(None, what, remedy)
+
+    def _header_by_numbers(self) -> tuple[_NamesLine, int]:
+        """Names above the widest table of numbers, and the index of its first line."""
+        first, width, best = 0, 0, ""
+        for delimiter in _DELIMITERS:
+            if delimiter == " " and best:
+                continue  # a blank within a time of day parts no cells where another delimiter does
+            table = self._table_start(delimiter)
+            if table is not None and table[1] > width:
+                first, width = table
+                best = delimiter
+        if not best:
+            raise self._refuse(None, "no table of numbers begins in its first lines", "Is it a record?")
+        header = -1
+        for number in range(first - 1, max(first - 6, -1), -1):
+            cells = split_line(self.lines[number], best)
+            if len(cells) > 1 and abs(len(cells) - width) <= 1:
+                header = number
+            elif cells:
+                break
+        names = split_line(self.lines[header], best)[:width] if header >= 0 else []
+        if not names:
+            names = [f"column{i + 1}" for i in range(width)]
+        return _NamesLine(header + 1, best, (*names, *[""] * (width - len(names)))), first
+
+    def _table_start(self, delimiter: str) -> tuple[int, int] | None:
+        """First line of the first run of lines of numbers, and how many columns they have."""
+        count, width = 0, 0
+        for number, line in enumerate(self.lines):
+            cells = split_line(line, delimiter)
+            if not _is_row_of_numbers(cells):
+                count = 0
+                continue
+            count = count + 1 if count and len(cells) == width else 1
+            width = len(cells)
+            if count == _TABLE_LINES or number == len(self.lines) - 1:
+                return number - count + 1, width
+        return None
+
+    def _check_duplicates(self, header: _NamesLine) -> None:
+        for name in self.channels.intersection(header.names):
+            columns = [str(i + 1) for i, cell in enumerate(header.names) if cell == name]
+            if len(columns) > 1:
+                what = f"column name {name!r} is in columns {', '.join(columns)}"
+                raise self._refuse(header.line, what, "Give every column its own name; which one counts?")
+
+    def _first_sample(self, header: _NamesLine) -> int:
+        """Index of the first line of samples: below the names and below lines of units."""
+        units_line = self.spec.units_line or 0
+        if units_line > header.line + _MAX_UNIT_LINES:
+            remedy = f"The names are in line {header.line}; correct [csv] units_line"
+            raise self._refuse(units_line, "units_line is far below the names", remedy)
+        skipped = 0
+        for number in range(max(header.line, units_line), len(self.lines)):
+            cells = split_line(self.lines[number], header.delimiter)
+            if cells and (any(map(looks_like, cells)) or all(map(is_missing, cells))):
+                return number
+            skipped += bool(cells)
+            if skipped > _MAX_UNIT_LINES:
+                what = "is neither names, units nor numbers"
+                raise self._refuse(number + 1, what, "Check [csv] delimiter and decimal")
+        raise self._refuse(header.line, "no samples follow the names", "Export the run again")
+
+    def _decimal(self, sample: list[list[str]]) -> str | None:
+        """Decimal mark; None where the sample holds whole numbers only."""
+        cells = [cell for row in sample for cell in row]
+        commas = [cell for cell in cells if "," in cell and is_number(cell, ",")]
+        points = [cell for cell in cells if "." in cell and is_number(cell, ".")]
+        stated = self.spec.decimal
+        if len(commas) == len(points):
+            return stated or ("." if points else None)
+        observed, example = (",", commas[0]) if len(commas) > len(points) else (".", points[0])
+        if stated is not None and stated != observed:
+            what = f"decimal is {stated!r} in the manifest, but numbers look like {example!r}"
+            raise self._refuse(None, what, f"Set [csv] decimal = {observed!r}, or leave it out")
+        return observed
+
+    def _names_of_all_cells(self, header: _NamesLine, sample: list[list[str]]) -> tuple[str, ...]:
+        """Names for every cell of a line of samples: a trailing delimiter may be in one line only."""
+        widths = [len(row) for row in sample]
+        width = max(set(widths), key=widths.count)
+        names = header.names
+        if len(names) < width:
+            extra = [cell for row in sample if len(row) == width for cell in row[len(names) :]]
+            if any(extra):
+                what = f"has {len(names)} names, but the samples have {width} cells (the first extra is {extra[0]!r})"
+                raise self._refuse(header.line, what, "Check [csv] delimiter and decimal; name every column")
+            return names + ("",) * (width - len(names))
+        if any(names[width:]):
+            named = len([name for name in names if name])
+            what = f"has {named} names, but the samples have {width} cells"
+            raise self._refuse(header.line, what, "Check [csv] delimiter and decimal")
+        return names[:width]
+
+    def _units(self, header: _NamesLine, first: int, names: tuple[str, ...]) -> tuple[str, ...]:
+        """Units from brackets in the names, or from the line below the names."""
+        below: list[str] = []
+        if 0 < header.line < first:
+            below = split_line(self.lines[header.line], header.delimiter)
+        units = []
+        for i, name in enumerate(names):
+            bracket = _UNIT.search(name)
+            text = bracket[1] if bracket else "".join(below[i : i + 1])
+            units.append(text.strip().strip("[]()"))
+        return tuple(units)
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
-    return split_line(line.rstrip("\r\n"), delimiter)
+def _is_row_of_numbers(cells: list[str]) -> bool:
+    usual = all(looks_like(cell) or is_missing(cell) or is_stamp(cell) or is_date(cell) for cell in cells)
+    return len(cells) > 1 and usual and any(map(looks_like, cells))
 
 
-def _names(lines: list[str], first: int, width: int, delimiter: str) -> tuple[int, tuple[str, ...]]:
-    """Index of the highest line above the numbers that has as many cells and words in them; -1 without one."""
-    found = -1
-    for i in range(first - 1, max(first - 6, -1), -1):
-        cells = _cells(lines[i], delimiter)
-        if abs(len(cells) - width) <= 1 and len(cells) > 1:
-            found = i
-        elif cells:
-            break
-    if found < 0:
-        return -1, tuple(f"column{i + 1}" for i in range(width))
-    cells = _cells(lines[found], delimiter)[:width]
-    return found, tuple(cells + [""] * (width - len(cells)))
+def _columns_of(kind: Callable[[str], bool], sample: list[list[str]]) -> frozenset[int]:
+    """Columns whose cells are all of a kind, missing ones apart."""
+    width = min((len(row) for row in sample), default=0)
+    columns = set()
+    for index in range(width):
+        cells = [row[index] for row in sample if row[index]]
+        if cells and all(map(kind, cells)):
+            columns.add(index)
+    return frozenset(columns)
 
 
-def _units(lines: list[str], header: int, first: int, names: tuple[str, ...], delimiter: str) -> tuple[str, ...]:
-    """Units from the line below the names, or from brackets in the names."""
-    below = _cells(lines[header + 1], delimiter) if header >= 0 and header + 1 < first else []
-    out = []
-    for i, name in enumerate(names):
-        bracket = _UNIT.search(name)
-        text = bracket[1] if bracket else (below[i] if i < len(below) else "")
-        out.append(text.strip().strip("[]()"))
-    return tuple(out)
+def without_unit(name: str) -> str:
+    """A column's name without the unit in brackets behind it."""
+    return _UNIT.sub("", name)
+
+
+def split_line(line: str, delimiter: str) -> list[str]:
+    """Cells of a line, stripped of white space and quotes; empty for a blank line."""
+    if not line.strip():
+        return []
+    if delimiter == " ":
+        return line.split()
+    cells = line.split(delimiter)
+    if '"' in line:
+        with contextlib.suppress(csv.Error):
+            cells = next(csv.reader([line], delimiter=delimiter))
+    return [cell.strip() for cell in cells]

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import refuse
 from rigdata.readers.series import Series, equidistant
-from rigdata.readers.text.byte_stream import all_lines, codec_of_bytes, text_encoding
+from rigdata.readers.text.byte_stream import all_lines, text_encoding
 from rigdata.readers.text.cells import stamp_seconds
 
 _MAGIC, _END = "LabVIEW Measurement", "***End_of_Header***"
@@ -23,159 +23,148 @@ _BLOCK = 20_000
 
 @dataclass
 class _Segment:
-    """One table with its header: key -> one cell per channel."""
+    """One table with its header."""
 
-    header: dict[str, list[str]] = field(default_factory=dict)
+    header: dict[str, list[str]] = field(default_factory=dict)  #: key -> one cell per channel
     names: list[str] = field(default_factory=list)
     rows: list[str] = field(default_factory=list)
-    blocks: list[FloatArray] = field(default_factory=list)
+    blocks: list[FloatArray] = field(default_factory=list)  #: (rows, columns), NaN where blank
+
+    def entry(self, key: str, number: int) -> str:
+        """What the header has under `key` for channel `number`, counted from 1."""
+        return "".join(self.header.get(key, [])[number - 1 : number])
 
 
 def read_series(path: Path) -> list[Series]:
     """Read every channel over time; segments of the same channels follow each other."""
-    encoding = text_encoding(path, None)
-    codec = codec_of_bytes(encoding)
-    lines = (line.decode(codec, "replace") for line in all_lines(path, encoding))
-    first = next(lines, "")
-    if not first.startswith(_MAGIC):
-        raise _refuse(path, "line 1", f"does not begin with {_MAGIC!r}", "Is it a LabVIEW measurement file?")
-    separator, decimal = _spelling(lines)
-    found: dict[str, list[Series]] = {}
-    for segment in _segments(path, lines, separator, decimal):
-        for one in _channels(segment, decimal):
-            found.setdefault(one.name, []).append(one)
-    if not found:
-        raise _refuse(path, "", "holds no channel over time", "Export the run again, with its samples")
-    return [_joined(parts) for parts in found.values()]
+    return _LvmFile(path).read()
 
 
-def _refuse(path: Path, place: str, what: str, cure: str) -> RigDataError:
-    return RigDataError(Problem("error", path.name, place, what, cure))
+class _LvmFile:
+    def __init__(self, path: Path) -> None:
+        self.file = path.name
+        self.lines = all_lines(path, text_encoding(path, None))
+        self.separator, self.decimal = "\t", "."
 
+    def read(self) -> list[Series]:
+        first = next(self.lines, "")
+        if not first.startswith(_MAGIC):
+            remedy = "Is it a LabVIEW measurement file?"
+            raise refuse(self.file, "line 1", f"does not begin with {_MAGIC!r}", remedy)
+        self._read_spelling()
+        parts: dict[str, list[Series]] = {}
+        for segment in self._segments():
+            for channel in self._channels(segment):
+                parts.setdefault(channel.name, []).append(channel)
+        if not parts:
+            raise refuse(self.file, "", "holds no channel over time", "Export the run again, with its samples")
+        return [_joined(segments) for segments in parts.values()]
 
-def _spelling(lines: Iterator[str]) -> tuple[str, str]:
-    """Separator and decimal mark by the file's own header, which ends with this."""
-    separator, decimal = "\t", "."
-    for line in lines:
-        if line.startswith("Separator"):  # it stands behind its own key
-            separator = line[len("Separator") :][:1] or separator
-        elif line.startswith("Decimal_Separator"):
-            decimal = line[len("Decimal_Separator") + 1 :].strip()[:1] or decimal
-        elif line.startswith(_END):
-            break
-    return separator, decimal
+    def _read_spelling(self) -> None:
+        """Separator and decimal mark by the file's own header, which ends with this."""
+        for line in self.lines:
+            if line.startswith("Separator"):  # it is behind its own key
+                self.separator = line[len("Separator") :][:1] or self.separator
+            elif line.startswith("Decimal_Separator"):
+                self.decimal = line[len("Decimal_Separator") + 1 :].strip()[:1] or self.decimal
+            elif line.startswith(_END):
+                break
 
+    def _cells(self, line: str) -> list[str]:
+        return [cell.strip() for cell in line.split(self.separator)]
 
-def _heading(lines: Iterator[str], separator: str) -> dict[str, list[str]]:
-    """Entries of a segment's heading, one cell per channel, up to its end mark; special blocks are left alone."""
-    found: dict[str, list[str]] = {}
-    special = False
-    for line in lines:
-        cells = [c.strip() for c in line.split(separator)]
-        if cells[0].startswith(_END):
-            break
-        special = (special or cells[0].startswith("***Start_Special")) and not cells[0].startswith("***End_Special")
-        if not special and cells[0]:
-            found[cells[0]] = cells[1:]
-    return found
+    def _heading(self) -> dict[str, list[str]]:
+        """Entries of a segment's heading, one cell per channel, up to its end mark; special blocks are left alone."""
+        entries: dict[str, list[str]] = {}
+        special = False
+        for line in self.lines:
+            key, *cells = self._cells(line)
+            if key.startswith(_END):
+                break
+            if key.startswith("***Start_Special"):
+                special = True
+            elif key.startswith("***End_Special"):
+                special = False
+            if key and not special:
+                entries[key] = cells
+        return entries
 
+    def _segments(self) -> Iterator[_Segment]:
+        """Segments in order, their rows as numbers; without headings of their own all samples are one."""
+        segment: _Segment | None = None
+        blank = f"{self.separator} \t\r\n"
+        for line in self.lines:
+            first = line.partition(self.separator)[0].strip()
+            if first == "Channels":
+                if segment is not None:
+                    self._convert_rows(segment)
+                    yield segment
+                segment = _Segment(self._heading(), self._cells(next(self.lines, "")))
+            elif first == _X:
+                segment = segment or _Segment()
+                segment.names = self._cells(line)
+            elif segment is not None and line.strip(blank):
+                segment.rows.append(line)
+                if len(segment.rows) == _BLOCK:
+                    self._convert_rows(segment)
+        if segment is not None:
+            self._convert_rows(segment)
+            yield segment
 
-def _segments(path: Path, lines: Iterator[str], separator: str, decimal: str) -> Iterator[_Segment]:
-    """Segments in order, their rows as numbers; without headings of their own all samples are one."""
-    segment: _Segment | None = None
-    blank = f"{separator} \t\r\n"
-    for line in lines:
-        first = line.partition(separator)[0].strip()
-        if first == "Channels":
-            if segment is not None:
-                yield _turned(path, segment, separator, decimal)
-            segment = _Segment(header=_heading(lines, separator))
-            names = next(lines, "")
-            segment.names = [c.strip() for c in names.split(separator)]
-        elif first == _X:
-            segment = segment or _Segment()
-            segment.names = [c.strip() for c in line.split(separator)]
-        elif segment is not None and line.strip(blank):
-            segment.rows.append(line)
-            if len(segment.rows) == _BLOCK:
-                _turned(path, segment, separator, decimal)
-    if segment is not None:
-        yield _turned(path, segment, separator, decimal)
+    def _convert_rows(self, segment: _Segment) -> None:
+        """Turn the rows that a segment holds as text into numbers; the column of comments is left out."""
+        import pandas as pd
 
-
-def _turned(path: Path, segment: _Segment, separator: str, decimal: str) -> _Segment:
-    """The segment with the rows that it holds as text turned into numbers."""
-    segment.blocks.append(_numbers(path, segment, separator, decimal))
-    segment.rows.clear()
-    return segment
-
-
-def _channels(segment: _Segment, decimal: str) -> list[Series]:
-    values = np.concatenate(segment.blocks)
-    found = []
-    x: FloatArray | None = None
-    number = 0
-    for i, name in enumerate(segment.names):
-        if name == _X:
-            x = values[:, i] if np.isfinite(values[:, i]).any() else None
-        elif name and name != _COMMENT:
-            number += 1
-            if _entry(segment, "X_Dimension", number, "Time").lower() not in ("time", ""):
-                continue
-            found.append(_series(segment, number, name, values[:, i], x, decimal))
-    return found
-
-
-def _numbers(path: Path, segment: _Segment, separator: str, decimal: str) -> FloatArray:
-    """Cells of all rows, NaN where blank; the column of comments is left out."""
-    import pandas as pd
-
-    width = len(segment.names)
-    used = [i for i, n in enumerate(segment.names) if n and n != _COMMENT]
-    if not segment.rows:
-        return np.empty((0, width))
-    # a blank comment at the end of every row may be left out altogether
-    first = segment.rows[0] + separator * max(0, width - 1 - segment.rows[0].count(separator))
-    text = io.StringIO("\n".join([first, *segment.rows[1:]]))
-    try:
-        frame = pd.read_csv(text, sep=separator, decimal=decimal, header=None, names=range(width), usecols=used,
-                            index_col=False, dtype=float, skip_blank_lines=False, quoting=3)  # fmt: skip
-    except ValueError as error:
-        raise _refuse(path, "", f"has text among its numbers ({error})", "Export the run again") from error
-    values = np.full((len(frame), width), np.nan)
-    values[:, used] = frame.to_numpy(float)
-    return values
-
-
-def _entry(segment: _Segment, key: str, number: int, default: str = "") -> str:
-    cells = segment.header.get(key, [])
-    return cells[number - 1] if number <= len(cells) else default
-
-
-def _series(
-    segment: _Segment, number: int, name: str, values: FloatArray, x: FloatArray | None, decimal: str
-) -> Series:
-    def stated(key: str) -> float:
+        width = len(segment.names)
+        used = [i for i, name in enumerate(segment.names) if name and name != _COMMENT]
+        if not segment.rows:
+            segment.blocks.append(np.empty((0, width)))
+            return
+        # a blank comment at the end of every row may be left out altogether
+        first, *further = segment.rows
+        first += self.separator * max(0, width - 1 - first.count(self.separator))
+        text = io.StringIO("\n".join([first, *further]))
         try:
-            return float(_entry(segment, key, number).replace(decimal, "."))
-        except ValueError:
-            return float("nan")
+            frame = pd.read_csv(
+                text, sep=self.separator, decimal=self.decimal, header=None, names=range(width), usecols=used,
+                index_col=False, dtype=float, skip_blank_lines=False, quoting=3,
+            )  # fmt: skip
+        except ValueError as error:
+            what = f"has text among its numbers ({error})"
+            raise refuse(self.file, "", what, "Export the run again") from error
+        values = np.full((len(frame), width), np.nan)
+        values[:, used] = frame.to_numpy(float)
+        segment.blocks.append(values)
+        segment.rows.clear()
 
-    count = stated("Samples")
-    last = int(count) if 0 < count <= len(values) else len(values)
-    values = values[:last]
-    step, start = stated("Delta_X"), stated("X0")
-    time: FloatArray | None = None
-    if step > 0:  # X as written is rounded
-        time = equidistant(last, step, start if np.isfinite(start) else 0.0)
-    elif x is not None:
-        time = x[:last]
-    return Series(name, _entry(segment, "Y_Unit_Label", number), values, time, _began(segment, number))
+    def _channels(self, segment: _Segment) -> Iterator[Series]:
+        values = np.concatenate(segment.blocks)
+        x: FloatArray | None = None
+        number = 0
+        for i, name in enumerate(segment.names):
+            if name == _X:
+                x = values[:, i] if np.isfinite(values[:, i]).any() else None
+            elif name and name != _COMMENT:
+                number += 1
+                if segment.entry("X_Dimension", number).lower() in ("time", ""):
+                    yield self._series(segment, number, name, values[:, i], x)
 
+    def _series(self, segment: _Segment, number: int, name: str, values: FloatArray, x: FloatArray | None) -> Series:
+        """A channel; its group is date and time of day at which the segment began."""
 
-def _began(segment: _Segment, number: int) -> str:
-    """Date and time of day at which a channel's segment began."""
-    return f"{_entry(segment, 'Date', number)} {_entry(segment, 'Time', number)}".strip()
+        def stated(key: str) -> float:
+            try:
+                return float(segment.entry(key, number).replace(self.decimal, "."))
+            except ValueError:
+                return float("nan")
+
+        count, step, start = stated("Samples"), stated("Delta_X"), stated("X0")
+        length = int(count) if 0 < count <= len(values) else len(values)
+        time = None if x is None else x[:length]
+        if step > 0:  # X as written is rounded
+            time = equidistant(length, step, start if np.isfinite(start) else 0.0)
+        began = f"{segment.entry('Date', number)} {segment.entry('Time', number)}".strip()
+        return Series(name, segment.entry("Y_Unit_Label", number), values[:length], time, began)
 
 
 def _joined(parts: Sequence[Series]) -> Series:
@@ -183,10 +172,10 @@ def _joined(parts: Sequence[Series]) -> Series:
     first = parts[0]
     if len(parts) == 1:
         return Series(first.name, first.unit, first.values, first.time)
-    values = np.concatenate([p.values for p in parts])
-    if any(p.time is None for p in parts):
+    values = np.concatenate([part.values for part in parts])
+    if any(part.time is None for part in parts):
         return Series(first.name, first.unit, values, None)
-    began, bad = stamp_seconds([p.group or None for p in parts])
+    began, bad = stamp_seconds([part.group or None for part in parts])
     times: list[FloatArray] = []
     for i, part in enumerate(parts):
         time = np.asarray(part.time)
