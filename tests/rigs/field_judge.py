@@ -71,12 +71,7 @@ def _campaign_refused(result: object) -> bool:
 
 
 def _severity(condition: object) -> str:
-    given = getattr(condition, "severity", None)
-    if given is not None:
-        return str(given)
-    from tpjb_ident.report.condition_words import is_serious
-
-    return "error" if is_serious(condition) else "warning"  # type: ignore[arg-type]
+    return str(condition.severity)  # type: ignore[attr-defined]
 
 
 def _judge_point(outcome: Outcome, p: object, rig: Rig, campaign_refused: bool) -> None:
