@@ -118,12 +118,7 @@ def prediction_frame(predictions: Sequence[PointPrediction], mesh_error: bool = 
     """Build prediction.csv: one row per operating point."""
     import pandas as pd
 
-    return pd.DataFrame(prediction_rows(predictions, mesh_error))
-
-
-def prediction_rows(predictions: Sequence[PointPrediction], mesh_error: bool = True) -> list[dict[str, Any]]:
-    """Rows of `prediction_frame`, for a process that needs no table."""
-    return [_row(one, mesh_error) for one in predictions]
+    return pd.DataFrame([_row(prediction, mesh_error) for prediction in predictions])
 
 
 def _row(one: PointPrediction, mesh_error: bool) -> dict[str, Any]:

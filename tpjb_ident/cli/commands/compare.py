@@ -28,7 +28,7 @@ from tpjb_ident.cli.common.options import (
     refuse_unknown,
 )
 from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import Progress, command_line, print_line, progress, table
+from tpjb_ident.cli.common.terminal import command_line, print_line, progress, table
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
@@ -101,10 +101,15 @@ def _compared(
     from tpjb_ident.runtime.executors import background_job
 
     with background_job(model_side, source, data.bearing, settings) as model, progress("comparing") as show:
+        from tpjb_ident.report.comparison_page import write_report  # loaded while the model is at work
+
         settings = replace(settings, identify=identify_settings(source, options["method"], options["norm"]))
         result = compare_campaign(source, data.bearing, settings, show, model)
         then = next_command(result, data.typed, data.given)
-        write_comparison(folder, result, named(options), inputs, then, show)
+        show("writing tables", 0, 2)
+        write_comparison(folder, result)
+        show("drawing figures", 1, 2)
+        write_report(folder, result, named(options), inputs, then)
     return result, then
 
 
@@ -119,16 +124,12 @@ def _variants(text: str) -> tuple[str, ...]:
     return names
 
 
-def write_comparison(
-    folder: Path, result: Comparison, settings: dict[str, Any], inputs: dict[str, str], then: str, show: Progress
-) -> None:
-    """Write every table, pivots.toml, and the report."""
+def write_comparison(folder: Path, result: Comparison) -> None:
+    """Write every table and pivots.toml."""
     from tpjb_ident.compare.comparison import comparison_frame, locus_frame
     from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.pivot import pivot_table, write_pivots
-    from tpjb_ident.report.comparison_page import write_report
 
-    show("writing tables", 0, 2)
     write_identification(folder, result.identification)
     write_table(folder, "comparison", comparison_frame(result))
     if result.curves:
@@ -140,8 +141,6 @@ def write_comparison(
     if result.locus is not None:
         write_table(folder, "locus", result.locus.to_frame())
         write_table(folder, "locus_comparison", locus_frame(result))
-    show("drawing figures", 1, 2)
-    write_report(folder, result, settings, inputs, then)
 
 
 def show_comparison(result: Comparison, then: str = "") -> None:

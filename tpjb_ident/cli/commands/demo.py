@@ -42,14 +42,18 @@ def demo(out: Out = None) -> None:
         campaign = load_campaign(path)
         bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
         with background_job(model_side, campaign, bearing, CompareSettings()) as model, progress("demo") as show:
-            from tpjb_ident.check.campaign import check_campaign  # late: the other process is at work meanwhile
+            from tpjb_ident.check.campaign import check_campaign  # loaded while the model is at work
+            from tpjb_ident.report.comparison_page import write_report
 
             show("reading and checking every record", 0, 1)
             summary = check_summary(path, check_campaign(path), campaign)
             write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")
             result = compare_campaign(campaign, bearing, progress=show, model=model)
             write_table(folder, "prediction", prediction_frame(result.variant("measured").points))
-            write_comparison(folder, result, named(options), campaign.fingerprint(), "", show)
+            show("writing tables", 0, 2)
+            write_comparison(folder, result)
+            show("drawing figures", 1, 2)
+            write_report(folder, result, named(options), campaign.fingerprint())
         write_record(folder, target, "demo", options, summary["files_sha256"])
     counts = summary["counts"]
     print_line(

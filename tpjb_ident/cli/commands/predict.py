@@ -27,20 +27,14 @@ from tpjb_ident.cli.common.options import (
 )
 from tpjb_ident.cli.common.quantities import MAX_VALUES, parse_value, parse_values
 from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import Progress, print_line, progress, table
+from tpjb_ident.cli.common.terminal import print_line, progress, table
 from tpjb_ident.errors import BadInputError, NotTrustedError
-from tpjb_ident.runtime.executors import background_job, cores, forks
 from tpjb_ident.runtime.output_folder import output_folder
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_table
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-    from model.bearing import Bearing
     from model.options import Options
-    from rigdata.operating_point import OperatingPoint
-    from tpjb_ident.compare.predictions import ModelSettings
 
 #: Name on the command line: what it does.
 PHYSICS = {
@@ -62,8 +56,6 @@ HousingTemperature = Annotated[
     typer.Option(help='With growth: mean temperature of the housing, "48 degC" [default: the oil supply\'s].'),
 ]
 NAMED_PIVOTS = ("rigid", "kirk", "kirk-secant")
-#: Points that take less time than a library to load.
-FEW = 20
 THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 
 
@@ -128,6 +120,7 @@ def predict(
     refuse_special(bearing)
     from model.bearing_file import load_bearing
     from tpjb_ident.compare.measured_pivots import refuse_counted_twice
+    from tpjb_ident.compare.predictions import predict_points, prediction_frame
 
     refuse_counted_twice(choice, settings.effects, effects)
     loaded = load_bearing(bearing)
@@ -135,7 +128,8 @@ def predict(
     target = out_folder(out, "predict")
     inputs = {p.name: sha256(p) for p in (bearing, effects, choice) if isinstance(p, Path)}
     with output_folder(target, "predict") as folder:
-        frame = _predicted(loaded, points, settings)
+        with progress("predicting") as show:
+            frame = prediction_frame(predict_points(loaded, points, settings, show))
         write_table(folder, "prediction", frame)
         write_record(folder, target, "predict", options, inputs)
     _show_predictions(frame, loaded.name)
@@ -148,31 +142,6 @@ def predict(
     rough = float(frame["mesh_error"].max())
     if rough > 0.05:
         raise NotTrustedError(f"the mesh error reaches {100 * rough:.0f} % of a direct coefficient.")
-
-
-def _predicted(bearing: Bearing, points: list[OperatingPoint], settings: ModelSettings) -> pd.DataFrame:
-    """Table of all points. A few are solved in a copy of this process while pandas is loaded in this one."""
-    rows = None
-    if len(points) <= FEW and cores() > 1 and forks():
-        with background_job(_rows, bearing, points, settings) as ahead, progress("predicting"):
-            import pandas as pd
-            import pyarrow.parquet  # noqa: F401  (what the table is written with)
-
-            rows = ahead()
-    if rows is None:
-        with progress("predicting") as show:
-            rows = _rows(bearing, points, settings, show)
-    import pandas as pd
-
-    return pd.DataFrame(rows)
-
-
-def _rows(
-    bearing: Bearing, points: list[OperatingPoint], settings: ModelSettings, show: Progress | None = None
-) -> list[dict[str, Any]]:
-    from tpjb_ident.compare.predictions import predict_points, prediction_rows
-
-    return prediction_rows(predict_points(bearing, points, settings, show))
 
 
 def operating_points(load: str, load_direction: str, speed: str, excitation: str | None) -> list[Any]:
