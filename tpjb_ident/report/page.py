@@ -12,7 +12,7 @@ from pathlib import Path
 import jinja2
 import markupsafe
 
-from tpjb_ident.report.figure import Panel, inline_svg, save_panels, shape
+from tpjb_ident.report.figure import Panel, inline_svg, save_panels, shape, svg_text
 from tpjb_ident.runtime.provenance import versions
 from tpjb_ident.runtime.tables import printable, readable, write_text
 
@@ -54,9 +54,8 @@ class Page:
     beside: str = "Figures are beside this file as SVG and PNG, tables as CSV and Parquet."
 
 
-def render_page(page: Page, svg: Mapping[str, str]) -> str:
-    """Render a report as HTML."""
-    environment = jinja2.Environment(
+def _templates() -> jinja2.Environment:
+    return jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
@@ -64,19 +63,34 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+
+
+def render_page(page: Page, svg: Mapping[str, str]) -> str:
+    """Render a report as HTML."""
+    environment = _templates()
     script = environment.get_template("sort.js").render()
-    shapes = {p.name: shape(svg[p.name]) for section in page.sections for p in section.panels}
-    drawn = {p.name: _element(svg[p.name], p) for section in page.sections for p in section.panels}
+    panels = [panel for section in page.sections for panel in section.panels]
     return environment.get_template("report.html").render(
         page=page,
-        drawn=drawn,
+        drawn={panel.name: _element(svg[panel.name], panel) for panel in panels},
         style=markupsafe.Markup(environment.get_template("style.css").render()),  # our own text, no data in it
         script=markupsafe.Markup(script),  # likewise
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        shapes=shapes,
+        shapes={panel.name: shape(svg[panel.name]) for panel in panels},
         versions=versions(),
         finished=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
     )
+
+
+def render_section(section: Section) -> str:
+    """Render one section with its style, as the text of an element that has a shadow root of its own."""
+    environment = _templates()
+    svg = {panel.name: svg_text(panel.figure, panel.name) for panel in section.panels}
+    drawn = {panel.name: _element(svg[panel.name], panel) for panel in section.panels}
+    shapes = {name: shape(text) for name, text in svg.items()}
+    style = environment.get_template("style.css").render().replace(":root", ":host")
+    html = environment.get_template("section.html").module.section(section, drawn, shapes, "")  # type: ignore[attr-defined]
+    return f"<style>{style} :host {{ background: var(--paper); color: var(--ink); }}</style>{html}"
 
 
 def write_page(folder: Path, page: Page) -> Path:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import html
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rigdata.problem import RigDataError
 from rigdata.survey.spectrum import amplitude_spectrum, strongest
-from tpjb_ident.view.style import BLUE, COLOURS, INK, RED, new_plot, side_by_side
+from tpjb_ident.runtime.tables import printable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +23,8 @@ MOST_POINTS = 6000
 HARMONICS = 2
 #: Stretches of a waterfall that do not overlap, and samples of one at most.
 STRETCHES, MOST_LINES = 12, 2048
+INK, BLUE, RED = "#1c2024", "#0072b2", "#d55e01"
+_COLOURS = (INK, BLUE, "#d98c00", "#009e73", RED, "#b9609a", "#7a828b")
 _UNITS = {
     "displacement": ("µm", 1e6),
     "force": ("N", 1.0),
@@ -92,12 +95,12 @@ def show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict[
     """Draw channels of one quantity over time and frequency; what is to be said of them."""
     first = records[0]
     unit, scale = _UNITS.get(first.quantity, ("", 1.0))
-    drawn = [r for r in records if r.quantity == first.quantity][: len(COLOURS)]
+    drawn = [r for r in records if r.quantity == first.quantity][: len(_COLOURS) - 1]
     label = first.name if len(drawn) == 1 else first.quantity
     plots[0].yaxis.axis_label, plots[1].yaxis.axis_label = f"{label}, {unit}", f"amplitude, {unit}"
     paths = [thinned(r.time, scale * r.values) for r in drawn]
     spectra = [amplitude_spectrum(scale * r.values, r.rate) for r in drawn]
-    look = {"colour": [INK, *COLOURS][: len(drawn)], "name": [r.name for r in drawn]}
+    look = {"colour": _COLOURS[: len(drawn)], "name": [r.name for r in drawn]}
     data["time"].data = {"x": [x for x, _ in paths], "y": [y for _, y in paths], **look}
     data["spectrum"].data = {
         "x": [f[4:] for f, _ in spectra],
@@ -166,8 +169,26 @@ def thinned(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _escaped(text: str) -> str:
-    import html
-
-    from tpjb_ident.runtime.tables import printable
-
     return html.escape(printable(text))
+
+
+def side_by_side(*parts: Any) -> Any:
+    """Set parts beside each other; on a narrow screen below each other."""
+    from bokeh.layouts import row
+
+    return row(*parts, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"})
+
+
+def new_plot(title: str, x: str, y: str, **options: Any) -> Any:
+    """Make an empty plot."""
+    from bokeh.plotting import figure
+
+    settings = {
+        "height": 280,
+        "min_width": 330,
+        "sizing_mode": "stretch_width",
+        "tools": "pan,box_zoom,wheel_zoom,reset,save",
+    }
+    plot = figure(title=title, x_axis_label=x, y_axis_label=y, **{**settings, **options})
+    plot.toolbar.logo = None
+    return plot

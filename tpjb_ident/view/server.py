@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 import html
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.runtime.tables import printable
-from tpjb_ident.view.session import Session
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import pandas as pd
+
+    from rigdata.campaign import Campaign
+    from tpjb_ident.dynamic.results.identification import Identification
 
 #: The only address that is ever listened on.
 LOOPBACK = "127.0.0.1"
@@ -24,6 +26,24 @@ MOST_ROWS = 5000
 
 class ViewError(TpjbError):
     """The page cannot be served; says why and what to do."""
+
+
+@dataclass
+class Session:
+    """A campaign with what is identified from it and predicted for it, or the tables of a folder of results."""
+
+    name: str
+    campaign: Campaign | None = None
+    tables: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    identify: Callable[[], Identification] | None = None
+    bearing: Any = None
+    #: Pivot models by name, as `tpjb_ident.compare.predictions.ModelSettings` takes them.
+    pivots: Mapping[str, Any] = field(default_factory=dict)
+
+    @functools.cached_property
+    def identification(self) -> Identification | None:
+        """Identified coefficients; None if the campaign has no dynamic runs."""
+        return None if self.identify is None else self.identify()
 
 
 def serve(session: Session, port: int, ready: Callable[[str], None], seconds: float | None = None) -> None:
@@ -63,12 +83,10 @@ def build(document: Any, session: Session) -> None:
 
         panels.append(TabPanel(child=records_tab(session.campaign), title="records"))
     if session.identification is not None:
-        from tpjb_ident.view.points_tab import points_tab
+        from tpjb_ident.view.results_tabs import model_tab, points_tab
 
         panels.append(TabPanel(child=points_tab(session.identification), title="points and windows"))
-        if session.predict is not None:
-            from tpjb_ident.view.model_tab import model_tab
-
+        if session.bearing is not None:
             panels.append(TabPanel(child=model_tab(session), title="prediction and measurement"))
     if session.tables:
         panels.append(TabPanel(child=_tables_tab(session.tables), title="tables"))

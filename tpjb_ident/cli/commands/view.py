@@ -16,9 +16,7 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import former_runs
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from tpjb_ident.view.session import Curve, Session
+    from tpjb_ident.view.server import Session
 
 Source = Annotated[Path, typer.Argument(metavar="CAMPAIGN|DIR", help="A campaign, or an output folder of tpjb.")]
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0: any free one.")]
@@ -61,7 +59,7 @@ def view(
 
 
 def _session(source: Path, bearing: Path | None) -> Session:
-    from tpjb_ident.view.session import Session
+    from tpjb_ident.view.server import Session
 
     place = campaign_place(source)
     if place.is_dir() and not (place / "campaign.toml").exists() and former_runs(place):
@@ -75,8 +73,8 @@ def _session(source: Path, bearing: Path | None) -> Session:
         session.identify = lambda: identify(campaign, IdentifySettings())
         if bearing is not None or campaign.bearing_text:
             drawn, _ = open_bearing(campaign, bearing)
-            laws = {"rigid": "rigid", "kirk": "kirk", **_measured(campaign, drawn)}
-            session.predict, session.pivots = _Predictor(drawn, laws), tuple(laws)
+            session.bearing = drawn
+            session.pivots = {"rigid": "rigid", "kirk": "kirk", **_measured(campaign, drawn)}
     return session
 
 
@@ -107,20 +105,3 @@ def _measured(campaign: Any, drawn: Any) -> dict[str, Any]:
     except ValueError as error:  # one of our own refusals: the page is of use without these curves
         note_line("warning", f"no measured pivots: {error}")
         return {}
-
-
-class _Predictor:
-    """Predicts curves over frequency; see `tpjb_ident.view.session.Predictor`."""
-
-    def __init__(self, bearing: Any, laws: dict[str, Any]) -> None:
-        self.bearing = bearing
-        self.laws = laws
-
-    def __call__(self, load: float, direction: float, speed: float, hertz: np.ndarray, pivots: str) -> Curve:
-        import numpy as np
-
-        from model.predict import predict
-        from tpjb_ident.view.session import Curve
-
-        got = predict(self.bearing, load, direction, speed, 2 * np.pi * hertz, pivots=self.laws[pivots])
-        return Curve(hertz, got.k, got.c, "" if got.converged else "; ".join(got.status))

@@ -64,7 +64,7 @@ def coefficient(
     for variant in dict.fromkeys(series["pivots"]):
         rows = series[series["pivots"] == variant].sort_values(column)
         _draw_predicted(axes, rows[column] / axis_scale, rows[f"{key}_predicted"] / scale, rows, str(variant))
-    measured = series.drop_duplicates(column).sort_values(column)
+    measured = series.drop_duplicates(column).dropna(subset=[key]).sort_values(column)
     value, low, high = (measured[f"{key}{end}"].to_numpy(float) / scale for end in ("", "_lo", "_hi"))
     axes.errorbar(
         measured[column] / axis_scale, value, yerr=np.abs([value - low, high - value]), fmt="o", color=LIGHT["ink"],

@@ -1,0 +1,139 @@
+"""Results, in the pictures and tables of the report: points with their windows, and prediction with measurement."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigdata.operating_point import OperatingPoint
+from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
+from tpjb_ident.report.comparison_page import measured_table
+from tpjb_ident.report.drawing.series import DIRECT, longest_series
+from tpjb_ident.report.figure import panel
+from tpjb_ident.report.page import Section, render_section
+from tpjb_ident.report.plots.coefficients import coefficient, direct_coefficients
+from tpjb_ident.report.plots.points import window_weights
+from tpjb_ident.report.plots.residuals import residual_map
+from tpjb_ident.schema import COEFFICIENT_COLUMNS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.dynamic.results.point_result import PointResult
+    from tpjb_ident.view.server import Session
+
+#: Frequencies of the curves [Hz].
+LINES = np.arange(5.0, 85.0, 5.0)
+#: Points are shown at the slider's load where theirs differs by no more than this share.
+_NEAR = 0.02
+
+
+def points_tab(identification: Identification) -> Any:
+    """Build the tab: windows of one point, then K and C of all."""
+    from bokeh.layouts import column
+    from bokeh.models import Div, Select
+
+    points = {_label(p): p for p in identification.points}
+    choice = Select(title="operating point", options=list(points), value=next(iter(points)), name="point", width=320)
+    windows = Div(name="windows", sizing_mode="stretch_width")
+
+    def update() -> None:
+        windows.text = _windows_html(points[choice.value])
+
+    choice.on_change("value", lambda attr, old, new: update())
+    update()
+    all_points = Div(text=_points_html(identification), name="coefficients", sizing_mode="stretch_width")
+    return column(choice, windows, all_points, sizing_mode="stretch_width")
+
+
+def _label(p: PointResult) -> str:
+    """Name of a point that no other point has."""
+    point = p.point
+    return (
+        f"{point.static_load / 1e3:g} kN at {point.static_load_direction_deg:g} deg, {point.shaft_speed_hz:g} Hz, "
+        f"excitation {point.excitation_hz:g} Hz"
+    )
+
+
+def _windows_html(p: PointResult) -> str:
+    flags = ", ".join(str(condition) for condition in p.quality) or "none"
+    title = f"Robust weight of {p.n_windows} windows; flags: {flags}"
+    return render_section(Section("Windows", panels=[panel("window-weights", title, window_weights(p), "")]))
+
+
+def _points_html(identification: Identification) -> str:
+    panels = []
+    if longest_series(identification.to_frame(), "load") is not None:
+        figure = direct_coefficients({identification.campaign: identification})
+        panels.append(panel("stiffness", "Direct stiffness over load, 95 % intervals", figure, ""))
+    return render_section(Section("All points", panels=panels, tables=[measured_table(identification)]))
+
+
+def model_tab(session: Session) -> Any:
+    """Build the tab: coefficients over excitation at the slider's load, then the residuals of all points."""
+    from bokeh.layouts import column
+    from bokeh.models import Div, Slider
+
+    identification = session.identification
+    assert identification is not None
+    loads = sorted({p.point.static_load / 1e3 for p in identification.points})
+    load = Slider(title="static load, kN", start=round(0.8 * loads[0], 2), end=round(1.15 * loads[-1], 2), step=0.05,
+                  value=loads[0], name="load", width=320)  # fmt: skip
+    curves = Div(name="curves", sizing_mode="stretch_width")
+    html = functools.lru_cache(maxsize=512)(functools.partial(_curves_html, session))
+
+    def update() -> None:
+        curves.text = html(round(load.value, 6))
+
+    load.on_change("value_throttled", lambda attr, old, new: update())  # when a moving slider is let go
+    update()
+    residuals = Div(text=_residuals_html(session), name="residuals", sizing_mode="stretch_width")
+    return column(load, curves, residuals, sizing_mode="stretch_width")
+
+
+def _curves_html(session: Session, kilonewtons: float) -> str:
+    """Direct coefficients over excitation at one load, with every pivot model."""
+    assert session.identification is not None
+    first = session.identification.points[0].point
+    measured = session.identification.to_frame()
+    measured = measured[(measured["static_load_N"] / (1e3 * kilonewtons) - 1.0).abs() < _NEAR]
+    measured = measured.assign(static_load_N=1e3 * kilonewtons)
+    frequencies = sorted({*LINES, *measured["excitation_Hz"]})
+    points = [
+        OperatingPoint(1e3 * kilonewtons, first.static_load_direction, first.shaft_speed, 2 * np.pi * frequency)
+        for frequency in frequencies
+    ]
+    table = _compared(session, points, measured)
+    panels = []
+    for name in DIRECT:
+        figure = coefficient(table, name, over="frequency")
+        panels.append(panel(f"model-{name}", f"{name} over excitation at {kilonewtons:g} kN", figure, ""))
+    note = f"{len(measured)} measured point{'' if len(measured) == 1 else 's'} at this load."
+    return render_section(Section("Prediction and measurement", [note], panels))
+
+
+def _residuals_html(session: Session) -> str:
+    identification = session.identification
+    assert identification is not None
+    table = _compared(session, [p.point for p in identification.points], identification.to_frame())
+    figure = residual_map(table)
+    return render_section(Section("All points", panels=[panel("residual-map", "Residuals of all points", figure, "")]))
+
+
+def _compared(session: Session, points: Sequence[OperatingPoint], measured: pd.DataFrame) -> pd.DataFrame:
+    """Predictions with every pivot model, and what was measured at the same points; columns as in comparison.csv."""
+    import pandas as pd
+
+    keys = ["static_load_N", "static_load_direction_deg", "shaft_speed_Hz", "excitation_Hz"]
+    frames = []
+    for name, pivots in session.pivots.items():
+        predictions = predict_points(session.bearing, points, ModelSettings(pivots))
+        table = prediction_frame(predictions, mesh_error=False)[[*keys, *COEFFICIENT_COLUMNS]]
+        frames.append(table.rename(columns={c: f"{c}_predicted" for c in COEFFICIENT_COLUMNS}).assign(pivots=name))
+    columns = [f"{name}{end}" for name in COEFFICIENT_COLUMNS for end in ("", "_lo", "_hi")]
+    predicted, measured = (table.round(dict.fromkeys(keys, 6)) for table in (pd.concat(frames), measured))
+    return predicted.merge(measured[[*keys, *columns]], how="left", on=keys)
