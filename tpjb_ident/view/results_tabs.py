@@ -35,19 +35,25 @@ _NEAR = 0.02
 def points_tab(identification: Identification) -> Any:
     """Build the tab: windows of one point, then K and C of all."""
     from bokeh.layouts import column
-    from bokeh.models import Div, Select
+    from bokeh.models import Select
 
     points = {_label(p): p for p in identification.points}
     choice = Select(title="operating point", options=list(points), value=next(iter(points)), name="point", width=320)
-    windows = Div(name="windows", sizing_mode="stretch_width")
+    windows = _text("windows")
 
     def update() -> None:
         windows.text = _windows_html(points[choice.value])
 
     choice.on_change("value", lambda attr, old, new: update())
     update()
-    all_points = Div(text=_points_html(identification), name="coefficients", sizing_mode="stretch_width")
-    return column(choice, windows, all_points, sizing_mode="stretch_width")
+    return column(choice, windows, _text("coefficients", _points_html(identification)), sizing_mode="stretch_width")
+
+
+def _text(name: str, html: str = "") -> Any:
+    from bokeh.models import Div
+
+    wide = ".bk-clearfix { display: block; width: 100%; }"  # otherwise as narrow as the text
+    return Div(text=html, name=name, sizing_mode="stretch_width", stylesheets=[wide])
 
 
 def _label(p: PointResult) -> str:
@@ -76,14 +82,14 @@ def _points_html(identification: Identification) -> str:
 def model_tab(session: Session) -> Any:
     """Build the tab: coefficients over excitation at the slider's load, then the residuals of all points."""
     from bokeh.layouts import column
-    from bokeh.models import Div, Slider
+    from bokeh.models import Slider
 
     identification = session.identification
     assert identification is not None
     loads = sorted({p.point.static_load / 1e3 for p in identification.points})
     load = Slider(title="static load, kN", start=round(0.8 * loads[0], 2), end=round(1.15 * loads[-1], 2), step=0.05,
                   value=loads[0], name="load", width=320)  # fmt: skip
-    curves = Div(name="curves", sizing_mode="stretch_width")
+    curves = _text("curves")
     html = functools.lru_cache(maxsize=512)(functools.partial(_curves_html, session))
 
     def update() -> None:
@@ -91,8 +97,7 @@ def model_tab(session: Session) -> Any:
 
     load.on_change("value_throttled", lambda attr, old, new: update())  # when a moving slider is let go
     update()
-    residuals = Div(text=_residuals_html(session), name="residuals", sizing_mode="stretch_width")
-    return column(load, curves, residuals, sizing_mode="stretch_width")
+    return column(load, curves, _text("residuals", _residuals_html(session)), sizing_mode="stretch_width")
 
 
 def _curves_html(session: Session, kilonewtons: float) -> str:
