@@ -48,15 +48,15 @@ def read_coefficients(path: Path, reading_error: float | None = None) -> tuple[T
     rows: list[TableRow] = []
     points: set[tuple[float, ...]] = set()
     for number, row in enumerate(_read(path).to_dict("records"), start=2):
-        where = f"{path.name}, line {number}"
-        place = _place(row, where)
-        found = _coefficients(row, reading_error, where)
-        if not found:
+        row_name = f"{path.name}, line {number}"
+        place = _place(row, row_name)
+        coefficients = _coefficients(row, reading_error, row_name)
+        if not coefficients:
             continue
         if place in points:
-            raise BadInputError(f"{where}: a second row for the same point. Keep one of them.")
+            raise BadInputError(f"{row_name}: a second row for the same point. Keep one of them.")
         points.add(place)
-        rows.append(TableRow(*place, found))
+        rows.append(TableRow(*place, coefficients))
     if not rows:
         raise BadInputError(f"{path.name}: holds no coefficient. Name columns as in coefficients.csv: kxx_N_per_m, ...")
     return tuple(rows)
@@ -85,41 +85,43 @@ def _read(path: Path) -> pd.DataFrame:
     return frame
 
 
-def _number(row: Mapping[Any, Any], name: str, where: str) -> float:
+def _number(row: Mapping[Any, Any], name: str, row_name: str) -> float:
     value = row.get(name)
     try:
         return float(value) if value is not None and value != "" else math.nan
     except (TypeError, ValueError) as error:
         raise BadInputError(
-            f"{where}, {name}: {value!r} is no number. Leave the cell empty where nothing is known."
+            f"{row_name}, {name}: {value!r} is no number. Leave the cell empty where nothing is known."
         ) from error
 
 
-def _place(row: Mapping[Any, Any], where: str) -> tuple[float, float, float, float]:
-    load, speed = _number(row, "static_load_N", where), HZ * _number(row, "shaft_speed_Hz", where)
-    direction, line = _number(row, "static_load_direction_deg", where), HZ * _number(row, "excitation_Hz", where)
+def _place(row: Mapping[Any, Any], row_name: str) -> tuple[float, float, float, float]:
+    load, speed = _number(row, "static_load_N", row_name), HZ * _number(row, "shaft_speed_Hz", row_name)
+    direction = _number(row, "static_load_direction_deg", row_name)
+    line = HZ * _number(row, "excitation_Hz", row_name)
     if not (load > 0.0 and speed > 0.0):
-        raise BadInputError(f"{where}: static_load_N and shaft_speed_Hz must be positive numbers.")
+        raise BadInputError(f"{row_name}: static_load_N and shaft_speed_Hz must be positive numbers.")
     return load, math.radians(-90.0 if math.isnan(direction) else direction), speed, speed if math.isnan(line) else line
 
 
-def _coefficients(row: Mapping[Any, Any], reading_error: float | None, where: str) -> dict[str, tuple[float, float]]:
+def _coefficients(row: Mapping[Any, Any], reading_error: float | None, row_name: str) -> dict[str, tuple[float, float]]:
     """Value and standard error of every coefficient that a row holds."""
     out = {}
     for part, unit in _UNITS.items():
         for entry in ENTRIES:
             name = f"{part}{entry}_{unit}"
-            value = _number(row, name, where)
+            value = _number(row, name, row_name)
             if math.isnan(value):
                 continue
-            error = _number(row, f"{name}_se", where)
+            error = _number(row, f"{name}_se", row_name)
             if math.isnan(error):
-                error = (_number(row, f"{name}_hi", where) - _number(row, f"{name}_lo", where)) / (2 * 1.96)
+                error = (_number(row, f"{name}_hi", row_name) - _number(row, f"{name}_lo", row_name)) / (2 * 1.96)
             if math.isnan(error) and reading_error is not None:
                 error = reading_error * abs(value)
             if not error >= 0.0:
                 raise BadInputError(
-                    f"{where}, {name}: nothing says how far it holds. Add {name}_se, _lo and _hi, or --reading-error."
+                    f"{row_name}, {name}: nothing says how far it holds. "
+                    f"Add {name}_se, _lo and _hi, or --reading-error."
                 )
             out[f"{part}{entry}"] = (value, error)
     return out

@@ -416,8 +416,8 @@ def compare_table(
     variants = []
     for name in names:
         model = ModelSettings(name, settings.thermal, settings.effects)
-        found = predict_points(bearing, [p.point for p in points], model, progress)
-        variants.append(Variant(name, found))
+        predictions = predict_points(bearing, [p.point for p in points], model, progress)
+        variants.append(Variant(name, predictions))
     identification = Identification(path.stem, METHOD, points, np.zeros((0, 8 * len(points))))
     source = TableSource(path.stem)
     return Comparison(source, bearing, settings, identification, (), None, None, tuple(variants), tuple(remarks))

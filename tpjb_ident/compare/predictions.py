@@ -121,11 +121,11 @@ def prediction_frame(predictions: Sequence[PointPrediction], mesh_error: bool = 
     return pd.DataFrame([_row(prediction, mesh_error) for prediction in predictions])
 
 
-def _row(one: PointPrediction, mesh_error: bool) -> dict[str, Any]:
-    p = one.prediction
-    row: dict[str, Any] = dict(point_columns(one.point))
-    row.update(zip(coefficient_names("k"), one.k.ravel(), strict=True))
-    row.update(zip(coefficient_names("c"), one.c.ravel(), strict=True))
+def _row(point_prediction: PointPrediction, mesh_error: bool) -> dict[str, Any]:
+    p = point_prediction.prediction
+    row: dict[str, Any] = dict(point_columns(point_prediction.point))
+    row.update(zip(coefficient_names("k"), point_prediction.k.ravel(), strict=True))
+    row.update(zip(coefficient_names("c"), point_prediction.c.ravel(), strict=True))
     row.update(x_m=p.position[0], y_m=p.position[1])
     for number in range(1, len(p.pad_load) + 1):
         row.update(_pad_columns(p, number))

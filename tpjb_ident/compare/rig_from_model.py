@@ -83,9 +83,9 @@ class _World:
         speed = static.shaft_speed
         prediction = predict_setup(self.setup, static.static_load, static.static_load_direction, speed, speed)
         if not prediction.converged:
-            where = f"{static.static_load:g} N, {static.static_load_direction_deg:g} deg, {static.shaft_speed_hz:g} Hz"
+            place = f"{static.static_load:g} N, {static.static_load_direction_deg:g} deg, {static.shaft_speed_hz:g} Hz"
             why = "; ".join(prediction.status)
-            raise ModelConvergenceError(f"the model finds no equilibrium at {where} ({why}). Leave that point out.")
+            raise ModelConvergenceError(f"the model finds no equilibrium at {place} ({why}). Leave that point out.")
         return prediction
 
     def _at(self, point: OperatingPoint) -> Prediction:

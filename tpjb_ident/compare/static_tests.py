@@ -46,10 +46,10 @@ def measure_static(campaign: Campaign, bearing: Bearing, with_pivots: bool = Tru
     curves: tuple[PivotCurve, ...] = ()
     if with_pivots and campaign.of_kind("dry_pivot"):
         curves = fit_pivots(campaign, angles, PivotSettings(on_refusal="few"))
-    clearance, left = _clearance(campaign, angles, curves)
+    clearance, excluded = _clearance(campaign, angles, curves)
     locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
-    left += [c for part in (*curves[:1], locus) if part is not None for c in part.status if c == "runs-refused"]
-    return StaticTests(curves, clearance, locus, tuple(left))
+    excluded += [c for part in (*curves[:1], locus) if part is not None for c in part.status if c == "runs-refused"]
+    return StaticTests(curves, clearance, locus, tuple(excluded))
 
 
 def _clearance(
@@ -59,23 +59,23 @@ def _clearance(
     from tpjb_ident.clearance.measure import coldest_run, measure_run
 
     runs = list(campaign.of_kind("clearance"))
-    left: list[Condition] = []
+    excluded: list[Condition] = []
     while runs:
         try:
-            return measure_run(coldest_run(runs), angles, curves or None), left
+            return measure_run(coldest_run(runs), angles, curves or None), excluded
         except RigDataError as error:  # a damaged sweep may not even tell how warm it was
             bad = next((run for run in runs if run.id == error.problems[0].run), runs[0])
-            left.append(Condition("runs-refused", f"{bad.id} ({error.problems[0]})"))
+            excluded.append(Condition("runs-refused", f"{bad.id} ({error.problems[0]})"))
             runs.remove(bad)
-    return None, left
+    return None, excluded
 
 
-def bearing_problems(campaign: Campaign, bearing: Bearing, known: Sequence[Problem] = ()) -> list[Problem]:
+def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Problem] = ()) -> list[Problem]:
     """Problems that show in the clearance sweeps of a campaign whose bearing is known."""
     sound = [
         run
         for run in campaign.of_kind("clearance")
-        if not any(p.run == run.id and p.severity == "error" for p in known)
+        if not any(p.run == run.id and p.severity == "error" for p in former)
     ]
     return [problem for run in sound for problem in _of_sweep(run, bearing)]
 
@@ -88,13 +88,13 @@ def _of_sweep(run: Run, bearing: Bearing) -> list[Problem]:
     names = " and ".join(c.name for c in run.channels.values() if c.quantity == "displacement")
     drawn = float(np.mean([pad.assembled_clearance for pad in bearing.pads]))
     measured = float(np.nanmean(polygon.clearance))
-    found = []
+    problems = []
     for condition in polygon.status:
         if condition == "probe-gains-differ":
             cure = "Check the sensitivities of both probes"
-            found.append(Problem("warning", run.file, f"channels {names}", condition.detail, cure, run.id))
+            problems.append(Problem("warning", run.file, f"channels {names}", condition.detail, cure, run.id))
     if not SCALE[0] * drawn < measured < SCALE[1] * drawn:
         what = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
         cure = "Check the sensitivities of the probes, and whether it is this bearing's file"
-        found.append(Problem("error", run.file, f"channels {names}", what, cure, run.id))
-    return found
+        problems.append(Problem("error", run.file, f"channels {names}", what, cure, run.id))
+    return problems

@@ -44,7 +44,7 @@ class Deviation:
 def deviations(comparison: Comparison, frame: pd.DataFrame | None = None) -> tuple[Deviation, ...]:
     """Deviation of every pivot model in every direct coefficient."""
     table = comparison_frame(comparison) if frame is None else frame
-    found = []
+    all_deviations = []
     for variant in comparison.variants:
         rows = table[table["pivots"] == variant.name]
         for name in DIRECT:
@@ -54,14 +54,14 @@ def deviations(comparison: Comparison, frame: pd.DataFrame | None = None) -> tup
             inside = int(((predicted >= rows[f"{name}_lo"]) & (predicted <= rows[f"{name}_hi"])).sum())
             worst = float(off[np.argmax(np.abs(off))]) if len(off) else math.nan
             median = float(np.median(off)) if len(off) else math.nan
-            found.append(Deviation(variant.name, name[:3], median, worst, len(off), inside))
-    return tuple(found)
+            all_deviations.append(Deviation(variant.name, name[:3], median, worst, len(off), inside))
+    return tuple(all_deviations)
 
 
-def closest(found: tuple[Deviation, ...]) -> str | None:
+def closest(all_deviations: tuple[Deviation, ...]) -> str | None:
     """Pivot model with the smallest mean size of its four medians; None if nothing could be compared."""
     scores: dict[str, list[float]] = {}
-    for d in found:
+    for d in all_deviations:
         if math.isfinite(d.median):
             scores.setdefault(d.pivots, []).append(abs(d.median))
     return min(scores, key=lambda name: sum(scores[name]) / len(scores[name])) if scores else None
@@ -71,29 +71,29 @@ def closest(found: tuple[Deviation, ...]) -> str | None:
 OFF = 0.05
 
 
-def worth_a_diagnosis(found: tuple[Deviation, ...]) -> bool:
+def worth_a_diagnosis(all_deviations: tuple[Deviation, ...]) -> bool:
     """Whether even the closest pivot model is off.
 
     A direct coefficient by its tolerance, half of its points or more.
     """
-    own = [d for d in found if d.pivots == closest(found) and math.isfinite(d.median)]
-    return any(abs(d.median) > OFF and d.inside <= 0.5 * d.n for d in own)
+    best_deviations = [d for d in all_deviations if d.pivots == closest(all_deviations) and math.isfinite(d.median)]
+    return any(abs(d.median) > OFF and d.inside <= 0.5 * d.n for d in best_deviations)
 
 
-def _verdict_sentence(comparison: Comparison, found: tuple[Deviation, ...]) -> str:
+def _verdict_sentence(comparison: Comparison, all_deviations: tuple[Deviation, ...]) -> str:
     """Say in one sentence what to conclude."""
-    name, best = comparison.campaign.id, closest(found)
+    name, best = comparison.campaign.id, closest(all_deviations)
     if best is None:
         return f"{name}: no coefficient could be compared; see the quality flags."
-    own = [d for d in found if d.pivots == best and math.isfinite(d.median)]
-    worst = max(own, key=lambda d: abs(d.median))
-    if worth_a_diagnosis(found):
+    best_deviations = [d for d in all_deviations if d.pivots == best and math.isfinite(d.median)]
+    worst = max(best_deviations, key=lambda d: abs(d.median))
+    if worth_a_diagnosis(all_deviations):
         who = "No pivot model explains" if len(comparison.variants) > 1 else "The model does not explain"
         return (
             f"{name}: {who} {worst.coefficient}: it is off by {percent(worst.median)} even with "
             f"{PIVOTS_IN_WORDS[best]}."
         )
-    agrees = f"agree within {100 * max(abs(d.median) for d in own):.1f} % (median)"
+    agrees = f"agree within {100 * max(abs(d.median) for d in best_deviations):.1f} % (median)"
     return f"{name}: prediction and measurement {agrees} with {PIVOTS_IN_WORDS[best]}."
 
 
@@ -115,31 +115,31 @@ def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
 
 def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None) -> tuple[str, ...]:
     """Say what the comparison found, the answer first."""
-    found = deviations(comparison, frame)
-    best = closest(found)
+    all_deviations = deviations(comparison, frame)
+    best = closest(all_deviations)
     sentences = []
     if best is None:
         sentences.append("No coefficient could be compared: see the quality flags.")
     else:
-        own = [d for d in found if d.pivots == best]
-        worst = max((d for d in own if math.isfinite(d.worst)), key=lambda d: abs(d.worst))
+        best_deviations = [d for d in all_deviations if d.pivots == best]
+        worst = max((d for d in best_deviations if math.isfinite(d.worst)), key=lambda d: abs(d.worst))
         sentences.append(
-            f"The prediction comes closest with {PIVOTS_IN_WORDS[best]}: {_medians(own)} (median over "
-            f"{max(d.n for d in own)} points); the largest single deviation is {percent(worst.worst)} in "
+            f"The prediction comes closest with {PIVOTS_IN_WORDS[best]}: {_medians(best_deviations)} (median over "
+            f"{max(d.n for d in best_deviations)} points); the largest single deviation is {percent(worst.worst)} in "
             f"{worst.coefficient}."
         )
     sentences += [
-        f"With {PIVOTS_IN_WORDS[v.name]}: {_medians([d for d in found if d.pivots == v.name])}."
+        f"With {PIVOTS_IN_WORDS[v.name]}: {_medians([d for d in all_deviations if d.pivots == v.name])}."
         for v in comparison.variants
         if v.name != best
     ]
-    sentences[:0] = [_verdict_sentence(comparison, found), *_effects_sentences(comparison)]
+    sentences[:0] = [_verdict_sentence(comparison, all_deviations), *_effects_sentences(comparison)]
     sentences += _pivot_sentence(comparison) + _clearance_sentence(comparison) + _locus_sentence(comparison)
     return (*sentences, *comparison.remarks)
 
 
-def _medians(found: list[Deviation]) -> str:
-    return ", ".join(f"{d.coefficient} {percent(d.median)}" for d in found)
+def _medians(compared: list[Deviation]) -> str:
+    return ", ".join(f"{d.coefficient} {percent(d.median)}" for d in compared)
 
 
 def _pivot_sentence(comparison: Comparison) -> list[str]:
@@ -177,11 +177,11 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
 
 def _locus_sentence(comparison: Comparison) -> list[str]:
     distances = {v.name: locus_distance(comparison, v) for v in comparison.variants}
-    known = {name: d for name, d in distances.items() if math.isfinite(d)}
-    if not known:
+    finite = {name: d for name, d in distances.items() if math.isfinite(d)}
+    if not finite:
         return []
     parts = ", ".join(
         f"{1e6 * d:.1f} µm with {name.capitalize() if name.startswith('kirk') else name} pivots"
-        for name, d in known.items()
+        for name, d in finite.items()
     )
     return [f"The predicted shaft centre locus is off the measured one by (root mean square) {parts}."]

@@ -60,7 +60,7 @@ def write_report(
     frame = comparison_frame(comparison)
     answer, *more = summary_sentences(comparison, frame)
     campaign, bearing = comparison.campaign, comparison.bearing
-    own = {} if isinstance(campaign, TableSource) else campaign.fingerprint()
+    hashes = {} if isinstance(campaign, TableSource) else campaign.fingerprint()
     described = f": {campaign.description}" if campaign.description else ""
     page = Page(
         title=f"{campaign.id}: predicted and measured dynamic coefficients",
@@ -71,7 +71,7 @@ def write_report(
         key_table=_key_table(deviations(comparison, frame)),
         sections=_sections(comparison, frame),
         settings={name: _setting(value) for name, value in (settings or _own_settings(comparison)).items()},
-        inputs=dict(own if inputs is None else inputs),
+        inputs=dict(hashes if inputs is None else inputs),
     )
     return write_page(folder, page)
 
@@ -93,13 +93,14 @@ def _own_settings(comparison: Comparison) -> dict[str, str]:
     }
 
 
-def _key_table(found: tuple[Deviation, ...]) -> Table:
+def _key_table(all_deviations: tuple[Deviation, ...]) -> Table:
     names = ("kxx", "kyy", "cxx", "cyy")
     rows = []
-    for variant in dict.fromkeys(d.pivots for d in found):
-        own = {d.coefficient: d for d in found if d.pivots == variant}
-        cells = [f"{percent(own[n].median)} ({percent(own[n].worst)})" for n in names]
-        inside, n = sum(own[name].inside for name in names), sum(own[name].n for name in names)
+    for variant in dict.fromkeys(d.pivots for d in all_deviations):
+        by_name = {d.coefficient: d for d in all_deviations if d.pivots == variant}
+        compared = [by_name[name] for name in names]
+        cells = [f"{percent(d.median)} ({percent(d.worst)})" for d in compared]
+        inside, n = sum(d.inside for d in compared), sum(d.n for d in compared)
         rows.append([VARIANT_LABEL[variant], *cells, f"{inside} of {n}"])
     return Table(
         "Predicted against measured: median deviation (largest single one)",
@@ -218,19 +219,19 @@ def flag_table(comparison: Comparison) -> Table:
         parts.append(("clearance", comparison.clearance.status))
     if comparison.locus is not None:
         parts.append(("locus", comparison.locus.status))
-    rows = [[where, str(c), c.detail, c.meaning] for where, status in parts for c in status]
+    rows = [[place, str(c), c.detail, c.meaning] for place, status in parts for c in status]
     return Table("Flags", ["flag", "what it means", "where", "found"], _gathered(rows), frozenset(range(4)))
 
 
 def _gathered(rows: Sequence[Sequence[str]]) -> list[list[str]]:
     """One row per flag and meaning, with every place; what was found where it differs from place to place."""
-    kept: dict[tuple[str, str], list[tuple[str, str]]] = {}
-    for where, name, found, means in rows:
-        kept.setdefault((name, means), []).append((where, found))
+    places_of: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for place, name, detail, means in rows:
+        places_of.setdefault((name, means), []).append((place, detail))
     out = []
-    for (name, means), places in kept.items():
-        details = list(dict.fromkeys(found for _, found in places if found))
-        out.append([name, means, "; ".join(where for where, _ in places), "; ".join(details)])
+    for (name, means), places in places_of.items():
+        details = list(dict.fromkeys(detail for _, detail in places if detail))
+        out.append([name, means, "; ".join(place for place, _ in places), "; ".join(details)])
     return out
 
 
@@ -245,8 +246,8 @@ def pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) ->
         for load in PIVOT_LOADS:
             value = float(curve.stiffness(load))
             low, high = (float(v) for v in curve.stiffness_band(load))
-            beyond = " (extrapolated)" if bool(curve.is_extrapolated(load)) else ""
-            cells.append(with_interval(value, low, high, 1e6) + beyond)
+            remark = " (extrapolated)" if bool(curve.is_extrapolated(load)) else ""
+            cells.append(with_interval(value, low, high, 1e6) + remark)
             cells.append(f"{100 * value / formula(curve.pad, load)[1]:.0f} %" if formula else "–")
         rows.append([f"#{curve.pad}", curve.law.name, *cells])
     return Table("Measured tangent stiffness, 95 %", columns, rows, frozenset({0, 1}))

@@ -76,10 +76,10 @@ def _effects_table(verdict: Verdict) -> Table:
 
 
 def _gap_table(verdict: Verdict) -> Table:
-    told = {name: verdict.gap[name] for name in GAPS if math.isfinite(verdict.gap.get(name, math.nan))}
+    gaps = {name: verdict.gap[name] for name in GAPS if math.isfinite(verdict.gap.get(name, math.nan))}
     if not verdict.effects:  # nothing was added: before and after are the same
-        told = {name: value for name, value in told.items() if not name.endswith("after")}
-    rows = [[GAPS[name], f"{value:.2f}"] for name, value in told.items()]
+        gaps = {name: value for name, value in gaps.items() if not name.endswith("after")}
+    rows = [[GAPS[name], f"{value:.2f}"] for name, value in gaps.items()]
     return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows, frozenset({0}))
 
 
@@ -182,11 +182,11 @@ def _evidence_sections(verdict: Verdict) -> list[Section]:
 
 def _left_sentences(verdict: Verdict) -> list[str]:
     """Say what is left on unseen points, what it behaves like, and what drifts."""
-    left = verdict.remainder
+    remainder = verdict.remainder
     out = [
         "On points that no fit has seen, with all that has a tolerance free within it, "
-        f"{left.sigma:.2f} sigma are left: {100 * left.share:.1f} % of the squared gap above noise, most in "
-        f"{in_words(left.where)}; against noise and stated tolerances p = {left.p:.2g}."
+        f"{remainder.sigma:.2f} sigma are left: {100 * remainder.share:.1f} % of the squared gap above noise, most in "
+        f"{in_words(remainder.where)}; against noise and stated tolerances p = {remainder.p:.2g}."
     ]
     out += [f"The rest behaves like {b.words} (within {100 * b.spread:.0f} %)." for b in verdict.behaves_like]
     out += [f"{label_in_words(d.effect)}: its {label_in_words(d.parameter)} {d.words}, from {d.start:.3g} to "

@@ -65,8 +65,8 @@ def verdict_sentences(
 
 def _within(verdict: Verdict) -> str:
     """The same gap once clearances, oil and sensors may be anywhere within their tolerances."""
-    left = verdict.gap.get("within_tolerances")
-    return "" if left is None else f", {left:.1f} with it free within its tolerances"
+    gap = verdict.gap.get("within_tolerances")
+    return "" if gap is None else f", {gap:.1f} with it free within its tolerances"
 
 
 def _answer(name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, float]] | None) -> str:
@@ -105,13 +105,13 @@ def observable(name: str) -> str:
     return OBSERVABLES.get(name, label_in_words(name))
 
 
-def place(where: str) -> str:
+def place(range_text: str) -> str:
     """A range of operating points in words and in kN, Hz and degrees."""
 
     def kilo(match: re.Match[str]) -> str:
         return f"{' to '.join(f'{float(v) / 1e3:g}' for v in match[1].split('-'))} kN"
 
-    text = re.sub(r"((?:\d+(?:\.\d+)?)(?:-\d+(?:\.\d+)?)?) N\b(?!/| s)", kilo, where)
+    text = re.sub(r"((?:\d+(?:\.\d+)?)(?:-\d+(?:\.\d+)?)?) N\b(?!/| s)", kilo, range_text)
     text = text.replace("static_load_direction", "load direction").replace("static_load", "static load")
     text = re.sub(r"(-?\d+)-(-?\d+) deg", r"\1 to \2°", text)
     text = re.sub(r"\bpads? (\d)", r"pad #\1", text).replace(" deg", "°")

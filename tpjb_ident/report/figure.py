@@ -95,9 +95,9 @@ def inline_svg(text: str, name: str, title: str) -> str:
                      f"font-size: {m[3]}px", body)  # fmt: skip
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.S)
     body = prefixed_ids(body, name)
-    head, rest = body.split(">", 1)
+    head, content = body.split(">", 1)
     head = re.sub(r'\s(width|height)="[^"]*"', "", head)
-    return f'{head} role="img" aria-label="{title}">{rest}'
+    return f'{head} role="img" aria-label="{title}">{content}'
 
 
 def prefixed_ids(svg: str, prefix: str) -> str:
@@ -218,12 +218,12 @@ def _with_unit(label: str, value: float, spread: str = "") -> str:
 
 def with_titles(svg: str, spots: tuple[Spots, ...]) -> str:
     """Put a title into every marker of the drawing that `mark_lines` knows."""
-    for one in spots:
-        start = svg.find(f'<g id="{one.gid}"')
+    for line_spots in spots:
+        start = svg.find(f'<g id="{line_spots.gid}"')
         if start < 0:
             continue
         end = _end_of_group(svg, start)
-        svg = svg[:start] + _USE.sub(functools.partial(_titled, one), svg[start:end]) + svg[end:]
+        svg = svg[:start] + _USE.sub(functools.partial(_titled, line_spots), svg[start:end]) + svg[end:]
     return svg
 
 
@@ -236,13 +236,13 @@ def _end_of_group(svg: str, start: int) -> int:
     return len(svg)
 
 
-def _titled(one: Spots, match: re.Match[str]) -> str:
+def _titled(line_spots: Spots, match: re.Match[str]) -> str:
     place = np.array([float(match[1]), float(match[2])])
     with np.errstate(invalid="ignore"):  # a spot off the axes has no place, and NaN is never near
-        away = np.abs(one.places - place).max(axis=1)
+        away = np.abs(line_spots.places - place).max(axis=1)
     if not np.isfinite(away).any():
         return match[0]
     best = int(np.nanargmin(away))
     if away[best] > _NEAR:
         return match[0]
-    return f"{match[0][:-2]}><title>{html.escape(one.texts[best])}</title></use>"
+    return f"{match[0][:-2]}><title>{html.escape(line_spots.texts[best])}</title></use>"

@@ -12,7 +12,7 @@ import numpy as np
 from rigdata.problem import RigDataError
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
-from tpjb_ident.report.drawing.series import longest_series, point_label, where
+from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
 from tpjb_ident.report.plots.coefficients import frf
@@ -60,14 +60,22 @@ def set_up_section(comparison: Comparison) -> Section:
 def _sensor_table(channels: Sequence[Channel]) -> Table:
     """Channels with their calibration."""
     rows = []
-    for one in channels:
-        if one.quantity not in SENSITIVITY:
+    for channel in channels:
+        if channel.quantity not in SENSITIVITY:
             continue
-        unit, scale = SENSITIVITY[one.quantity]
-        axis = "" if one.axis is None else f"{math.degrees(one.axis):g}°"
-        place = axis if one.pad is None else f"pad #{one.pad}"
-        known = "not stated" if one.uncertainty is None else f"{100 * one.uncertainty:.2g} %"
-        rows.append([one.name, one.quantity, place, f"{one.slope / scale:.5g} {unit} per {one.unit or 'unit'}", known])
+        unit, scale = SENSITIVITY[channel.quantity]
+        axis = "" if channel.axis is None else f"{math.degrees(channel.axis):g}°"
+        place = axis if channel.pad is None else f"pad #{channel.pad}"
+        uncertainty = "not stated" if channel.uncertainty is None else f"{100 * channel.uncertainty:.2g} %"
+        rows.append(
+            [
+                channel.name,
+                channel.quantity,
+                place,
+                f"{channel.slope / scale:.5g} {unit} per {channel.unit or 'unit'}",
+                uncertainty,
+            ]
+        )
     columns = ["channel", "quantity", "direction or pad", "calibration", "uncertainty (1 standard deviation)"]
     return Table("Sensors", columns, rows, frozenset({0, 1, 2, 3}))
 
@@ -144,7 +152,9 @@ def _stiffness_panels(result: Identification) -> list[Panel]:
     panels = []
     series = longest_series(result.to_frame(), "frequency") if result.points else None
     if series is not None:
-        title = f"Dynamic stiffness h over frequency, {where(series, 'frequency')}; a line: the model that fits"
+        title = (
+            f"Dynamic stiffness h over frequency, {constant_along(series, 'frequency')}; a line: the model that fits"
+        )
         panels.append(panel("h-over-frequency", title, functools.partial(frf, result), EVIDENCE))
     for number, band in enumerate(result.bands, start=1):
         key = band.key()

@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.colours import BLUE, INK, RULE
 from tpjb_ident.report.drawing.picture import FONT_SIZE
-from tpjb_ident.report.drawing.series import CROSS, DIRECT, longest_series, where
+from tpjb_ident.report.drawing.series import CROSS, DIRECT, constant_along, longest_series
 from tpjb_ident.report.figure import Panel, panel, save_panels
 from tpjb_ident.report.plots.coefficients import coefficient
 from tpjb_ident.report.plots.diagnoses import isolability
@@ -46,7 +46,7 @@ def coefficient_panels(table: pd.DataFrame) -> list[Panel]:
             continue
         for names, kind in ((DIRECT, "Stiffness and damping"), (CROSS, "Cross-coupled stiffness and damping")):
             for name in names:
-                title = f"{name} ({KINDS[name[0]].quantity}) over {over}, at {where(series, over)}"
+                title = f"{name} ({KINDS[name[0]].quantity}) over {over}, at {constant_along(series, over)}"
                 figure = functools.partial(coefficient, table, name, over=over)
                 panels.append(panel(f"{name}-over-{over}", title, figure, f"{kind} over {over}"))
     return panels
@@ -110,28 +110,28 @@ def quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) 
     shown = list(series)[:MOST]
     height = _ROW * len(shown) + 0.9
     figure = Figure(figsize=(_WIDTH, height))
-    figure.suptitle(printable(title), fontsize=FONT_SIZE + 1, color=LIGHT["ink"], y=1.0 - 0.15 / height)
-    for i, one in enumerate(shown):
+    figure.suptitle(printable(title), fontsize=FONT_SIZE + 1, color=INK, y=1.0 - 0.15 / height)
+    for i, channel in enumerate(shown):
         bottom = 1.0 - (0.45 + _ROW * (i + 1) - 0.12) / height
         size = (_ROW - 0.32) / height
         last = i == len(shown) - 1
-        left = figure.add_axes((0.11, bottom, 0.42, size))
-        right = figure.add_axes((0.62, bottom, 0.36, size))
-        _time(left, one)
-        look = looks[one.name]
+        time_axes = figure.add_axes((0.11, bottom, 0.42, size))
+        spectrum_axes = figure.add_axes((0.62, bottom, 0.36, size))
+        _time(time_axes, channel)
+        look = looks[channel.name]
         if len(look.amplitude) > 4:
-            right.semilogy(
-                look.frequency[4:], np.maximum(look.amplitude[4:], 1e-300), color=LIGHT["blue"], linewidth=0.7
+            spectrum_axes.semilogy(
+                look.frequency[4:], np.maximum(look.amplitude[4:], 1e-300), color=BLUE, linewidth=0.7
             )
-        name = f"{one.name}, {one.unit}" if one.unit else one.name
-        left.set_ylabel(printable(name), fontsize=FONT_SIZE - 1, color=LIGHT["ink"])
-        for axes, label in ((left, "time, s"), (right, "frequency, Hz")):
-            axes.tick_params(labelsize=FONT_SIZE - 2, colors=LIGHT["ink"])
-            axes.grid(True, color=LIGHT["rule"], linewidth=0.5)
+        name = f"{channel.name}, {channel.unit}" if channel.unit else channel.name
+        time_axes.set_ylabel(printable(name), fontsize=FONT_SIZE - 1, color=INK)
+        for axes, label in ((time_axes, "time, s"), (spectrum_axes, "frequency, Hz")):
+            axes.tick_params(labelsize=FONT_SIZE - 2, colors=INK)
+            axes.grid(True, color=RULE, linewidth=0.5)
             axes.margins(x=0.0)
-            axes.yaxis.get_major_locator().set_params(**({"nbins": 3} if axes is left else {"numticks": 4}))
+            axes.yaxis.get_major_locator().set_params(**({"nbins": 3} if axes is time_axes else {"numticks": 4}))
             if last:
-                axes.set_xlabel(label, fontsize=FONT_SIZE - 1, color=LIGHT["ink"])
+                axes.set_xlabel(label, fontsize=FONT_SIZE - 1, color=INK)
     return figure
 
 
@@ -139,9 +139,9 @@ def _time(axes: Axes, series: Series) -> None:
     time = np.arange(len(series), dtype=float) if series.time is None else series.time
     step = max(1, len(series) // _POINTS)
     if step == 1:
-        axes.plot(time, series.values, color=LIGHT["ink"], linewidth=0.6)
+        axes.plot(time, series.values, color=INK, linewidth=0.6)
         return
     count = len(series) // step
     blocks = np.ma.masked_invalid(series.values[: count * step].reshape(count, step))
     ends = time[: count * step : step]
-    axes.fill_between(ends, blocks.min(axis=1), blocks.max(axis=1), color=LIGHT["ink"], linewidth=0.4)
+    axes.fill_between(ends, blocks.min(axis=1), blocks.max(axis=1), color=INK, linewidth=0.4)

@@ -69,8 +69,8 @@ def _group(status: RunStatus) -> str:
     run, p = status.run, status.run.point
     if run.kind != "dynamic":
         return KINDS[run.kind]
-    where = f"{p.static_load / 1e3:g} kN, {p.static_load_direction_deg:g} deg, shaft {p.shaft_speed_hz:g} Hz"
-    return f"{where}, excited at {p.excitation_hz:g} Hz"
+    set_point = f"{p.static_load / 1e3:g} kN, {p.static_load_direction_deg:g} deg, shaft {p.shaft_speed_hz:g} Hz"
+    return f"{set_point}, excited at {p.excitation_hz:g} Hz"
 
 
 def _sections(snapshot: Snapshot) -> list[Section]:
@@ -107,10 +107,10 @@ def _pivot(curve: object) -> str:
 
 
 def _panels(snapshot: Snapshot) -> list[Panel]:
-    found = snapshot.measured.identification
-    if found is None:
+    identification = snapshot.measured.identification
+    if identification is None:
         return []
-    good = [p for p in found.points if np.isfinite(p.stiffness.h).all() and not untrusted(p.quality)]
+    good = [p for p in identification.points if np.isfinite(p.stiffness.h).all() and not untrusted(p.quality)]
     series: tuple[tuple[Literal["load", "frequency"], set[float]], ...] = (
         ("load", {p.point.static_load for p in good}),
         ("frequency", {p.point.excitation for p in good}),
@@ -118,7 +118,7 @@ def _panels(snapshot: Snapshot) -> list[Panel]:
     panels = []
     for over, values in series:
         if len(values) > 1:
-            figure = direct_coefficients({found.campaign: found}, part="k", over=over)
+            figure = direct_coefficients({identification.campaign: identification}, part="k", over=over)
             panels.append(panel(f"k-over-{over}", f"Direct stiffness over {over}, 95 % intervals", figure, "K"))
     return panels
 
@@ -141,7 +141,7 @@ def _points_table(points: tuple[PointResult, ...]) -> Table:
 
 def _records_table(snapshot: Snapshot) -> Table:
     """Records that have landed, the newest first."""
-    why = {one.run.id: one.why for one in snapshot.placed if one.run is not None}
+    why = {placed.run.id: placed.why for placed in snapshot.placed if placed.run is not None}
     landed = sorted((s for s in snapshot.states if s.landed), key=lambda s: s.landed, reverse=True)
     rows = []
     for s in landed:

@@ -64,9 +64,9 @@ def _bring(staging: Path, target: Path, command: str) -> None:
 
 def _clear_abandoned(target: Path) -> None:
     """Delete what killed runs into the same folder have left beside it."""
-    for rest in target.parent.glob(f".{glob.escape(target.name)}.part-*"):
-        if is_abandoned(rest):
-            shutil.rmtree(rest, ignore_errors=True)  # whoever else clears it at the same time may be quicker
+    for abandoned in target.parent.glob(f".{glob.escape(target.name)}.part-*"):
+        if is_abandoned(abandoned):
+            shutil.rmtree(abandoned, ignore_errors=True)  # whoever else clears it at the same time may be quicker
 
 
 def _checked(out: Path, inputs: tuple[Path, ...]) -> Path:

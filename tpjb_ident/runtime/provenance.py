@@ -15,13 +15,13 @@ def versions() -> dict[str, str]:
     """Versions of Python and of the packages that results depend on."""
     import importlib.metadata  # with the mail parser behind it, an eighth of what help waits for
 
-    found = {"python": platform.python_version(), "platform": platform.system()}
+    installed = {"python": platform.python_version(), "platform": platform.system()}
     for package in PACKAGES:
         try:
-            found[package] = importlib.metadata.version(package)
+            installed[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:
-            found[package] = "not installed"
-    return found
+            installed[package] = "not installed"
+    return installed
 
 
 def sha256(path: Path) -> str:
@@ -40,8 +40,8 @@ def source_stamp(packages: tuple[str, ...] = ("rigdata", "tpjb_ident")) -> str:
 
     digest = hashlib.sha256(json.dumps(versions(), sort_keys=True).encode())
     for package in packages:
-        found = importlib.util.find_spec(package)
-        for folder in sorted(found.submodule_search_locations or ()) if found else ():
+        spec = importlib.util.find_spec(package)
+        for folder in sorted(spec.submodule_search_locations or ()) if spec else ():
             for source in sorted(Path(folder).rglob("*.py")):
                 digest.update(source.relative_to(folder).as_posix().encode() + b"\0" + source.read_bytes())
     return digest.hexdigest()

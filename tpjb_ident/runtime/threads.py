@@ -22,7 +22,7 @@ def _loaded() -> tuple[tuple[Callable[[], int], Callable[[int], None]], ...]:
         return ()
     lines = maps.read_text(encoding="utf-8", errors="replace").splitlines()
     paths = dict.fromkeys(line.split(maxsplit=5)[-1] for line in lines if "openblas" in line)
-    found = []
+    limits = []
     for path in paths:
         try:
             library = ctypes.CDLL(path)
@@ -30,9 +30,9 @@ def _loaded() -> tuple[tuple[Callable[[], int], Callable[[int], None]], ...]:
             continue
         for name in _NAMES:
             if hasattr(library, name.format("set")):
-                found.append((getattr(library, name.format("get")), getattr(library, name.format("set"))))
+                limits.append((getattr(library, name.format("get")), getattr(library, name.format("set"))))
                 break
-    return tuple(found)
+    return tuple(limits)
 
 
 def limit_threads(count: int = 1) -> None:

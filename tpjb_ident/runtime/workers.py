@@ -83,10 +83,13 @@ def _checked(client: Any, address: str, patience: float) -> int:
             f"the workers of {address} cannot run tpjb-ident ({type(error).__name__}: {str(error)[:160]}). "
             "Install the same tpjb-ident there"
         ) from error
-    for worker, found in theirs.items():
-        other = [f"{name} {found[name]} (here {ours[name]})" for name in _SAME if found[name] != ours[name]]
-        if other:
-            raise ClusterError(f"worker {worker} has {', '.join(other)}. Install the same versions on all machines")
+    for worker, installed in theirs.items():
+        differences = [
+            f"{name} {installed[name]} (here {ours[name]})" for name in _SAME if installed[name] != ours[name]
+        ]
+        if differences:
+            text = ", ".join(differences)
+            raise ClusterError(f"worker {worker} has {text}. Install the same versions on all machines")
     return max(1, sum(client.nthreads().values()))
 
 

@@ -44,7 +44,7 @@ def records_tab(campaign: Campaign) -> Any:
     first = campaign.runs[0]
     pick = Select(title="run", options=list(runs), value=first.id, name="run", width=240)
     channel = Select(title="channel", options=list(first.channels), value=next(iter(first.channels)), name="channel")
-    others = MultiSelect(
+    further = MultiSelect(
         title="beside it (same quantity)", options=list(first.channels), value=[], name="others", width=320
     )
     facts = Div(name="run-facts", sizing_mode="stretch_width")
@@ -70,12 +70,12 @@ def records_tab(campaign: Campaign) -> Any:
         text = f"{run.kind}, {p.static_load / 1e3:g} kN at {p.static_load_direction_deg:g} deg, {p.shaft_speed_hz:g} Hz"
         text += f", excitation {p.excitation_hz:g} Hz" if p.excitation else ""
         try:
-            records = [run.record(channel.value), *(run.record(n) for n in others.value if n != channel.value)]
-            said = show_channels(records, (time, spectrum), data)
+            records = [run.record(channel.value), *(run.record(n) for n in further.value if n != channel.value)]
+            message = show_channels(records, (time, spectrum), data)
             fall.title.text = f"waterfall of {records[0].name}"
             data["waterfall"].data = waterfall(records[0])
             data["orbit"].data, data["without"].data = _orbits(run)
-            facts.text = _escaped(f"{text}. {said}")
+            facts.text = _escaped(f"{text}. {message}")
         except RigDataError as error:
             for source in data.values():
                 source.data = {name: [] for name in source.data}
@@ -83,12 +83,14 @@ def records_tab(campaign: Campaign) -> Any:
 
     pick.on_change("value", lambda attr, old, new: update())
     channel.on_change("value", lambda attr, old, new: update())
-    others.on_change("value", lambda attr, old, new: update())
+    further.on_change("value", lambda attr, old, new: update())
     update()
-    left, right = (
+    left_column, right = (
         column(*pair, sizing_mode="stretch_width", min_width=340) for pair in ((time, spectrum), (orbit, fall))
     )
-    return column(side_by_side(pick, channel, others), facts, side_by_side(left, right), sizing_mode="stretch_width")
+    return column(
+        side_by_side(pick, channel, further), facts, side_by_side(left_column, right), sizing_mode="stretch_width"
+    )
 
 
 def show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict[str, Any]) -> str:
@@ -109,11 +111,11 @@ def show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict[
     }
     lines = ", ".join(f"{x.frequency:.4g} Hz ({x.amplitude:.3g} {unit})" for x in strongest(*spectra[0], 3))
     missing = int(np.isnan(first.values).sum())
-    apart = ", ".join(r.name for r in records if r not in drawn)
-    said = (
+    not_shown = ", ".join(r.name for r in records if r not in drawn)
+    message = (
         f"{first.name}: {len(first.values)} samples at {first.rate:g} Hz, {missing} missing; lines: {lines or 'none'}"
     )
-    return said + (f"; of another quantity, not drawn: {apart}" if apart else "")
+    return message + (f"; of another quantity, not drawn: {not_shown}" if not_shown else "")
 
 
 def _waterfall_plot(source: Any) -> Any:
@@ -149,12 +151,12 @@ def _orbits(run: Any) -> tuple[dict[str, Any], dict[str, Any]]:
         return {"x": [], "y": []}, {"x": [], "y": []}
     path = 1e6 * (record.values - np.nanmean(record.values, axis=0))
     good = np.isfinite(path).all(axis=1)
-    omega, rest = run.point.shaft_speed, np.full((0, 2), np.nan)
+    omega, without_synchronous = run.point.shaft_speed, np.full((0, 2), np.nan)
     if omega > 0 and good.sum() > 2 * HARMONICS + 1:
         turns = [wave(k * omega * record.time) for k in range(1, HARMONICS + 1) for wave in (np.cos, np.sin)]
         waves = np.column_stack(turns)
-        rest = path - waves @ np.linalg.lstsq(waves[good], path[good], rcond=None)[0]
-    return tuple({"x": p[:MOST_POINTS, 0], "y": p[:MOST_POINTS, 1]} for p in (path, rest))  # type: ignore[return-value]
+        without_synchronous = path - waves @ np.linalg.lstsq(waves[good], path[good], rcond=None)[0]
+    return tuple({"x": p[:MOST_POINTS, 0], "y": p[:MOST_POINTS, 1]} for p in (path, without_synchronous))  # type: ignore[return-value]
 
 
 def thinned(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

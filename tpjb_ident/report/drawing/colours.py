@@ -18,6 +18,7 @@ LIGHT = {
     "purple": "#b9609a",
     "grey": "#7a828b",
 }
+INK, RULE, PAPER, BLUE, RED, GREY = (LIGHT[name] for name in ("ink", "rule", "paper", "blue", "red", "grey"))
 #: How each pivot model is drawn everywhere: colour, line, marker. Line and marker tell them apart without colour.
 VARIANT_STYLE: dict[str, tuple[str, Any, str]] = {
     "rigid": ("grey", (0, (1, 1.5)), "s"),

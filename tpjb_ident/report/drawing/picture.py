@@ -16,7 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 
-from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.colours import GREY, INK, RULE
 
 WIDTH, HEIGHT = 5.2, 3.4  # inches: legible in one column of a phone
 FONT_SIZE = 9.0
@@ -61,9 +61,7 @@ def new_pictures(
         for i in range(rows)
     ]  # fmt: skip
     if title:
-        figure.suptitle(
-            title, x=0.5, y=1.0 - 0.06 / size[1], va="top", fontsize=FONT_SIZE + 1.0, color=LIGHT["ink"], wrap=True
-        )
+        figure.suptitle(title, x=0.5, y=1.0 - 0.06 / size[1], va="top", fontsize=FONT_SIZE + 1.0, color=INK, wrap=True)
     return figure, grid
 
 
@@ -71,11 +69,11 @@ def _panel(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
     """Empty axes at a box in inches, in the house look."""
     axes = figure.add_axes(_fractions(figure, box))
     axes.patch.set_alpha(0.0)
-    axes.tick_params(colors=LIGHT["ink"], labelsize=FONT_SIZE, color=LIGHT["rule"], labelcolor=LIGHT["ink"])
-    axes.grid(True, color=LIGHT["rule"], linewidth=0.6, linestyle="-", alpha=1.0)
+    axes.tick_params(colors=INK, labelsize=FONT_SIZE, color=RULE, labelcolor=INK)
+    axes.grid(True, color=RULE, linewidth=0.6, linestyle="-", alpha=1.0)
     axes.set_axisbelow(True)
     for side, spine in axes.spines.items():
-        spine.set_color(LIGHT["rule"])
+        spine.set_color(RULE)
         spine.set_visible(side in ("left", "bottom"))
     return axes
 
@@ -87,11 +85,11 @@ def _fractions(figure: Figure, box: tuple[float, float, float, float]) -> tuple[
 
 def label(axes: Axes, x_label: str, y_label: str, heading: str | None = None) -> None:
     """Label both axes; a heading stands above the panel, which gives way."""
-    axes.set_xlabel(x_label, fontsize=FONT_SIZE, color=LIGHT["ink"])
-    axes.set_ylabel(y_label, fontsize=FONT_SIZE, color=LIGHT["ink"])
+    axes.set_xlabel(x_label, fontsize=FONT_SIZE, color=INK)
+    axes.set_ylabel(y_label, fontsize=FONT_SIZE, color=INK)
     if heading:
         shrink(axes, top=1.2 * LINE)
-        axes.set_title(heading, fontsize=FONT_SIZE, color=LIGHT["ink"], pad=4.0)
+        axes.set_title(heading, fontsize=FONT_SIZE, color=INK, pad=4.0)
 
 
 def shrink(axes: Axes, *, left: float = 0.0, right: float = 0.0, top: float = 0.0, bottom: float = 0.0) -> None:
@@ -121,7 +119,7 @@ def add_legend(
     legend = axes.legend(
         handles=drawn, fontsize=FONT_SIZE, frameon=False, ncols=columns, loc="lower center", borderaxespad=0.2,
         bbox_to_anchor=(centre, 1.0 + heading / _height(axes)), columnspacing=1.2, handlelength=2.6, labelspacing=0.35,
-        labelcolor=LIGHT["ink"],
+        labelcolor=INK,
     )  # fmt: skip
     return legend
 
@@ -153,20 +151,20 @@ def add_colour_bar(axes: Axes, image: Any, text: str) -> None:
     shrink(axes, right=0.75)
     figure, box = axes.figure, axes.get_position()
     width = _size(axes)[0]
-    beside = figure.add_axes((box.x1 + 0.12 / width, box.y0, 0.14 / width, box.height))
-    bar = figure.colorbar(image, cax=beside)  # type: ignore[union-attr]
+    bar_axes = figure.add_axes((box.x1 + 0.12 / width, box.y0, 0.14 / width, box.height))
+    bar = figure.colorbar(image, cax=bar_axes)  # type: ignore[union-attr]
     bar.outline.set_visible(False)  # type: ignore[operator]
-    bar.ax.tick_params(labelsize=FONT_SIZE - 1, colors=LIGHT["ink"], color=LIGHT["rule"])
-    bar.set_label(text, fontsize=FONT_SIZE, color=LIGHT["ink"])
+    bar.ax.tick_params(labelsize=FONT_SIZE - 1, colors=INK, color=RULE)
+    bar.set_label(text, fontsize=FONT_SIZE, color=INK)
 
 
 def mark_extrapolated(axes: Axes, start: float) -> None:
     """Shade everything right of `start` (in the panel's units) and say why."""
     end = axes.get_xlim()[1]
     if end > start:
-        axes.axvspan(start, end, color=LIGHT["rule"], alpha=0.35, linewidth=0, zorder=0)
+        axes.axvspan(start, end, color=RULE, alpha=0.35, linewidth=0, zorder=0)
         axes.text(
             start, 0.02, " extrapolated", transform=axes.get_xaxis_transform(), fontsize=FONT_SIZE - 1.5,
-            color=LIGHT["grey"], va="bottom", ha="left",
+            color=GREY, va="bottom", ha="left",
         )  # fmt: skip
         axes.set_xlim(right=end)

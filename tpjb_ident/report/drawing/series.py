@@ -38,7 +38,7 @@ def longest_series(table: pd.DataFrame, axis: str) -> pd.DataFrame | None:
     return best
 
 
-def where(series: pd.DataFrame, axis: str) -> str:
+def constant_along(series: pd.DataFrame, axis: str) -> str:
     """What is constant along a series, in words."""
     first = series.iloc[0]
     fixed = f"{first.excitation_Hz:g} Hz excitation" if axis == "load" else f"{first.static_load_N / 1e3:g} kN"

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.drawing.colours import LIGHT, VARIANT_LABEL, VARIANT_STYLE
+from tpjb_ident.report.drawing.colours import INK, LIGHT, VARIANT_LABEL, VARIANT_STYLE
 from tpjb_ident.report.drawing.picture import add_legend, label, new_picture, new_pictures
 from tpjb_ident.report.drawing.series import AXES, DIRECT, as_table, longest_series
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, STATIC_COLUMNS, coefficient_column
@@ -51,9 +51,9 @@ def coefficient(
     ValueError
         For an unknown coefficient, or when nothing varies over `over`.
     """
-    known = [column[:3] for column in COEFFICIENT_COLUMNS]
-    if name not in known:
-        raise ValueError(f"name must be one of {', '.join(known)}; got {name!r}")
+    names = [column[:3] for column in COEFFICIENT_COLUMNS]
+    if name not in names:
+        raise ValueError(f"name must be one of {', '.join(names)}; got {name!r}")
     series = longest_series(_comparison_table(comparison), over)
     if series is None:
         raise ValueError(f"the campaign has no two points that differ in {over} alone")
@@ -67,7 +67,7 @@ def coefficient(
     measured = series.drop_duplicates(column).dropna(subset=[key]).sort_values(column)
     value, low, high = (measured[f"{key}{end}"].to_numpy(float) / scale for end in ("", "_lo", "_hi"))
     axes.errorbar(
-        measured[column] / axis_scale, value, yerr=np.abs([value - low, high - value]), fmt="o", color=LIGHT["ink"],
+        measured[column] / axis_scale, value, yerr=np.abs([value - low, high - value]), fmt="o", color=INK,
         markersize=5, capsize=3, linewidth=1.2, label="measured, 95 %", zorder=5,
     )  # fmt: skip
     axes.margins(x=0.06, y=0.1)
@@ -93,10 +93,10 @@ def _draw_predicted(axes: Axes, over: pd.Series, predicted: pd.Series, rows: pd.
     axes.plot(x, y, color=LIGHT[colour], linestyle=dashes, linewidth=1.6, marker=marker, markersize=4,
               label=VARIANT_LABEL.get(variant, variant))  # fmt: skip
     if variant == "measured" and "pivot_extrapolated" in rows:
-        beyond = rows["pivot_extrapolated"].to_numpy(bool)
-        if beyond.any():
-            axes.plot(x[beyond], y[beyond], linestyle="none", marker=marker, markersize=8.5, color=LIGHT[colour],
-                      markerfacecolor="none", label="beyond the dry tests")  # fmt: skip
+        extrapolated = rows["pivot_extrapolated"].to_numpy(bool)
+        if extrapolated.any():
+            axes.plot(x[extrapolated], y[extrapolated], linestyle="none", marker=marker, markersize=8.5,
+                      color=LIGHT[colour], markerfacecolor="none", label="beyond the dry tests")  # fmt: skip
 
 
 _BEARING_COLOURS = ("blue", "red", "green", "purple")
@@ -256,11 +256,11 @@ def _rows_of_sines(series: pd.DataFrame | None) -> pd.DataFrame | None:
         return None
     rows = series.drop_duplicates("excitation_Hz").sort_values("excitation_Hz", kind="stable")
     omega = 2 * np.pi * rows["excitation_Hz"]
-    made = {}
+    columns = {}
     for entry, end in itertools.product(_FRF_STYLE, ("", "_lo", "_hi")):
-        made[f"h{entry}_real_N_per_m{end}"] = rows[f"k{entry}_N_per_m{end}"]
-        made[f"h{entry}_imag_N_per_m{end}"] = rows[f"c{entry}_Ns_per_m{end}"] * omega
-    return rows[["excitation_Hz"]].assign(**made)
+        columns[f"h{entry}_real_N_per_m{end}"] = rows[f"k{entry}_N_per_m{end}"]
+        columns[f"h{entry}_imag_N_per_m{end}"] = rows[f"c{entry}_Ns_per_m{end}"] * omega
+    return rows[["excitation_Hz"]].assign(**columns)
 
 
 def _model_of_sines(source: Identification, series: pd.DataFrame | None) -> _FittedModel | None:

@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 from tpjb_ident.compare.effect_words import label_in_words
-from tpjb_ident.report.drawing.colours import LIGHT, SEQUENTIAL
+from tpjb_ident.report.drawing.colours import INK, LIGHT, PAPER, RED, SEQUENTIAL
 from tpjb_ident.report.drawing.picture import (
     CHARACTER,
     FONT_SIZE,
@@ -60,18 +60,18 @@ def gap(
     for offset, values, colour, hatch, name in (
         (-0.2, before, "orange", "////", "baseline"), (0.2, after, "blue", None, "with the effects found"),
     ):  # fmt: skip
-        axes.barh(y + offset, values, 0.38, color=LIGHT[colour] if hatch is None else LIGHT["paper"], hatch=hatch,
+        axes.barh(y + offset, values, 0.38, color=LIGHT[colour] if hatch is None else PAPER, hatch=hatch,
                   edgecolor=LIGHT[colour], linewidth=0.8, label=name)  # fmt: skip
     axes.set_yticks(y, words)
     axes.invert_yaxis()
     axes.grid(axis="y", visible=False)
-    axes.axvline(1.0, color=LIGHT["ink"], linewidth=0.9, linestyle=(0, (2, 2)), label="noise and tolerance")
+    axes.axvline(1.0, color=INK, linewidth=0.9, linestyle=(0, (2, 2)), label="noise and tolerance")
     handles = axes.get_legend_handles_labels()[0]
-    both = np.concatenate([before, after])
-    wide = float(both.max()) > 30.0 * max(float(both[both > 0].min(initial=1.0)), 1e-3)
+    sizes = np.concatenate([before, after])
+    wide = float(sizes.max()) > 30.0 * max(float(sizes[sizes > 0].min(initial=1.0)), 1e-3)
     if logarithmic or (logarithmic is None and wide):
         axes.set_xscale("log")
-        axes.set_xlim(left=max(0.7 * float(both[both > 0].min(initial=1.0)), 1e-2))
+        axes.set_xlim(left=max(0.7 * float(sizes[sizes > 0].min(initial=1.0)), 1e-2))
     add_legend(axes, 3, [*handles[1:], handles[0]], across=True)
     return figure
 
@@ -133,6 +133,6 @@ def isolability(
     axes.set_xticks(range(k), words, rotation=90, fontsize=FONT_SIZE - 1)
     axes.set_yticks(range(k), words, fontsize=FONT_SIZE - 1)
     for i, j in zip(*np.nonzero(matrix < _CONFUSABLE), strict=True):
-        axes.add_patch(Rectangle((j - 0.45, i - 0.45), 0.9, 0.9, fill=False, edgecolor=LIGHT["red"], linewidth=1.2))
+        axes.add_patch(Rectangle((j - 0.45, i - 0.45), 0.9, 0.9, fill=False, edgecolor=RED, linewidth=1.2))
     add_colour_bar(axes, image, "distance, standard deviations")
     return figure

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.report.drawing.colours import LIGHT, style_of_pad
+from tpjb_ident.report.drawing.colours import GREY, INK, PAPER, style_of_pad
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, label, mark_extrapolated, new_picture, new_pictures
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def _draw_steps(axes: Axes, curve: PivotCurve) -> None:
     steps = curve.steps
     for mask, face, name in (
         ((steps.weight > 0) & (steps.branch > 0), colour, f"pad #{curve.pad}, {curve.law.name}"),
-        ((steps.weight > 0) & (steps.branch < 0), LIGHT["paper"], f"pad #{curve.pad}, unloading"),
+        ((steps.weight > 0) & (steps.branch < 0), PAPER, f"pad #{curve.pad}, unloading"),
     ):
         if mask.any():
             axes.errorbar(
@@ -76,7 +76,7 @@ def _draw_steps(axes: Axes, curve: PivotCurve) -> None:
     bad = steps.weight == 0
     if bad.any():
         axes.plot(1e6 * steps.deflection[bad], steps.load[bad] / 1e3, linestyle="none", marker="x", markersize=6,
-                  color=LIGHT["ink"], label="step left out", zorder=5)  # fmt: skip
+                  color=INK, label="step left out", zorder=5)  # fmt: skip
 
 
 def _draw_law(axes: Axes, curve: PivotCurve, top: float, level: float) -> None:
@@ -86,9 +86,9 @@ def _draw_law(axes: Axes, curve: PivotCurve, top: float, level: float) -> None:
     reading, low, high = (1e6 * part for part in curve.reading_band(load, level))
     measured = ~curve.is_extrapolated(load)
     axes.fill_betweenx(load / 1e3, low, high, color=colour, alpha=0.25, linewidth=0)
-    own = 1e6 * curve.deflection(load)
-    axes.plot(own, load / 1e3, color=colour, linestyle=(0, (1, 1.5)), linewidth=1.2)
-    axes.plot(np.where(measured, own, np.nan), load / 1e3, color=colour, linewidth=1.5)
+    deflection = 1e6 * curve.deflection(load)
+    axes.plot(deflection, load / 1e3, color=colour, linestyle=(0, (1, 1.5)), linewidth=1.2)
+    axes.plot(np.where(measured, deflection, np.nan), load / 1e3, color=colour, linewidth=1.5)
     if curve.law.contact:
         coming = load <= max(curve.onset_load, load[0])
         axes.plot(reading[coming], load[coming] / 1e3, color=colour, linewidth=0.7)
@@ -139,8 +139,8 @@ def pivot_stiffness(
         _draw_stiffness(axes, curve, grid, secant, level)
     if formula is not None:
         printed = np.array([formula(curves[0].pad, float(load)) for load in grid]) / 1e6
-        axes.plot(grid / 1e3, printed[:, 1], color=LIGHT["ink"], linewidth=1.3, label="Kirk, tangent")
-        axes.plot(grid / 1e3, printed[:, 0], color=LIGHT["ink"], linewidth=1.3, linestyle=(0, (5, 2)),
+        axes.plot(grid / 1e3, printed[:, 1], color=INK, linewidth=1.3, label="Kirk, tangent")
+        axes.plot(grid / 1e3, printed[:, 0], color=INK, linewidth=1.3, linestyle=(0, (5, 2)),
                   label="Kirk, printed")  # fmt: skip
     axes.set_ylim(bottom=0.0)
     axes.set_xlim(0.0, float(grid[-1]) / 1e3)
@@ -159,8 +159,8 @@ def _draw_stiffness(axes: Axes, curve: PivotCurve, grid: FloatArray, secant: boo
     axes.plot(grid / 1e3, np.where(outside, np.nan, value), color=colour, linestyle=dashes, linewidth=1.7,
               label=f"pad #{curve.pad}")  # fmt: skip
     # one point of overlap, so that the two lines meet
-    beyond = np.where(outside | np.roll(outside, 1) | np.roll(outside, -1), value, np.nan)
-    axes.plot(grid / 1e3, beyond, color=colour, linestyle=(0, (1, 2)), linewidth=0.9)
+    extrapolated = np.where(outside | np.roll(outside, 1) | np.roll(outside, -1), value, np.nan)
+    axes.plot(grid / 1e3, extrapolated, color=colour, linestyle=(0, (1, 2)), linewidth=0.9)
 
 
 def pad_projection(curves: Sequence[PivotCurve], *, title: str | None = None) -> Figure:
@@ -199,8 +199,8 @@ def pad_projection(curves: Sequence[PivotCurve], *, title: str | None = None) ->
         axes.set_ylim(-reach, reach)
         axes.set_aspect("equal", adjustable="box")
     handles = [
-        Line2D([], [], marker="o", linestyle="none", color=LIGHT["ink"], markerfacecolor="none", label="measured"),
-        Line2D([], [], marker="o", linestyle="none", color=LIGHT["ink"], label="on the pad's direction"),
+        Line2D([], [], marker="o", linestyle="none", color=INK, markerfacecolor="none", label="measured"),
+        Line2D([], [], marker="o", linestyle="none", color=INK, label="on the pad's direction"),
     ]
     for axes in (forces, places):
         add_legend(axes, 2, handles)
@@ -215,12 +215,12 @@ def _draw_vectors(axes: Axes, curve: PivotCurve, along: FloatArray, across: Floa
     projected = np.outer(along, axis)
     measured = projected + np.outer(across, side)
     end = 1.12 * float(np.max(along)) * axis
-    axes.plot([0.0, end[0]], [0.0, end[1]], color=LIGHT["grey"], linestyle=(0, (5, 3)), linewidth=0.9, zorder=1)
+    axes.plot([0.0, end[0]], [0.0, end[1]], color=GREY, linestyle=(0, (5, 3)), linewidth=0.9, zorder=1)
     axes.plot(*measured.T, linestyle="none", marker=marker, markersize=5.5, markerfacecolor="none",
               markeredgewidth=1.0, color=colour)  # fmt: skip
     axes.plot(*projected.T, linestyle="none", marker=marker, markersize=3.0, color=colour)
     text = f"#{curve.pad}\n{math.degrees(off):+.1f}°"
     axes.annotate(
         text, (end[0], end[1]), xytext=(12.0 * axis[0], 12.0 * axis[1]), textcoords="offset points", ha="center",
-        va="center", fontsize=FONT_SIZE - 1, color=LIGHT["ink"],
+        va="center", fontsize=FONT_SIZE - 1, color=INK,
     )  # fmt: skip

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.colours import INK, LIGHT, PAPER, RULE
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, label, new_picture, new_pictures, shrink
 from tpjb_ident.report.drawing.series import as_table
 
@@ -41,21 +41,21 @@ def coherence(identification: Identification | pd.DataFrame, *, title: str | Non
     if not len(table):
         raise ValueError("there is no operating point to draw")
     rows = table.sort_values(["static_load_N", "excitation_Hz"], kind="stable")
-    left = np.clip(1.0 - rows["coherence"].to_numpy(float), _SMALLEST, None)
+    unexplained = np.clip(1.0 - rows["coherence"].to_numpy(float), _SMALLEST, None)
     width = max(5.2, 0.36 * len(rows) + 1.2)
     figure, ((axes,),) = new_pictures(1, 1, title=title, width=width, height=3.4)
     label(axes, "static load, kN, and excitation, Hz", "1 - coherence")
     shrink(axes, bottom=0.25)
-    low = left > 1.0 - _FLAGGED
+    low = unexplained > 1.0 - _FLAGGED
     at = np.arange(len(rows))
     for mask, colour, marker, name in ((~low, "blue", "o", "operating point"), (low, "red", "X", "flagged")):
         if mask.any():
-            axes.plot(at[mask], left[mask], linestyle="none", marker=marker, markersize=6, color=LIGHT[colour],
+            axes.plot(at[mask], unexplained[mask], linestyle="none", marker=marker, markersize=6, color=LIGHT[colour],
                       label=name)  # fmt: skip
-    axes.axhline(1.0 - _FLAGGED, color=LIGHT["ink"], linestyle=(0, (5, 2)), linewidth=1.0, label="flagged above")
+    axes.axhline(1.0 - _FLAGGED, color=INK, linestyle=(0, (5, 2)), linewidth=1.0, label="flagged above")
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")  # powers of ten are set by a parser that takes longer than the picture
-    axes.set_ylim(0.5 * float(left.min()), 1.0)
+    axes.set_ylim(0.5 * float(unexplained.min()), 1.0)
     ticks = [f"{w / 1e3:g}\n{f:g}" for w, f in zip(rows["static_load_N"], rows["excitation_Hz"], strict=True)]
     axes.set_xticks(at, ticks, fontsize=FONT_SIZE - 1.5)
     axes.grid(axis="x", visible=False)
@@ -82,17 +82,17 @@ def window_weights(result: PointResult | DynamicStiffness, *, title: str | None 
         raise ValueError("the estimate has no windows")
     figure, axes = new_picture("window, in the order of the runs", "robust weight", title=title, width=6.4)
     at = np.arange(1, len(weights) + 1)
-    same = bool(np.allclose(weights[:, 0], weights[:, 1], equal_nan=True))
+    equal_weights = bool(np.allclose(weights[:, 0], weights[:, 1], equal_nan=True))
     for axis, colour, marker, name in ((0, "blue", "o", "horizontal force"), (1, "red", "s", "vertical force")):
-        if same and axis:
+        if equal_weights and axis:
             break
         values = weights[:, axis]
         axes.vlines(at, 0.0, values, color=LIGHT[colour], linewidth=0.6, alpha=0.5)
         axes.plot(
             at, values, linestyle="none", marker=marker, markersize=3.5 if axis else 4.5, color=LIGHT[colour],
-            markerfacecolor=LIGHT[colour if axis else "paper"], label="both forces" if same else name,
+            markerfacecolor=LIGHT[colour if axis else "paper"], label="both forces" if equal_weights else name,
         )  # fmt: skip
-    axes.axhline(_REJECTED, color=LIGHT["ink"], linestyle=(0, (5, 2)), linewidth=0.9, label="counted as outlier below")
+    axes.axhline(_REJECTED, color=INK, linestyle=(0, (5, 2)), linewidth=0.9, label="counted as outlier below")
     axes.set_ylim(-0.03, 1.08)
     axes.set_xlim(0.0, len(weights) + 1)
     rejected = sorted(getattr(result, "rejected", ()), key=lambda w: w.weight)
@@ -100,8 +100,8 @@ def window_weights(result: PointResult | DynamicStiffness, *, title: str | None 
         words = [f"{w.run} at {w.time:.2f} s: {w.reason}" for w in rejected[:_NAMED]]
         if len(rejected) > _NAMED:
             words.append(f"and {len(rejected) - _NAMED} more")
-        box = {"facecolor": LIGHT["paper"], "edgecolor": LIGHT["rule"], "alpha": 0.85}
-        axes.text(0.015, 0.42, "\n".join(words), transform=axes.transAxes, fontsize=FONT_SIZE - 2, color=LIGHT["ink"],
+        box = {"facecolor": PAPER, "edgecolor": RULE, "alpha": 0.85}
+        axes.text(0.015, 0.42, "\n".join(words), transform=axes.transAxes, fontsize=FONT_SIZE - 2, color=INK,
                   va="bottom", bbox=box)  # fmt: skip
     add_legend(axes)
     return figure

@@ -12,7 +12,7 @@ from matplotlib.patches import Ellipse
 
 from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.polygon import corners
-from tpjb_ident.report.drawing.colours import LIGHT, VARIANT_LABEL, VARIANT_STYLE
+from tpjb_ident.report.drawing.colours import GREY, INK, LIGHT, VARIANT_LABEL, VARIANT_STYLE
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, new_picture
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def clearance_and_locus(
         raise ValueError("nothing to draw: give polygons, a locus, predicted positions or a drawing")
     figure, axes = new_picture("x, µm", "y, µm", title=title, width=5.2, height=5.4)
     if drawing is not None:
-        axes.plot(*(1e6 * _closed(_ordered_corners(*drawing))).T, color=LIGHT["grey"], linewidth=1.0,
+        axes.plot(*(1e6 * _closed(_ordered_corners(*drawing))).T, color=GREY, linewidth=1.0,
                   linestyle=(0, (5, 2)), label="clearance, drawing")  # fmt: skip
     for (name, polygon), (colour, dashes) in zip(named.items(), _POLYGON_STYLE * len(named), strict=False):
         _draw_polygon(axes, name, polygon, LIGHT[colour], dashes)
@@ -96,7 +96,7 @@ def _draw_numbers(axes: Axes, polygon: ClearancePolygon) -> None:
             toward = np.array([np.cos(angle), np.sin(angle)])
             axes.annotate(
                 f"#{k}", tuple(1e6 * clearance * toward), xytext=tuple(-10.0 * toward), textcoords="offset points",
-                ha="center", va="center", fontsize=FONT_SIZE - 1, color=LIGHT["ink"],
+                ha="center", va="center", fontsize=FONT_SIZE - 1, color=INK,
             )  # fmt: skip
 
 
@@ -109,11 +109,11 @@ def _draw_locus(axes: Axes, locus: Locus | FloatArray) -> None:
             size, turn = np.linalg.eigh(point.covariance)
             axes.add_patch(Ellipse(
                 tuple(1e6 * point.position), *(2e6 * _TWO_SIGMA * np.sqrt(np.maximum(size, 0.0))),
-                angle=float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0]))), color=LIGHT["ink"], alpha=0.25,
+                angle=float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0]))), color=INK, alpha=0.25,
                 linewidth=0,
             ))  # fmt: skip
     if len(places):
-        axes.plot(*(1e6 * places).T, linestyle="none", marker="o", markersize=4.0, color=LIGHT["ink"],
+        axes.plot(*(1e6 * places).T, linestyle="none", marker="o", markersize=4.0, color=INK,
                   label="locus, measured")  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.drawing.colours import DIVERGING, LIGHT, VARIANT_LABEL
+from tpjb_ident.report.drawing.colours import DIVERGING, INK, LIGHT, PAPER, RULE, VARIANT_LABEL
 from tpjb_ident.report.drawing.picture import (
     FONT_SIZE,
     add_colour_bar,
@@ -140,7 +140,7 @@ def _draw_map(axes: Axes, frame: pd.DataFrame, points: list[tuple[float, float]]
     axes.grid(False)
     axes.set_yticks(range(len(_ENTRIES)), _ENTRIES)
     axes.set_xticks(range(len(points)), [f"{w / 1e3:g}\n{f:g}" for w, f in points], fontsize=FONT_SIZE - 1.5)
-    axes.axhline(3.5, color=LIGHT["ink"], linewidth=0.8)
+    axes.axhline(3.5, color=INK, linewidth=0.8)
     for (i, j), z in np.ndenumerate(table):
         if np.isfinite(z):
             strong = abs(norm(z) - 0.5) > 0.3
@@ -189,22 +189,22 @@ def residual_series(
     """
     frame = residual_frame(source)
     column, scale, text = AXES[over]
-    other = AXES["frequency" if over == "load" else "load"][0]
-    counts = frame.groupby(other)[column].nunique()
+    fixed_column = AXES["frequency" if over == "load" else "load"][0]
+    counts = frame.groupby(fixed_column)[column].nunique()
     if frame.empty or counts.max() < 2:
         raise ValueError(f"there are no two points that differ in {over} alone")
-    series = frame[frame[other] == counts.idxmax()]
+    series = frame[frame[fixed_column] == counts.idxmax()]
     models = list(dict.fromkeys(frame["model"]))
     chosen = list(entries or _worst(frame[frame["model"] == models[0]]))
     figure, axes = new_picture(text, "(measured - predicted) / sigma", title=title)
-    axes.axhspan(-2, 2, color=LIGHT["rule"], alpha=0.6, linewidth=0)
+    axes.axhspan(-2, 2, color=RULE, alpha=0.6, linewidth=0)
     for entry, (colour, marker) in zip(chosen, _STYLE, strict=False):
         for number, model in enumerate(models):
             rows = series[(series["entry"] == entry) & (series["model"] == model)].sort_values(column)
             last = number == len(models) - 1
             axes.plot(
                 rows[column] / scale, rows["z"], color=LIGHT[colour], linestyle=_DASHES[number % len(_DASHES)],
-                marker=marker, markersize=4.5, markerfacecolor=LIGHT[colour] if last else LIGHT["paper"], linewidth=1.3,
+                marker=marker, markersize=4.5, markerfacecolor=LIGHT[colour] if last else PAPER, linewidth=1.3,
                 label=f"{entry}, {VARIANT_LABEL.get(model, str(model))}",
             )  # fmt: skip
     add_legend(axes)

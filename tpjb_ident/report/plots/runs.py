@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from rigdata.survey.spectrum import amplitude_spectrum
 from tpjb_ident.arrays import FloatArray
-from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.colours import BLUE, GREY, INK, LIGHT
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, label, new_picture, new_pictures
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def orbit(run: Run, *, title: str | None = None) -> Figure:
     path = 1e6 * (path - np.median(path[good], axis=0))
     figure, axes = new_picture("x, µm", "y, µm", title=title, width=4.6, height=4.6)
     shown = path[:_MOST_SAMPLES]
-    axes.plot(shown[:, 0], shown[:, 1], color=LIGHT["grey"], linewidth=0.5, label="as measured")
+    axes.plot(shown[:, 0], shown[:, 1], color=GREY, linewidth=0.5, label="as measured")
     drive = run.point.excitation
     if drive:
         time = np.asarray(record.time, float)[good]
@@ -52,7 +52,7 @@ def orbit(run: Run, *, title: str | None = None) -> Figure:
         turn = np.linspace(0.0, 2.0 * np.pi, 181)
         ellipse = np.outer(np.cos(turn), cosine) + np.outer(np.sin(turn), sine)
         name = f"at the excitation, {run.point.excitation_hz:g} Hz"
-        axes.plot(ellipse[:, 0], ellipse[:, 1], color=LIGHT["blue"], linewidth=1.8, label=name)
+        axes.plot(ellipse[:, 0], ellipse[:, 1], color=BLUE, linewidth=1.8, label=name)
     axes.set_aspect("equal", adjustable="datalim")
     add_legend(axes)
     return figure
@@ -106,9 +106,9 @@ def spectra(run: Run, *, up_to: float | None = None, title: str | None = None) -
         axes.set_xlim(0.0, top)
         axes.set_ylim(top=3.0 * largest)
         if drive:
-            axes.axvline(drive, color=LIGHT["grey"], linewidth=0.9, zorder=0)
+            axes.axvline(drive, color=GREY, linewidth=0.9, zorder=0)
             axes.annotate(f"{drive:g} Hz", (drive, 1.0), xycoords=("data", "axes fraction"), xytext=(3, -2),
-                          textcoords="offset points", va="top", fontsize=FONT_SIZE - 1, color=LIGHT["ink"])  # fmt: skip
+                          textcoords="offset points", va="top", fontsize=FONT_SIZE - 1, color=INK)  # fmt: skip
     add_legend(grid[0][0])
     return figure
 
@@ -156,10 +156,10 @@ def coherence_spectrum(
     from scipy.special import betaincinv
 
     chance = float(betaincinv(2, max(averages - 2, 1), _LEVEL))
-    axes.axhline(chance, color=LIGHT["ink"], linestyle=(0, (4, 2)), linewidth=0.9, label="by chance, 95 %")
+    axes.axhline(chance, color=INK, linestyle=(0, (4, 2)), linewidth=0.9, label="by chance, 95 %")
     if drive:
-        axes.axvline(drive, color=LIGHT["grey"], linewidth=0.9)
-        axes.text(drive, 0.03, f" {drive:g} Hz", color=LIGHT["ink"], fontsize=FONT_SIZE - 1, va="bottom")
+        axes.axvline(drive, color=GREY, linewidth=0.9)
+        axes.text(drive, 0.03, f" {drive:g} Hz", color=INK, fontsize=FONT_SIZE - 1, va="bottom")
     axes.set_xlim(0.0, top)
     axes.set_ylim(0.0, 1.02)
     add_legend(axes)
@@ -178,8 +178,8 @@ def _multiple_coherence(
     spectra = np.array([np.fft.rfft((s - s.mean(axis=0)) * window[:, None], axis=0)
                         for s in (signals[a : a + piece] for a in starts)])  # fmt: skip
     cross = np.einsum("kfi,kfj->fij", spectra.conj(), spectra)
-    inputs, both, power = cross[:, :2, :2], cross[:, :2, 2:], np.einsum("fii->fi", cross[:, 2:, 2:]).real
-    explained = np.einsum("fij,fij->fj", both.conj(), np.linalg.pinv(inputs, rcond=1e-10, hermitian=True) @ both).real
+    inputs, joint, power = cross[:, :2, :2], cross[:, :2, 2:], np.einsum("fii->fi", cross[:, 2:, 2:]).real
+    explained = np.einsum("fij,fij->fj", joint.conj(), np.linalg.pinv(inputs, rcond=1e-10, hermitian=True) @ joint).real
     value = np.clip(explained / np.maximum(power, 1e-300), 0.0, 1.0)
     # half-overlapping Hann windows: about 11/9 of the pieces that fit side by side count as independent
     averages = max(math.floor(11.0 / 18.0 * len(spectra)), 3)
