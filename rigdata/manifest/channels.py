@@ -15,8 +15,7 @@ from rigdata.calibration import (
     reading_zero,
 )
 from rigdata.channel_response import ChannelResponse, parse_filter, parse_response_table
-from rigdata.manifest.fields import CHANNEL
-from rigdata.manifest.table import Findings, Table, nearest, shown
+from rigdata.manifest.fields import CHANNEL, Findings, Table, nearest, shown
 from rigdata.problem import RigDataError
 from rigdata.units import UnitError, is_signal
 

@@ -10,9 +10,8 @@ from typing import Any
 
 from rigdata.calibration import Channel
 from rigdata.manifest.channels import TextFile, read_channels
-from rigdata.manifest.fields import ACQUISITION, CSV, HOUSING, MAINS_FREQUENCIES, TOP
+from rigdata.manifest.fields import ACQUISITION, CSV, HOUSING, MAINS_FREQUENCIES, TOP, Findings, Table, key_lines
 from rigdata.manifest.runs import RunEntry, read_runs
-from rigdata.manifest.table import Findings, Table, key_lines
 from rigdata.problem import Problem, RigDataError, refuse
 
 SCHEMA = "tpjb-rig/1"

@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from rigdata.manifest.fields import RUN
-from rigdata.manifest.table import Findings, Table, shown
+from rigdata.manifest.fields import RUN, Findings, Table, shown
 from rigdata.operating_point import OperatingPoint
 from rigdata.units import UnitError, parse_quantity
 

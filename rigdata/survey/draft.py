@@ -11,9 +11,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MAINS_FREQUENCIES, RUN, draft_line
-from rigdata.survey.channel_guess import ChannelGuess, guess_channel, quantity_of_unit
 from rigdata.survey.exports import Export
-from rigdata.survey.run_guess import RunGuess, guess_run, strongest_lines
+from rigdata.survey.guess import (
+    ChannelGuess,
+    RunGuess,
+    guess_channel,
+    guess_run,
+    quantity_of_unit,
+    strongest_lines,
+)
 
 #: Stands where only the person at the rig knows; no parser takes it for a value.
 MARK = "??"

@@ -9,9 +9,9 @@ from typing import Any
 
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.series import is_time, seconds
-from rigdata.survey.channel_guess import ChannelGuess
 from rigdata.survey.draft import MARK, Survey, channel_blocks, run_lines, survey
 from rigdata.survey.exports import Export
+from rigdata.survey.guess import ChannelGuess
 
 
 @dataclass

@@ -15,9 +15,8 @@ import numpy as np
 
 from rigdata.virtual_rig.faults import CSV_ONLY, HDF5_ONLY, NEEDS_TIME, Fault
 from rigdata.virtual_rig.instruments import Sensor
-from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout, Layout, layout_named
+from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout, Layout, layout_named, manifest_text
 from rigdata.virtual_rig.ledger import CampaignTruth, campaign_truth, run_facts
-from rigdata.virtual_rig.manifest_text import manifest_text
 from rigdata.virtual_rig.plan import PlannedRun
 from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig
 from rigdata.virtual_rig.sensing import converter_step

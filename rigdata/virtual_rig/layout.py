@@ -1,10 +1,17 @@
-"""How a campaign is laid out on disk: a folder of CSV in some dialect, or one HDF5 file."""
+"""How a campaign is laid out on disk: a folder of CSV in some dialect, or one HDF5 file, each with its manifest."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from math import degrees
 
-from rigdata.virtual_rig.truth import VirtualRigError
+from rigdata.operating_point import OperatingPoint
+from rigdata.virtual_rig.faults import Fault
+from rigdata.virtual_rig.instruments import Instruments, Sensor
+from rigdata.virtual_rig.plan import DryTest, PlannedRun
+from rigdata.virtual_rig.truth import VirtualRigError, hz
 
 
 @dataclass(frozen=True)
@@ -104,3 +111,117 @@ def layout_named(layout: str | Layout) -> Layout:
     if layout not in LAYOUTS:
         raise VirtualRigError(f"no layout {layout!r}; there are {', '.join(LAYOUTS)}")
     return replace(LAYOUTS[layout])
+
+
+def manifest_text(
+    header: dict[str, str],
+    instruments: Instruments,
+    runs: Sequence[PlannedRun],
+    layout: Layout,
+    faults: Iterable[Fault] = (),
+) -> str:
+    """Write the manifest (`tpjb-rig/1`)."""
+    common = max({run.rate for run in runs}, key=[run.rate for run in runs].count)
+    blocks = [
+        _table(None, {"schema": "tpjb-rig/1", **header}),
+        _table("[housing]", {"mass": f"{instruments.housing_mass:.10g} kg"}),
+        _table("[acquisition]", {"sample_rate": _rate(common)}),
+    ]
+    if isinstance(layout, CsvLayout) and layout.declared:
+        blocks.append(_table("[csv]", _dialect(layout)))
+    if layout.time_name is not None:
+        blocks.append(_table(f"[channels.{layout.time_name}]", {"quantity": "time", "unit": "s"}))
+    blocks += [_channel(sensor) for sensor in instruments.sensors]
+    faults = tuple(faults)
+    blocks += [_run(run, layout, common, faults) for run in runs]
+    return "\n".join(blocks)
+
+
+def _table(title: str | None, entries: dict[str, object]) -> str:
+    lines = [] if title is None else [title]
+    lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in entries.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _dialect(layout: CsvLayout) -> dict[str, object]:
+    entries: dict[str, object] = {
+        "delimiter": layout.delimiter,
+        "decimal": layout.decimal,
+        "encoding": layout.encoding,
+        "header_line": len(layout.preamble) + 1,
+    }
+    if layout.units_line:
+        entries["units_line"] = len(layout.preamble) + 2
+    return entries
+
+
+def _channel(sensor: Sensor) -> str:
+    entries: dict[str, object] = {"quantity": sensor.quantity}
+    if sensor.axis is not None:
+        entries["axis"] = _degrees(sensor.axis)
+    if sensor.pad is not None:
+        entries["pad"] = sensor.pad
+    for key, value in sensor.stated:
+        if key == "position":
+            entries[key] = float(value)
+    entries["unit"] = sensor.unit
+    entries.update({key: value for key, value in sensor.stated if key != "position"})
+    if sensor.polarity != 1:
+        entries["polarity"] = sensor.polarity
+    if sensor.uncertainty:
+        entries["uncertainty"] = f"{100 * sensor.uncertainty:g} %"
+    return _table(f"[channels.{sensor.name}]", entries)
+
+
+def _run(run: PlannedRun, layout: Layout, common_rate: float, faults: tuple[Fault, ...]) -> str:
+    noted = _as_noted(run, faults)
+    entries: dict[str, object] = {"id": run.id}
+    if isinstance(layout, CsvLayout):
+        entries["file"] = f"runs/{run.record}.csv"
+    entries["kind"] = run.kind
+    if isinstance(noted.test, DryTest):
+        entries["pad"] = noted.test.pad
+        entries["static_load_direction"] = _degrees(noted.direction or 0.0)
+        if noted.test.branch != "up":
+            entries["branch"] = noted.test.branch
+    if noted.point is not None:
+        entries.update(_set_point(noted.point))
+        if noted.kind == "dynamic":
+            entries["excitation_frequency"] = f"{noted.point.excitation_hz:.10g} Hz"
+            entries["excitation_direction"] = _degrees(noted.direction or 0.0)
+    if run.rate != common_rate:
+        entries["sample_rate"] = _rate(run.rate)
+    return _table("[[runs]]", entries)
+
+
+def _set_point(point: OperatingPoint) -> dict[str, object]:
+    return {
+        "shaft_speed": f"{point.shaft_speed_hz:.10g} Hz",
+        "static_load": f"{point.static_load / 1e3:.10g} kN",
+        "static_load_direction": _degrees(point.static_load_direction),
+    }
+
+
+def _as_noted(run: PlannedRun, faults: tuple[Fault, ...]) -> PlannedRun:
+    """Give the run as somebody noted it, with that person's mistakes."""
+    for fault in faults:
+        if fault.value is None or fault.place != "run" or not fault.strikes(run.id):
+            continue
+        if fault.kind == "wrong_pad" and isinstance(run.test, DryTest):
+            run = replace(run, test=replace(run.test, pad=int(fault.value)))
+        elif fault.kind == "wrong_direction" and run.direction is not None:
+            run = replace(run, direction=run.direction + fault.value)
+        elif fault.kind == "wrong_frequency" and run.point is not None:
+            excitation = run.point.excitation + hz(fault.value)
+            run = replace(run, point=replace(run.point, excitation=excitation))
+        elif fault.kind == "wrong_load" and run.point is not None:
+            run = replace(run, point=replace(run.point, static_load=run.point.static_load * fault.value))
+    return run
+
+
+def _degrees(angle: float) -> str:
+    return f"{round(degrees(angle), 9) + 0.0:.10g} deg"
+
+
+def _rate(rate: float) -> str:
+    return f"{rate / 1e3:g} kHz" if rate >= 1e3 and rate % 1e3 == 0 else f"{rate:.10g} Hz"

@@ -14,8 +14,8 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig.instruments import Instruments
+from rigdata.virtual_rig.motion import answer
 from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig
-from rigdata.virtual_rig.running import answer
 from rigdata.virtual_rig.sensing import felt_direction
 
 PIVOT_LOADS = np.arange(250.0, 8001.0, 250.0)

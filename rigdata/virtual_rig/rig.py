@@ -6,13 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from rigdata.virtual_rig.at_rest import clearance_physics, dry_physics
 from rigdata.virtual_rig.faults import Fault, check_faults, faulty_instruments, spoil_record
 from rigdata.virtual_rig.instruments import Instruments
-from rigdata.virtual_rig.motion import RunPhysics
+from rigdata.virtual_rig.motion import RunPhysics, clearance_physics, dry_physics, running_physics
 from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import PlannedRun, RigPlan
-from rigdata.virtual_rig.running import running_physics
 from rigdata.virtual_rig.sensing import (
     Glitch,
     Readings,

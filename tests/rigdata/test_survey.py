@@ -10,10 +10,9 @@ import pytest
 from rigdata import RigDataError, load_campaign
 from rigdata.readers.series import Series
 from rigdata.readers.text.head import find_head
-from rigdata.survey.channel_guess import guess_channel, usable_unit
 from rigdata.survey.draft import MARK, draft_manifest, survey
 from rigdata.survey.exports import Export, read_exports, record_files
-from rigdata.survey.run_guess import guess_run
+from rigdata.survey.guess import guess_channel, guess_run, usable_unit
 from rigdata.survey.spectrum import look_at
 from tpjb_ident.check.campaign import check_campaign
 

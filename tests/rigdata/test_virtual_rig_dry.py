@@ -19,7 +19,7 @@ from rigdata.virtual_rig import (
     VirtualRig,
     VirtualRigError,
 )
-from rigdata.virtual_rig.at_rest import corners, held_back, load_history, swept_position
+from rigdata.virtual_rig.motion import corners, held_back, load_history, swept_position
 
 HERTZ = 1.4e-8
 
