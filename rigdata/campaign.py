@@ -137,35 +137,35 @@ def load_campaign(path: str | Path) -> Campaign:
     RigDataError
         Every problem of the manifest at once, each with its line.
     """
-    given = Path(path)
+    source = Path(path)
     try:
-        kind = _kind_of(given)
+        kind = _kind_of(source)
     except RigDataError:
         raise
     except (OSError, ValueError) as error:  # a name too long or with a NUL, a folder that may not be entered
-        what = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
-        raise refuse(str(path)[:100], "", what, "Check the path and its rights") from error
+        message = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
+        raise refuse(str(path)[:100], "", message, "Check the path and its rights") from error
     if kind == "folder":
-        return _load_folder(given, given / MANIFEST_NAME)
-    return _load_folder(given.parent, given) if kind == "manifest" else _load_hdf5(given)
+        return _load_folder(source, source / MANIFEST_NAME)
+    return _load_folder(source.parent, source) if kind == "manifest" else _load_hdf5(source)
 
 
-def _kind_of(given: Path) -> str:
+def _kind_of(source: Path) -> str:
     """Tell what `given` is: "folder", "manifest" or "hdf5"; refuse what is none of these."""
-    if given.is_dir():
-        if (given / MANIFEST_NAME).exists():
+    if source.is_dir():
+        if (source / MANIFEST_NAME).exists():
             return "folder"
-        inside_it = [p.name for p in itertools.islice(given.iterdir(), 1000) if p.suffix.lower() in HDF5_SUFFIXES][:3]
+        inside_it = [p.name for p in itertools.islice(source.iterdir(), 1000) if p.suffix.lower() in HDF5_SUFFIXES][:3]
         hint = f", or one of its HDF5 files ({', '.join(inside_it)})" if inside_it else ""
         cure = f"Give the folder that holds {MANIFEST_NAME}{hint}; `tpjb init FOLDER` drafts one for records"
-        raise refuse(str(given), "", f"the folder has no {MANIFEST_NAME}", cure)
-    if not given.exists():
-        raise refuse(str(given)[:200], "", "there is no such file or folder", "Check the path")
-    if not given.is_file():
-        raise refuse(str(given), "", "is not an ordinary file", f"Give a folder with {MANIFEST_NAME} or an HDF5 file")
-    if given.suffix.lower() in TEXT:
-        raise refuse(str(given), "", "is a record, not a campaign", f"Give the folder that holds {MANIFEST_NAME}")
-    return "manifest" if given.suffix.lower() == ".toml" else "hdf5"
+        raise refuse(str(source), "", f"the folder has no {MANIFEST_NAME}", cure)
+    if not source.exists():
+        raise refuse(str(source)[:200], "", "there is no such file or folder", "Check the path")
+    if not source.is_file():
+        raise refuse(str(source), "", "is not an ordinary file", f"Give a folder with {MANIFEST_NAME} or an HDF5 file")
+    if source.suffix.lower() in TEXT:
+        raise refuse(str(source), "", "is a record, not a campaign", f"Give the folder that holds {MANIFEST_NAME}")
+    return "manifest" if source.suffix.lower() == ".toml" else "hdf5"
 
 
 def _read_text(path: Path, file: str, limit: int) -> str:
@@ -239,8 +239,8 @@ def _bearing_text(folder: Path, manifest: Manifest, file: str, files: dict[str, 
         problems.extend(error.problems)
         return ""
     if not os.path.isfile(path):
-        what = f"the bearing file {manifest.bearing!r} is not in the folder"
-        problems.append(Problem("warning", file, "bearing", what, "Add it, or give --bearing where one is needed"))
+        message = f"the bearing file {manifest.bearing!r} is not in the folder"
+        problems.append(Problem("warning", file, "bearing", message, "Add it, or give --bearing where one is needed"))
         return ""
     files[manifest.bearing] = path
     try:

@@ -6,22 +6,22 @@ import difflib
 from collections.abc import Iterable
 
 
-def nearest_name(name: object, known: Iterable[str], cutoff: float = 0.6) -> str | None:
+def nearest_name(name: object, choices: Iterable[str], cutoff: float = 0.6) -> str | None:
     """The one of the `known` names that looks most like `name`; None where none does."""
-    close = difflib.get_close_matches(str(name)[:60], list(known), n=1, cutoff=cutoff)
+    close = difflib.get_close_matches(str(name)[:60], list(choices), n=1, cutoff=cutoff)
     return close[0] if close else None
 
 
-def hint(name: object, known: Iterable[str], listed: str = "Known:", cutoff: float = 0.6) -> str:
+def hint(name: object, choices: Iterable[str], listed: str = "Known:", cutoff: float = 0.6) -> str:
     """The name that may have been meant as a question, or all that there are."""
-    names = list(known)
+    names = list(choices)
     near = nearest_name(name, names, cutoff)
     return f"Did you mean {near!r}?" if near else f"{listed} {', '.join(names)}"
 
 
-def unknown_name(what: str, name: object, known: Iterable[str]) -> str:
+def unknown_name(kind: str, name: object, choices: Iterable[str]) -> str:
     """The refusal of a name that a registry does not hold, with the nearest one and all there are."""
-    names = list(known)
+    names = list(choices)
     near = nearest_name(name, names)
     hint = f"; did you mean {near!r}?" if near else ""
-    return f"unknown {what} {name!r}{hint} Known: {', '.join(names)}"
+    return f"unknown {kind} {name!r}{hint} Known: {', '.join(names)}"

@@ -41,11 +41,11 @@ def read_channels(table: Table, findings: Findings, files: TextFile | None = Non
         return channels
     tables = {name: table.subtable(name) for name in table.data}
     for name in sorted(tables, key=lambda n: "like" in tables[n].data):
-        own = tables[name]
-        if "like" in own.data and not _complete(own, name, tables, channels):
+        entry = tables[name]
+        if "like" in entry.data and not _complete(entry, name, tables, channels):
             continue
         errors = findings.errors
-        channel = _read_channel(name, own, files)
+        channel = _read_channel(name, entry, files)
         if channel is not None and findings.errors == errors:
             channels[name] = channel
     channels = {name: channels[name] for name in tables if name in channels}
@@ -54,35 +54,35 @@ def read_channels(table: Table, findings: Findings, files: TextFile | None = Non
     return channels
 
 
-def _complete(own: Table, name: str, tables: dict[str, Table], read: dict[str, Channel]) -> bool:
+def _complete(entry: Table, name: str, tables: dict[str, Table], read: dict[str, Channel]) -> bool:
     """Give a channel the entries of the one that it is `like`, but for its place; whether that can be read."""
-    model = own.value(_FIELD["like"])
+    model = entry.value(_FIELD["like"])
     if model is None:
         return False
     if model not in tables or model == name or "like" in tables[model].data:
-        known = [n for n, t in tables.items() if "like" not in t.data and n != name]
-        own.error("like", f"is no channel that is described in full ({shown(model)})", nearest(model, known))
+        described = [n for n, t in tables.items() if "like" not in t.data and n != name]
+        entry.error("like", f"is no channel that is described in full ({shown(model)})", nearest(model, described))
         return False
     if model not in read:  # what is wrong with it has been said there
         return False
-    own.data.update({k: v for k, v in tables[model].data.items() if k not in own.data and k not in _PLACE})
+    entry.data.update({k: v for k, v in tables[model].data.items() if k not in entry.data and k not in _PLACE})
     return True
 
 
 def _read_channel(name: str, table: Table, files: TextFile | None) -> Channel | None:
-    where = f"[channels.{name[:40]}]"
+    heading = f"[channels.{name[:40]}]"
     if not name.strip() or len(name) > 200 or not name.isprintable() or _PATH_STEPS & set(name.split("/")):
-        table.only(CHANNEL, where)
+        table.only(CHANNEL, heading)
         table.findings.error(table.path, f"channel name {shown(name)} cannot be used", "Use letters and digits")
         return None
     quantity = table.value(_FIELD["quantity"])
     if quantity is None or quantity == "ignore":
-        table.only(CHANNEL, where)
+        table.only(CHANNEL, heading)
         return Channel(name, "ignore") if quantity else None
     plain = quantity in UNCALIBRATED
     directed = quantity in VECTOR_QUANTITIES or quantity == "command"
     needed = (["axis"] if directed else []) + ([] if plain else ["unit"])
-    values = table.read(CHANNEL, where, needed)
+    values = table.read(CHANNEL, heading, needed)
     if isinstance(values["polarity"], bool) or values["polarity"] not in (1, -1):
         table.error("polarity", f"polarity is {shown(values['polarity'])}", "Give 1 or -1, without quotes")
         return None

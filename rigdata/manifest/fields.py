@@ -43,7 +43,7 @@ class Field:
     example: str
     default: Any = None
     required: bool = False
-    known: tuple[str, ...] = ()
+    choices: tuple[str, ...] = ()
     #: bounds in SI: from, to; `above` and `below` exclude their ends
     low: float | None = None
     high: float | None = None
@@ -96,7 +96,7 @@ CSV = (
 )
 CHANNEL = (
     Field("like", "text", "a sensor of the same type: its entries but axis, pad and position", '"L1H"'),
-    Field("quantity", "choice", "what the column holds", '"displacement"', required=True, known=QUANTITIES),
+    Field("quantity", "choice", "what the column holds", '"displacement"', required=True, choices=QUANTITIES),
     Field("axis", "angle", "direction of the positive quantity, counter-clockwise from +X", '"45 deg"'),
     Field("unit", "text", "of the readings; V, mA, mV/V, or an engineering unit if already converted", '"V"'),
     Field("sensitivity", "calibration", "reading per quantity; of a bridge: mV/V at full scale", '"7.78 mV/um"'),
@@ -127,16 +127,16 @@ CHANNEL = (
 RUN = (
     Field("id", "text", "name of the run", '"d-05000-25-03"', required=True),
     Field("file", "text", "record in the folder; HDF5: the group /runs/ID", '"runs/d-05000-25-03.csv"', default=""),
-    Field("kind", "choice", "what was done", '"dynamic"', required=True, known=KINDS),
+    Field("kind", "choice", "what was done", '"dynamic"', required=True, choices=KINDS),
     Field("shaft_speed", "speed", "of the shaft, set point", '"22 Hz"', default=0.0, low=0.0),
     Field("static_load", "force", "set point, per bearing", '"5 kN"', default=0.0, low=0.0),
     Field("static_load_direction", "angle", "where it pushes the shaft; down is -90 deg", '"-90 deg"', -math.pi / 2),
     Field("excitation_frequency", "speed", "of a sine", '"25 Hz"', default=0.0, above=0.0),
     Field("excitation_direction", "angle", "of the force", '"54 deg"'),
-    Field("excitation", "choice", "its course in time", '"sweep"', default="sine", known=EXCITATIONS),
+    Field("excitation", "choice", "its course in time", '"sweep"', default="sine", choices=EXCITATIONS),
     Field("excitation_band", "text", "in place of the frequency, where it is no sine", '"5..120 Hz"'),
     Field("pad", "whole", "number of the pad that a dry test loads, without quotes", "1", low=1, high=100),
-    Field("branch", "choice", "of a dry test's load", '"cycle"', default="up", known=BRANCHES),
+    Field("branch", "choice", "of a dry test's load", '"cycle"', default="up", choices=BRANCHES),
     Field("sample_rate", "frequency", "of this run", '"500 Hz"', above=0.0),
 )
 TABLES = {
@@ -173,7 +173,7 @@ _HOLDS = {
 
 
 def _holds(field: Field) -> str:
-    text = ", ".join(field.known) or _HOLDS.get(field.kind, field.kind)
+    text = ", ".join(field.choices) or _HOLDS.get(field.kind, field.kind)
     if field.kind == "whole":
         text += f" from {field.low:g}"
     if field.required:
@@ -197,9 +197,9 @@ def shown(value: object, length: int = 60) -> str:
     return text if len(text) <= length else text[: length - 3] + "..."
 
 
-def nearest(name: str, known: Collection[str]) -> str:
+def nearest(name: str, choices: Collection[str]) -> str:
     """The nearest of `known`, as the remedy for an unknown `name`."""
-    return hint(name.lower(), known, cutoff=0.4)
+    return hint(name.lower(), choices, cutoff=0.4)
 
 
 class Findings:
@@ -244,17 +244,17 @@ class Table:
         """Note an error of `key`."""
         self.findings.error((*self.path, key), what, cure)
 
-    def read(self, fields: tuple[Field, ...], where: str, needed: Collection[str] = ()) -> dict[str, Any]:
+    def read(self, fields: tuple[Field, ...], heading: str, needed: Collection[str] = ()) -> dict[str, Any]:
         """The value of every field, SI; keys that are no field are noted."""
-        self.only(fields, where)
+        self.only(fields, heading)
         return {field.key: self.value(field, field.key in needed) for field in fields}
 
-    def only(self, fields: tuple[Field, ...], where: str) -> None:
+    def only(self, fields: tuple[Field, ...], heading: str) -> None:
         """Note every key that is no field."""
-        known = [field.key for field in fields]
+        choices = [field.key for field in fields]
         for key in self.data:
-            if key not in known:
-                self.error(key, f"unknown key {shown(key)} in {where}", nearest(key, known))
+            if key not in choices:
+                self.error(key, f"unknown key {shown(key)} in {heading}", nearest(key, choices))
 
     def value(self, field: Field, needed: bool = False) -> Any:
         """The value of one field, SI."""
@@ -266,7 +266,7 @@ class Table:
         if field.kind in RAW:
             return value
         if field.kind == "whole":
-            checked: Any = self._whole(field, value)
+            checked: Any = self._whole_number(field, value)
         elif field.kind in ("text", "choice"):
             checked = self._text(field, value, needed)
         else:
@@ -282,13 +282,13 @@ class Table:
             self.error(key, f"{key} is too long or holds a NUL character", "Shorten it")
         elif (needed or field.required) and not value.strip():
             self.error(key, f"{key} is empty", "Give a value")
-        elif field.known and value not in field.known:
-            self.error(key, f"{key} {shown(value)} is unknown", nearest(value, field.known))
+        elif field.choices and value not in field.choices:
+            self.error(key, f"{key} {shown(value)} is unknown", nearest(value, field.choices))
         else:
             return value
         return None
 
-    def _whole(self, field: Field, value: object) -> int | None:
+    def _whole_number(self, field: Field, value: object) -> int | None:
         if isinstance(value, bool) or not isinstance(value, int) or not field.holds(value):
             advice = f"Give a whole number from {field.low:g} on, without quotes"
             self.error(field.key, f"{field.key} is {shown(value)}", advice)

@@ -56,10 +56,10 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     data = _load_toml(text, file)
     findings = Findings(file, key_lines(text))
     top = Table(data, (), findings)
-    stated = top.read(TOP, "the manifest")
-    if stated["schema"] not in (None, SCHEMA):
-        what = f"schema is {stated['schema']!r}, not {SCHEMA!r}"
-        findings.error(("schema",), what, "Export in the format tpjb-rig/1")
+    header = top.read(TOP, "the manifest")
+    if header["schema"] not in (None, SCHEMA):
+        message = f"schema is {header['schema']!r}, not {SCHEMA!r}"
+        findings.error(("schema",), message, "Export in the format tpjb-rig/1")
     channels = read_channels(top.subtable("channels"), findings, files)
     runs = read_runs(data.get("runs"), findings)
     excited = any(run.kind in {"dynamic", "baseline"} for run in runs)
@@ -69,9 +69,9 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     if mains not in (None, *MAINS_FREQUENCIES):
         findings.error(("acquisition", "mains"), f"mains is {mains:g} Hz", 'Give "50 Hz" or "60 Hz"')
     manifest = Manifest(
-        id=stated["id"] or "",
-        bearing=stated["bearing"] or "",
-        description=stated["description"],
+        id=header["id"] or "",
+        bearing=header["bearing"] or "",
+        description=header["description"],
         housing_mass=housing["mass"],
         sample_rate=acquisition["sample_rate"],
         csv=_read_csv(top.subtable("csv")),
@@ -92,16 +92,16 @@ def _load_toml(text: str, file: str) -> dict[str, Any]:
     for number, line in enumerate(text.split("\n"), start=1):
         # Dotted keys nest as deeply as they are long, and parsing them takes the square of it.
         if len(line) > MAX_LINE or (line.count(".") > MAX_DOTS and _QUOTED.sub("", line).count(".") > MAX_DOTS):
-            what = "the line is far too long, or nests far too deeply"
-            raise refuse(file, f"line {number}", what, "Shorten or break it")
+            message = "the line is far too long, or nests far too deeply"
+            raise refuse(file, f"line {number}", message, "Shorten or break it")
     cure = "Mend the TOML at this place"
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise refuse(file, "", f"not valid TOML: {error}", cure) from error
     except (RecursionError, ValueError) as error:  # deep nesting; integers of thousands of digits
-        what = f"not usable TOML: {type(error).__name__}, nested too deep or a number too long"
-        raise refuse(file, "", what, cure) from error
+        message = f"not usable TOML: {type(error).__name__}, nested too deep or a number too long"
+        raise refuse(file, "", message, cure) from error
 
 
 def _read_csv(table: Table) -> CsvSpec:

@@ -54,8 +54,8 @@ def read_runs(data: object, findings: Findings) -> tuple[RunEntry, ...]:
         if run is None:
             continue
         if run.id in first:
-            what = f"run id {shown(run.id)} is used twice, also by run no. {first[run.id] + 1}"
-            findings.error(("runs", index, "id"), what, "Give every run its own id", run.id)
+            message = f"run id {shown(run.id)} is used twice, also by run no. {first[run.id] + 1}"
+            findings.error(("runs", index, "id"), message, "Give every run its own id", run.id)
         if findings.errors == errors:
             runs.append(run)
         first.setdefault(run.id, index)

@@ -56,13 +56,14 @@ class Survey:
     per_hertz: dict[str, float] = field(default_factory=dict)
 
 
-def survey(exports: Sequence[Export], given: Mapping[str, ChannelGuess] | None = None) -> Survey:
+def survey(exports: Sequence[Export], described: Mapping[str, ChannelGuess] | None = None) -> Survey:
     """Guess channels and runs of a folder of exports."""
     channels: dict[str, ChannelGuess] = {}
     for export in exports:
-        for one in export.series:
-            if one.name not in channels:
-                channels[one.name] = _with_given(guess_channel(one.name, one.unit), (given or {}).get(one.name))
+        for series in export.series:
+            if series.name not in channels:
+                guess = guess_channel(series.name, series.unit)
+                channels[series.name] = _with_manifest(guess, (described or {}).get(series.name))
     quantities = {name: guess.quantity for name, guess in channels.items()}
     runs = _common_speeds(_one_direction([guess_run(export, channels) for export in exports]))
     line = _common_line(exports, quantities, runs)
@@ -78,69 +79,74 @@ def survey(exports: Sequence[Export], given: Mapping[str, ChannelGuess] | None =
     )
 
 
-def _with_given(guess: ChannelGuess, known: ChannelGuess | None) -> ChannelGuess:
-    if known is None:
+def _with_manifest(guess: ChannelGuess, manifest_guess: ChannelGuess | None) -> ChannelGuess:
+    if manifest_guess is None:
         return guess
-    if known.quantity and known.quantity != guess.quantity:
-        guess = replace(guess, quantity=known.quantity, axis="", why=known.why)
-    return replace(guess, unit=known.unit or guess.unit, axis=known.axis or guess.axis)
+    if manifest_guess.quantity and manifest_guess.quantity != guess.quantity:
+        guess = replace(guess, quantity=manifest_guess.quantity, axis="", why=manifest_guess.why)
+    return replace(guess, unit=manifest_guess.unit or guess.unit, axis=manifest_guess.axis or guess.axis)
 
 
 def _one_direction(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
-    """Directions that lie within a few degrees of each other become one: -89 and -91 deg are a load on one pad."""
+    """Directions within a few degrees of each other become the same: -89 and -91 deg are a load on one pad."""
 
-    def alike(group: list[float], angle: float) -> bool:
+    def close(group: list[float], angle: float) -> bool:
         return angle - group[-1] <= _ALIKE and angle - group[0] <= 2 * _ALIKE
 
-    def meant(middle: float) -> float:
-        round_one = 45.0 * round(middle / 45.0)  # an axis, or between two; pads may stand anywhere
-        return round_one if abs(round_one - middle) <= _ALIKE / 2 else middle
+    def rounded(middle: float) -> float:
+        nearby = 45.0 * round(middle / 45.0)  # an axis, or between two; pads may stand anywhere
+        return nearby if abs(nearby - middle) <= _ALIKE / 2 else middle
 
-    common = _common([r.direction for r in runs], alike, meant)
-    return tuple(replace(r, direction=common.get(r.direction, r.direction)) for r in runs)
+    set_points = _common([r.direction for r in runs], close, rounded)
+    return tuple(replace(r, direction=set_points.get(r.direction, r.direction)) for r in runs)
 
 
 def _common_speeds(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
     """Speeds within a per cent or so of each other are one set point: a tachometer shows what came of it."""
 
-    def meant(middle: float) -> float:
-        round_one = float(f"{middle:.2g}")  # 21.99 Hz was meant to be 22 Hz
-        return round_one if abs(round_one - middle) <= _ROUND * middle else float(f"{middle:.4g}")
+    def rounded(middle: float) -> float:
+        nearby = float(f"{middle:.2g}")  # 21.99 Hz was meant to be 22 Hz
+        return nearby if abs(nearby - middle) <= _ROUND * middle else float(f"{middle:.4g}")
 
-    common = _common([r.speed for r in runs], lambda group, speed: speed <= _ONE_SPEED * group[0], meant)
-    return tuple(replace(r, speed=common.get(r.speed, r.speed)) for r in runs)
+    set_points = _common([r.speed for r in runs], lambda group, speed: speed <= _ONE_SPEED * group[0], rounded)
+    return tuple(replace(r, speed=set_points.get(r.speed, r.speed)) for r in runs)
 
 
 def _common(
-    values: Sequence[float], alike: Callable[[list[float], float], bool], meant: Callable[[float], float]
+    values: Sequence[float], close: Callable[[list[float], float], bool], rounded: Callable[[float], float]
 ) -> dict[float, float]:
     """What every finite value was meant to be: the middle of its group of values that are alike, rounded."""
     groups: list[list[float]] = []
     for value in sorted({v for v in values if math.isfinite(v)}):
-        if groups and alike(groups[-1], value):
+        if groups and close(groups[-1], value):
             groups[-1].append(value)
         else:
             groups.append([value])
-    common: dict[float, float] = {}
+    set_points: dict[float, float] = {}
     for group in groups:
-        every = sorted(v for v in values if v in group)
-        common |= dict.fromkeys(group, meant(every[len(every) // 2]))
-    return common
+        members = sorted(v for v in values if v in group)
+        set_points |= dict.fromkeys(group, rounded(members[len(members) // 2]))
+    return set_points
 
 
 def _tachometers(
     exports: Sequence[Export], channels: Mapping[str, ChannelGuess], runs: Sequence[RunGuess], line: float
 ) -> dict[str, float]:
     """Reading per hertz of speed channels in volts, where it is one in all running records."""
-    found = {}
-    for name, guess in channels.items():
-        if guess.quantity != "speed" or quantity_of_unit(guess.unit) or not math.isfinite(line):
-            continue
-        running = [e for e, r in zip(exports, runs, strict=True) if r.kind in ("dynamic", "locus")]
-        means = sorted(float(np.nanmedian(s.values)) / line for e in running for s in e.series if s.name == name)
-        if means and means[0] > 0 and means[-1] - means[0] <= _NEAR * means[-1]:
-            found[name] = means[len(means) // 2]
-    return found
+    per_hertz: dict[str, float] = {}
+    if not math.isfinite(line):
+        return per_hertz
+    ratios: dict[str, list[float]] = {}
+    for export, run in zip(exports, runs, strict=True):
+        for series in export.series if run.kind in ("dynamic", "locus") else ():
+            guess = channels[series.name]
+            if guess.quantity == "speed" and not quantity_of_unit(guess.unit):
+                ratios.setdefault(series.name, []).append(float(np.nanmedian(series.values)) / line)
+    for name, values in ratios.items():
+        low, high = min(values), max(values)
+        if low > 0 and high - low <= _NEAR * high:
+            per_hertz[name] = sorted(values)[len(values) // 2]
+    return per_hertz
 
 
 def _is_mains(frequency: float) -> bool:
@@ -152,22 +158,23 @@ def _common_line(exports: Sequence[Export], quantities: dict[str, str], runs: Se
     running = []
     for export, run in zip(exports, runs, strict=True):
         if run.kind in ("dynamic", "locus"):
-            found = strongest_lines([s for s in export.series if quantities.get(s.name) == "displacement"])
+            peaks = strongest_lines([s for s in export.series if quantities.get(s.name) == "displacement"])
             driven = run.lines[0].frequency if run.kind == "dynamic" and run.lines else -1.0
-            running.append([x.frequency for x in found if abs(x.frequency - driven) > _NEAR * x.frequency])
+            running.append([p.frequency for p in peaks if abs(p.frequency - driven) > _NEAR * p.frequency])
     if len(running) < 2:
         return float("nan")
-    # the mains stand in every record as well: they are the speed only where nothing else is
-    for candidate in sorted({f for lines in running for f in lines}, key=lambda f: (_is_mains(f), f)):
-        near = [f for lines in running for f in lines if abs(f - candidate) < _NEAR * candidate]
+    frequencies = np.sort(np.concatenate(running))
+    # the mains are in every record as well: they are the speed only where nothing else is
+    for candidate in sorted(set(frequencies.tolist()), key=lambda f: (_is_mains(f), f)):
+        near = frequencies[np.abs(frequencies - candidate) < _NEAR * candidate]
         if len(near) >= _MOST_OF * len(running):
-            half = [f for lines in running for f in lines if abs(2 * f - candidate) < _NEAR * candidate]
+            half = frequencies[np.abs(2 * frequencies - candidate) < _NEAR * candidate]
             speeds = half if 2 * len(half) >= len(near) else near  # an oval shaft shows twice its speed more often
-            return sorted(speeds)[len(speeds) // 2]
+            return float(speeds[len(speeds) // 2])
     return float("nan")
 
 
-def draft_manifest(found: Survey, name: str, bearing: str | None) -> str:
+def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
     """Write the text of a draft."""
     lines = [
         "# Draft by `tpjb init`. Places marked ?? only you can know; what is marked (guess) is worth a look.",
@@ -182,37 +189,39 @@ def draft_manifest(found: Survey, name: str, bearing: str | None) -> str:
         draft_line(HOUSING, "mass", f'"{MARK} kg"'),
         "",
     ]
-    if not all(rate > 0 for rate in found.rates):
+    if not all(rate > 0 for rate in surveyed.rates):
         lines += ["[acquisition]", draft_line(ACQUISITION, "sample_rate", f'"{MARK} Hz"'), ""]
-    if found.nameless:
-        names = ", ".join(_toml_string(f"column{i + 1}") for i in range(found.nameless))
+    if surveyed.nameless:
+        names = ", ".join(_toml_string(f"column{i + 1}") for i in range(surveyed.nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
-    if found.clock:
-        head = f"[channels.{_key(found.clock)}]"
+    if surveyed.clock:
+        head = f"[channels.{_key(surveyed.clock)}]"
         lines += [
             head,
             'quantity = "time"   # (guess) by its name',
             'unit = "s"   # (guess); times of day become seconds',
             "",
         ]
-    for block in channel_blocks(found).values():
+    for block in channel_blocks(surveyed).values():
         lines += [*block, ""]
-    for export, run in zip(found.exports, found.runs, strict=True):
-        lines += [*run_lines(export, run, found), ""]
+    for export, run in zip(surveyed.exports, surveyed.runs, strict=True):
+        lines += [*run_lines(export, run, surveyed), ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def channel_blocks(found: Survey) -> dict[str, list[str]]:
+def channel_blocks(surveyed: Survey) -> dict[str, list[str]]:
     """Lines of every channel's table; sensors of one kind and unit are described once, the others are `like` it."""
     first: dict[tuple[str, str], str] = {}
     blocks = {}
-    for name, guess in found.channels.items():
+    for name, guess in surveyed.channels.items():
         kind = (guess.quantity, guess.unit)
         open_still = guess.quantity in _EXAMPLE and quantity_of_unit(guess.unit) == ""
         model = first.setdefault(kind, name) if open_still else name
         blocks[name] = _channel_lines(name, guess, "" if model == name else model)
-        if name in found.per_hertz and guess.unit:
-            text = f'sensitivity = "{found.per_hertz[name]:.4g} {guess.unit}/Hz"   # (guess) the probes show the speed'
+        if name in surveyed.per_hertz and guess.unit:
+            text = (
+                f'sensitivity = "{surveyed.per_hertz[name]:.4g} {guess.unit}/Hz"   # (guess) the probes show the speed'
+            )
             blocks[name] = [text if line.startswith("sensitivity") else line for line in blocks[name]]
     return blocks
 
@@ -247,7 +256,7 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str) -> list[str]:
     return lines
 
 
-def run_lines(export: str, run: RunGuess, found: Survey) -> list[str]:
+def run_lines(export: str, run: RunGuess, surveyed: Survey) -> list[str]:
     """Lines of a run's table."""
     stem = export.rpartition("/")[2].rpartition(".")[0]
     kind = f'kind = "{MARK}"   # {", ".join(KINDS)}'
@@ -258,12 +267,12 @@ def run_lines(export: str, run: RunGuess, found: Survey) -> list[str]:
         if math.isfinite(run.speed):
             lines.append(_line("shaft_speed", run.speed, "Hz", run.why_speed))
         else:
-            mains = "; it may be the mains" if _is_mains(found.speed_line) else ""
-            lines.append(_line("shaft_speed", found.speed_line, "Hz", f"most records hold this line{mains}"))
+            mains = "; it may be the mains" if _is_mains(surveyed.speed_line) else ""
+            lines.append(_line("shaft_speed", surveyed.speed_line, "Hz", f"most records hold this line{mains}"))
         lines.append(_line("static_load", run.load / 1e3, "kN", "by the file's name"))
     if run.kind == "dry_pivot":
-        known = f"pad = {run.pad}   # (guess) by the file's name"
-        lines.append(known if run.pad else draft_line(RUN, "pad", f'"{MARK}"'))
+        manifest_guess = f"pad = {run.pad}   # (guess) by the file's name"
+        lines.append(manifest_guess if run.pad else draft_line(RUN, "pad", f'"{MARK}"'))
     if run.kind != "clearance":
         lines.append(_line("static_load_direction", run.direction, "deg", "by the cells"))
     if run.kind in ("dynamic", ""):

@@ -36,26 +36,26 @@ class Export:
 
 def record_files(folder: Path) -> list[Path]:
     """List files below `folder` that may be records, by suffix, in order of name."""
-    found = records_below(folder)
-    if not found:
-        others = [p for p in sorted(folder.rglob("*")) if p.is_file() and not p.name.startswith(".")][:1]
-        cure = suffix_hint(others[0]) if others else f"known are {', '.join((*TEXT, *FORMATS))}"
-        named = f"{others[0].name}: {cure}" if others else cure.capitalize()
-        raise refuse(str(folder), "", "holds no records", named)
-    return found
+    records = records_below(folder)
+    if not records:
+        unlisted = [p for p in sorted(folder.rglob("*")) if p.is_file() and not p.name.startswith(".")][:1]
+        hint = suffix_hint(unlisted[0]) if unlisted else f"known are {', '.join((*TEXT, *FORMATS))}"
+        remedy = f"{unlisted[0].name}: {hint}" if unlisted else hint.capitalize()
+        raise refuse(str(folder), "", "holds no records", remedy)
+    return records
 
 
 def records_below(folder: Path) -> list[Path]:
     """Files below `folder` that may be records, none among them; hidden ones are left alone."""
-    known = (*TEXT, *FORMATS)
-    found = []
+    suffixes = (*TEXT, *FORMATS)
+    records = []
     for path in sorted(folder.rglob("*")):
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
-        if path.suffix.lower() in known and path.is_file() and not hidden:
-            found.append(path)
-        if len(found) > MOST_FILES:
+        if path.suffix.lower() in suffixes and path.is_file() and not hidden:
+            records.append(path)
+        if len(records) > MOST_FILES:
             raise refuse(str(folder), "", f"holds more than {MOST_FILES} records", "Give a folder below")
-    return found
+    return records
 
 
 def read_export(path: Path, name: str | None = None) -> Export:
@@ -73,9 +73,9 @@ def read_export(path: Path, name: str | None = None) -> Export:
     return Export(name, series, times.name if times is not None else "", len(head.names))
 
 
-def _counts_evenly(one: Series) -> bool:
+def _counts_evenly(series: Series) -> bool:
     """Whether a nameless column rises in equal steps, as times do and nothing that is measured."""
-    steps = np.diff(one.values)
+    steps = np.diff(series.values)
     mean = float(steps.mean()) if len(steps) > 8 else 0.0
     return mean > 0 and bool(np.all(np.abs(steps - mean) < 0.1 * mean))
 

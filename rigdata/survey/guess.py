@@ -92,9 +92,7 @@ def _axis(name: str, quantity: str) -> str:
     """Direction from the letters at a name's end, for quantities that have one."""
     if quantity not in ("displacement", "force", "acceleration"):
         return ""
-    end = re.search(r"(?:^|[\d_\-. ])([xyhv])$", name.strip(), re.IGNORECASE) or re.match(
-        r"[fdal]([xyhv])$", name.strip(), re.I
-    )
+    end = re.search(r"(?:^|[\d_\-. ]|^[fdal])([xyhv])$", name.strip(), re.IGNORECASE)
     if end is None:
         return ""
     return "0 deg" if end[1].lower() in "xh" else "90 deg"
@@ -139,13 +137,13 @@ def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
     moves = [s for s in export.series if quantities.get(s.name) == "displacement"]
     lines = strongest_lines(forces) or strongest_lines(moves)
     stem = export.name.rpartition("/")[2]
-    named = next((k for k, pattern in _BY_NAME if re.search(pattern, stem, re.IGNORECASE)), "")
-    seen, why = _by_movement(forces, moves, lines)
-    kind, reason = named or seen, "by its name" if named else "nothing tells"
-    if seen == kind and seen:
+    name_kind = next((k for k, pattern in _BY_NAME if re.search(pattern, stem, re.IGNORECASE)), "")
+    movement, why = _by_movement(forces, moves, lines)
+    kind, reason = name_kind or movement, "by its name" if name_kind else "nothing tells"
+    if movement == kind and movement:
         reason = why
-    elif seen and {seen, named} != {"dynamic", "locus"}:
-        kind, reason = seen, f"{why} (its name says {named})"
+    elif movement and {movement, name_kind} != {"dynamic", "locus"}:
+        kind, reason = movement, f"{why} (its name says {name_kind})"
     pad = re.search(r"(?:^p|pad)[-_ #]?(\d{1,2})(?!\d)", stem, re.IGNORECASE)
     direction = _direction(forces, channels, steps=kind == "dry_pivot")
     speed, why_speed = _speed(export, channels, stem)
@@ -154,7 +152,7 @@ def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
         why=reason,
         lines=lines,
         load=_load_of(stem),
-        direction=direction if math.isfinite(direction) else _stated(stem, r"deg(?:ree)?s?|°|grad"),
+        direction=direction if math.isfinite(direction) else _number_before(stem, r"deg(?:ree)?s?|°|grad"),
         pad=int(pad[1]) if pad else 0,
         speed=speed,
         excitation=_confirmed(stem, lines),
@@ -162,33 +160,38 @@ def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
     )
 
 
-def _stated(stem: str, unit: str) -> float:
+def _number_before(stem: str, unit: str) -> float:
     """Number before a unit in a file's name: ``-90deg``, ``1320_rpm``; NaN without one."""
-    found = re.search(rf"(?<![\d.,])((?<![a-z0-9])[-+])?(\d+(?:[.,]\d+)?)[ _]?(?:{unit})(?![a-z])", stem, re.IGNORECASE)
-    if found is None:
+    match = re.search(rf"(?<![\d.,])((?<![a-z0-9])[-+])?(\d+(?:[.,]\d+)?)[ _]?(?:{unit})(?![a-z])", stem, re.IGNORECASE)
+    if match is None:
         return float("nan")
-    size = float(found[2].replace(",", "."))
-    return -size if found[1] == "-" else size  # behind a letter it is a hyphen
+    size = float(match[2].replace(",", "."))
+    return -size if match[1] == "-" else size  # behind a letter it is a hyphen
 
 
 def _speed(export: Export, channels: Mapping[str, ChannelGuess], stem: str) -> tuple[float, str]:
     """Shaft speed [Hz] by a tachometer in engineering units, else by the file's name, and which of them said so."""
-    for one in export.series:
-        guess = channels.get(one.name)
+    for series in export.series:
+        guess = channels.get(series.name)
         if guess is not None and guess.quantity == "speed" and guess.unit in _TURNS:
-            good = one.values[np.isfinite(one.values)]
+            good = series.values[np.isfinite(series.values)]
             mean = float(np.median(good)) * _TURNS[guess.unit] if len(good) else 0.0
             if mean > 0:
-                return mean, f"by the tachometer {one.name}"
-    turns = _stated(stem, r"rpm|u[-_]?min|1[-_]min") / 60.0
+                return mean, f"by the tachometer {series.name}"
+    turns = _number_before(stem, r"rpm|u[-_]?min|1[-_]min") / 60.0
     return turns, "by the file's name" if math.isfinite(turns) else ""
 
 
 def _confirmed(stem: str, lines: tuple[SpectralPeak, ...]) -> float:
     """Frequency [Hz] that a file's name states and one of the record's lines confirms; NaN without one."""
-    stated = [float(n.replace(",", ".")) for n in re.findall(r"(\d+(?:[.,]\d+)?)[ _]?Hz(?![a-z])", stem, re.IGNORECASE)]
-    seen = [f for f in stated if any(abs(x.frequency - f) <= _CONFIRMS * f for x in lines)]
-    return seen[0] if len(seen) == 1 else float("nan")
+    numbers = re.findall(r"(\d+(?:[.,]\d+)?)[ _]?Hz(?![a-z])", stem, re.IGNORECASE)
+    frequencies = [float(number.replace(",", ".")) for number in numbers]
+    confirmed = []
+    for frequency in frequencies:
+        nearest = min((abs(line.frequency - frequency) for line in lines), default=math.inf)
+        if nearest <= _CONFIRMS * frequency:
+            confirmed.append(frequency)
+    return confirmed[0] if len(confirmed) == 1 else math.nan
 
 
 def _direction(forces: list[Series], channels: Mapping[str, ChannelGuess], steps: bool) -> float:
@@ -200,10 +203,13 @@ def _direction(forces: list[Series], channels: Mapping[str, ChannelGuess], steps
     if channels[pair[0].name].unit != channels[pair[1].name].unit:
         return float("nan")
     parts = []
-    for one in pair:
-        good = one.values[np.isfinite(one.values)]
+    for series in pair:
+        good = series.values[np.isfinite(series.values)]
         tenth = max(1, len(good) // 10)
-        parts.append(float(good[-tenth:].mean() - good[:tenth].mean() if steps else good.mean()) if len(good) else 0.0)
+        mean = float(good.mean()) if len(good) else 0.0
+        if steps and len(good):
+            mean = float(good[-tenth:].mean() - good[:tenth].mean())
+        parts.append(mean)
     return float(round(math.degrees(math.atan2(parts[1], parts[0])))) if any(parts) else float("nan")
 
 
@@ -223,7 +229,7 @@ def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[Spectra
             if spread[-1] < _STRAIGHT * spread.sum():
                 return "clearance", "the force goes around"
         return "dry_pivot", "the force climbs slowly along one line"
-    return ("dynamic", "the force swings") if lines else ("locus", "the force stands still")
+    return ("dynamic", "the force oscillates") if lines else ("locus", "the force is constant")
 
 
 def _slow(series: Series) -> FloatArray:
@@ -231,17 +237,22 @@ def _slow(series: Series) -> FloatArray:
     step = max(1, round(_BLOCK * series.rate))
     count = len(series.values) // step
     blocks = series.values[: count * step].reshape(count, step)
-    return np.array([float(np.mean(b[np.isfinite(b)])) for b in blocks if np.isfinite(b).any()])
+    means = []
+    for block in blocks:
+        finite = block[np.isfinite(block)]
+        if len(finite):
+            means.append(float(np.mean(finite)))
+    return np.array(means)
 
 
-def strongest_lines(series: list[Series]) -> tuple[SpectralPeak, ...]:
-    """Lines of the channel that swings most, strongest first."""
+def strongest_lines(channels: list[Series]) -> tuple[SpectralPeak, ...]:
+    """Lines of the channel that oscillates most, strongest first."""
     best: tuple[SpectralPeak, ...] = ()
-    size = 0.0
-    for one in series:
-        found = strongest(*amplitude_spectrum(one.values, one.rate), most=4)
-        if found and found[0].amplitude > size:
-            best, size = found, found[0].amplitude
+    for series in channels:
+        frequency, amplitude = amplitude_spectrum(series.values, series.rate)
+        peaks = strongest(frequency, amplitude, most=4)
+        if peaks and (not best or peaks[0].amplitude > best[0].amplitude):
+            best = peaks
     return best
 
 

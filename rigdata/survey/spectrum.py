@@ -46,19 +46,19 @@ class Look:
 def look_at(values: FloatArray, rate: float) -> Look:
     """Take a first look at a channel."""
     good = np.isfinite(values)
-    kept = values[good]
+    finite = values[good]
     empty = np.empty(0)
-    if not len(kept):
+    if not len(finite):
         nan = float("nan")
         return Look(len(values), len(values), nan, nan, nan, nan, empty, empty)
     frequency, amplitude = amplitude_spectrum(values, rate)
     return Look(
         count=len(values),
         missing=int((~good).sum()),
-        mean=float(kept.mean()),
-        deviation=float(kept.std()),
-        low=float(kept.min()),
-        high=float(kept.max()),
+        mean=float(finite.mean()),
+        deviation=float(finite.std()),
+        low=float(finite.min()),
+        high=float(finite.max()),
         frequency=frequency,
         amplitude=amplitude,
         lines=strongest(frequency, amplitude, _NAMED),
@@ -85,20 +85,20 @@ def amplitude_spectrum(values: FloatArray, rate: float) -> tuple[FloatArray, Flo
 
 def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> tuple[SpectralPeak, ...]:
     """Name the strongest peaks that stand out of their neighbourhood; slow drift below four bins is no line."""
-    found: list[SpectralPeak] = []
+    peaks: list[SpectralPeak] = []
     if len(amplitude) < 16:
         return ()
-    left = amplitude.copy()
-    left[:4] = 0.0
+    remaining = amplitude.copy()
+    remaining[:4] = 0.0
     for _ in range(4 * most):
-        i = int(np.argmax(left))
-        if left[i] <= 0.0 or len(found) == most:
+        i = int(np.argmax(remaining))
+        if remaining[i] <= 0.0 or len(peaks) == most:
             break
         around = amplitude[max(4, i - _NEIGHBOURS) : i + _NEIGHBOURS + 1]
         if amplitude[i] > _STANDS_OUT * np.median(around) and i + 1 < len(amplitude):
-            found.append(SpectralPeak(_refined(frequency, amplitude, i), float(amplitude[i])))
-        left[max(0, i - 2) : i + 3] = 0.0  # the window's main lobe
-    return tuple(found)
+            peaks.append(SpectralPeak(_refined(frequency, amplitude, i), float(amplitude[i])))
+        remaining[max(0, i - 2) : i + 3] = 0.0  # the window's main lobe
+    return tuple(peaks)
 
 
 def _refined(frequency: FloatArray, amplitude: FloatArray, i: int) -> float:

@@ -58,8 +58,8 @@ def updated_manifest(text: str, exports: Sequence[Export]) -> tuple[str, list[st
 
     An entry counts as a guess while it holds what `tpjb init` had guessed; one that was changed by hand stays.
     """
-    given = _known_channels(text)
-    before, after = survey(exports), survey(exports, given)
+    described = _known_channels(text)
+    before, after = survey(exports), survey(exports, described)
     blocks = _blocks(text)
     changes: list[str] = []
     _update_channels(blocks, before, after, changes)
@@ -93,12 +93,12 @@ def _blocks(text: str) -> list[_Block]:
 
 
 def _update_channels(blocks: list[_Block], before: Survey, after: Survey, changes: list[str]) -> None:
-    there = {b.name for b in blocks if b.kind == "channels"}
+    present = {b.name for b in blocks if b.kind == "channels"}
     old, new = channel_blocks(before), channel_blocks(after)
     for block in blocks:
         if block.kind == "channels" and block.name in new:
             _merge(block, new[block.name], old.get(block.name, []), f"channel {block.name}", changes)
-    fresh = [_Block("channels", name, lines, {}) for name, lines in new.items() if name not in there]
+    fresh = [_Block("channels", name, lines, {}) for name, lines in new.items() if name not in present]
     changes += [f"channel {b.name}: new" for b in fresh]
     at = next((i for i, b in enumerate(blocks) if b.kind == "runs"), len(blocks))
     blocks[at:at] = fresh
@@ -107,19 +107,19 @@ def _update_channels(blocks: list[_Block], before: Survey, after: Survey, change
 def _update_runs(blocks: list[_Block], before: Survey, after: Survey, changes: list[str]) -> None:
     old = {e: run_lines(e, r, before) for e, r in zip(before.exports, before.runs, strict=True)}
     new = {e: run_lines(e, r, after) for e, r in zip(after.exports, after.runs, strict=True)}
-    there = {b.name for b in blocks if b.kind == "runs"}
+    present = {b.name for b in blocks if b.kind == "runs"}
     for block in blocks:
         if block.kind == "runs" and block.name in new:
             _merge(block, new[block.name], old[block.name], f"run {block.data.get('id', block.name)}", changes)
         elif block.kind == "runs" and block.name:
             changes.append(f"run {block.data.get('id', block.name)}: its file {block.name} is not there; left as it is")
     for name, lines in new.items():
-        if name not in there:
+        if name not in present:
             blocks.append(_Block("runs", name, lines, {}))
             changes.append(f"run {name}: new")
 
 
-def _merge(block: _Block, new: Sequence[str], old: Sequence[str], where: str, changes: list[str]) -> None:
+def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, changes: list[str]) -> None:
     """Put new guesses where the old ones or open places still stand, and add what is lacking."""
     guessed, wanted = _values(old), _values(new)
     lines, have = [], set()
@@ -131,9 +131,9 @@ def _merge(block: _Block, new: Sequence[str], old: Sequence[str], where: str, ch
             lines.append(line)
         elif key in wanted:
             lines.append(wanted[key][1])
-            changes.append(f"{where}: {key} {value} becomes {wanted[key][0]}")
+            changes.append(f"{place}: {key} {value} becomes {wanted[key][0]}")
         else:
-            changes.append(f"{where}: {key} {value} goes")
+            changes.append(f"{place}: {key} {value} goes")
     while lines and not lines[-1].strip():
         lines.pop()
     # a sensor is described in full or by another one of its type
@@ -143,7 +143,7 @@ def _merge(block: _Block, new: Sequence[str], old: Sequence[str], where: str, ch
     for key, (value, line) in wanted.items():
         if key not in have | instead:
             lines.append(line)
-            changes.append(f"{where}: {key} {value} added")
+            changes.append(f"{place}: {key} {value} added")
     block.lines = lines
 
 
@@ -159,12 +159,12 @@ def _entry(line: str) -> tuple[str, str]:
 
 
 def _values(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
-    found = {}
+    entries = {}
     for line in lines:
         key, value = _entry(line)
         if key:
-            found[key] = (value, line)
-    return found
+            entries[key] = (value, line)
+    return entries
 
 
 def renamed(export: Export, names: Sequence[str]) -> Export:

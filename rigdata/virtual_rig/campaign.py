@@ -52,14 +52,14 @@ def write_campaign(
     # the temporary sibling is on the same file system, so that the last step is one rename
     with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as spare:
         if isinstance(chosen, Hdf5Layout):
-            made = Path(spare) / "campaign.h5"
-            _write_hdf5(made, rig, manifest, records, chosen)
+            draft = Path(spare) / "campaign.h5"
+            _write_hdf5(draft, rig, manifest, records, chosen)
         else:
-            made = Path(spare) / "campaign"
-            made.mkdir()
-            _write_csv(made, rig, manifest, records, chosen)
+            draft = Path(spare) / "campaign"
+            draft.mkdir()
+            _write_csv(draft, rig, manifest, records, chosen)
         truth = campaign_truth(rig, facts)
-        _put_in_place(made, target, Path(spare))
+        _put_in_place(draft, target, Path(spare))
     return truth
 
 
@@ -104,21 +104,21 @@ def _is_hdf5(path: Path) -> bool:
         return file.read(8) == b"\x89HDF\r\n\x1a\n"
 
 
-def _put_in_place(made: Path, target: Path, spare: Path) -> None:
-    if not made.is_dir():
-        os.replace(made, target)
+def _put_in_place(draft: Path, target: Path, spare: Path) -> None:
+    if not draft.is_dir():
+        os.replace(draft, target)
         return
     # a folder cannot be renamed onto a full one: the old campaign steps aside first
-    old = spare / "old"
+    former = spare / "old"
     if target.exists():
-        os.rename(target, old)
+        os.rename(target, former)
     try:
-        os.rename(made, target)
+        os.rename(draft, target)
     except OSError:
-        if old.exists():
-            os.rename(old, target)
+        if former.exists():
+            os.rename(former, target)
         raise
-    shutil.rmtree(old, ignore_errors=True)
+    shutil.rmtree(former, ignore_errors=True)
 
 
 def _write_hdf5(

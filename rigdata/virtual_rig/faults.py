@@ -107,9 +107,9 @@ def check_faults(faults: Iterable[Fault], runs: Iterable[str], channels: Iterabl
             raise VirtualRigError(f"fault {fault.kind!r}: no run matches {fault.run!r}")
         if fault.channel is not None and not any(fnmatchcase(c, fault.channel) for c in channels):
             raise VirtualRigError(f"fault {fault.kind!r}: no channel matches {fault.channel!r}; there are {channels}")
-        known = channels if fault.kind == "swapped" else runs
-        if fault.other is not None and fault.other not in known:
-            raise VirtualRigError(f"fault {fault.kind!r}: there is no {fault.other!r} among {known}")
+        candidates = channels if fault.kind == "swapped" else runs
+        if fault.other is not None and fault.other not in candidates:
+            raise VirtualRigError(f"fault {fault.kind!r}: there is no {fault.other!r} among {candidates}")
 
 
 def faulty_instruments(instruments: Instruments, faults: Iterable[Fault], run: str) -> Instruments:
@@ -148,8 +148,8 @@ def spoil_record(
         if fault.place != "record" or not fault.strikes(run):
             continue
         if fault.kind == "time_gap":
-            keep = ~_window(fault, time)
-            time, columns = time[keep], {name: v[keep] for name, v in columns.items()}
+            recorded = ~_window(fault, time)
+            time, columns = time[recorded], {name: v[recorded] for name, v in columns.items()}
         elif fault.kind == "time_jitter":
             spread = 0.2 if fault.value is None else fault.value
             time = time + np.clip(spread * rng.standard_normal(len(time)), -0.45, 0.45) / readings.rate

@@ -38,7 +38,7 @@ class Sensor:
     polarity: int = 1
     zero: float = 0.0
     span: float = 10.0
-    stated: tuple[tuple[str, str], ...] = ()
+    calibration: tuple[tuple[str, str], ...] = ()
     uncertainty: float = 0.0
     pad: int | None = None
     error: SensorError = SensorError()
@@ -46,34 +46,42 @@ class Sensor:
     @classmethod
     def probe(cls, name: str, axis: float, gap_voltage: float = 8.0) -> Sensor:
         """Eddy-current probe of 7.78 mV/um: the reading falls as the shaft comes nearer."""
-        stated = (("sensitivity", "7.78 mV/um"),)
+        calibration = (("sensitivity", "7.78 mV/um"),)
         return cls(
-            name, "displacement", "V", 7.78e3, axis, polarity=-1, zero=gap_voltage, stated=stated, uncertainty=0.005
+            name,
+            "displacement",
+            "V",
+            7.78e3,
+            axis,
+            polarity=-1,
+            zero=gap_voltage,
+            calibration=calibration,
+            uncertainty=0.005,
         )
 
     @classmethod
     def load_cell(cls, name: str, axis: float) -> Sensor:
         """Strain-gauge cell of 20 kN in a bridge: 2 mV/V at full scale, supplied with 5 V."""
-        stated = (("sensitivity", "2.0 mV/V"), ("full_scale", "20 kN"), ("excitation", "5 V"))
-        return cls(name, "force", "mV", 10.0 / 20e3, axis, span=10.0, stated=stated, uncertainty=0.002)
+        calibration = (("sensitivity", "2.0 mV/V"), ("full_scale", "20 kN"), ("excitation", "5 V"))
+        return cls(name, "force", "mV", 10.0 / 20e3, axis, span=10.0, calibration=calibration, uncertainty=0.002)
 
     @classmethod
     def accelerometer(cls, name: str, axis: float) -> Sensor:
         """Accelerometer of 10 mV/g on a converter of 0.05 V."""
-        stated = (("sensitivity", "10 mV/g"),)
-        return cls(name, "acceleration", "V", 10.0 * 1e-3 / STANDARD_GRAVITY, axis, span=0.05, stated=stated)
+        calibration = (("sensitivity", "10 mV/g"),)
+        return cls(name, "acceleration", "V", 10.0 * 1e-3 / STANDARD_GRAVITY, axis, span=0.05, calibration=calibration)
 
     @classmethod
     def thermometer(cls, name: str, pad: int) -> Sensor:
         """Pt100 with its amplifier, at three quarters of a pad's arc."""
-        stated = (("position", "0.75"), ("sensitivity", "15 K/V"), ("zero", "0 degC"))
-        return cls(name, "temperature", "V", 1 / 15.0, stated=stated, pad=pad)
+        calibration = (("position", "0.75"), ("sensitivity", "15 K/V"), ("zero", "0 degC"))
+        return cls(name, "temperature", "V", 1 / 15.0, calibration=calibration, pad=pad)
 
     @classmethod
     def tachometer(cls, name: str, mv_per_hz: float = 100.0) -> Sensor:
         """Speed as a voltage."""
-        stated = (("sensitivity", f"{mv_per_hz:g} mV/Hz"),)
-        return cls(name, "speed", "V", mv_per_hz * 1e-3 / hz(1.0), stated=stated)
+        calibration = (("sensitivity", f"{mv_per_hz:g} mV/Hz"),)
+        return cls(name, "speed", "V", mv_per_hz * 1e-3 / hz(1.0), calibration=calibration)
 
     def with_error(self, **changes: float) -> Sensor:
         """Return the sensor with these fields of its error replaced."""

@@ -161,11 +161,11 @@ def _channel(sensor: Sensor) -> str:
         entries["axis"] = _degrees(sensor.axis)
     if sensor.pad is not None:
         entries["pad"] = sensor.pad
-    for key, value in sensor.stated:
+    for key, value in sensor.calibration:
         if key == "position":
             entries[key] = float(value)
     entries["unit"] = sensor.unit
-    entries.update({key: value for key, value in sensor.stated if key != "position"})
+    entries.update({key: value for key, value in sensor.calibration if key != "position"})
     if sensor.polarity != 1:
         entries["polarity"] = sensor.polarity
     if sensor.uncertainty:

@@ -92,15 +92,15 @@ def run_facts(record: SimulatedRun) -> dict[str, object]:
 
 def _point(rig: VirtualRig, point: OperatingPoint) -> dict[str, object]:
     h = rig.truth.h(point)
-    seen = apparent_stiffness(h, point.excitation, rig.instruments)
+    readings = apparent_stiffness(h, point.excitation, rig.instruments)
     position = rig.truth.centre(replace(point, excitation=0.0))
     return {
         **_set_point(point),
         "excitation_Hz": point.excitation_hz,
         "K": h.real.tolist(),
         "C": (h.imag / point.excitation).tolist(),
-        "K_apparent": seen.real.tolist(),
-        "C_apparent": (seen.imag / point.excitation).tolist(),
+        "K_apparent": readings.real.tolist(),
+        "C_apparent": (readings.imag / point.excitation).tolist(),
         "x_m": float(position[0]),
         "y_m": float(position[1]),
         "pad_temperature_C": rig.truth.temperatures(replace(point, excitation=0.0)).tolist(),
@@ -149,19 +149,19 @@ def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instrumen
     do, and a sharp test of whoever evaluates the records.
     """
     lines = [answer(frequency, force, h, instruments) for force in np.eye(2, dtype=complex)]
-    seen = {}
+    readings = {}
     for quantity in ("displacement", "force", "acceleration"):
         phasors = np.stack([line.phasor(quantity) for line in lines], axis=1)
-        seen[quantity] = _reading_map(instruments, quantity, frequency) @ phasors
-    oil_force = seen["force"] + instruments.housing_mass * seen["acceleration"]
-    return oil_force @ np.linalg.inv(seen["displacement"])
+        readings[quantity] = _reading_map(instruments, quantity, frequency) @ phasors
+    oil_force = readings["force"] + instruments.housing_mass * readings["acceleration"]
+    return oil_force @ np.linalg.inv(readings["displacement"])
 
 
 def _reading_map(instruments: Instruments, quantity: str, frequency: float) -> ComplexArray:
     """Map (2, 2) from true to stated X and Y of a quantity, phasors at `frequency` [rad/s]; first pair of sensors."""
     pair = instruments.of(quantity)[:2]
-    stated = np.array([s.stated_direction for s in pair])
-    felt = np.array(
+    stated_axes = np.array([s.stated_direction for s in pair])
+    sensed = np.array(
         [s.error.gain * np.exp(-1j * frequency * s.error.delay) * felt_direction(s, instruments) for s in pair]
     )
-    return np.linalg.solve(stated.astype(complex), felt)
+    return np.linalg.solve(stated_axes.astype(complex), sensed)

@@ -185,7 +185,7 @@ def _actuator_forces(run: PlannedRun, noise: Noise, rng: np.random.Generator) ->
     forces: list[tuple[float, ComplexArray]] = []
     if run.direction is None:
         return forces
-    along = np.array([np.cos(run.direction), np.sin(run.direction)])
+    along = _unit(run.direction)
     across = np.array([-along[1], along[0]])
     defects = noise.actuators
     for frequency, amplitude in run.lines:
@@ -255,7 +255,7 @@ def dry_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Ru
         raise VirtualRigError(f"run {run.id} is not a dry pivot test")
     rng = stream(seed, run.record, "dry")
     pad = test.pad - 1
-    toward = np.array([np.cos(run.direction), np.sin(run.direction)])
+    toward = _unit(run.direction)
     sideways = np.array([-toward[1], toward[0]])
     time, load = load_history(test, run.rate)
     flaws = noise.dry
@@ -269,7 +269,7 @@ def dry_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Ru
     radial = truth.clearance[pad] + deflection - missing
     position = np.outer(radial, toward) + np.outer(side_start + side * (deflection - missing), sideways)
     direction = run.direction + off
-    motion = SlowMotion(time, position, np.outer(load, [np.cos(direction), np.sin(direction)]), _cold(truth))
+    motion = SlowMotion(time, position, np.outer(load, _unit(direction)), _cold(truth))
     facts = {
         "load_direction_error_deg": float(np.degrees(off)),
         "side_share": side,
@@ -343,8 +343,7 @@ def clearance_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int)
     direction = sweep.start + 2 * np.pi * time / sweep.seconds
     position = swept_position(truth, push, direction, sweep.slide_lag, sweep.slide_width)
     load = push * np.stack([np.cos(direction), np.sin(direction)], axis=1)
-    cold = np.full(len(truth.pivot_angles), truth.cold_temperature)
-    return RunPhysics(time, SlowMotion(time, position, load, cold), {"push_N": push})
+    return RunPhysics(time, SlowMotion(time, position, load, _cold(truth)), {"push_N": push})
 
 
 def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: float, width: float) -> FloatArray:
@@ -356,16 +355,16 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
     of the angle between them: there the side stands at clearance + deflection(that).
     """
     pads = _sides(truth)
-    normals = np.array([[np.cos(truth.pivot_angles[k]), np.sin(truth.pivot_angles[k])] for k in pads])
+    normals = np.array([_normal(truth, k) for k in pads])
     shares, places = [], []
     for i, pad in enumerate(pads):
         after = pads[(i + 1) % len(pads)]
-        here, there = truth.pivot_angles[pad], truth.pivot_angles[after]
-        gap = (there - here) % (2 * np.pi)
-        beyond = (direction - here - lag + np.pi) % (2 * np.pi) - np.pi
-        left = (there + lag - direction + np.pi) % (2 * np.pi) - np.pi
-        share = 0.25 * (1 + np.tanh(beyond / width)) * (1 + np.tanh(left / width))
-        turned = np.clip((direction - here + np.pi) % (2 * np.pi) - np.pi, 0.0, gap)
+        angle, next_angle = truth.pivot_angles[pad], truth.pivot_angles[after]
+        gap = (next_angle - angle) % (2 * np.pi)
+        passed = (direction - angle - lag + np.pi) % (2 * np.pi) - np.pi
+        remaining = (next_angle + lag - direction + np.pi) % (2 * np.pi) - np.pi
+        share = 0.25 * (1 + np.tanh(passed / width)) * (1 + np.tanh(remaining / width))
+        turned = np.clip((direction - angle + np.pi) % (2 * np.pi) - np.pi, 0.0, gap)
         forces = push * np.stack([np.sin(gap - turned), np.sin(turned)]) / np.sin(gap)
         reach = np.stack([truth.clearance[k] + truth.deflection(k + 1, f) for k, f in zip((pad, after), forces)])
         corner = np.linalg.solve(np.stack([normals[i], normals[(i + 1) % len(pads)]]), reach).T
@@ -377,8 +376,8 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
         # between two corners a blend of both would share the load among three pads
         alone = 4.0 * weight[i - 1] * weight[i]
         off = np.cos(direction - truth.pivot_angles[pad])
-        stands = truth.clearance[pad] + truth.deflection(pad + 1, push * np.maximum(off, 0.0))
-        position += (alone * (stands - position @ normals[i]))[:, None] * normals[i]
+        side = truth.clearance[pad] + truth.deflection(pad + 1, push * np.maximum(off, 0.0))
+        position += (alone * (side - position @ normals[i]))[:, None] * normals[i]
     return np.asarray(position)
 
 
@@ -419,5 +418,8 @@ def _corner(truth: RigTruth, first: int, second: int) -> FloatArray:
 
 
 def _normal(truth: RigTruth, pad: int) -> FloatArray:
-    angle = truth.pivot_angles[pad]
+    return _unit(truth.pivot_angles[pad])
+
+
+def _unit(angle: float) -> FloatArray:
     return np.array([np.cos(angle), np.sin(angle)])

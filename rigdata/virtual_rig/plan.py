@@ -131,11 +131,11 @@ class RigPlan:
             *self._dry_runs(pivot_angles),
             *self._clearance_runs(),
         )
-        seen: set[str] = set()
+        ids: set[str] = set()
         for run in runs:
-            if run.id in seen:
+            if run.id in ids:
                 raise VirtualRigError(f"the plan has two runs with the id {run.id!r}; every test only once")
-            seen.add(run.id)
+            ids.add(run.id)
         if not runs:
             raise VirtualRigError("the plan is empty; give it at least one test")
         return runs

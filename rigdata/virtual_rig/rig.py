@@ -91,7 +91,7 @@ class VirtualRig:
         """Simulate a run, or the one whose record was copied in its place."""
         for fault in self.faults_of(run.record):
             if fault.kind == "duplicate_run":
-                copied = next(other for other in self.runs() if other.id == fault.other)
+                copied = next(candidate for candidate in self.runs() if candidate.id == fault.other)
                 return replace(self._simulate(copied), run=run)
         return self._simulate(run)
 

@@ -81,14 +81,14 @@ def draw_glitches(instruments: Instruments, noise: Noise, samples: int, seed: in
     rules = noise.glitches
     channels = [s for s in instruments.sensors if s.quantity in ("displacement", "force")]
     rng = stream(seed, run, "glitches")
-    found: list[Glitch] = []
-    while channels and len(found) < 4 and rng.uniform() < rules.share:
+    glitches: list[Glitch] = []
+    while channels and len(glitches) < 4 and rng.uniform() < rules.share:
         sensor = channels[rng.integers(len(channels))]
         largest = rules.displacement if sensor.quantity == "displacement" else rules.force
         count = min(int(rng.integers(rules.shortest, rules.longest, endpoint=True)), samples)
         size = float(rng.uniform(0.4, 1.0) * largest * rng.choice([-1.0, 1.0]))
-        found.append(Glitch(sensor.name, int(rng.integers(0, samples - count + 1)), count, size))
-    return tuple(found)
+        glitches.append(Glitch(sensor.name, int(rng.integers(0, samples - count + 1)), count, size))
+    return tuple(glitches)
 
 
 def add_glitches(columns: dict[str, FloatArray], instruments: Instruments, glitches: Iterable[Glitch]) -> None:

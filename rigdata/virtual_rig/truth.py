@@ -118,8 +118,8 @@ def hz(frequency: float) -> float:
     return 2 * pi * frequency
 
 
-def _checked(values: Any, shape: tuple[int, ...], what: str) -> FloatArray:
+def _checked(values: Any, shape: tuple[int, ...], name: str) -> FloatArray:
     array = np.asarray(values, dtype=float)
     if array.shape != shape or not np.isfinite(array).all():
-        raise VirtualRigError(f"{what} must be finite with shape {shape}, got shape {array.shape}")
+        raise VirtualRigError(f"{name} must be finite with shape {shape}, got shape {array.shape}")
     return array
