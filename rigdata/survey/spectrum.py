@@ -33,6 +33,7 @@ class Look:
     deviation: float
     low: float
     high: float
+    #: (m,) each: Hz, unit of the signal
     frequency: FloatArray = field(repr=False)
     amplitude: FloatArray = field(repr=False)
     lines: tuple[SpectralPeak, ...] = ()
@@ -44,7 +45,7 @@ class Look:
 
 
 def look_at(values: FloatArray, rate: float) -> Look:
-    """Take a first look at a channel."""
+    """Take a first look at a channel's `values` (n,)."""
     good = np.isfinite(values)
     finite = values[good]
     empty = np.empty(0)
@@ -66,7 +67,7 @@ def look_at(values: FloatArray, rate: float) -> Look:
 
 
 def amplitude_spectrum(values: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Peak amplitudes over frequency [Hz], Hann window, straight trend taken off; empty if there is too little.
+    """Peak amplitudes (m,) over frequency (m,) [Hz] of values (n,), Hann window, no trend; empty if there are too few.
 
     Gaps are filled in between, which is good enough for a look and for nothing else.
     """

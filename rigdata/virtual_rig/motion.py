@@ -61,7 +61,9 @@ class Motion(Protocol):
 class MotionLine:
     """One spectral line, phasors of exp(+i omega t)."""
 
+    #: rad/s
     frequency: float
+    #: (2,) each: N, m, N, m/s^2
     oil_force: ComplexArray
     displacement: ComplexArray
     cell_force: ComplexArray
@@ -76,15 +78,19 @@ class MotionLine:
 class SteadyMotion:
     """A mean state with spectral lines on it."""
 
+    #: (2,) each: m, N
     position: FloatArray
     load: FloatArray
     lines: tuple[MotionLine, ...]
+    #: (n_pads,), degC
     temperature: FloatArray
+    #: rad/s
     speed: float
+    #: (n_orders,), runout of 1X, 2X, ... [m]
     surface: ComplexArray
 
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
-        """See `Motion`."""
+        """See `Motion`; (n, 2) at `time` (n,) [s]."""
         mean = {"displacement": self.position, "force": self.load}.get(quantity, np.zeros(2))
         out = np.broadcast_to(mean, (len(time), 2)).copy()
         for line in self.lines:
@@ -105,9 +111,12 @@ class SteadyMotion:
 class SlowMotion:
     """A quasi-static test, given on a time grid: no accelerations, no rotation."""
 
+    #: (n,), s
     time: FloatArray
+    #: (n, 2) each: m, N
     position: FloatArray
     load: FloatArray
+    #: (n_pads,), degC
     temperature: FloatArray
     speed: float = 0.0
 
@@ -129,6 +138,7 @@ class SlowMotion:
 class RunPhysics:
     """A run as it really was."""
 
+    #: (n,), s
     time: FloatArray = field(repr=False)
     motion: Motion = field(repr=False)
     facts: Mapping[str, object]
