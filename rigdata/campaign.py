@@ -300,7 +300,7 @@ def _named_file(folder: Path, file: str, files: dict[str, Path]) -> Callable[[st
 
 @dataclass(frozen=True)
 class _Opened:
-    """What of a campaign stands on the disk: folder or file, text of the bearing, every file that was read."""
+    """A campaign on the disk: folder or file, text of the bearing, every file that was read."""
 
     path: Path
     bearing: str

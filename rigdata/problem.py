@@ -1,4 +1,4 @@
-"""What is wrong with an export, said so that the person at the rig can mend it."""
+"""What is wrong with an export, in words with which the person at the rig can repair it."""
 
 from __future__ import annotations
 

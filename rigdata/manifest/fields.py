@@ -34,7 +34,7 @@ RAW = ("table", "list", "sign", "calibration")
 
 @dataclass(frozen=True)
 class Field:
-    """One key of a table: what it holds, what it means, and what stands where it is not stated."""
+    """One key of a table: what it holds, what it means, and its default."""
 
     key: str
     #: a dimension of `rigdata.units`, "text", "choice" (of `known`), "whole" (number), or one of `RAW`

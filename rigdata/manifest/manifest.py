@@ -94,7 +94,7 @@ def _load_toml(text: str, file: str) -> dict[str, Any]:
         if len(line) > MAX_LINE or (line.count(".") > MAX_DOTS and _QUOTED.sub("", line).count(".") > MAX_DOTS):
             message = "the line is far too long, or nests far too deeply"
             raise refuse(file, f"line {number}", message, "Shorten or break it")
-    cure = "Mend the TOML at this place"
+    cure = "Repair the TOML at this place"
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -1,4 +1,4 @@
-"""A commented draft of a manifest: what the exports tell is filled in, what they cannot tell is marked."""
+"""A commented draft of a manifest: what the exports show is filled in, the remainder is marked."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _one_direction(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
         return angle - group[-1] <= _ALIKE and angle - group[0] <= 2 * _ALIKE
 
     def rounded(middle: float) -> float:
-        nearby = 45.0 * round(middle / 45.0)  # an axis, or between two; pads may stand anywhere
+        nearby = 45.0 * round(middle / 45.0)  # an axis, or between two; pads may be anywhere
         return nearby if abs(nearby - middle) <= _ALIKE / 2 else middle
 
     set_points = _common([r.direction for r in runs], close, rounded)
@@ -182,7 +182,7 @@ def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
         "# Signs and frame: docs/guide/mounting.md",
         'schema = "tpjb-rig/1"',
         f"id = {_toml_string(name)}",
-        f"bearing = {_toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # bearing file, beside this one',
+        f"bearing = {_toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # bearing file, in this folder',
         'description = ""',
         "",
         "[housing]",

@@ -51,7 +51,7 @@ def guess_channel(name: str, unit: str) -> ChannelGuess:
         return ChannelGuess(by_unit, usable, _axis(name, by_unit), f"by its unit {usable}")
     if by_name:
         return ChannelGuess(by_name, usable, _axis(name, by_name), "by its name")
-    return ChannelGuess("", usable, "", "neither name nor unit tell")
+    return ChannelGuess("", usable, "", "neither by its name nor by its unit")
 
 
 def usable_unit(unit: str) -> str:
@@ -139,7 +139,7 @@ def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
     stem = export.name.rpartition("/")[2]
     name_kind = next((k for k, pattern in _BY_NAME if re.search(pattern, stem, re.IGNORECASE)), "")
     movement, why = _by_movement(forces, moves, lines)
-    kind, reason = name_kind or movement, "by its name" if name_kind else "nothing tells"
+    kind, reason = name_kind or movement, "by its name" if name_kind else "not known"
     if movement == kind and movement:
         reason = why
     elif movement and {movement, name_kind} != {"dynamic", "locus"}:

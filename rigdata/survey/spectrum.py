@@ -8,7 +8,7 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 
-#: A line must stand this far out of the median of its neighbourhood to be named.
+#: A line must exceed by this factor the median of its neighbourhood to be named.
 _STANDS_OUT = 8.0
 _NEIGHBOURS = 25
 #: Lines that a first look names.
@@ -85,7 +85,7 @@ def amplitude_spectrum(values: FloatArray, rate: float) -> tuple[FloatArray, Flo
 
 
 def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> tuple[SpectralPeak, ...]:
-    """Name the strongest peaks that stand out of their neighbourhood; slow drift below four bins is no line."""
+    """The strongest peaks well above their neighbourhood; slow drift below four bins is no line."""
     peaks: list[SpectralPeak] = []
     if len(amplitude) < 16:
         return ()

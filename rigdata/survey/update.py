@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import refuse
 from rigdata.readers.series import is_time, seconds
 from rigdata.survey.draft import MARK, Survey, channel_blocks, run_lines, survey
 from rigdata.survey.exports import Export
@@ -16,7 +16,7 @@ from rigdata.survey.guess import ChannelGuess
 
 @dataclass
 class _Block:
-    """A table of a manifest: its header, its lines as they stand, and what they say."""
+    """A table of a manifest: its header, its lines, and what they mean."""
 
     kind: str
     name: str
@@ -29,9 +29,7 @@ def _known_channels(text: str) -> dict[str, ChannelGuess]:
     try:
         tables = tomllib.loads(text).get("channels", {})
     except tomllib.TOMLDecodeError as error:
-        raise RigDataError(
-            Problem("error", "campaign.toml", "", f"not valid TOML: {error}", "Mend it first")
-        ) from error
+        raise refuse("campaign.toml", "", f"not valid TOML: {error}", "Repair it first") from error
     return {
         str(name): ChannelGuess(_text(t, "quantity"), _text(t, "unit"), _text(t, "axis"), "as the manifest says")
         for name, t in tables.items()
@@ -120,7 +118,7 @@ def _update_runs(blocks: list[_Block], before: Survey, after: Survey, changes: l
 
 
 def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, changes: list[str]) -> None:
-    """Put new guesses where the old ones or open places still stand, and add what is lacking."""
+    """Put new guesses in place of old ones and of open places, and add what is lacking."""
     guessed, wanted = _values(old), _values(new)
     lines, have = [], set()
     for line in block.lines:

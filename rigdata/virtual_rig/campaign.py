@@ -154,10 +154,10 @@ def _write_record(
         stored = record.readings.time[: 0 if empty else None]
         group.create_dataset(layout.time_name, data=stored, **_options(len(stored), layout))
     for name, values in record.readings.columns.items():
-        if any(f.kind == "missing_channel" and f.strikes(record.run.id, name) for f in faults):
+        if any(f.kind == "missing_channel" and f.affects(record.run.id, name) for f in faults):
             continue
         count = 0 if empty else len(values)
-        if any(f.kind == "short_channel" and f.strikes(record.run.id, name) for f in faults):
+        if any(f.kind == "short_channel" and f.affects(record.run.id, name) for f in faults):
             count = count * 3 // 4
         data = values[:count].astype(np.dtype(precision))
         group.create_dataset(name, data=data, **_options(count, layout))
@@ -196,8 +196,8 @@ def _write_csv(
 
 
 def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout, faults: tuple[Fault, ...]) -> str:
-    sensors = [s for s in rig.instruments.sensors if not _struck("missing_channel", faults, s.name)]
-    twice = [s for s in sensors if _struck("duplicate_column", faults, s.name)]
+    sensors = [s for s in rig.instruments.sensors if not _affected("missing_channel", faults, s.name)]
+    twice = [s for s in sensors if _affected("duplicate_column", faults, s.name)]
     names = [s.name for s in (*sensors, *twice)]
     units = [s.unit for s in (*sensors, *twice)]
     columns = [record.readings.columns[name] for name in names]
@@ -240,5 +240,5 @@ def _time_form(rate: float) -> str:
     return "%.6f" if (1e6 / rate).is_integer() else "%.9f"
 
 
-def _struck(kind: str, faults: tuple[Fault, ...], channel: str) -> bool:
-    return any(f.kind == kind and f.strikes("*", channel) for f in faults)
+def _affected(kind: str, faults: tuple[Fault, ...], channel: str) -> bool:
+    return any(f.kind == kind and f.affects("*", channel) for f in faults)

@@ -24,7 +24,7 @@ Place = Literal["sensor", "record", "run", "file"]
 KINDS: dict[str, tuple[Place, str]] = {
     "scaled": ("sensor", "readings are `value` times the truth"),
     "delayed": ("sensor", "recorded `value` seconds late"),
-    "rotated": ("sensor", "the sensor stands `value` rad from its stated axis"),
+    "rotated": ("sensor", "the sensor is `value` rad off its stated axis"),
     "offset": ("sensor", "`value` (SI) is added"),
     "crosstalk": ("sensor", "also reads this fraction `value` of the other axis"),
     "dead": ("record", "reads `value` (default 0) all the time"),
@@ -33,7 +33,7 @@ KINDS: dict[str, tuple[Place, str]] = {
     "swapped": ("record", "exchanged with the channel `other`"),
     "inverted": ("record", "wired the wrong way round: the reading has the wrong sign"),
     "nan_gap": ("record", "no value from `start` for `length`"),
-    "glitch": ("record", "stands off by `value` (SI) from `start` for `length`"),
+    "glitch": ("record", "is off by `value` (SI) from `start` for `length`"),
     "time_gap": ("record", "rows from `start` for `length` are missing in all channels"),
     "time_jitter": ("record", "time stamps scatter by `value` (default 0.2) of a sample"),
     "missing_excitation": ("run", "the actuators were off"),
@@ -43,7 +43,7 @@ KINDS: dict[str, tuple[Place, str]] = {
     "wrong_frequency": ("run", "the manifest's excitation frequency is off by `value` Hz"),
     "wrong_load": ("run", "the manifest's static load is `value` times the truth"),
     "missing_channel": ("file", "the file lacks the channel"),
-    "duplicate_column": ("file", "CSV: the column stands there twice"),
+    "duplicate_column": ("file", "CSV: the column is there twice"),
     "truncated_line": ("file", "CSV: the last line ends in the middle"),
     "short_channel": ("file", "HDF5: the dataset is shorter than the others"),
     "missing_file": ("file", "the run's file or group is not there"),
@@ -92,7 +92,7 @@ class Fault:
         """Where it sits."""
         return KINDS[self.kind][0]
 
-    def strikes(self, run: str, channel: str | None = None) -> bool:
+    def affects(self, run: str, channel: str | None = None) -> bool:
         """Whether it concerns a run, and a channel of it."""
         return fnmatchcase(run, self.run) and (
             channel is None or self.channel is None or fnmatchcase(channel, self.channel)
@@ -117,7 +117,7 @@ def faulty_instruments(instruments: Instruments, faults: Iterable[Fault], run: s
     sensors = list(instruments.sensors)
     for fault in faults:
         for i, sensor in enumerate(sensors):
-            if fault.place == "sensor" and fault.strikes(run, sensor.name) and fault.value is not None:
+            if fault.place == "sensor" and fault.affects(run, sensor.name) and fault.value is not None:
                 sensors[i] = _faulty_sensor(sensor, fault.kind, fault.value)
     return replace(instruments, sensors=tuple(sensors))
 
@@ -145,7 +145,7 @@ def spoil_record(
     columns = dict(readings.columns)
     time = readings.time
     for fault in faults:
-        if fault.place != "record" or not fault.strikes(run):
+        if fault.place != "record" or not fault.affects(run):
             continue
         if fault.kind == "time_gap":
             recorded = ~_window(fault, time)
@@ -157,7 +157,7 @@ def spoil_record(
             columns[fault.channel], columns[fault.other] = columns[fault.other], columns[fault.channel]
         else:
             for name in columns:
-                if fault.strikes(run, name):
+                if fault.affects(run, name):
                     sensor = instruments.named(name)
                     columns[name] = SPOIL[fault.kind](columns[name], fault, sensor, time)
     return Readings(time, columns, readings.rate)

@@ -121,8 +121,8 @@ class Instruments:
     def like_paper(cls, n_pads: int = 5, seed: int | None = None) -> Instruments:
         """Two probes at 45 and 135 deg, cells and accelerometers at 0 and 90 deg, a Pt100 per pad, a tacho.
 
-        With a `seed`, gap voltages and the zeros of accelerometers and Pt100s are drawn; without, the probes
-        stand at 8 V and everything else is at zero.
+        With a `seed`, gap voltages and the zeros of accelerometers and Pt100s are random; without, the probes
+        are at 8 V and everything else is at zero.
         """
         rng = None if seed is None else np.random.default_rng([seed, 0])
         gaps = (8.0, 8.0) if rng is None else tuple(rng.normal(8.0, 0.2, 2))

@@ -76,7 +76,7 @@ class CsvLayout:
 
     @classmethod
     def bare(cls) -> CsvLayout:
-        """Comma, point, no time column, not declared: the rate stands in the manifest only."""
+        """Comma, point, no time column, not declared: the rate is in the manifest only."""
         return cls(time_name=None, declared=False)
 
 
@@ -205,7 +205,7 @@ def _set_point(point: OperatingPoint) -> dict[str, object]:
 def _as_noted(run: PlannedRun, faults: tuple[Fault, ...]) -> PlannedRun:
     """Give the run as somebody noted it, with that person's mistakes."""
     for fault in faults:
-        if fault.value is None or fault.place != "run" or not fault.strikes(run.id):
+        if fault.value is None or fault.place != "run" or not fault.affects(run.id):
             continue
         if fault.kind == "wrong_pad" and isinstance(run.test, DryTest):
             run = replace(run, test=replace(run.test, pad=int(fault.value)))

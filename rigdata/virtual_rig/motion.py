@@ -130,7 +130,7 @@ class SlowMotion:
         return np.stack([np.interp(time, self.time, column) for column in values.T], axis=1)
 
     def runout(self, axis: float, time: FloatArray) -> FloatArray:
-        """See `Motion`: the shaft stands still, its runout is part of the gap voltage."""
+        """See `Motion`: the shaft does not turn, its runout is part of the gap voltage."""
         return np.zeros(len(time))
 
 
@@ -362,7 +362,7 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
     The shaft rests in the corner between the two pads that the load points between; each pivot carries its share
     of the load and gives by its own law. It slides along a pad's side to the next corner when the load has
     passed that pad by `lag`, over about `width` (friction). On its way that pad alone carries, push times the cosine
-    of the angle between them: there the side stands at clearance + deflection(that).
+    of the angle between them: there the side is at clearance + deflection(that).
     """
     pads = _sides(truth)
     normals = np.array([_normal(truth, k) for k in pads])

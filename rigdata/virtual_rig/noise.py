@@ -43,7 +43,7 @@ class ShaftDefects:
 
 @dataclass(frozen=True)
 class ActuatorDefects:
-    """What the actuators do beside the command."""
+    """What the actuators do in addition to the command."""
 
     harmonics: tuple[float, ...] = ()
     scatter: float = 0.0
@@ -63,7 +63,7 @@ class SetPointMiss:
 
 @dataclass(frozen=True)
 class Glitches:
-    """Bursts in which a displacement or force channel stands off by a constant."""
+    """Bursts in which a displacement or force channel is off by a constant."""
 
     share: float = 0.0
     shortest: int = 3

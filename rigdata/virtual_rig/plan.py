@@ -198,7 +198,7 @@ class RigPlan:
             yield PlannedRun(id=name, kind="clearance", rate=self.timing.dry_rate, record=name, test=sweep)
 
     def _name(self, point: OperatingPoint) -> str:
-        """Load, and whatever else tells the points of this plan apart."""
+        """Load, and whatever else distinguishes the points of this plan."""
         name = _load_name(point)
         if len({p.static_load_direction for p in self.dynamic}) > 1:
             name += f"-w{point.static_load_direction_deg:g}"

@@ -50,7 +50,7 @@ class VirtualRig:
         pads = {s.pad for s in self.instruments.of("temperature")}
         if any(p is None or not 1 <= p <= len(self.truth.pivot_angles) for p in pads):
             raise VirtualRigError(
-                f"temperature sensors stand in pads {sorted(map(str, pads))}, but the bearing has pads 1 to "
+                f"temperature sensors are in pads {sorted(map(str, pads))}, but the bearing has pads 1 to "
                 f"{len(self.truth.pivot_angles)}"
             )
         if self.faults:
@@ -85,7 +85,7 @@ class VirtualRig:
         if not self.faults:
             return ()
         members = [run.id for run in self.runs() if run.record == record]
-        return tuple(replace(f, run="*") for f in self.faults if any(f.strikes(member) for member in members))
+        return tuple(replace(f, run="*") for f in self.faults if any(f.affects(member) for member in members))
 
     def _recorded(self, run: PlannedRun) -> SimulatedRun:
         """Simulate a run, or the one whose record was copied in its place."""

@@ -16,7 +16,7 @@ from rigdata.virtual_rig.noise import ChannelNoise, Noise, stream
 
 @dataclass(frozen=True)
 class Glitch:
-    """One burst: a channel stands off by `size` (SI) over some samples."""
+    """One burst: a channel is off by `size` (SI) over some samples."""
 
     channel: str
     first: int

@@ -27,7 +27,7 @@ FIVE_PADS = tuple(np.radians([-90.0, -18.0, 54.0, 126.0, 198.0]).tolist())
 
 
 class VirtualRigError(RigError):
-    """The virtual rig was asked for something it cannot do; says what and how to mend it."""
+    """The virtual rig was asked for something it cannot do; says what and what to do."""
 
 
 @dataclass(frozen=True)

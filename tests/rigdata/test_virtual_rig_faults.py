@@ -218,4 +218,4 @@ def test_the_truth_tells_all_faults(tmp_path):
     truth = write_campaign(tmp_path / "c.h5", rig(fault))
     assert truth.faults == ({"kind": "dead", "run": FIRST, "channel": "X1A", "start": 0.0},)
     assert all(text for _, text in KINDS.values())
-    assert replace(fault, run="*").strikes(SECOND, "X1A")
+    assert replace(fault, run="*").affects(SECOND, "X1A")
