@@ -11,7 +11,6 @@ import numpy as np
 
 from model.arrays import ComplexArray, FloatArray
 from model.bearing import Bearing
-from model.conditions import Condition
 from model.dynamics.reduction import bearing_impedance, friction_regimes
 from model.effects import Effect, apply_effects
 from model.errors import ModelError, OptionError
@@ -23,6 +22,7 @@ from model.prediction import Prediction
 from model.setup import Mesh, Setup
 from model.statics.equilibrium import Equilibrium
 from model.statics.solve import solve_equilibrium
+from rigdata.problem import Condition
 from rigdata.units import UnitError, to_si
 
 #: No shaker excites faster [rad/s]; beyond, squares overflow.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal, Self
 
 Severity = Literal["error", "warning", "note"]
 
@@ -54,6 +54,28 @@ class Problem:
 
 def _escaped(character: str) -> str:
     return character if character == "\n" else character.encode("unicode_escape").decode("ascii")
+
+
+class Condition(str):
+    """What a result says of itself: a short name that compares like a string, and knows how much it matters."""
+
+    __slots__ = ("detail", "pads", "severity")
+    severity: Severity
+    detail: str
+    pads: tuple[int, ...]
+
+    def __new__(cls, name: str, severity: Severity, detail: str = "", pads: tuple[int, ...] = ()) -> Self:
+        """Make a condition from its name, its weight, its sentence and its pads."""
+        condition = super().__new__(cls, name)
+        condition.severity, condition.detail, condition.pads = severity, detail, pads
+        return condition
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Condition, (str(self), self.severity, self.detail, self.pads)
+
+    def sentence(self) -> str:
+        """Name and detail in one line."""
+        return f"{self!s}: {self.detail}" if self.detail else str(self)
 
 
 class RigDataError(RigError):

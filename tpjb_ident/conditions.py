@@ -3,39 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any, Self
 
-from rigdata.problem import Severity
+from rigdata import problem
 from tpjb_ident.condition_kinds import condition_kind
 
 
-class Condition(str):
-    """A name of the registry that compares like a string, with a sentence on what was found."""
+class Condition(problem.Condition):
+    """A name of the registry, with its severity there and a sentence on what was found."""
 
-    __slots__ = ("detail",)
-    detail: str
+    __slots__ = ()
 
-    def __new__(cls, name: str, detail: str = "") -> Condition:
+    def __new__(cls, name: str, detail: str = "") -> Self:
         """Make a condition from its name and its sentence."""
-        condition = super().__new__(cls, condition_kind(name).name)
-        condition.detail = detail
-        return condition
+        kind = condition_kind(name)
+        return super().__new__(cls, kind.name, kind.severity, detail)
 
-    def __reduce__(self) -> tuple[type[Condition], tuple[str, str]]:
+    def __reduce__(self) -> tuple[Any, ...]:
         return Condition, (str(self), self.detail)
-
-    @property
-    def severity(self) -> Severity:
-        """How grave it is: "error" forbids trust, "warning" needs a look, "note" is for information."""
-        return condition_kind(self).severity
 
     @property
     def meaning(self) -> str:
         """What it means to the reader, and what to do."""
         return condition_kind(self).meaning
-
-    def sentence(self) -> str:
-        """Name and detail in one line."""
-        return f"{self!s}: {self.detail}" if self.detail else str(self)
 
 
 def merged(*groups: tuple[Condition, ...]) -> tuple[Condition, ...]:

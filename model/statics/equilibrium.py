@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from model.arrays import FloatArray
-from model.conditions import Condition, has_answer
+from model.conditions import has_answer
 from model.statics.pad_film import PadFilm
+from rigdata.problem import Condition
 
 
 @dataclass(frozen=True)

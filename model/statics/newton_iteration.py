@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from model.arrays import FloatArray
-from model.conditions import Condition, has_answer
+from model.conditions import has_answer
 from model.film.oil_state import least_share
 from model.statics import conditions
 from model.statics.acceleration import Anderson
@@ -35,6 +35,7 @@ from model.statics.equilibrium import Equilibrium
 from model.statics.film_step import refine_derivatives, solve_films
 from model.statics.newton_step import newton_step
 from model.statics.search import Search
+from rigdata.problem import Condition
 
 #: A pad that tilts by this share of the largest tilt in the last step swings, too.
 SWINGING = 0.3

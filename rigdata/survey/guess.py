@@ -51,7 +51,7 @@ def guess_channel(name: str, unit: str) -> ChannelGuess:
         return ChannelGuess(by_unit, usable, _axis(name, by_unit), f"by its unit {usable}")
     if by_name:
         return ChannelGuess(by_name, usable, _axis(name, by_name), "by its name")
-    return ChannelGuess("", usable, "", "neither by its name nor by its unit")
+    return ChannelGuess("", usable, "", "name and unit are not known")
 
 
 def usable_unit(unit: str) -> str:

@@ -66,7 +66,7 @@ def test_a_channel_that_was_given_its_quantity_gets_the_entries_that_it_lacks(fo
     record(folder / "test-5kN.csv", ("Time", "Dev1_ai0", "Dev1_ai1", "FH [N]", "FV [N]"))
     tpjb("init", folder)
     manifest = folder / "campaign.toml"
-    why = 'quantity = "ignore"   # (guess) neither by its name nor by its unit; or displacement, force, acceleration, ..'
+    why = 'quantity = "ignore"   # (guess) name and unit are not known; or displacement, force, acceleration, ..'
     edit(manifest, (why, 'quantity = "displacement"'))
     result = tpjb("init", folder, "--update")
     assert "channel Dev1_ai0: axis '?? deg' added" in result.stdout
