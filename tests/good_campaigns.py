@@ -49,6 +49,9 @@ from rigdata.virtual_rig.layout import CsvLayout, Layout, layout_named
 BEARINGS = Path(__file__).resolve().parents[1] / "model" / "bearings"
 STIFFNESS = np.array([[3.0e8, 0.2e8], [-0.3e8, 4.5e8]])
 DAMPING = np.array([[5e5, 2e4], [1e4, 7e5]])
+#: Of a bearing with strong cross coupling, for the tests of the virtual rig itself.
+CROSS_STIFFNESS = np.array([[2.0e8, 1.3e7], [-1.1e7, 4.0e8]])
+CROSS_DAMPING = np.array([[4.0e5, 2.0e4], [1.0e4, 6.0e5]])
 #: Of the rig with the rocker bearing file.
 ROCKER_STIFFNESS = np.array([[1.0e8, 2e6], [1e6, 2.0e8]])
 ROCKER_DAMPING = np.array([[5e5, 1e4], [1e4, 7e5]])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,40 +16,24 @@ from rigdata.survey.draft import MARK, draft_manifest, survey
 from rigdata.survey.exports import Export, read_exports, record_files
 from rigdata.survey.guess import guess_channel, guess_run, usable_unit
 from rigdata.survey.spectrum import look_at
+from rigdata.virtual_rig import DryTest, locus_points, operating_points
+from tests.good_campaigns import SMALL_PLAN, rocker_rig
 from tpjb_ident.check.campaign import check_campaign
 
 RATE = 1000.0
 
 
 @pytest.fixture(scope="module")
-def exports(tmp_path_factory):
+def exports(campaign_of, tmp_path_factory):
     """CSV folder of a virtual rig, in German spelling, its manifest taken away."""
-    from rigdata.virtual_rig import (
-        ClearanceSweep,
-        DryTest,
-        Instruments,
-        Noise,
-        RigPlan,
-        RigTruth,
-        Timing,
-        VirtualRig,
-        locus_points,
-        operating_points,
-        write_campaign,
-    )
-
-    plan = RigPlan(
+    plan = replace(
+        SMALL_PLAN,
         dynamic=operating_points([(2500.0, 25.0), (5000.0, 40.0)]),
         directions=(0.0, math.pi / 2),
         locus=locus_points(2, load=1000.0),
         dry=(DryTest(1, levels=(500.0, 1000.0, 2000.0)),),
-        clearance=(ClearanceSweep(seconds=6.0),),
-        timing=Timing(dynamic_seconds=1.0),
     )
-    truth = RigTruth.constant(np.diag([1e8, 2e8]), np.diag([5e5, 7e5]), bearing_text='schema = "tpjb-bearing/1"\n')
-    rig = VirtualRig(truth, plan, Instruments.like_paper(5, 3), Noise.like_samples(), seed=3)
-    folder = tmp_path_factory.mktemp("exports") / "rig"
-    write_campaign(folder, rig, "csv-german")
+    folder = shutil.copytree(campaign_of(rocker_rig(3, plan=plan), "csv-german"), tmp_path_factory.mktemp("e") / "rig")
     text = (folder / "campaign.toml").read_text(encoding="utf-8")
     (folder / "campaign.toml").unlink()
     return folder, text

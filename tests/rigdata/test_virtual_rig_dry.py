@@ -195,20 +195,6 @@ def test_sweep_goes_once_around_with_its_push():
     assert columns["K1"][0] == 0.0
 
 
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"levels": (500.0, 400.0)}, "levels must rise"),
-        ({"hold": (1.0, 2.0)}, "2 values for 10 levels"),
-        ({"ramp": 0.0}, "ramp must be positive"),
-        ({"branch": "sideways"}, "branch must be"),
-    ],
-)
-def test_impossible_dry_tests_are_refused(fields, message):
-    with pytest.raises(VirtualRigError, match=message):
-        DryTest(1, **fields)
-
-
 def test_a_law_of_the_wrong_shape_is_refused():
     truth = replace(TRUTH, pivot_deflection=lambda pad, load: 1e-6)
     rig = VirtualRig(truth, RigPlan(dry=(DryTest(1),)), noise=Noise.none())

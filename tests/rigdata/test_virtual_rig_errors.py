@@ -20,9 +20,9 @@ from rigdata.virtual_rig import (
     operating_points,
 )
 from rigdata.virtual_rig.ledger import apparent_stiffness, campaign_truth
+from tests.good_campaigns import CROSS_DAMPING as C
+from tests.good_campaigns import CROSS_STIFFNESS as K
 
-K = np.array([[2.0e8, 1.3e7], [-1.1e7, 4.0e8]])
-C = np.array([[4.0e5, 2.0e4], [1.0e4, 6.0e5]])
 OMEGA = 2 * np.pi * 40.0
 H = K + 1j * OMEGA * C
 RIGID = replace(Instruments.like_paper(), cell_stiffness=(math.inf, math.inf))

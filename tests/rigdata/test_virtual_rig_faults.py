@@ -24,10 +24,10 @@ from rigdata.virtual_rig import (
     write_campaign,
 )
 from rigdata.virtual_rig.faults import KINDS, SPOIL
+from tests.good_campaigns import CROSS_DAMPING as C
+from tests.good_campaigns import CROSS_STIFFNESS as K
 from tpjb_ident.check.campaign import check_campaign
 
-K = np.array([[2.0e8, 1.3e7], [-1.1e7, 4.0e8]])
-C = np.array([[4.0e5, 2.0e4], [1.0e4, 6.0e5]])
 FIRST, SECOND = "d-05000-25-01", "d-05000-25-02"
 
 
@@ -138,16 +138,14 @@ def test_time_jitter_keeps_the_order():
     assert np.std(record.time - np.arange(2000) / 1000) == pytest.approx(0.3e-3 * 0.85, rel=0.1)
 
 
-def test_wrong_notes_stand_in_the_manifest_only(tmp_path):
+def test_wrong_notes_are_in_the_manifest_only(campaign_of):
     faults = (
         Fault("wrong_pad", "p-2-up", value=4),
         Fault("wrong_direction", FIRST, value=np.pi / 2),
         Fault("wrong_frequency", SECOND, value=5.0),
         Fault("wrong_load", SECOND, value=2.0),
     )
-    write_campaign(tmp_path / "wrong.h5", rig(*faults, seconds=0.5))
-    write_campaign(tmp_path / "right.h5", rig(seconds=0.5))
-    wrong, right = (rigdata.load_campaign(tmp_path / f"{n}.h5") for n in ("wrong", "right"))
+    wrong, right = (rigdata.load_campaign(campaign_of(r)) for r in (rig(*faults, seconds=0.5), rig(seconds=0.5)))
     assert wrong.run("p-2-up").pad == 4
     assert wrong.run(FIRST).excitation_direction == pytest.approx(0.3 + np.pi / 2)
     assert wrong.run(SECOND).point.excitation_hz == 30.0
@@ -171,38 +169,40 @@ FILE_FAULTS = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("layout", "fault"), FILE_FAULTS, ids=lambda v: v if isinstance(v, str) else v.kind)
-def test_the_reader_reports_file_faults_of_that_run_only(tmp_path, layout, fault):
-    target = tmp_path / ("c.h5" if layout == "hdf5" else "c")
-    write_campaign(target, rig(fault, seconds=0.8), layout)
-    problems = check_campaign(target)
+def test_the_reader_reports_file_faults_of_that_run_only(campaign_of, layout, fault):
+    problems = check_campaign(campaign_of(rig(fault, seconds=0.8), layout))
     assert problems
     assert {p.run for p in problems} == {FIRST}
 
 
-def test_missing_values_are_nan_in_every_layout(tmp_path):
+LAYOUTS = [Hdf5Layout(), *(CsvLayout(missing=m, delimiter=";") for m in ("", "NaN", "-", "#N/A"))]
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_missing_values_are_nan_in_every_layout(campaign_of, layout):
     fault = Fault("nan_gap", FIRST, "X1A", start=0.5, length=0.1)
-    layouts = [Hdf5Layout(), *(CsvLayout(missing=m, delimiter=";") for m in ("", "NaN", "-", "#N/A"))]
-    for number, layout in enumerate(layouts):
-        write_campaign(tmp_path / f"c{number}", rig(fault, seconds=0.8), layout)
-        values = rigdata.load_campaign(tmp_path / f"c{number}").run(FIRST).record("X1A").values
-        assert np.flatnonzero(np.isnan(values)).tolist() == list(range(500, 600))
+    values = rigdata.load_campaign(campaign_of(rig(fault, seconds=0.8), layout)).run(FIRST).record("X1A").values
+    assert np.flatnonzero(np.isnan(values)).tolist() == list(range(500, 600))
 
 
-def test_unknown_useless_and_incomplete_faults_are_refused(tmp_path):
-    with pytest.raises(VirtualRigError, match="did you mean 'swapped'"):
-        Fault("swaped", FIRST, "X1A", other="X1B")
-    with pytest.raises(VirtualRigError, match="needs channel"):
-        Fault("dead", FIRST)
-    with pytest.raises(VirtualRigError, match="needs value"):
-        Fault("scaled", FIRST, "X1A")
-    with pytest.raises(VirtualRigError, match="needs other"):
-        Fault("duplicate_run", FIRST)
-    with pytest.raises(VirtualRigError, match="no run matches 'd-9"):
-        rig(Fault("dead", "d-9*", "X1A"))
-    with pytest.raises(VirtualRigError, match="no channel matches 'Q'"):
-        rig(Fault("dead", FIRST, "Q"))
-    with pytest.raises(VirtualRigError, match="there is no 'Q'"):
-        rig(Fault("swapped", FIRST, "X1A", other="Q"))
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [
+        ({"kind": "swaped", "channel": "X1A", "other": "X1B"}, "did you mean 'swapped'"),
+        ({"kind": "dead"}, "needs channel"),
+        ({"kind": "scaled", "channel": "X1A"}, "needs value"),
+        ({"kind": "duplicate_run"}, "needs other"),
+        ({"kind": "dead", "run": "d-9*", "channel": "X1A"}, "no run matches 'd-9"),
+        ({"kind": "dead", "channel": "Q"}, "no channel matches 'Q'"),
+        ({"kind": "swapped", "channel": "X1A", "other": "Q"}, "there is no 'Q'"),
+    ],
+)
+def test_unknown_useless_and_incomplete_faults_are_refused(fault, says):
+    with pytest.raises(VirtualRigError, match=says):
+        rig(Fault(**{"run": FIRST, **fault}))
+
+
+def test_faults_that_a_layout_cannot_show_are_refused(tmp_path):
     for fault, layout in (
         (Fault("truncated_line", FIRST), "hdf5"),
         (Fault("short_channel", FIRST, "X1A"), "csv"),

@@ -23,9 +23,9 @@ from rigdata.virtual_rig import (
     operating_points,
 )
 from rigdata.virtual_rig.sensing import channel_noise, converter_step, draw_glitches, flicker, slow_drift
+from tests.good_campaigns import CROSS_DAMPING as C
+from tests.good_campaigns import CROSS_STIFFNESS as K
 
-K = np.array([[2.0e8, 1.3e7], [-1.1e7, 4.0e8]])
-C = np.array([[4.0e5, 2.0e4], [1.0e4, 6.0e5]])
 TRUTH = RigTruth.constant(K, C)
 LONG = Timing(locus_seconds=20.0)
 

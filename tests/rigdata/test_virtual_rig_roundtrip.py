@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import time
 from dataclasses import replace
@@ -27,10 +26,10 @@ from rigdata.virtual_rig import (
     operating_points,
     write_campaign,
 )
+from tests.good_campaigns import CROSS_DAMPING as C
+from tests.good_campaigns import CROSS_STIFFNESS as K
 from tpjb_ident.check.campaign import check_campaign
 
-K = np.array([[2.0e8, 1.3e7], [-1.1e7, 4.0e8]])
-C = np.array([[4.0e5, 2.0e4], [1.0e4, 6.0e5]])
 LAYOUTS = {"hdf5": 1e-9, "csv": 1e-6, "csv-german": 1e-6, "csv-tabbed": 1e-6, "csv-bare": 1e-6}
 
 
@@ -50,37 +49,30 @@ def quiet_rig(**changes) -> VirtualRig:
     return replace(rig, **changes)
 
 
-def phasor(run, quantity, omega):
+def phasor(run, quantity, frequencies=None):
+    """Phasor (2,) of a run's own line, where the record holds these lines [Hz]."""
     record = run.vector(quantity)
-    design = np.stack([np.ones(len(record)), np.cos(omega * record.time), np.sin(omega * record.time)], axis=1)
+    frequencies = frequencies or [run.point.excitation_hz]
+    turns = 2 * np.pi * np.outer(record.time, frequencies)
+    design = np.hstack([np.ones((len(record), 1)), np.cos(turns), np.sin(turns)])
     fit = np.linalg.lstsq(design, record.values, rcond=None)[0]
-    return fit[1] - 1j * fit[2]
+    own = 1 + frequencies.index(run.point.excitation_hz)
+    return fit[own] - 1j * fit[own + len(frequencies)]
 
 
-def fitted_stiffness(runs, housing_mass=30.0):
-    omega = runs[0].point.excitation
-    d = np.array([phasor(run, "displacement", omega) for run in runs])
-    f = np.array([phasor(run, "force", omega) + housing_mass * phasor(run, "acceleration", omega) for run in runs])
-    return np.linalg.solve(d, f).T
+def oil_force(run, frequencies=None):
+    return phasor(run, "force", frequencies) + 30.0 * phasor(run, "acceleration", frequencies)
 
 
-@pytest.fixture(scope="module")
-def quiet(tmp_path_factory):
-    """The campaign without noise in any layout."""
-
-    @functools.cache
-    def campaign(layout):
-        target = tmp_path_factory.mktemp(layout) / ("c.h5" if layout == "hdf5" else "c")
-        write_campaign(target, quiet_rig(), layout)
-        return rigdata.load_campaign(target)
-
-    return campaign
+def fitted_stiffness(runs):
+    d = np.array([phasor(run, "displacement") for run in runs])
+    return np.linalg.solve(d, np.array([oil_force(run) for run in runs])).T
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_noise_free_records_give_back_the_stiffness(quiet, layout):
-    runs = quiet(layout).of_kind("dynamic")
+def test_noise_free_records_give_back_the_stiffness(campaign_of, layout):
+    runs = rigdata.load_campaign(campaign_of(quiet_rig(), layout)).of_kind("dynamic")
     for frequency in (25.0, 40.0):
         omega = 2 * np.pi * frequency
         pair = [run for run in runs if run.point.excitation_hz == frequency]
@@ -91,20 +83,15 @@ SLOW = {"hdf5", "csv", "csv-german", "csv-bare"}
 
 
 @pytest.mark.parametrize("layout", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in LAYOUTS])
-def test_the_check_finds_nothing_in_a_sound_campaign(tmp_path, layout):
-    target = tmp_path / ("c.h5" if layout == "hdf5" else "c")
-    write_campaign(target, quiet_rig(noise=Noise.like_samples()), layout)
-    assert check_campaign(target) == []
+def test_the_check_finds_nothing_in_a_sound_campaign(campaign_of, layout):
+    assert check_campaign(campaign_of(quiet_rig(noise=Noise.like_samples()), layout)) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_means_temperatures_and_speed_come_back(tmp_path, layout):
+def test_means_temperatures_and_speed_come_back(campaign_of, layout):
     rig = quiet_rig(instruments=Instruments.like_paper())
-    target = tmp_path / ("c.h5" if layout == "hdf5" else "c")
-    write_campaign(target, rig, layout)
-    campaign = rigdata.load_campaign(target)
-    run = campaign.of_kind("locus")[1]
+    run = rigdata.load_campaign(campaign_of(rig, layout)).of_kind("locus")[1]
     # the probes' zero is 0 V: the bearing centre stands at the gap voltage of 8 V
     centre = -8.0 / 7.78e-3 * 1e-6 * np.array([math.cos(math.pi / 4) + math.cos(3 * math.pi / 4), math.sqrt(2)])
     position = run.vector("displacement").values.mean(axis=0) - centre
@@ -117,8 +104,9 @@ def test_means_temperatures_and_speed_come_back(tmp_path, layout):
     np.testing.assert_allclose(run.record("K1").values, 2 * np.pi * 22.0, atol=1e-6)
 
 
-def test_manifest_set_points_are_those_of_the_plan(quiet):
-    rig, campaign = quiet_rig(), quiet("hdf5")
+def test_manifest_set_points_are_those_of_the_plan(campaign_of):
+    rig = quiet_rig()
+    campaign = rigdata.load_campaign(campaign_of(rig))
     for planned, found in zip(rig.runs(), campaign.runs, strict=True):
         assert (planned.id, planned.kind) == (found.id, found.kind)
         if planned.point is not None:
@@ -148,48 +136,32 @@ def test_stiffness_is_asked_at_the_point_really_run():
         np.testing.assert_allclose(h @ line.displacement, line.oil_force, rtol=1e-12, atol=1e-9)
 
 
-def test_frequencies_can_share_a_record(tmp_path):
-    plan = replace(small_plan(), joint_frequencies=True)
+def test_frequencies_can_share_a_record(campaign_of):
+    rig = quiet_rig(plan=replace(small_plan(), joint_frequencies=True))
     for layout in ("hdf5", "csv"):
-        target = tmp_path / layout
-        write_campaign(target, quiet_rig(plan=plan), layout)
-        campaign = rigdata.load_campaign(target)
+        campaign = rigdata.load_campaign(campaign_of(rig, layout))
         first, other = campaign.run("d-05000-25-01"), campaign.run("d-05000-40-01")
         np.testing.assert_array_equal(first.record("X1A").values, other.record("X1A").values)
         # each of two lines has 1/sqrt(2) of 10 % of 5 kN
         for run in (first, other):
-            force = phasor_joint(run, "force", [25.0, 40.0])[run.point.excitation_hz]
-            inertia = 30.0 * phasor_joint(run, "acceleration", [25.0, 40.0])[run.point.excitation_hz]
-            assert abs(force[0] + inertia[0]) == pytest.approx(500.0 / math.sqrt(2), rel=1e-5)
+            assert abs(oil_force(run, [25.0, 40.0])[0]) == pytest.approx(500.0 / math.sqrt(2), rel=1e-5)
 
 
-def phasor_joint(run, quantity, frequencies):
-    record = run.vector(quantity)
-    columns = [np.ones(len(record))]
-    for frequency in frequencies:
-        turn = 2 * np.pi * frequency * record.time
-        columns += [np.cos(turn), np.sin(turn)]
-    fit = np.linalg.lstsq(np.stack(columns, axis=1), record.values, rcond=None)[0]
-    return {f: fit[1 + 2 * i] - 1j * fit[2 + 2 * i] for i, f in enumerate(frequencies)}
-
-
-def test_probes_at_other_angles_and_engineering_units(tmp_path):
+def test_probes_at_other_angles_and_engineering_units(campaign_of):
     base = Instruments.like_paper()
     probes = (
         Sensor("DX", "displacement", "um", 1e6, math.radians(20.0), span=500.0),
         Sensor.probe("DY", math.radians(80.0)),
     )
     rig = quiet_rig(instruments=replace(base, sensors=(*probes, *base.sensors[2:])))
-    write_campaign(tmp_path / "c.h5", rig)
-    runs = rigdata.load_campaign(tmp_path / "c.h5").of_kind("dynamic")[:2]
+    runs = rigdata.load_campaign(campaign_of(rig)).of_kind("dynamic")[:2]
     np.testing.assert_allclose(fitted_stiffness(runs), K + 1j * runs[0].point.excitation * C, rtol=1e-9)
 
 
 @pytest.mark.slow
-def test_the_check_finds_nothing_in_a_whole_short_campaign(tmp_path):
+def test_the_check_finds_nothing_in_a_whole_short_campaign(campaign_of):
     rig = VirtualRig(RigTruth.constant(K, C), RigPlan.short(), Instruments.like_paper(seed=2), seed=4)
-    write_campaign(tmp_path / "c.h5", rig)
-    assert check_campaign(tmp_path / "c.h5") == []
+    assert check_campaign(campaign_of(rig)) == []
 
 
 @pytest.mark.slow

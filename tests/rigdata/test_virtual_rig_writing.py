@@ -60,10 +60,8 @@ def test_same_seed_same_bytes_other_seed_other_bytes(tmp_path, layout):
     assert all(other[name] != code for name, code in digest(tmp_path / "a").items() if "run" in name or name == ".")
 
 
-def test_both_forms_hold_the_same_readings(tmp_path):
-    write_campaign(tmp_path / "c.h5", rig())
-    write_campaign(tmp_path / "c", rig(), "csv-german")
-    one, other = rigdata.load_campaign(tmp_path / "c.h5"), rigdata.load_campaign(tmp_path / "c")
+def test_both_forms_hold_the_same_readings(campaign_of):
+    one, other = (rigdata.load_campaign(campaign_of(rig(), layout)) for layout in ("hdf5", "csv-german"))
     for run in one.runs:
         for name in ("X1A", "L1V", "A1H", "T5", "K1"):
             first, second = run.record(name).values, other.run(run.id).record(name).values
@@ -135,44 +133,35 @@ def test_a_rigid_rig_has_a_truth_file_too(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["c.h5", "truth.json"]
 
 
-def test_float32_holds_16_bit_readings_exactly(tmp_path):
+def test_float32_holds_16_bit_readings_exactly(campaign_of):
     import h5py
 
-    write_campaign(tmp_path / "c.h5", rig())
-    write_campaign(tmp_path / "wide.h5", rig(), Hdf5Layout(precision="float64"))
-    with h5py.File(tmp_path / "c.h5") as narrow, h5py.File(tmp_path / "wide.h5") as wide:
+    double = campaign_of(rig(), Hdf5Layout(precision="float64"))
+    with h5py.File(campaign_of(rig())) as narrow, h5py.File(double) as wide:
         first, second = (f["runs/d-02500-25-01/X1A"] for f in (narrow, wide))
         assert (first.dtype, second.dtype) == (np.float32, np.float64)
         np.testing.assert_array_equal(np.rint(first[:] / (20 / 2**16)), np.rint(second[:] / (20 / 2**16)))
         assert narrow["runs/d-02500-25-01"].attrs["sample_rate_hz"] == 1000.0
 
 
-def test_layouts_refuse_what_cannot_be_read_back():
-    with pytest.raises(VirtualRigError, match="must differ"):
-        CsvLayout(delimiter=",", decimal=",")
-    with pytest.raises(VirtualRigError, match="precision"):
-        Hdf5Layout(precision="float16")
-    with pytest.raises(VirtualRigError, match="no layout 'tdms'"):
-        write_campaign("x", rig(), "tdms")
-
-
-def test_plans_refuse_what_cannot_be_run():
-    with pytest.raises(VirtualRigError, match="empty"):
-        RigPlan().runs(TRUTH.pivot_angles)
-    with pytest.raises(VirtualRigError, match="pads 1 to 5"):
-        RigPlan(dry=(DryTest(6),)).runs(TRUTH.pivot_angles)
-    with pytest.raises(VirtualRigError, match="two runs with the id 'p-1-up'"):
-        RigPlan(dry=(DryTest(1), DryTest(1, ramp=1.0))).runs(TRUTH.pivot_angles)
-    with pytest.raises(VirtualRigError, match="one clearance per pad"):
-        RigTruth.constant(np.eye(2), np.eye(2), clearance=(1e-4,))
-    singular = RigTruth.constant(np.ones((2, 2)) * 1e8, np.zeros((2, 2)), position=lambda point: np.zeros(2))
-    with pytest.raises(VirtualRigError, match="singular"):
-        rig(truth=singular).simulate("d-02500-25-01")
+SINGULAR = RigTruth.constant(np.ones((2, 2)) * 1e8, np.zeros((2, 2)), position=lambda point: np.zeros(2))
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
+        (lambda: CsvLayout(delimiter=",", decimal=","), "must differ"),
+        (lambda: Hdf5Layout(precision="float16"), "precision"),
+        (lambda: write_campaign("x", rig(), "tdms"), "no layout 'tdms'"),
+        (lambda: RigPlan().runs(TRUTH.pivot_angles), "empty"),
+        (lambda: RigPlan(dry=(DryTest(6),)).runs(TRUTH.pivot_angles), "pads 1 to 5"),
+        (lambda: RigPlan(dry=(DryTest(1), DryTest(1, ramp=1.0))).runs(TRUTH.pivot_angles), "the id 'p-1-up'"),
+        (lambda: RigTruth.constant(np.eye(2), np.eye(2), clearance=(1e-4,)), "one clearance per pad"),
+        (lambda: rig(truth=SINGULAR).simulate("d-02500-25-01"), "singular"),
+        (lambda: DryTest(1, levels=(500.0, 400.0)), "levels must rise"),
+        (lambda: DryTest(1, hold=(1.0, 2.0)), "2 values for 10 levels"),
+        (lambda: DryTest(1, ramp=0.0), "ramp must be positive"),
+        (lambda: DryTest(1, branch="sideways"), "branch must be"),
         (lambda: Timing(dynamic_rate=0.0), "must be positive"),
         (lambda: RigPlan(dynamic=operating_points([(5000.0, 600.0)])).runs(()), "600 Hz cannot be sampled at 1000 Hz"),
         (lambda: RigPlan(dynamic=operating_points([(5000.0, 0.0)])).runs(()), "0 Hz cannot be sampled"),
