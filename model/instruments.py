@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from model.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 
 #: A sensor map: excitation frequency [rad/s] -> (2, 2) complex; 0 gives what static readings see.
 SensorMap = Callable[[float], ComplexArray | FloatArray]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from model.arrays import FloatArray
+from rigdata.arrays import FloatArray
 
 #: Steps of `bracketed_root`; each halves the bracket at least every third time.
 MOST_STEPS = 200

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.errors import ModelError
 from model.interpolation import monotone_cubics
+from rigdata.arrays import FloatArray
 
 
 class PivotCurveError(ModelError):

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from model.arrays import ComplexArray, FloatArray
 from model.bearing import Bearing
 from model.dynamics.reduction import bearing_impedance, friction_regimes
 from model.effects import Effect, apply_effects
@@ -22,6 +21,7 @@ from model.prediction import Prediction
 from model.setup import Mesh, Setup
 from model.statics.equilibrium import Equilibrium
 from model.statics.solve import solve_equilibrium
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import Condition
 from rigdata.units import UnitError, to_si
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from model.arrays import ComplexArray, FloatArray
 from model.dynamics.reduction import PadMatrices, pad_matrices
 from model.setup import Setup
 from model.statics.conditions import largest_reynolds
 from model.statics.equilibrium import Equilibrium
 from model.statics.pad_flow import PadFlow, pad_flow
 from model.statics.power import power_loss
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import Condition
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.bearing import Bearing, BearingError, Pad
 from model.errors import OptionError, check_known
 from model.growth import Growth
 from model.instruments import Instruments
 from model.options import Options
 from model.pivots import PivotLaw
+from rigdata.arrays import FloatArray
 
 THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 #: Those with pads that deform.

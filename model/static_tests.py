@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.predict import predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
 from model.statics.equilibrium import Equilibrium
 from model.statics.warm_start import extrapolated_state
+from rigdata.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.film.cavitation_matrix import face_flows
 from model.film.mesh import FilmGrid, FilmWork
+from rigdata.arrays import FloatArray
 
 
 def fluid_fraction(

@@ -8,13 +8,13 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from model.arrays import FloatArray
 from model.bearing import Bearing, Pad
 from model.errors import ModelError
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, SectorMesh, sector_mesh
 from model.pad.operators import conduct
 from model.pad.solid import PadSolid, solid_of
+from rigdata.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False, repr=False)

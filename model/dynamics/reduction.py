@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from model.arrays import ComplexArray, FloatArray
 from model.film.following_heat import heat_impedance
 from model.film.reynolds import conductances
 from model.film.slopes import shape_slopes, squeeze_slopes
@@ -23,6 +22,7 @@ from model.statics.axial_tilt import axial_tilt_of
 from model.statics.equilibrium import Equilibrium
 from model.statics.pad_film import PadFilm
 from model.statics.tilt_hold import friction_limits, tilt_hold
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import Condition
 
 #: Turns of pressure and deformation, and the share of the deformation at which they end.

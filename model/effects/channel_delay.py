@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.arrays import ComplexArray
 from model.effects.kind import EffectKind, EffectWords, Parameter
 from model.setup import Setup
+from rigdata.arrays import ComplexArray
 
 
 def apply(setup: Setup, delay: float) -> Setup:

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.arrays import BoolArray, FloatArray
 from model.compilation import compiled, inner
 from model.film.cavitation_matrix import (
     FaceFlows,
@@ -37,6 +36,7 @@ from model.film.matrix import assemble, factorise
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, solve_film
 from model.film.slopes import net_inflow
+from rigdata.arrays import BoolArray, FloatArray
 
 
 @inner

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import BoolArray, FloatArray
 from model.compilation import compiled, inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import conductances
+from rigdata.arrays import BoolArray, FloatArray
 
 
 class FaceFlows(NamedTuple):

@@ -18,10 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import compiled, inner
 from model.film.cross_film import CrossFilm, CrossOperator
 from model.film.mesh import FilmGrid, FilmWork
+from rigdata.arrays import FloatArray
 
 #: Least share of its Couette flow that a cell is taken to carry downstream.
 LEAST_FLOW = 1e-3

@@ -18,10 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import compiled, inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import change_by_oil
+from rigdata.arrays import FloatArray
 
 #: Cells across the film: the temperatures of pad and film move by less than 0.2 K with twice as many.
 CELLS = 6

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import compiled, inner
 from model.film.cross_film import CrossOperator
 from model.film.mesh import FilmGrid, FilmWork
+from rigdata.arrays import FloatArray
 
 #: GMRES steps at most; what they leave contracts with the rest.
 STEPS = 12

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import compiled, inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import Running
 from model.film.slopes import pressure_change
+from rigdata.arrays import FloatArray
 
 #: Least share of the Couette flow that is taken to run downstream. A pressure peak near a leading edge pushes oil
 #: back there; what the journal drags in mixes with what returns, so that the net flow is no measure of the heat

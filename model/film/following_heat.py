@@ -16,13 +16,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from model.arrays import ComplexArray, FloatArray
 from model.compilation import compiled, inner
 from model.film.matrix import substitute
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import Running
 from model.film.reynolds import conductances
 from model.film.slopes import keep_ruptured, net_inflow
+from rigdata.arrays import ComplexArray, FloatArray
 
 #: Turns of pressure and heat, and the change of temperature at which they end, as a share of the temperature.
 MOST_TURNS, SETTLED = 60, 1e-7

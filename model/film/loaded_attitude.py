@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.film.mesh import film_grid, film_work
 from model.film.reynolds import solve_film
 from model.interpolation import bracketed_root, evaluated, monotone_cubics
+from rigdata.arrays import FloatArray
 
 _TABLE_MESH = (32, 4)
 #: (A, B) -> tilting force and load over mu U R^2 L; the tilting force is infinite where the film is gone.

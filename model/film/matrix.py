@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from model.arrays import BoolArray, FloatArray
 from model.compilation import inner
+from rigdata.arrays import BoolArray, FloatArray
 
 
 @inner

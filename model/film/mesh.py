@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import BoolArray, FloatArray
 from model.errors import OptionError
+from rigdata.arrays import BoolArray, FloatArray
 
 
 class FilmGrid(NamedTuple):

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import compiled
 from model.film.mesh import FilmGrid, FilmWork
+from rigdata.arrays import FloatArray
 
 
 class Running(NamedTuple):

@@ -22,11 +22,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import BoolArray, FloatArray
 from model.compilation import compiled, inner
 from model.film.matrix import add_diagonal, assemble, factorise, substitute
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import derivatives, rupture_line
+from rigdata.arrays import BoolArray, FloatArray
 
 #: A cold start moves the rupture line by one node a step, so that fine meshes need many.
 MAX_ACTIVE_SET_STEPS = 2000

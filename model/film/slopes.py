@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import compiled, inner
 from model.film.matrix import substitute, substitute_four, substitute_many
 from model.film.mesh import FilmGrid, FilmWork
+from rigdata.arrays import FloatArray
 
 
 @inner

@@ -19,12 +19,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import compiled, inner
 from model.film.matrix import add_diagonal, assemble, factorise, substitute_four
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, _active_set, _integrate, _source, _thickness, conductances
 from model.film.slopes import keep_ruptured, net_inflow, rupture_line
+from rigdata.arrays import FloatArray
 
 #: Factor and exponent of Re in k_x, k_z (beside 12) and C (beside 1).
 ALONG, ACROSS, SHEAR = (0.0136, 0.90), (0.0043, 0.96), (0.0012, 0.94)

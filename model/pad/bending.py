@@ -15,12 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.bearing import Bearing, Pad
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, conductances
 from model.film.slopes import shape_slopes
 from model.pad.mesh import PadGeometry
+from rigdata.arrays import FloatArray
 
 #: Stations on the dry arc ahead of a film that starts late.
 DRY_STATIONS = 8

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import cholesky
 from scipy.linalg.blas import dgemm, dsyrk, dtrsm
 
-from model.arrays import FloatArray
+from rigdata.arrays import FloatArray
 
 BlockRow = dict[int, FloatArray]  # block row i of a lower triangle: column j <= i -> block (i, j); absent ones are zero
 

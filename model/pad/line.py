@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from model.arrays import FloatArray
 from model.errors import ModelError
+from rigdata.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from model.arrays import BoolArray, FloatArray
 from model.bearing import Bearing, BearingError, Material, Pad
 from model.errors import ModelError, OptionError
 from model.pad.line import Line, graded
+from rigdata.arrays import BoolArray, FloatArray
 
 
 @dataclass(frozen=True)

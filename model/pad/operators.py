@@ -8,11 +8,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from model.arrays import BoolArray, FloatArray
 from model.pad.block_cholesky import BlockCholesky, BlockRow, factor_rows, forward_rows
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PadGeometry, SectorMesh, sector_mesh
 from model.pad.store import load_arrays, save_arrays, storage_key
+from rigdata.arrays import BoolArray, FloatArray
 
 #: Eight nodes: expansion to 2e-6, heat into the pad to 3e-4 (`tests/model/test_convection.py`).
 NODES = 8

@@ -14,11 +14,11 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from model.arrays import FloatArray
 from model.errors import ModelError
 from model.pad.line import Line, gauss_rule
 from model.pad.mesh import MeshDensity, PadGeometry
 from model.pad.operators import PadOperators, pad_operators
+from rigdata.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from model.arrays import FloatArray
+from rigdata.arrays import FloatArray
 
 _LOG = logging.getLogger(__name__)
 _KEEP = 40  # files of 3 to 4 MB each

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from model.arrays import FloatArray
+from rigdata.arrays import FloatArray
 
 
 @dataclass

@@ -7,7 +7,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from model.arrays import FloatArray, IntArray
 from model.film.loaded_attitude import Branch, LoadedAttitude
 from model.film.reynolds import FilmForces
 from model.options import Options
@@ -24,6 +23,7 @@ from model.statics.equilibrium import Equilibrium
 from model.statics.newton_iteration import ended, settled_status
 from model.statics.search import Search
 from model.statics.tilt_hold import rolling_radius
+from rigdata.arrays import FloatArray, IntArray
 
 #: Parts of a set-up that the compiled search takes into account, or that do not concern it; any other one must be at
 #: its default.

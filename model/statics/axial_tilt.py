@@ -20,13 +20,13 @@ import math
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.film.mesh import FilmGrid
 from model.film.reynolds import FilmForces
 from model.pad.bending import AxialTilt, change_of_shape
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
 from model.statics.tilt_hold import tilt_hold
+from rigdata.arrays import FloatArray
 
 
 def axial_shape(grid: FilmGrid) -> FloatArray:

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 
-from model.arrays import FloatArray
 from model.film.loaded_attitude import Branch, LoadedAttitude, loaded_attitude
 from model.setup import Setup
 from model.statics.compiled.constants import CROWN, EDGE, LONGEST_STEP, MAX_LOAD_CHANGES, NEAR_EDGE
 from model.statics.pad_film import PadFilm
 from model.statics.tilt_hold import tilt_hold
+from rigdata.arrays import FloatArray
 
 
 def attitude_of(setup: Setup, film: PadFilm) -> LoadedAttitude:

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.setup import Setup
 from model.statics.compiled.constants import MAX_LOAD_CHANGES
 from model.statics.pad_film import PadFilm
+from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
 
 #: Below this film the surfaces touch: three times the combined roughness, 1 um, of ground journal and bored pad [m].

@@ -19,7 +19,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.film.cross_energy import cross_operator
 from model.film.cross_film import CrossOperator
 from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
@@ -28,6 +27,7 @@ from model.setup import Setup
 from model.statics.compiled.constants import BOUNDLESS
 from model.statics.heat_paths import FilmAnswer, balance_heat
 from model.statics.pad_film import PadFilm
+from rigdata.arrays import FloatArray
 
 #: What a pad conducts is solved to this share in every step; what is left contracts with the rest.
 CONDUCTION_TOLERANCE = 0.03

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from model.arrays import FloatArray
 from model.conditions import has_answer
 from model.statics.pad_film import PadFilm
+from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
 
 

@@ -23,7 +23,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.film.energy import dissipation, march
 from model.film.oil_state import Running
 from model.pad.bending import PadDeformation
@@ -31,6 +30,7 @@ from model.setup import Setup
 from model.statics.compiled.constants import BOUNDLESS
 from model.statics.pad_film import PadFilm, oil_constants
 from model.statics.pad_flow import flow_weighted, outlet_temperature, through_flow
+from rigdata.arrays import FloatArray
 
 #: q h / k (T_mean - T_wall) of a parabolic profile, flat at the other wall.
 NUSSELT = 3.0

@@ -10,7 +10,6 @@ import math
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.conditions import has_answer
 from model.film.oil_state import least_share
 from model.statics import conditions
@@ -35,6 +34,7 @@ from model.statics.equilibrium import Equilibrium
 from model.statics.film_step import refine_derivatives, solve_films
 from model.statics.newton_step import newton_step
 from model.statics.search import Search
+from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
 
 #: A pad that tilts by this share of the largest tilt in the last step swings, too.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.setup import Setup
 from model.statics.compiled.elimination import PadEquations, eliminate
 from model.statics.pad_film import PadFilm
 from model.statics.tilt_hold import tilt_hold
+from rigdata.arrays import FloatArray
 
 
 def newton_step(setup: Setup, load: FloatArray, films: list[PadFilm]) -> tuple[float, FloatArray, FloatArray]:

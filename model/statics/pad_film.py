@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.bearing import Oil, Pad
 from model.film.cross_film import CrossFilm, cross_film, cross_pressure_change, set_cross_viscosity
 from model.film.energy import heat_step
@@ -22,6 +21,7 @@ from model.film.turbulence import solve_turbulent_film
 from model.pad.bending import BendingStep, PadDeformation, pad_deformation
 from model.setup import Setup
 from model.statics.compiled.stack import film_works
+from rigdata.arrays import FloatArray
 
 
 @dataclass

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import BoolArray, FloatArray
 from model.bearing import Oil
 from model.film.mesh import FilmWork
 from model.statics.pad_film import PadFilm
+from rigdata.arrays import BoolArray, FloatArray
 
 
 class PadFlow(NamedTuple):

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.film.cross_film import CrossOperator
 from model.film.energy import heat_by_drag
 from model.film.mesh import FilmWork
@@ -21,6 +20,7 @@ from model.statics.compiled.first_position import first_position
 from model.statics.equilibrium import Equilibrium, mean_temperature
 from model.statics.heat_paths import couples_heat
 from model.statics.pad_film import PadFilm, pad_films
+from rigdata.arrays import FloatArray
 
 #: A change of the clearance by more than this share asks for the table of a pad's loaded attitudes anew.
 NEW_TABLE = 1e-3

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.setup import Setup
 from model.statics import conditions
 from model.statics.at_once import able, iterate_at_once
@@ -18,6 +17,7 @@ from model.statics.equilibrium import Equilibrium
 from model.statics.heat_paths import couples_heat
 from model.statics.newton_iteration import iterate
 from model.statics.search import Search
+from rigdata.arrays import FloatArray
 
 #: First share of the load or the heat, where the whole of it finds no equilibrium at once, and the least step on.
 FIRST_SHARE, LEAST_STEP = 0.25, 0.02

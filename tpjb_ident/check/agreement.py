@@ -12,9 +12,9 @@ from itertools import combinations
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
-from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.gain_evidence import PointReadings, leverage, stiffness_of
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.one_gain import gain_of_run

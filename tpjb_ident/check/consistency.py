@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray
+from rigdata.arrays import ComplexArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.set_points import excited, plane_vector
 from tpjb_ident.check.wiring import repairs

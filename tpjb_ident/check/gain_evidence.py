@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 
 #: Stiffness, damping and static load of one run may differ from the others' by this share, one standard deviation:
 #: oil gets warmer, loads are set by hand.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.run import Run
-from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.dynamic.records.line_fit import GLITCH_LIMIT, fit_without_glitches
 from tpjb_ident.dynamic.records.windows import line_design
 

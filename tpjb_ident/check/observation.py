@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.lines import RecordLines, band_lines, fit_lines, strongest_line, turning_frequency
 from tpjb_ident.check.signals import check_clock, check_signal, needed

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
-from tpjb_ident.arrays import AnyArray, ComplexArray, FloatArray
 from tpjb_ident.check.agreement import RunResponse, check_agreement, misfit_of, response_of, robust_stiffness
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.run_gains import check_gains, point_readings, probe_centres
@@ -50,7 +52,7 @@ def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[O
             check_gains(group, outliers, readings)
 
 
-def definiteness(matrix: AnyArray) -> float:
+def definiteness(matrix: NDArray[Any]) -> float:
     """Least over greatest eigenvalue of the symmetric part; 1 is isotropic, not above 0 impossible."""
     low, high = np.linalg.eigvalsh((matrix + matrix.T) / 2)
     return float(low / high) if high > 0 else -1.0

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
 from rigdata.vector import inverse_directions
-from tpjb_ident.arrays import AnyArray, ComplexArray, FloatArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.wiring import guess_wiring, repairs
 from tpjb_ident.dynamic.records.run_data import oil_force as film_force
@@ -27,12 +29,12 @@ def plane_of(channels: Sequence[Channel]) -> FloatArray:
     return inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
 
 
-def to_plane(channels: Sequence[Channel], readings: AnyArray) -> AnyArray:
+def to_plane(channels: Sequence[Channel], readings: NDArray[Any]) -> NDArray[Any]:
     """X, Y from one value per channel; complex stays complex; `readings` (m,) and (m, n)."""
     return np.asarray(plane_of(channels) @ readings)
 
 
-def plane_vector(seen: Observation, quantity: str, values: AnyArray) -> AnyArray | None:
+def plane_vector(seen: Observation, quantity: str, values: NDArray[Any]) -> NDArray[Any] | None:
     """X, Y of one value per channel of `quantity`; None where its channels do not span the plane; `values` (m,)."""
     where = seen.pick(quantity)
     if len(where) < 2:
@@ -79,7 +81,7 @@ def without_static_part(ratios: ComplexArray) -> bool:
     return bool(mean < NO_STATIC[0] or (mean < NO_STATIC[1] and mean < 4 * error))
 
 
-def _check_static_load(seen: Observation, mean: AnyArray, ratio: float) -> None:
+def _check_static_load(seen: Observation, mean: NDArray[Any], ratio: float) -> None:
     run, place = seen.run, "mean force"
     _check_size(seen, ratio)
     if ratio < 0.02 or seen.lines is None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Severity
 from rigdata.run import Run
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.findings import Reporter
 
 #: Quantities without which a run of that kind says nothing.

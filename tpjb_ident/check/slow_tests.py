@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.problem import Severity
 from rigdata.vector import directions
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.response import definiteness, mirrored
 from tpjb_ident.check.set_points import angle_between, to_plane

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.vector import inverse_directions
-from tpjb_ident.arrays import FloatArray
 
 
 def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple[str, FloatArray]]:

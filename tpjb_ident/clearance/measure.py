@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.vector import directions
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.clearance.polygon import Centre, CentreRule, SideFit, corners, find_centre, fit_sides, gain_ratio
 from tpjb_ident.clearance.sweep import Touch, read_sweep
 from tpjb_ident.conditions import Condition, sentences

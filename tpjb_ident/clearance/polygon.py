@@ -22,8 +22,8 @@ from typing import Literal
 
 import numpy as np
 
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.vector import directions
-from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.clearance.sweep import Touch
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.curve import PivotCurve

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.vector import directions
-from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.slow_records.bad_samples import piece_means, slow_samples
 
 if TYPE_CHECKING:

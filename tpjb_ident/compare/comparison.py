@@ -12,9 +12,9 @@ import numpy as np
 
 from model.bearing import Bearing
 from model.effects import Effect
+from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.compare.coefficient_table import TableRow, TableSource, read_coefficients
 from tpjb_ident.compare.measured_pivots import beside_measured, counted_twice, measured_laws
 from tpjb_ident.compare.predictions import (

@@ -17,9 +17,9 @@ from model.pivots import pivot_laws
 from model.predict import predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Instruments, RigTruth
-from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.compare.predictions import ModelSettings
 from tpjb_ident.errors import TpjbError
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from model.effects import Effect, apply_effects
 from model.setup import Mesh, Setup
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.candidates import candidates
 from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import Nuisance, column_of, nuisances

@@ -21,11 +21,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr
 
-from model.arrays import ComplexArray
 from model.effects import Effect, kind_of
 from model.instruments import Instruments, SensorMap
 from model.setup import Setup
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.diagnosis.forward.forward import Change, Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
+from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.vector import zero_uncertainty
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.check.redundant_channels import widened
 from tpjb_ident.conditions import merged

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
-from tpjb_ident.arrays import ComplexArray
 from tpjb_ident.dynamic.broadband.band_point import is_broadband
 from tpjb_ident.dynamic.estimators.r_matrix import r_matrix
 from tpjb_ident.dynamic.estimators.rlm import RlmSettings, rlm_fit

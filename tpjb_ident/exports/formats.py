@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rigdata.arrays import BoolArray, FloatArray
 from rigdata.near_names import nearest_name
-from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.condition_kinds import ERRORS
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_COLUMNS, coefficient_column

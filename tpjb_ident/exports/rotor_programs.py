@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, FloatArray
+from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.exports.formats import StaticPoint
 from tpjb_ident.exports.table import INTERVALS
 from tpjb_ident.runtime.tables import printable, write_text

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.exports.formats import COLUMNS, ExportError, StaticPoint
 from tpjb_ident.runtime.tables import printable, safe_for_spreadsheets, write_atomic
 from tpjb_ident.schema import ENTRIES

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.steps import Hold
 from tpjb_ident.slow_records.bad_samples import piece_means

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize, special
 
-from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.dry_record import PadDirection

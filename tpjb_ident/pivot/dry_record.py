@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import fft, ndimage
 
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import Problem, RigDataError
-from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.pivot.blocks import Blocks, PivotSettings, Samples, cut_blocks
 from tpjb_ident.pivot.steps import Hold, find_holds
 from tpjb_ident.slow_records.bad_samples import slow_samples

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import special
 
+from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import Problem, RigDataError
-from tpjb_ident.arrays import BoolArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps, measure_loop

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.dry_record import DryRecord
 from tpjb_ident.pivot.law_fit import FitData, LawFit, fit_law

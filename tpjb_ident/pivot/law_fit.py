@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.pivot.laws import Law
 
 OFFSET, FRICTION, SCALE = 0, 1, 2  # places of the parameters that every law has; the shape follows

@@ -29,7 +29,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 
 
 class Law(Protocol):

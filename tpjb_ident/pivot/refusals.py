@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.dry_record import (
     DryRecord,

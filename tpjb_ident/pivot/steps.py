@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, FloatArray
+from rigdata.arrays import BoolArray, FloatArray
 
 STILL = 0.2  # share of the mean rate of change below which the load counts as held
 SETTLED = 4.0  # noise standard deviations within which the load must lie of the hold's own level

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.curve import PivotCurve

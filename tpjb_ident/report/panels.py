@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.report.drawing.colours import BLUE, INK, RULE
 from tpjb_ident.report.drawing.picture import FONT_SIZE
 from tpjb_ident.report.drawing.series import CROSS, DIRECT, constant_along, longest_series

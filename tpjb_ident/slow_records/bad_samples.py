@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
-from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign, run_in_file
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from tpjb_ident.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import inner
+from rigdata.arrays import FloatArray
 
 #: Differences that are kept.
 DEPTH = 4

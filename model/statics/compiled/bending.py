@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import FloatArray, IntArray
 from model.compilation import inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import conductances
 from model.film.slopes import shape_slopes
 from model.pad.bending import PadDeformation
 from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of, work_of
+from rigdata.arrays import FloatArray, IntArray
 
 
 class BodyStack(NamedTuple):

@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import inner
 from model.film.mesh import FilmWork
 from model.film.oil_state import Running
 from model.statics.compiled.constants import CROWN, EDGE, MAX_LOAD_CHANGES, NEAR_EDGE
 from model.statics.compiled.laws import compliance, deflection
 from model.statics.compiled.stack import PadStack, PadState
+from rigdata.arrays import FloatArray
 
 #: Every so many rows of an attitude's table the pivot is asked; between them its give is as good as straight.
 EVERY = 4

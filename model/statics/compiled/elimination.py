@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import compiled, inner
+from rigdata.arrays import FloatArray
 
 
 class PadEquations(NamedTuple):

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from model.arrays import FloatArray, IntArray
 from model.compilation import compiled, inner
 from model.film.loaded_attitude import Branch
+from rigdata.arrays import FloatArray, IntArray
 
 #: Share of the load that may be missing.
 GOOD_ENOUGH = 0.002

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import compiled, inner
 from model.film.energy import heat_by_drag
 from model.film.mesh import FilmWork
@@ -40,6 +39,7 @@ from model.statics.compiled.constants import (
 from model.statics.compiled.first_position import balance
 from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of, work_of
 from model.statics.compiled.step import move, newton, solve_films, solve_pressure
+from rigdata.arrays import FloatArray
 
 #: How an iteration ends.
 SETTLED, RESTARTING, FILM_LOST, BOUNDLESS_HEAT, SINGULAR, NOT_CONVERGED = range(6)

@@ -8,10 +8,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import inner
 from model.measured_pivot import MeasuredPivot
 from model.pivots import ConstantPivot, PivotLaw, RigidPivot, RockerPivot, ScaledPivot, SphericalPivot
+from rigdata.arrays import FloatArray
 
 #: First number of a law's row: which formula; the others are its constants, the last the factor on the stiffness.
 RIGID, CONSTANT, ROCKER, SPHERICAL, MEASURED = range(5)

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.arrays import BoolArray, FloatArray, IntArray
 from model.compilation import inner
 from model.film.mesh import FilmGrid, FilmWork
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 
 
 class GridStack(NamedTuple):

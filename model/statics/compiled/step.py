@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from model.arrays import FloatArray
 from model.compilation import inner
 from model.film.energy import heat_step
 from model.film.mesh import FilmGrid, FilmWork
@@ -18,6 +17,7 @@ from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_
 from model.statics.compiled.elimination import PadEquations, eliminate
 from model.statics.compiled.laws import compliance, deflection
 from model.statics.compiled.stack import PadStack, PadState, grid_of, work_of
+from rigdata.arrays import FloatArray
 
 
 @inner

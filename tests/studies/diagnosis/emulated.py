@@ -26,7 +26,7 @@ from scipy.interpolate import CubicSpline
 from model.effects import Effect, apply_effects
 from model.pivots import PivotLaw, ScaledPivot
 from model.setup import Setup
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.forward import (
     _PLAIN,
     SENSOR,

@@ -29,9 +29,9 @@ from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.pivots import pivot_laws
 from model.setup import Setup
+from rigdata.arrays import FloatArray
 from tests.studies.diagnosis.emulated import emulate
 from tests.studies.diagnosis.tables import tables
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.diagnosis.diagnose import ACCURACY, MESH, pose
 from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
 from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel, NoEquilibriumError

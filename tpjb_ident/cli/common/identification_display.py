@@ -10,7 +10,7 @@ from tpjb_ident.cli.common.terminal import print_line, table
 from tpjb_ident.conditions import sentences, untrusted
 
 if TYPE_CHECKING:
-    from tpjb_ident.arrays import FloatArray
+    from rigdata.arrays import FloatArray
     from tpjb_ident.dynamic.broadband.band_result import BandResult
     from tpjb_ident.dynamic.results.identification import Identification
 

@@ -11,7 +11,7 @@ import numpy as np
 from model.bearing import Bearing
 from model.effects import Effect, Parameter, known_effects
 from model.effects.kind import EffectKind
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 
 #: Standard deviation of the prior of an amplitude, in the library's typical sizes: three of them are no surprise in a
 #: bearing that has the fault at all.

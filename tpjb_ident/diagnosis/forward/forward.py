@@ -16,7 +16,7 @@ from model.predict import solve_as_it_runs
 from model.setup import Setup
 from model.static_tests import dry_curve, polygon_sides
 from model.statics.equilibrium import Equilibrium
-from tpjb_ident.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.diagnosis.observations.observe import DryTest, DynamicTest, Element, Layout
 from tpjb_ident.errors import TpjbError
 

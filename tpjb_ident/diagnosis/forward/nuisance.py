@@ -17,7 +17,7 @@ import numpy as np
 
 from model.effects import Effect, kind_of
 from model.setup import Setup
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.forward import ForwardModel
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.observations.gap import centre_shifts

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, IntArray
+from rigdata.arrays import BoolArray, IntArray
 from tpjb_ident.diagnosis.observations.observe import Element, Observations
 
 #: Frequencies at one load from which each is a block of its own.

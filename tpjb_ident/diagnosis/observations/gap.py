@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, FloatArray
+from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnosis.observations.observe import Element, Observations
 
 

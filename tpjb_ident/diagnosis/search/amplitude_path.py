@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 
 #: Amplitudes at which a course is asked for, in typical sizes: the nearest where a rig is expected, the others as far
 #: as the prior reaches (`candidates.PRIOR_WIDTH`).

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg import lapack
 from scipy.sparse import csr_array
 
-from tpjb_ident.arrays import FloatArray, IntArray
+from rigdata.arrays import FloatArray, IntArray
 from tpjb_ident.diagnosis.observations.folds import Fold
 from tpjb_ident.diagnosis.search.components import Component
 

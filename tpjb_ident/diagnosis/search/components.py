@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray, IntArray
+from rigdata.arrays import FloatArray, IntArray
 from tpjb_ident.diagnosis.observations.gap import coordinate
 from tpjb_ident.diagnosis.observations.observe import Element, Observations
 

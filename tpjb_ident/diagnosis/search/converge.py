@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.forward import ForwardModel, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import column_of
 from tpjb_ident.diagnosis.forward.workers import Map

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.forward import ForwardModel, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import predict
 from tpjb_ident.diagnosis.search.assessment import Assessment, Basis, assess

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, FloatArray
+from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnosis.forward.candidates import Candidate
 from tpjb_ident.diagnosis.forward.nuisance import Nuisance
 from tpjb_ident.diagnosis.observations.folds import Fold, folds, held_out

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.candidates import Candidate
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.search.converge import converge

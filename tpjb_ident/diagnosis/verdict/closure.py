@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.observations.gap import gap, noise_square
 from tpjb_ident.diagnosis.search.fit import Fit
 from tpjb_ident.diagnosis.search.problem import Problem

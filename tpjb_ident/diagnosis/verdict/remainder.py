@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc, ndtr
 
-from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.diagnosis.observations.gap import residuals
 from tpjb_ident.diagnosis.observations.observe import Observations
 from tpjb_ident.diagnosis.search.assessment import assess

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import fdtrc, stdtrit
 
-from tpjb_ident.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.broadband.band_equations import Basis, RunSums, complex_h, k_c, k_c_m, line_sums
 from tpjb_ident.dynamic.broadband.line_fit import outer_matrix, satterthwaite
 from tpjb_ident.dynamic.broadband.line_rows import LineRows

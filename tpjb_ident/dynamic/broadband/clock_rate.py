@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.broadband.disturbing_lines import Disturbance, bins_taken
 from tpjb_ident.dynamic.broadband.samples import Samples, interpolated
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, FloatArray
+from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.dynamic.broadband.samples import Samples
 
 #: Highest harmonics of shaft and mains that are looked for.

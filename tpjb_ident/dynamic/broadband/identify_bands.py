@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from rigdata.run import Run
-from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.check.redundant_channels import widened
 from tpjb_ident.conditions import Condition, merged

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)

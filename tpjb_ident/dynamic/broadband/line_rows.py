@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 from tpjb_ident.errors import BadInputError
 

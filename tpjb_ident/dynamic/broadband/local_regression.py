@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.broadband.line_fit import LineFit, by_runs, inconsistent_runs, no_fit
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.dynamic.broadband.samples import Samples, interpolated
 
 #: Periods that a record must hold.

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.broadband.clock_rate import ClockRate, clock_rates, with_one_clock
 from tpjb_ident.dynamic.broadband.disturbing_lines import (

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 
 QUANTITIES = ("displacement", "force", "acceleration")

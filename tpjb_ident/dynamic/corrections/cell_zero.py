@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
-from tpjb_ident.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
 
 #: Set points must differ by this share for a zero to be told from a gain.

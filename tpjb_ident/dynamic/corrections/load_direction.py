@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.corrections.static_load import MAX_SIDEWAYS, LoadMiss
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.records.line_means import complex_median

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.estimators.r_matrix import ols_fit
 
 _STARTS = 2000

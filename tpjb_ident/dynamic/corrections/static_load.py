@@ -17,8 +17,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.set_points import without_static_part
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.cell_zero import CellZero, cell_zero

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.vector import directions
-from tpjb_ident.arrays import AnyArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.runs.point_data import PointData
@@ -57,7 +58,7 @@ def gain_draws(channels: Mapping[str, Any], n: int, seed: int) -> GainDraws:
     return GainDraws(matrices["displacement"], matrices["force"], matrices["acceleration"], tuple(unstated))
 
 
-def _on_vectors(axes: FloatArray, gains: AnyArray) -> AnyArray:
+def _on_vectors(axes: FloatArray, gains: NDArray[Any]) -> NDArray[Any]:
     """What gains (n, m) of channels along `axes` (m,) do to X and Y, (n, 2, 2)."""
     if len(axes) < 2:
         return _unit(len(gains))
@@ -126,7 +127,7 @@ class SystematicSources:
             return _unit(_count(self.turns))
         return np.einsum("ac,ncb->nab", np.linalg.pinv(directions(axes)), directions(axes + self.turns[quantity]))
 
-    def _delayed(self, quantity: str, omega: float) -> AnyArray:
+    def _delayed(self, quantity: str, omega: float) -> NDArray[Any]:
         if quantity not in self.delays:
             return _unit(_count(self.delays))
         return _on_vectors(self.axes[quantity], np.exp(-1j * omega * self.delays[quantity]))

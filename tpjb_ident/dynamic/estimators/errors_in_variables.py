@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import fdtri
 
-from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable
 from tpjb_ident.dynamic.estimators.robust_constants import trimming_limits, trimming_weight
 from tpjb_ident.dynamic.estimators.uncertainty import (

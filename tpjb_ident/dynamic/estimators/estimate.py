@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
-from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, repeats, windows_used_again
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit

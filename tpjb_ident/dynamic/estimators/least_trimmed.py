@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.estimators.robust_constants import half_shrinkage, trimming_limits, trimming_weight
 
 STARTS = 60

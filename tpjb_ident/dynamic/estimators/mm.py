@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray, FloatArray, IntArray
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.least_trimmed import Regression, distance2, evenly_chosen, robust_start
 from tpjb_ident.dynamic.estimators.robust_constants import bisquare_weight, efficiency_constant

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
-from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.r_matrix import real_rows
 from tpjb_ident.errors import ArgumentError, TpjbError

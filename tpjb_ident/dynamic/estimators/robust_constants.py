@@ -13,7 +13,7 @@ import numpy as np
 from scipy import optimize
 from scipy.special import chdtr, gammaincinv, gammaln, xlogy
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 
 #: Probabilities beyond which a window begins to lose weight, and beyond which none is left.
 _BEGIN, _END = 0.99, 0.9999

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri, gammaincinv
 
-from tpjb_ident.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable
 
 #: Up to so many directions their effects are pooled over directions and axes: a jackknife of three or four is none.

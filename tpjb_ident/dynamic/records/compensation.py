@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from rigdata.vector import directions, inverse_directions
-from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, RunPhasors
 

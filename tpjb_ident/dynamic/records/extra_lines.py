@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import median_filter
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, RunPhasors
 from tpjb_ident.dynamic.records.windows import line_design

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpjb_ident.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 
 #: A sample is a glitch beyond this many robust standard deviations of the fit's residual.
 GLITCH_LIMIT = 5.5

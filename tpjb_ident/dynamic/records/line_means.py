@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray
+from rigdata.arrays import ComplexArray
 from tpjb_ident.dynamic.records.run_data import RunPhasors
 
 

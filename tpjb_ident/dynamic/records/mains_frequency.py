@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError
 from rigdata.run import Run
-from tpjb_ident.arrays import FloatArray
 
 #: Excitations this near to one of them make the question matter [Hz].
 NEAR = 0.3

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.records.line_fit import GLITCH_LIMIT, SCALE_LIMIT, beside, fit_without_glitches
 from tpjb_ident.dynamic.records.windows import line_design
 

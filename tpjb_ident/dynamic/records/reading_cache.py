@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
 from rigdata.record import Record, VectorRecord
 from rigdata.rows import RowReader, VectorRows
 from rigdata.run import Run
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.dynamic.records.run_data import MeasuredRun
 
 #: What the checks look at: so many samples, or so many seconds if that is more, of those that are kept.

@@ -9,11 +9,11 @@ from typing import Protocol
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from rigdata.record import Record, VectorRecord
 from rigdata.rows import RowReader
-from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.lines import LineSet, LineSettings
 from tpjb_ident.dynamic.records.phasors import PhasorBlock

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.run import Run, pulse_times
-from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.lines import LineSettings
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, RunPhasors

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import chdtrc
 
+from rigdata.arrays import FloatArray
 from rigdata.near_names import unknown_name
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.errors import ArgumentError

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from rigdata.run import Run
 from rigdata.vector import inverse_directions
-from tpjb_ident.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.gain_evidence import PointReadings
 from tpjb_ident.check.one_gain import wrong_gains
 from tpjb_ident.check.run_gains import gain_in_words, swept_centre

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES, DynamicStiffness

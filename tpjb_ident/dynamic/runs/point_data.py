@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.run import Run
-from tpjb_ident.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.records.run_phasors import RunPhasors
 
 #: Samples from which a run's temperatures are taken.

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.clock_rates import ClockRates
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns, RunDigest

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tpjb_ident.arrays import ComplexArray, IntArray
+from rigdata.arrays import ComplexArray, IntArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.line_means import complex_median
 from tpjb_ident.dynamic.records.shaft import shaft_order

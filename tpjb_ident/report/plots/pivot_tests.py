@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.report.drawing.colours import GREY, INK, PAPER, style_of_pad
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, label, mark_extrapolated, new_picture, new_pictures
 

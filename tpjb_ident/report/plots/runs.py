@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rigdata.arrays import FloatArray
 from rigdata.survey.spectrum import amplitude_spectrum
-from tpjb_ident.arrays import FloatArray
 from tpjb_ident.report.drawing.colours import BLUE, GREY, INK, LIGHT
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, label, new_picture, new_pictures
 
