@@ -12,7 +12,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import refuse
 from rigdata.readers.base import LEAST_RATE, MOST_RATE, RunReader
 from rigdata.record import Record, VectorRecord
 from rigdata.rows import RowReader, Rows
@@ -76,9 +76,8 @@ class Run:
         """Nominal sample rate [Hz]: time column or HDF5 attribute, else the run's, else the campaign's."""
         rate = self.reader.rate()
         if not LEAST_RATE <= rate <= MOST_RATE:
-            raise self._error(
-                "sample rate", f"is {rate:g} Hz", "Check the time column, and sample_rate in the manifest"
-            )
+            remedy = "Check the time column, and sample_rate in the manifest"
+            raise refuse(self.file, "sample rate", f"is {rate:g} Hz", remedy, self.id)
         return rate
 
     def time(self, start: int | None = None, stop: int | None = None) -> FloatArray:
@@ -99,9 +98,6 @@ class Run:
         length = self.length
         first, last, _ = slice(start, stop).indices(length)
         return first, max(first, last)
-
-    def _error(self, place: str, what: str, cure: str) -> RigDataError:
-        return RigDataError(Problem("error", self.file, place, what, cure, self.id))
 
     def record(self, name: str, start: int | None = None, stop: int | None = None) -> Record:
         """One channel, calibrated.
@@ -125,8 +121,8 @@ class Run:
         """
         channel = self.channels.get(name)
         if channel is None:
-            known = ", ".join(self.channels)
-            raise self._error(f"channel {name}", "is not described in the manifest", f"Described: {known}")
+            remedy = f"Described: {', '.join(self.channels)}"
+            raise refuse(self.file, f"channel {name}", "is not described in the manifest", remedy, self.id)
         first, last = self._slice(start, stop)
         (reading,) = self.reader.read([name], first, last)
         rate = self.sample_rate  # refused before times are counted from it
@@ -177,13 +173,14 @@ class Run:
         """Channels that X and Y of a quantity come from."""
         chosen = [c for c in self.channels.values() if c.quantity == quantity and c.axis is not None]
         if len(chosen) < 2:
-            cure = f"Describe two {quantity} channels with different axes in the manifest"
-            raise self._error(f"quantity {quantity}", f"has {len(chosen)} channels, two are needed", cure)
+            what = f"has {len(chosen)} channels, two are needed"
+            remedy = f"Describe two {quantity} channels with different axes in the manifest"
+            raise refuse(self.file, f"quantity {quantity}", what, remedy, self.id)
         axes = np.array([c.axis for c in chosen])
         if not np.any(np.abs(np.sin(axes - axes[0])) > COLLINEAR_SINE):
-            cure = "Two channels at different angles (3 deg apart or more) are needed; check their axis"
             names = ", ".join(c.name for c in chosen)
-            raise self._error(f"channels {names}", "all measure along one line", cure)
+            remedy = "Two channels at different angles (3 deg apart or more) are needed; check their axis"
+            raise refuse(self.file, f"channels {names}", "all measure along one line", remedy, self.id)
         return chosen
 
     def row_reader(self, quantities: Sequence[str]) -> RowReader:
@@ -196,9 +193,9 @@ class Run:
         """
         return _FileRows(self, quantities)
 
-    def kept_open(self) -> AbstractContextManager[None]:
+    def opened(self) -> AbstractContextManager[None]:
         """Keep the file open while the block runs, where its reader can do that; nested blocks share it."""
-        opener = getattr(self.reader, "kept_open", None)
+        opener = getattr(self.reader, "opened", None)
         return nullcontext() if opener is None else opener()
 
     def temperatures(self) -> tuple[Channel, ...]:

@@ -81,18 +81,18 @@ class RunReader(Protocol):
         """
 
     def problems(self) -> tuple[Problem, ...]:
-        """Tell what reading found that does not stop the run from being used."""
+        """Report what does not stop the run from being used."""
 
 
 def undescribed(names: Sequence[str], what: str, file: str, run: str) -> tuple[Problem, ...]:
     """Note columns or datasets that the manifest does not describe."""
     if not names:
         return ()
-    listed = ", ".join(ascii(n)[1:-1][:40] for n in names[:6]) + (
-        f", ... ({len(names)} in all)" if len(names) > 6 else ""
-    )
-    cure = "Nothing, or describe them in the manifest"
-    return (Problem("note", file, what, f"{what} without a description: {listed}", cure, run),)
+    listed = ", ".join(ascii(name)[1:-1][:40] for name in names[:6])
+    if len(names) > 6:
+        listed += f", ... ({len(names)} in all)"
+    remedy = "Nothing, or describe them in the manifest"
+    return (Problem("note", file, what, f"{what} without a description: {listed}", remedy, run),)
 
 
 def missing_channel(name: str, names: Iterable[str]) -> tuple[str, str, str]:
@@ -104,28 +104,28 @@ def missing_channel(name: str, names: Iterable[str]) -> tuple[str, str, str]:
 
 
 def rate_of_time(time: FloatArray) -> float:
-    """Nominal sample rate of a time column [Hz].
+    """Nominal sample rate of a time column (n,) [Hz].
 
     The median step over many samples is free of gaps, of jitter and of the rounding of the column
-    (0.000, 0.001, 0.001, 0.002 at 2 kHz); NaN where no two times are known or time stands still.
+    (0.000, 0.001, 0.001, 0.002 at 2 kHz); NaN where no two times are finite or time does not advance.
     """
-    known = time[np.isfinite(time)]
-    span = min(1000, len(known) // 4) or len(known) - 1
+    finite = time[np.isfinite(time)]
+    span = min(1000, len(finite) // 4) or len(finite) - 1
     if span < 1:
         return float("nan")
-    step = float(np.median(known[span:] - known[:-span])) / span
-    # Ten digits: what a column of rounded times can tell; keeps 1000 Hz from being 999.9999999999.
+    step = float(np.median(finite[span:] - finite[:-span])) / span
+    # Ten digits: as much as a column of rounded times holds; keeps 1000 Hz from being 999.9999999999.
     return float(f"{1.0 / step:.10g}") if step > 0 else float("nan")
 
 
 def suffix_hint(path: Path) -> str:
     """What to do about a suffix that no reader is known by; "" where it is known."""
     suffix = path.suffix.lower()
-    known = (*TEXT, *FORMATS)
-    if suffix in known:
+    readable = (*TEXT, *FORMATS)
+    if suffix in readable:
         return ""
     if suffix in _EXPORTABLE:
         return f"{suffix} files are not read; export it as {_EXPORTABLE[suffix]}"
-    near = nearest_name(suffix, known)
-    hint = f"did you mean {near}?" if near else f"known are {', '.join(known)}"
+    near = nearest_name(suffix, readable)
+    hint = f"did you mean {near}?" if near else f"known are {', '.join(readable)}"
     return f"the suffix {suffix or '(none)'} is not known; {hint}"

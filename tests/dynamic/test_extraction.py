@@ -81,7 +81,7 @@ def test_two_channels_become_rows_in_one_request(axes, zero, polarity):
     run = run_of(data, [*probes(axes, zero, polarity), tach, *cells])
     expected = run.vector("displacement", 7, 30).values.T
     run.reader.asked.clear()
-    with run.kept_open():
+    with run.opened():
         stretches = run.row_reader(("displacement",))
         found = stretches.read(7, 30)
     assert run.reader.asked == [("X0", "X1", "K")]
@@ -96,7 +96,7 @@ def test_a_reading_that_is_none_is_none(bad, name):
     data = readings(2)
     data[name][20] = bad
     run = run_of(data, probes((45.0, 135.0)), stamps=0.5 + np.arange(50) / RATE)
-    with run.kept_open():
+    with run.opened():
         stretches = run.row_reader(("displacement",))
         found = stretches.read(10, 40)
         sound = stretches.read(30, 40)
@@ -111,13 +111,13 @@ def test_a_reading_that_is_none_is_none(bad, name):
 
 def test_three_channels_and_those_without_an_axis_are_left_to_the_run():
     run = run_of(readings(3), probes((45.0, 135.0, 80.0)))
-    with run.kept_open():
+    with run.opened():
         stretches = run.row_reader(("displacement",))
         rows = stretches.read(0, 50).rows["displacement"]
     np.testing.assert_array_equal(rows, run.vector("displacement").values.T)
     other = Channel("T", "displacement", "um", 1e-6)
     two = run_of(readings(2) | {"T": np.zeros(50)}, [*probes((45.0, 135.0)), other])
-    with two.kept_open():
+    with two.opened():
         stretches = two.row_reader(("displacement",))
         rows = stretches.read(0, 50).rows["displacement"]
     np.testing.assert_allclose(rows, two.vector("displacement").values.T, rtol=1e-12)
@@ -153,7 +153,7 @@ class Held:
     def row_reader(self, quantities):
         return VectorRows(self, quantities)
 
-    def kept_open(self):
+    def opened(self):
         return nullcontext()
 
     def vector(self, quantity, start=None, stop=None):

@@ -43,7 +43,7 @@ def test_blocks_are_the_plain_columns(length):
 
 
 def test_stretches_are_what_the_run_says(run):
-    with run.kept_open():
+    with run.opened():
         stretches = run.row_reader(("displacement", "force"))
         for start, stop in ((0, 1000), (7777, 9000), (run.length - 5, run.length)):
             stretch = stretches.read(start, stop)
@@ -65,7 +65,7 @@ def test_missing_values_and_overflows_are_those_of_the_run(run, tmp_path):
         file[f"runs/{run.id}/X1A"][100:110] = np.nan
         file[f"runs/{run.id}/L1H"][150] = 3e38
     broken = load_campaign(path).of_kind("dynamic")[0]
-    with broken.kept_open():
+    with broken.opened():
         stretches = broken.row_reader(("displacement", "force"))
         rows = stretches.read(0, 300).rows
     assert np.flatnonzero(np.isnan(rows["displacement"]).any(axis=0)).tolist() == list(range(100, 110))
@@ -74,13 +74,13 @@ def test_missing_values_and_overflows_are_those_of_the_run(run, tmp_path):
 
 def test_a_kept_file_serves_many_requests_and_lets_go(run):
     reader = run.reader
-    with reader.kept_open():
+    with reader.opened():
         parts = [reader.read(["X1A"], i, i + 500)[0] for i in range(0, 5000, 500)]
     np.testing.assert_array_equal(np.concatenate(parts), reader.read(["X1A"], 0, 5000)[0])
-    assert reader.held == {}
-    with pytest.raises(KeyError, match="mine"), reader.kept_open():
+    assert reader.opened_members == {}
+    with pytest.raises(KeyError, match="mine"), reader.opened():
         raise KeyError("mine")  # no fault of the file
-    assert reader.held == {}
+    assert reader.opened_members == {}
 
 
 @pytest.mark.slow

@@ -47,7 +47,7 @@ class HeldRun:
     def row_reader(self, quantities: Sequence[str]) -> RowReader:
         return VectorRows(self, quantities)
 
-    def kept_open(self) -> AbstractContextManager[None]:
+    def opened(self) -> AbstractContextManager[None]:
         return nullcontext()
 
     def speed(self, start: int | None = None, stop: int | None = None) -> Record:

@@ -21,7 +21,7 @@ ATTRIBUTES = {
 }  # fmt: skip
 #: file: what it may do, and why.
 ALLOWED = {
-    "rigdata/readers/formats/walled.py": {"subprocess"},  # this interpreter, to read files that crash libraries
+    "rigdata/readers/formats/sandbox.py": {"subprocess"},  # this interpreter, to read files that crash libraries
     "tpjb_ident/runtime/executors.py": {"pickle"},  # what its own processes send each other, never a file
     "tpjb_ident/runtime/threads.py": {"ctypes"},  # OpenBLAS as numpy has loaded it, to say how many threads it takes
 }

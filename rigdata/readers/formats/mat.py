@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 import zlib
@@ -12,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import refuse
 from rigdata.readers.series import Series, equidistant, is_time, seconds
 
 _RATES = ("fs", "sample_rate", "samplerate", "sample_rate_hz", "abtastrate")
@@ -37,7 +38,7 @@ def read_series(path: Path) -> list[Series]:
     """Read every numeric vector.
 
     A variable or structure field with at least eight numbers is a channel. The columns of a matrix are channels,
-    named by a list of as many texts beside it (``ChannelNames``, ``labels``, ..; units likewise), else ``name_1``,
+    named by a list of as many texts next to it (``ChannelNames``, ``labels``, ..; units likewise), else ``name_1``,
     ``name_2``, ..; where the list has as many names as the matrix has rows, its rows are the channels. One named like
     a time (``t``, ``time``, ``Zeit``) is the clock, a scalar ``fs`` or ``sample_rate`` [Hz] stands in for it.
 
@@ -46,92 +47,95 @@ def read_series(path: Path) -> list[Series]:
     path : Path
         ``.mat``
     """
-    flat = list(_flattened(_load(path), "", 0))
-    texts = {name: value for name, value in flat if isinstance(value, list)}
+    variables = list(_flattened(_load(path), "", 0))
+    texts = {name: value for name, value in variables if isinstance(value, list)}
     vectors, scalars, units = {}, {}, {}
-    for name, value in flat:
+    for name, value in variables:
         if isinstance(value, list):
             continue
         if value.size == 1:
             scalars[name] = float(value.reshape(-1)[0])
         elif value.size >= _SHORTEST:
-            named, stated = _columns(name, value, texts)
-            vectors.update(named)
-            units.update(stated)
+            columns, column_units = _columns(name, value, texts)
+            vectors.update(columns)
+            units.update(column_units)
     if not vectors:
-        held = ", ".join(name for name, _ in flat[:6]) or "no numbers at all"
-        what = f"holds no vector of at least {_SHORTEST} numbers, only {held}"
-        raise RigDataError(Problem("error", path.name, "", what, "Save the channels as vectors, or as a matrix"))
-    clock = next((n for n in vectors if is_time(n.rpartition(".")[2])), None)
+        names = ", ".join(name for name, _ in variables[:6]) or "no numbers at all"
+        what = f"holds no vector of at least {_SHORTEST} numbers, only {names}"
+        raise refuse(path.name, "", what, "Save the channels as vectors, or as a matrix")
+    clock = next((name for name in vectors if is_time(_last_part(name))), None)
     time = None if clock is None else seconds(vectors.pop(clock), units.get(clock, ""))
-    rate = next((v for n, v in scalars.items() if n.rpartition(".")[2].lower() in _RATES and v > 0), None)
-    found = []
+    rates = [value for name, value in scalars.items() if value > 0 and _last_part(name).lower() in _RATES]
+    series = []
     for name, values in vectors.items():
-        own = time if time is not None and len(time) == len(values) else None
-        if own is None and rate is not None:
-            own = equidistant(len(values), 1.0 / rate)
-        found.append(Series(name, units.get(name, ""), values, own))
-    return found
+        times = None
+        if time is not None and len(time) == len(values):
+            times = time
+        elif rates:
+            times = equidistant(len(values), 1.0 / rates[0])
+        series.append(Series(name, units.get(name, ""), values, times))
+    return series
+
+
+def _last_part(name: str) -> str:
+    return name.rpartition(".")[2]
 
 
 def _load(path: Path) -> dict[str, Any]:
-    # a 7.3 file is HDF5 behind 512 bytes of MATLAB's own text
     with path.open("rb") as stream:
-        stream.seek(512)
-        newer = stream.read(8) == _HDF5
-        stream.seek(0)
-        newer = newer or stream.read(8) == _HDF5
-    if newer:
-        return _load_hdf5(path)
+        head = stream.read(520)
+    if _HDF5 in (head[:8], head[512:]):  # a 7.3 file is HDF5 behind 512 bytes of MATLAB's own text
+        import h5py
+
+        with h5py.File(path, "r", locking="best-effort") as file:
+            return _group(file, path, 0)
     from scipy.io import loadmat
 
     check_mat5(path)
-    return {k: v for k, v in loadmat(path, simplify_cells=True).items() if not k.startswith("__")}
-
-
-def _load_hdf5(path: Path) -> dict[str, Any]:
-    import h5py
-
-    with h5py.File(path, "r", locking="best-effort") as file:
-        return _group(file, path, 0)
+    return {name: value for name, value in loadmat(path, simplify_cells=True).items() if not name.startswith("__")}
 
 
 def _group(group: Any, path: Path, depth: int) -> dict[str, Any]:
     """Datasets and groups by name; links out of the file and MATLAB's own store of references are left alone."""
     import h5py
 
-    found: dict[str, Any] = {}
+    members: dict[str, Any] = {}
     for name in group:
         if name.startswith("#") or depth > _DEEPEST:
             continue
         if isinstance(group.get(name, getlink=True), (h5py.ExternalLink, h5py.SoftLink)):
-            problem = Problem("error", path.name, f"dataset {name}", "is a link", "Store the data in this file")
-            raise RigDataError(problem)
+            raise refuse(path.name, f"dataset {name}", "is a link", "Store the data in this file")
         item = group[name]
         if isinstance(item, h5py.Group):
-            found[name] = _group(item, path, depth + 1)
+            members[name] = _group(item, path, depth + 1)
         elif item.dtype == h5py.ref_dtype:
             texts = _cell_texts(item)
             if texts:
-                found[name] = np.array(texts, dtype=object)
-        elif item.dtype.kind in "fiu" and not (item.is_virtual or item.external or _is_text(item)):
-            found[name] = np.asarray(item[()], dtype=float).T  # MATLAB writes columns first
-    return found
+                members[name] = np.array(texts, dtype=object)
+        elif item.dtype.kind in "fiu" and _is_inside(item) and not _is_text(item):
+            members[name] = np.asarray(item[()], dtype=float).T  # MATLAB writes columns first
+    return members
 
 
 def _cell_texts(item: Any) -> list[str]:
     """Texts of a cell array of characters in a 7.3 file, which holds a reference to each; none if it holds others."""
-    if item.size > _MOST_NAMES or item.is_virtual or item.external:
+    if item.size > _MOST_NAMES or not _is_inside(item):
         return []
-    found = []
+    texts = []
     for reference in np.asarray(item[()]).T.reshape(-1):
         text = item.file[reference] if reference else None
         if text is None or not hasattr(text, "dtype") or text.dtype.kind != "u" or text.size > _LONGEST:
             return []
-        if not _is_text(text) or text.is_virtual or text.external:
+        if not (_is_text(text) and _is_inside(text)):
             return []
-        found.append("".join(chr(int(c)) for c in np.asarray(text[()]).T.reshape(-1)))
-    return found
+        codes = np.asarray(text[()]).T.reshape(-1)
+        texts.append("".join(chr(int(code)) for code in codes))
+    return texts
+
+
+def _is_inside(item: Any) -> bool:
+    """Whether a dataset's samples are in the file itself."""
+    return not (item.is_virtual or item.external)
 
 
 def _is_text(item: Any) -> bool:
@@ -148,26 +152,35 @@ def _flattened(value: Any, name: str, depth: int) -> Iterator[tuple[str, np.ndar
     array = np.asarray(value)
     if array.dtype.kind in "fiu" and array.size and array.ndim <= 2:
         yield name, array.astype(float)
-    elif array.dtype.kind in "UO" and array.size <= _MOST_NAMES:
-        texts = [str(cell).strip() for cell in array.reshape(-1)]
-        if texts and all(isinstance(cell, str) for cell in array.reshape(-1)):
-            yield name, texts
+    elif array.dtype.kind in "UO" and 0 < array.size <= _MOST_NAMES:
+        cells = array.reshape(-1).tolist()
+        if all(isinstance(cell, str) for cell in cells):
+            yield name, [cell.strip() for cell in cells]
 
 
 def _columns(name: str, value: np.ndarray, texts: dict[str, list[str]]) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Channels of a variable, and units of those that a list beside it tells."""
+    """Channels of a variable, and units of those that a list next to it has."""
     if value.ndim == 1 or 1 in value.shape:
         return {name: np.ascontiguousarray(value).reshape(-1)}, {}
+    names: list[str] = []
+    units: list[str] = []
     level = name.rpartition(".")[0]
-    beside = {k.rpartition(".")[2].lower(): v for k, v in texts.items() if k.rpartition(".")[0] == level}
-    names = next((v for k, v in beside.items() if _NAMES.search(k) and len(v) in value.shape), None)
-    if names is None:
-        return {f"{name}_{i + 1}": np.ascontiguousarray(value[:, i]) for i in range(value.shape[1])}, {}
-    if len(names) != value.shape[1]:
-        value = value.T
-    units = next((v for k, v in beside.items() if _UNITS.search(k) and len(v) == len(names)), [""] * len(names))
-    labels = [n if n and names.count(n) == 1 else f"{n or name}_{i + 1}" for i, n in enumerate(names)]
-    return {n: np.ascontiguousarray(value[:, i]) for i, n in enumerate(labels)}, dict(zip(labels, units, strict=True))
+    lists = {_last_part(key).lower(): cells for key, cells in texts.items() if key.rpartition(".")[0] == level}
+    for key, cells in lists.items():
+        if not names and _NAMES.search(key) and len(cells) in value.shape:
+            names = cells
+    if not names:
+        return {f"{name}_{i + 1}": np.ascontiguousarray(column) for i, column in enumerate(value.T)}, {}
+    for key, cells in lists.items():
+        if not units and _UNITS.search(key) and len(cells) == len(names):
+            units = cells
+    columns, column_units = {}, {}
+    for i, column in enumerate(value.T if len(names) == value.shape[1] else value):
+        is_unique = names[i] and names.count(names[i]) == 1
+        label = names[i] if is_unique else f"{names[i] or name}_{i + 1}"
+        columns[label] = np.ascontiguousarray(column)
+        column_units[label] = units[i] if units else ""
+    return columns, column_units
 
 
 @dataclass
@@ -210,22 +223,19 @@ def check_mat5(path: Path) -> None:
     if len(data) < _HEADER or not any(data[:4]) or order is None:
         return  # version 4, or no MATLAB file
     walk = _Bytes(data, order, _HEADER, len(data))
-    left = LARGEST
+    limit = LARGEST
     try:
         while walk.at < walk.end:
             kind, start, size = walk.element(frozenset({_MATRIX, _COMPRESSED}))
             if kind == _COMPRESSED:
-                plain = _unpacked(data[start : start + size], left)
-                left -= len(plain)
-                inner = _Bytes(plain, order, 0, len(plain))
-                _, start, size = inner.element(frozenset({_MATRIX}))
-                _matrix(_Bytes(plain, order, start, start + size), 0)
+                plain = _unpacked(data[start : start + size], limit)
+                limit -= len(plain)
+                _inner(_Bytes(plain, order, 0, len(plain)), 0)
             elif size:
                 _matrix(_Bytes(data, order, start, start + size), 0)
     except ValueError as error:
-        raise RigDataError(
-            Problem("error", path.name, f"byte {walk.at}", f"is damaged: {error}", "Copy it again from the logger")
-        ) from error
+        remedy = "Copy it again from the logger"
+        raise refuse(path.name, f"byte {walk.at}", f"is damaged: {error}", remedy) from error
 
 
 def _unpacked(packed: bytes, limit: int) -> bytes:
@@ -249,20 +259,18 @@ def _matrix(walk: _Bytes, depth: int) -> None:
     if size != 8:
         raise ValueError("a variable's flags have a wrong size")
     (flags,) = struct.unpack_from(f"{walk.order}I", walk.data, start)
-    kind, complex_ = flags & 0xFF, bool(flags & 0x800)
+    kind, is_complex = flags & 0xFF, bool(flags & 0x800)
     if kind == _OPAQUE:
         for _ in range(3):
             walk.element(frozenset({1}))
-        _inner(walk, depth)
+        _inner(walk, depth + 1)
         return
     _, start, size = walk.element(frozenset({5}))
     shape = struct.unpack_from(f"{walk.order}{size // 4}i", walk.data, start)
     if size % 4 or not 1 <= len(shape) <= 32 or min(shape) < 0:
         raise ValueError("a variable has an impossible shape")
     walk.element(frozenset({1}))
-    count = 1
-    for length in shape:
-        count *= length
+    count = math.prod(shape)
     if kind in (_CELL, _STRUCT, _OBJECT, _FUNCTION):
         if kind == _OBJECT:
             walk.element(frozenset({1}))
@@ -270,7 +278,7 @@ def _matrix(walk: _Bytes, depth: int) -> None:
     elif kind == _CHAR:
         walk.element(_TEXTS)
     elif kind == _SPARSE or 6 <= kind <= 15:
-        for _ in range((2 if kind == _SPARSE else 0) + 1 + complex_):
+        for _ in range((2 if kind == _SPARSE else 0) + 1 + is_complex):
             walk.element(_NUMBERS)
     else:
         raise ValueError(f"a variable is of the unknown class {kind}")
@@ -290,9 +298,9 @@ def _members(walk: _Bytes, kind: int, count: int, depth: int) -> None:
     if 8 * count > walk.end - walk.at:
         raise ValueError(f"claims {count} members, more than there is room for")
     for _ in range(count):
-        _inner(walk, depth)
+        _inner(walk, depth + 1)
 
 
 def _inner(walk: _Bytes, depth: int) -> None:
     _, start, size = walk.element(frozenset({_MATRIX}))
-    _matrix(_Bytes(walk.data, walk.order, start, start + size), depth + 1)
+    _matrix(_Bytes(walk.data, walk.order, start, start + size), depth)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigdata.readers.formats.walled import read_walled
+from rigdata.readers.formats.sandbox import read_sandboxed
 from rigdata.readers.series import Series
 
 
@@ -28,19 +28,19 @@ def read_series(path: Path) -> list[Series]:
     """
     if importlib.util.find_spec("asammdf") is None:
         raise ModuleNotFoundError("No module named 'asammdf'", name="asammdf")
-    return read_walled("mdf4", path)
+    return read_sandboxed("mdf4", path)
 
 
-def read_walled_in(path: Path) -> list[Series]:
+def read_in_sandbox(path: Path) -> list[Series]:
     """As `read_series`, in this process: a damaged file can end it."""
     from asammdf import MDF
 
-    found = []
+    series = []
     with MDF(path) as file:
         for signal in file.iter_channels(skip_master=True):
             values = signal.samples
             if values.ndim == 1 and np.issubdtype(values.dtype, np.number):
                 time = np.asarray(signal.timestamps, dtype=float)
                 group = f"group {signal.group_index + 1}"
-                found.append(Series(signal.name, signal.unit or "", np.asarray(values, dtype=float), time, group))
-    return found
+                series.append(Series(signal.name, signal.unit or "", np.asarray(values, dtype=float), time, group))
+    return series

@@ -20,17 +20,17 @@ def read_series(path: Path) -> list[Series]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    columns, units = {}, {}
     with pq.ParquetFile(path) as table:
         schema, rows = table.schema_arrow, table.metadata.num_rows
-        columns = {
-            f.name: to_temporary_file(table.read([f.name]).column(0).cast(pa.float64()).to_numpy())
-            for f in schema
-            if pa.types.is_integer(f.type) or pa.types.is_floating(f.type)
-        }
-    units = {f.name: (f.metadata or {}).get(b"unit", b"").decode("utf-8", "replace") for f in schema}
-    clock = next((n for n in columns if is_time(n)), None)
+        for column in schema:
+            if pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
+                values = table.read([column.name]).column(0).cast(pa.float64()).to_numpy()
+                columns[column.name] = to_temporary_file(values)
+                units[column.name] = (column.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
+    clock = next(filter(is_time, columns), None)
     time = None if clock is None else seconds(columns.pop(clock), units[clock])
     rate = (schema.metadata or {}).get(b"sample_rate_hz")
     if time is None and rate is not None and columns:
         time = equidistant(rows, 1.0 / float(rate))
-    return [Series(n, units[n], v, time) for n, v in columns.items()]
+    return [Series(name, units[name], values, time) for name, values in columns.items()]

@@ -25,7 +25,7 @@ def read_series(path: Path) -> list[Series]:
     """
     from nptdms import TdmsFile
 
-    found: list[Series] = []
+    series: list[Series] = []
     # opened here: npTDMS leaves a file open that it cannot read
     with path.open("rb") as stream, TdmsFile.open(stream) as file:
         for group in file.groups():
@@ -33,17 +33,15 @@ def read_series(path: Path) -> list[Series]:
             clock = next((c for c in channels if is_time(c.name) and len(c)), None)
             unit = "" if clock is None else str(clock.properties.get("unit_string", ""))
             shared = None if clock is None else seconds(np.asarray(clock[:], dtype=float), unit)
-            found += [_series(channel, group.name, shared) for channel in channels if channel is not clock]
-    return found
+            series += [_series(channel, group.name, shared) for channel in channels if channel is not clock]
+    return series
 
 
 def _series(channel: Any, group: str, shared: FloatArray | None) -> Series:
     values = to_temporary_file(np.asarray(channel[:], dtype=float))
     unit = str(channel.properties.get("unit_string", ""))
     step = channel.properties.get("wf_increment")
-    time: FloatArray | None
+    time = shared if shared is not None and len(shared) == len(values) else None
     if step is not None and float(step) > 0:
         time = equidistant(len(values), float(step), float(channel.properties.get("wf_start_offset", 0.0)))
-    else:
-        time = shared if shared is not None and len(shared) == len(values) else None
     return Series(channel.name, unit, values, time, group)

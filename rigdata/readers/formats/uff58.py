@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import refuse
 from rigdata.readers.series import Series, equidistant, to_temporary_file
 
 #: Function types of data set 58 that are records over time.
@@ -35,37 +36,34 @@ def read_series(path: Path) -> list[Series]:
     import pyuff
 
     file = pyuff.UFF(str(path))
-    found, others = [], []
+    series: list[Series] = []
+    unusable: Counter[str] = Counter()
     for index, kind in enumerate(file.get_set_types()):
         if int(kind) != 58:
-            others.append(f"data set {int(kind)}")
+            unusable[f"data set {int(kind)}"] += 1
             continue
         data = file.read_sets(index)
         function = int(data.get("func_type", 0))
         if function in (_GENERAL, _TIME_RESPONSE) and not np.iscomplexobj(data["data"]):
-            found.append(_series(data, index))
+            series.append(_series(data, index))
         else:
-            others.append(_FUNCTIONS.get(function, f"function type {function}"))
-    if not found:
-        counted = [f"{others.count(one)} x {one}" for one in dict.fromkeys(others)]
-        what = f"holds no record over time, only {', '.join(counted[:6])}" if others else "holds no data set"
-        raise RigDataError(
-            Problem("error", path.name, "", what, "Export the time records (data set 58, time response)")
-        )
-    return found
+            unusable[_FUNCTIONS.get(function, f"function type {function}")] += 1
+    if not series:
+        counts = ", ".join([f"{count} x {kind}" for kind, count in unusable.items()][:6])
+        what = f"holds no record over time, only {counts}" if counts else "holds no data set"
+        raise refuse(path.name, "", what, "Export the time records (data set 58, time response)")
+    return series
 
 
 def _series(data: dict[str, Any], index: int) -> Series:
     values = to_temporary_file(np.asarray(data["data"], dtype=float))
-    known = data.get("x")
-    time: FloatArray | None
+    x = data.get("x")
     step = float(data.get("abscissa_inc") or 0.0)
-    if known is not None and len(known) == len(values):
-        time = to_temporary_file(np.asarray(known, dtype=float))
+    time: FloatArray | None = None
+    if x is not None and len(x) == len(values):
+        time = to_temporary_file(np.asarray(x, dtype=float))
     elif step > 0:
         time = equidistant(len(values), step, float(data.get("abscissa_min") or 0.0))
-    else:
-        time = None
     unit = str(data.get("ordinate_axis_units_lab") or "").strip()
     return Series(_name(data, index), "" if unit.upper() == "NONE" else unit, values, time, f"set {index + 1}")
 
@@ -75,10 +73,11 @@ def _name(data: dict[str, Any], index: int) -> str:
         text = str(data.get(key) or "").strip()
         if text and text.upper() != "NONE":
             return text
-    node = data.get("rsp_node")
-    return f"Rsp {node}{_direction(data.get('rsp_dir'))}" if node else f"set {index + 1}"
-
-
-def _direction(code: object) -> str:
+    node, code = data.get("rsp_node"), data.get("rsp_dir")
+    if not node:
+        return f"set {index + 1}"
     number = int(code) if isinstance(code, (int, float)) else 0
-    return f"{'+' if number > 0 else '-'}{'XYZ'[abs(number) - 1]}" if 1 <= abs(number) <= 3 else ""
+    direction = ""
+    if 1 <= abs(number) <= 3:
+        direction = ("+" if number > 0 else "-") + "XYZ"[abs(number) - 1]
+    return f"Rsp {node}{direction}"

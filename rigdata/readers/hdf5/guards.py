@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import refuse
 
 #: With the version; three reserved bytes follow, which the library does not look at.
 _SIGNATURE, _RESERVED = b"GCOL\x01", b"\0\0\0"
@@ -24,6 +24,9 @@ _LARGEST_HEAP = 2**28
 #: the descriptions of type and shape.
 _REFERENCE, _BEHIND = struct.Struct("<IQI"), 80
 _MAX_STEPS = 64
+#: HDF5's class of texts (H5T_STRING), and the classes of what is stored in its own place: integers, floats, texts.
+TEXT = 3
+_PLAIN = (0, 1, TEXT)
 
 
 def broken_heap(path: Path) -> int | None:
@@ -44,13 +47,14 @@ def too_long_text(path: Path, names: Sequence[str], base: int = 0) -> str | None
     """
     with path.open("rb") as stream:
         size = stream.seek(0, 2)
-        heaps, behind = set[int](), list[tuple[str, bytes]]()
+        heaps, followers = set[int](), list[tuple[str, bytes]]()
         for start, block in _ends(stream, size):
             heaps.update(start + at - base for at in _places(block, _SIGNATURE))
             for name in names:
-                ends = (at + len(name) for at in _places(block, name.encode() + b"\0"))
-                behind += [(name, block[end : end + _BEHIND]) for end in ends]
-    for name, piece in behind:
+                for at in _places(block, name.encode() + b"\0"):
+                    end = at + len(name)
+                    followers.append((name, block[end : end + _BEHIND]))
+    for name, piece in followers:
         for place in range(len(piece) - _REFERENCE.size + 1):
             length, address, _ = _REFERENCE.unpack_from(piece, place)
             if address in heaps and length > size:
@@ -93,36 +97,39 @@ def _is_sound(stream: BinaryIO, at: int, size: int) -> bool:
 
 
 def resolve(start: Any, path: str, file: str, run: str | None = None) -> Any:
-    """Walk `path` from the group `start`, one link at a time."""
+    """Walk `path` from the group `start`, one link at a time; None where there is no such member."""
     import h5py
 
-    def refuse(place: str, what: str) -> RigDataError:
-        return RigDataError(Problem("error", file, place, what, "Copy the data into this file", run))
-
-    here, todo, steps = start, [p for p in path.split("/") if p not in {"", "."}], 0
-    soft = False
-    while todo:
+    remedy = "Copy the data into this file"
+    member, remaining, steps = start, _parts(path), 0
+    is_soft = False
+    while remaining:
         steps += 1
         if steps > _MAX_STEPS:
-            raise refuse(path, "is a circle of links, or too deep")
-        name = todo.pop(0)
-        known = isinstance(here, h5py.Group) and has_link(here, name)
-        link = here.get(name, getlink=True) if known else None
-        if link is None:
-            if soft:
-                raise refuse(path, "is a soft link that leads nowhere")
+            raise refuse(file, path, "is a circle of links, or too deep", remedy, run)
+        name = remaining.pop(0)
+        link = None
+        if isinstance(member, h5py.Group) and has_link(member, name):
+            link = member.get(name, getlink=True)
+        if isinstance(link, h5py.HardLink):
+            member = member[name]
+        elif isinstance(link, h5py.SoftLink):
+            target, is_soft = str(link.path), True
+            member = member.file["/"] if target.startswith("/") else member
+            remaining = _parts(target) + remaining
+        elif isinstance(link, h5py.ExternalLink):
+            raise refuse(file, path, f"is a link out of the file (to {str(link.filename)[:80]!a})", remedy, run)
+        elif link is not None:
+            raise refuse(file, path, "is a link of an unknown kind", remedy, run)
+        elif is_soft:
+            raise refuse(file, path, "is a soft link that leads nowhere", remedy, run)
+        else:
             return None
-        if isinstance(link, h5py.ExternalLink):
-            raise refuse(path, f"is a link out of the file (to {str(link.filename)[:80]!a})")
-        if isinstance(link, h5py.SoftLink):
-            target, soft = str(link.path), True
-            here = here.file["/"] if target.startswith("/") else here
-            todo = [p for p in target.split("/") if p not in {"", "."}] + todo
-            continue
-        if not isinstance(link, h5py.HardLink):
-            raise refuse(path, "is a link of an unknown kind")
-        here = here[name]
-    return here
+    return member
+
+
+def _parts(path: str) -> list[str]:
+    return [part for part in path.split("/") if part not in ("", ".")]
 
 
 def has_link(group: Any, name: str) -> bool:
@@ -139,3 +146,14 @@ def chunk_bytes(group: Any, name: str) -> int:
     member = group[name]
     chunk = member.chunks if isinstance(member, h5py.Dataset) else None
     return 0 if chunk is None else math.prod(chunk) * member.dtype.itemsize
+
+
+def is_plain(attribute: Any, most: int) -> bool:
+    """Whether an attribute is made of numbers or texts of up to `most` bytes that are stored where it is itself.
+
+    A text elsewhere in the file is as long as its reference says, and a damaged one says gigabytes, for which the
+    library makes room before it looks.
+    """
+    kind = attribute.get_type()
+    is_within = kind.get_class() in _PLAIN and not (kind.get_class() == TEXT and kind.is_variable_str())
+    return is_within and attribute.get_storage_size() <= most

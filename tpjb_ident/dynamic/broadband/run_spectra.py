@@ -79,7 +79,7 @@ class SpectraSettings:
 
 def run_clocks(run: Run, settings: SpectraSettings) -> dict[str, ClockRate]:
     """What one run shows of the rates of its clocks."""
-    with run.kept_open():
+    with run.opened():
         samples = read_samples(run, settings.seconds)
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.mains, settings.band[1])
     return clock_rates(samples, settings.band, lines)
@@ -87,7 +87,7 @@ def run_clocks(run: Run, settings: SpectraSettings) -> dict[str, ClockRate]:
 
 def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> RunSpectra:
     """Read one run and transform it."""
-    with run.kept_open():
+    with run.opened():
         slower, told = inspect_readings(run)
         samples = read_samples(run, settings.seconds)
         temperatures = mean_temperatures(run)

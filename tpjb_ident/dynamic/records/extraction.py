@@ -34,7 +34,7 @@ def extract(
     speeds = None if follow is None else follow.at(np.asarray(middles, dtype=float))
     work = _Work(length, run.sample_rate, lines, speeds, run.point.shaft_speed_hz)
     parts: list[_Fitted] = []
-    with run.kept_open():
+    with run.opened():
         stretches = run.row_reader(quantities)
         for first, stop in _chunks(length, count):
             parts.append(work.fit(stretches, first, stop))

@@ -60,9 +60,9 @@ class ShortRecord:
         """Rows of what is kept."""
         return VectorRows(self, quantities)
 
-    def kept_open(self) -> AbstractContextManager[None]:
+    def opened(self) -> AbstractContextManager[None]:
         """As the run's own."""
-        return self._run.kept_open()
+        return self._run.opened()
 
 
 class ReadingCache:

@@ -57,7 +57,7 @@ class MeasuredRun(Protocol):
     def row_reader(self, quantities: Sequence[str]) -> RowReader:
         """Reader of several quantities at once."""
 
-    def kept_open(self) -> AbstractContextManager[None]:
+    def opened(self) -> AbstractContextManager[None]:
         """Keep the file open while the block runs."""
 
 

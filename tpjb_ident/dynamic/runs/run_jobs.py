@@ -125,7 +125,7 @@ def _anywhere(run: Run) -> Any:
 
 def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResult:
     """Phasors and temperatures of one run."""
-    with run.kept_open():
+    with run.opened():
         kept = with_kept_beginning(run)
         try:
             phasors = run_phasors(kept, housing_mass, settings)

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import refuse
 from rigdata.readers.series import Series
 
 #: Seconds of processor time that any file may take, and bytes per second more; `PATIENCE` times that by the clock.
@@ -30,62 +30,59 @@ MEMORY, MULTIPLES = 2**30, 64
 _AGAIN = "Export or copy it again from the logger"
 
 
-def read_walled(module: str, path: Path) -> list[Series]:
-    """Let ``rigdata.readers.<module>.read_walled_in(path)`` read a file in a child process."""
+def read_sandboxed(module: str, path: Path) -> list[Series]:
+    """Let ``rigdata.readers.formats.<module>.read_in_sandbox(path)`` read a file in a child process."""
     seconds = SECONDS + path.stat().st_size / BYTES_PER_SECOND
     # The child must find the same rigdata as this process, wherever that came from.
     home = str(Path(__file__).parents[3])
-    around = {**os.environ, "PYTHONPATH": os.pathsep.join([home, os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)}
-    allowed = str(math.ceil(seconds))
-    command = [sys.executable, "-m", "rigdata.readers.formats.walled", module, str(path), allowed]
-    too_long = _refuse(f"took longer than {seconds:.0f} s to read, far beyond its size", _AGAIN)
+    search_path = os.pathsep.join([home, os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)
+    command = [sys.executable, "-m", "rigdata.readers.formats.sandbox", module, str(path), str(math.ceil(seconds))]
+    too_long = refuse("", "", f"took longer than {seconds:.0f} s to read, far beyond its size", _AGAIN)
     try:
-        # asammdf mends a copy of a measurement that was cut short, and a child that dies cannot clear it away.
+        # asammdf repairs a copy of a measurement that was cut short, and a child that dies cannot clear it away.
         with tempfile.TemporaryDirectory(prefix="tpjb-", ignore_cleanup_errors=True) as scratch:
-            around |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), scratch)
+            temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), scratch)
             # What a library prints about a broken file is no message for people; its exception comes with the answer.
-            done = subprocess.run(
+            child = subprocess.run(
                 command,
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
                 timeout=PATIENCE * seconds,
-                env=around,
+                env={**os.environ, "PYTHONPATH": search_path, **temporary},
                 check=False,
             )
     except subprocess.TimeoutExpired as error:
         raise too_long from error
-    if done.returncode == -getattr(signal, "SIGXCPU", 0) != 0:
+    if child.returncode == -getattr(signal, "SIGXCPU", 0) != 0:
         raise too_long
-    head, _, body = done.stdout.partition(b"\n")
-    if done.returncode != 0 or not head:
-        raise _refuse(f"made its library crash (exit status {done.returncode}): it is damaged", _AGAIN)
-    said = json.loads(head)
-    if isinstance(said, dict):
-        raise _refuse(str(said["error"]), _AGAIN)
-    return _unpack(said, body)
-
-
-def _refuse(what: str, cure: str) -> RigDataError:
-    return RigDataError(Problem("error", "", "", what, cure))
+    head, _, body = child.stdout.partition(b"\n")
+    if child.returncode != 0 or not head:
+        what = f"made its library crash (exit status {child.returncode}): it is damaged"
+        raise refuse("", "", what, _AGAIN)
+    answer = json.loads(head)
+    if isinstance(answer, dict):
+        raise refuse("", "", str(answer["error"]), _AGAIN)
+    return _unpack(answer, body)
 
 
 def _unpack(heads: list[list[str]], body: bytes) -> list[Series]:
-    numbers, at, found = np.frombuffer(body, dtype=float), 0, []
-    for name, unit, group, length, timed in heads:
-        n = int(length)
-        values, at = numbers[at : at + n], at + n
-        time = numbers[at : at + n] if timed else None
-        at += n if timed else 0
-        found.append(Series(name, unit, values, time, group))
-    return found
+    numbers, start = np.frombuffer(body, dtype=float), 0
+    series = []
+    for name, unit, group, length, is_timed in heads:
+        middle = start + int(length)
+        end = middle + int(length) if is_timed else middle
+        time = numbers[middle:end] if is_timed else None
+        series.append(Series(name, unit, numbers[start:middle], time, group))
+        start = end
+    return series
 
 
-def _answer(found: Sequence[Series]) -> None:
-    heads = [[s.name, s.unit, s.group, len(s), s.time is not None] for s in found]
+def _send(series: Sequence[Series]) -> None:
+    heads = [[s.name, s.unit, s.group, len(s), s.time is not None] for s in series]
     out = sys.stdout.buffer
     out.write(json.dumps(heads).encode() + b"\n")
-    for one in found:
-        for numbers in (one.values, one.time):
+    for channel in series:
+        for numbers in (channel.values, channel.time):
             if numbers is not None:
                 out.write(np.ascontiguousarray(numbers, dtype=float).data)
     out.flush()
@@ -116,13 +113,13 @@ def main(module: str, path: Path) -> None:
     _limit_memory(path)
     try:
         with contextlib.redirect_stdout(sys.stderr):  # asammdf prints what it finds; the answer would begin with that
-            found = reader.read_walled_in(path)
+            series = reader.read_in_sandbox(path)
     except MemoryError:
         error = "claims more data than its size can hold"
     except Exception as problem:  # whatever another library raises on a broken file: it is the file's fault here
         error = f"cannot be read ({type(problem).__name__}: {str(problem)[:120]})"
     else:
-        _answer(found)
+        _send(series)
         return
     print(json.dumps({"error": error}))
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rigdata.problem import RigDataError
-from rigdata.readers.formats import walled
+from rigdata.readers.formats import sandbox
 from rigdata.readers.formats.foreign import read_foreign
 from rigdata.readers.series import Series
 
@@ -25,9 +25,9 @@ def test_numbers_cross_the_wall_bit_for_bit(capsysbinary):
         Series("X1A", "V", np.array([1.0, np.nan, -np.inf, 5e-324]), np.arange(4.0), "group 1"),
         Series("Temperatür", "°C", np.array([]), None, "group 2"),
     ]
-    walled._answer(given)
+    sandbox._send(given)
     head, _, body = capsysbinary.readouterr().out.partition(b"\n")
-    for one, back in zip(given, walled._unpack(json.loads(head), body), strict=True):
+    for one, back in zip(given, sandbox._unpack(json.loads(head), body), strict=True):
         assert (one.name, one.unit, one.group) == (back.name, back.unit, back.group)
         assert one.values.tobytes() == back.values.tobytes()
         assert (one.time is None) == (back.time is None)
@@ -35,15 +35,15 @@ def test_numbers_cross_the_wall_bit_for_bit(capsysbinary):
 
 
 def test_what_a_library_prints_is_no_part_of_the_answer(tmp_path, monkeypatch, capsysbinary):
-    def read_walled_in(path):
+    def read_in_sandbox(path):
         print("a channel looks odd")  # asammdf says such things of files that it can read
         return [Series("X1A", "V", np.arange(3.0), None, "")]
 
-    monkeypatch.setitem(sys.modules, "rigdata.readers.formats.talks", SimpleNamespace(read_walled_in=read_walled_in))
-    monkeypatch.setattr(walled, "_limit_memory", lambda path: None)
-    walled.main("talks", tmp_path)
+    monkeypatch.setitem(sys.modules, "rigdata.readers.formats.talks", SimpleNamespace(read_in_sandbox=read_in_sandbox))
+    monkeypatch.setattr(sandbox, "_limit_memory", lambda path: None)
+    sandbox.main("talks", tmp_path)
     head, _, body = capsysbinary.readouterr().out.partition(b"\n")
-    (back,) = walled._unpack(json.loads(head), body)
+    (back,) = sandbox._unpack(json.loads(head), body)
     assert back.values.tolist() == [0.0, 1.0, 2.0]
 
 
@@ -51,15 +51,15 @@ def test_a_child_that_dies_is_told(tmp_path):
     path = tmp_path / "a.mf4"
     path.write_bytes(b"x")
     with pytest.raises(RigDataError, match="crash"):
-        walled.read_walled("no_such_reader", path)
+        sandbox.read_sandboxed("no_such_reader", path)
 
 
 def test_a_child_that_does_not_end_is_ended(tmp_path, monkeypatch):
     path = tmp_path / "a.mf4"
     path.write_bytes(b"x")
-    monkeypatch.setattr(walled, "SECONDS", 0.001)  # ten times that: less than Python takes to start
+    monkeypatch.setattr(sandbox, "SECONDS", 0.001)  # ten times that: less than Python takes to start
     with pytest.raises(RigDataError, match="took longer than 0 s"):
-        walled.read_walled("mdf4", path)
+        sandbox.read_sandboxed("mdf4", path)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a shell script stands for the child")
@@ -72,7 +72,7 @@ def test_what_a_dying_child_leaves_in_the_temporary_folder_is_cleared_away(tmp_p
     monkeypatch.setattr(tempfile, "tempdir", str(shelf))
     monkeypatch.setattr(sys, "executable", str(dying))
     with pytest.raises(RigDataError, match="exit status 9"):
-        walled.read_walled("mdf4", path)
+        sandbox.read_sandboxed("mdf4", path)
     assert Path(told.read_text().strip()).parent == shelf
     assert list(shelf.iterdir()) == []
 
@@ -81,6 +81,6 @@ def test_what_a_dying_child_leaves_in_the_temporary_folder_is_cleared_away(tmp_p
 @pytest.mark.parametrize("name", ["crash", "circle", "gigabytes"])
 def test_what_fuzzing_found_is_refused(name, monkeypatch):
     pytest.importorskip("asammdf", reason="asammdf is heavy; install the extra mdf to run this")
-    monkeypatch.setattr(walled, "SECONDS", 10.0)
+    monkeypatch.setattr(sandbox, "SECONDS", 10.0)
     with pytest.raises(RigDataError, match=rf"{name}\.mf4"):
         read_foreign(DAMAGED / f"{name}.mf4", f"{name}.mf4")
