@@ -173,9 +173,9 @@ class Run:
         """Channels that X and Y of a quantity come from."""
         chosen = [c for c in self.channels.values() if c.quantity == quantity and c.axis is not None]
         if len(chosen) < 2:
-            what = f"has {len(chosen)} channels, two are needed"
+            fault = f"has {len(chosen)} channels, two are needed"
             remedy = f"Describe two {quantity} channels with different axes in the manifest"
-            raise refuse(self.file, f"quantity {quantity}", what, remedy, self.id)
+            raise refuse(self.file, f"quantity {quantity}", fault, remedy, self.id)
         axes = np.array([c.axis for c in chosen])
         if not np.any(np.abs(np.sin(axes - axes[0])) > COLLINEAR_SINE):
             names = ", ".join(c.name for c in chosen)

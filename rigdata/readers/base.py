@@ -84,7 +84,7 @@ class RunReader(Protocol):
         """Report what does not stop the run from being used."""
 
 
-def undescribed(names: Sequence[str], what: str, file: str, run: str) -> tuple[Problem, ...]:
+def undescribed(names: Sequence[str], members: str, file: str, run: str) -> tuple[Problem, ...]:
     """Note columns or datasets that the manifest does not describe."""
     if not names:
         return ()
@@ -92,7 +92,7 @@ def undescribed(names: Sequence[str], what: str, file: str, run: str) -> tuple[P
     if len(names) > 6:
         listed += f", ... ({len(names)} in all)"
     remedy = "Nothing, or describe them in the manifest"
-    return (Problem("note", file, what, f"{what} without a description: {listed}", remedy, run),)
+    return (Problem("note", file, members, f"{members} without a description: {listed}", remedy, run),)
 
 
 def missing_channel(name: str, names: Iterable[str]) -> tuple[str, str, str]:

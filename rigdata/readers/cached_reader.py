@@ -101,8 +101,8 @@ class CachedReader:
         columns = self._columns(names)
         for name in names:
             if name not in columns.values:
-                place, what, remedy = missing_channel(name, filter(None, self.names()))
-                raise refuse(self.file, place, what, remedy, self.run)
+                place, fault, remedy = missing_channel(name, filter(None, self.names()))
+                raise refuse(self.file, place, fault, remedy, self.run)
         return [np.asarray(columns.values[name][start:stop], dtype=float) for name in names]
 
     def rate(self) -> float:
@@ -112,9 +112,9 @@ class CachedReader:
         if rate > 0:
             return rate
         if self.stated_rate is None:
-            what = "there are neither usable times nor a sample rate"
+            fault = "there are neither usable times nor a sample rate"
             remedy = 'Add sample_rate to the run or to [acquisition], or a channel with quantity = "time"'
-            raise refuse(self.file, "", what, remedy, self.run)
+            raise refuse(self.file, "", fault, remedy, self.run)
         return self.stated_rate
 
     def time(self, start: int, stop: int) -> FloatArray:

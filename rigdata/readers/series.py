@@ -127,8 +127,8 @@ def on_one_clock(series: Sequence[Series], file: str, run: str | None = None) ->
     if not timed:
         lengths = {len(channel) for channel in channels}
         if len(lengths) > 1:
-            what = f"has channels of {len(lengths)} different lengths and no times"
-            raise refuse(file, "", what, "Export with a time channel, or channels of one length", run)
+            fault = f"has channels of {len(lengths)} different lengths and no times"
+            raise refuse(file, "", fault, "Export with a time channel, or channels of one length", run)
         return Columns({channel.name: channel.values for channel in channels})
     master = max(timed, key=lambda channel: (channel.rate, len(channel)))
     clock = _rising_times(master, file, run)
@@ -139,9 +139,9 @@ def on_one_clock(series: Sequence[Series], file: str, run: str | None = None) ->
         values[channel.name] = channel.values
         if channel.time is None:
             if len(channel) != len(clock):
-                what = f"channel {channel.name} has {len(channel)} samples and no times"
-                what += f", {master.name} has {len(clock)}"
-                raise refuse(file, "", what, "Export it with its time channel", run)
+                fault = f"channel {channel.name} has {len(channel)} samples and no times"
+                fault += f", {master.name} has {len(clock)}"
+                raise refuse(file, "", fault, "Export it with its time channel", run)
         elif not _alike(channel.time, clock):
             times = _rising_times(channel, file, run)
             values[channel.name] = _interpolated(times, channel.values, clock)
@@ -149,16 +149,16 @@ def on_one_clock(series: Sequence[Series], file: str, run: str | None = None) ->
     problems: tuple[Problem, ...] = ()
     if interpolated:
         names = ", ".join(interpolated[:8])
-        what = f"interpolated onto the clock of {master.name} ({master.rate:.6g} Hz): {names}"
-        problems = (Problem("note", file, "", what, "Nothing, if that is meant", run),)
+        fault = f"interpolated onto the clock of {master.name} ({master.rate:.6g} Hz): {names}"
+        problems = (Problem("note", file, "", fault, "Nothing, if that is meant", run),)
     return Columns(values, clock, problems)
 
 
 def _rising_times(channel: Series, file: str, run: str | None) -> FloatArray:
     time = np.asarray(channel.time, dtype=float)
     if not np.isfinite(time).all() or np.any(np.diff(time) < 0):
-        what = f"the times of {channel.name} have gaps or run backwards"
-        raise refuse(file, "", what, "Sort or split the run, or export without times and state sample_rate", run)
+        fault = f"the times of {channel.name} have gaps or run backwards"
+        raise refuse(file, "", fault, "Sort or split the run, or export without times and state sample_rate", run)
     return time
 
 

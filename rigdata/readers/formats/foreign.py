@@ -50,14 +50,14 @@ def read_foreign(path: Path, file: str, run: str | None = None) -> list[Series]:
         hint = suffix_hint(path)
         raise RigDataError([replace(p, file=file, cure=hint or p.cure, run=run) for p in error.problems]) from error
     except ModuleNotFoundError as error:
-        what = f"{path.suffix} files need the library {error.name}, which is not installed"
-        raise refuse(file, "", what, f'Install it with: pip install "tpjb-ident[{extra}]"', run) from error
+        fault = f"{path.suffix} files need the library {error.name}, which is not installed"
+        raise refuse(file, "", fault, f'Install it with: pip install "tpjb-ident[{extra}]"', run) from error
     except MemoryError as error:  # of a file that is small enough: it claims more than it holds
         remedy = "Export or copy it again, or split the run"
         raise refuse(file, "", "claims more data than fit in memory", remedy, run) from error
     except Exception as error:  # whatever another library raises on a broken file: it is the file's fault here
-        what = f"cannot be read as {path.suffix.lstrip('.').upper()} ({type(error).__name__}: {str(error)[:120]})"
-        raise refuse(file, "", what, again, run) from error
+        fault = f"cannot be read as {path.suffix.lstrip('.').upper()} ({type(error).__name__}: {str(error)[:120]})"
+        raise refuse(file, "", fault, again, run) from error
     if not series:
         raise refuse(file, "", "holds no channel of numbers", "Export the run again, with its channels", run)
     return series

@@ -61,8 +61,8 @@ def read_series(path: Path) -> list[Series]:
             units.update(column_units)
     if not vectors:
         names = ", ".join(name for name, _ in variables[:6]) or "no numbers at all"
-        what = f"holds no vector of at least {_SHORTEST} numbers, only {names}"
-        raise refuse(path.name, "", what, "Save the channels as vectors, or as a matrix")
+        fault = f"holds no vector of at least {_SHORTEST} numbers, only {names}"
+        raise refuse(path.name, "", fault, "Save the channels as vectors, or as a matrix")
     clock = next((name for name in vectors if is_time(_last_part(name))), None)
     time = None if clock is None else seconds(vectors.pop(clock), units.get(clock, ""))
     rates = [value for name, value in scalars.items() if value > 0 and _last_part(name).lower() in _RATES]

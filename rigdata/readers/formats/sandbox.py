@@ -57,8 +57,8 @@ def read_sandboxed(module: str, path: Path) -> list[Series]:
         raise too_long
     head, _, body = child.stdout.partition(b"\n")
     if child.returncode != 0 or not head:
-        what = f"made its library crash (exit status {child.returncode}): it is damaged"
-        raise refuse("", "", what, _AGAIN)
+        fault = f"made its library crash (exit status {child.returncode}): it is damaged"
+        raise refuse("", "", fault, _AGAIN)
     answer = json.loads(head)
     if isinstance(answer, dict):
         raise refuse("", "", str(answer["error"]), _AGAIN)

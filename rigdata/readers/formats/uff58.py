@@ -50,8 +50,8 @@ def read_series(path: Path) -> list[Series]:
             unusable[_FUNCTIONS.get(function, f"function type {function}")] += 1
     if not series:
         counts = ", ".join([f"{count} x {kind}" for kind, count in unusable.items()][:6])
-        what = f"holds no record over time, only {counts}" if counts else "holds no data set"
-        raise refuse(path.name, "", what, "Export the time records (data set 58, time response)")
+        fault = f"holds no record over time, only {counts}" if counts else "holds no data set"
+        raise refuse(path.name, "", fault, "Export the time records (data set 58, time response)")
     return series
 
 

@@ -54,11 +54,11 @@ def _translated_faults(file: str, run: str | None) -> Iterator[None]:
     except FileNotFoundError as error:
         raise refuse(file, "", "the file is not there", "Check the path", run) from error
     except BlockingIOError as error:  # HDF5's file lock
-        what = "the file is being written by another program"
-        raise refuse(file, "", what, "Wait until the export has ended, or copy it first", run) from error
+        fault = "the file is being written by another program"
+        raise refuse(file, "", fault, "Wait until the export has ended, or copy it first", run) from error
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError) as error:
-        what = f"the file cannot be read as HDF5 ({_first_line(error)})"
-        raise refuse(file, "", what, "Copy it again from the rig, or check it with h5dump", run) from error
+        fault = f"the file cannot be read as HDF5 ({_first_line(error)})"
+        raise refuse(file, "", fault, "Copy it again from the rig, or check it with h5dump", run) from error
 
 
 def _first_line(error: BaseException) -> str:
@@ -75,15 +75,15 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
     except OSError as error:
         raise refuse(file, "", f"cannot be read ({error.strerror or error})", "Check the path") from error
     if heap is not None:
-        what = "the file is damaged: its store of texts cannot be walked"
-        raise refuse(file, f"byte {heap}", what, "Copy the file again from the rig")
+        fault = "the file is damaged: its store of texts cannot be walked"
+        raise refuse(file, f"byte {heap}", fault, "Copy the file again from the rig")
     with open_readonly(path, file) as handle:
         if "manifest" not in handle.attrs:
             raise refuse(file, "root attribute manifest", "is missing", "Store campaign.toml's text there")
         damaged = too_long_text(path, ("manifest", "bearing"), handle.userblock_size)
         if damaged is not None:
-            what = "claims a text longer than the file"
-            raise refuse(file, f"root attribute {damaged}", what, "Copy the file again from the rig")
+            fault = "claims a text longer than the file"
+            raise refuse(file, f"root attribute {damaged}", fault, "Copy the file again from the rig")
         manifest = _text_attribute(handle, "manifest", file)
         bearing = _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
     return manifest, bearing
@@ -208,8 +208,8 @@ class Hdf5Reader:
         if not isinstance(dataset, h5py.Dataset):
             raise refuse(self.file, place, "is not a dataset", "Store one 1-D dataset per channel", self.run)
         if dataset.dtype.kind not in "fiu" or dataset.ndim != 1:
-            what = f"has type {dataset.dtype} and shape {dataset.shape}, not 1-D numbers"
-            raise refuse(self.file, place, what, "Store one 1-D dataset of numbers per channel", self.run)
+            fault = f"has type {dataset.dtype} and shape {dataset.shape}, not 1-D numbers"
+            raise refuse(self.file, place, fault, "Store one 1-D dataset of numbers per channel", self.run)
         if dataset.shape[0] > MAX_SAMPLES:
             raise refuse(self.file, place, f"claims {dataset.shape[0]} samples", "Split the run", self.run)
         self._check_storage(dataset, place)
@@ -221,8 +221,8 @@ class Hdf5Reader:
             raise refuse(self.file, place, "holds its data in another file", "Copy the data into this file", self.run)
         for code, *_ in _filters(dataset):
             if code not in _FILTERS:
-                what = f"needs HDF5 filter {code}, which is not a built-in one"
-                raise refuse(self.file, place, what, "Use gzip", self.run)
+                fault = f"needs HDF5 filter {code}, which is not a built-in one"
+                raise refuse(self.file, place, fault, "Use gzip", self.run)
         chunk = dataset.chunks
         if chunk is not None and chunk[0] * dataset.dtype.itemsize > _MAX_CHUNK:
             raise refuse(self.file, place, f"has chunks of {chunk[0]} samples", "Use chunks below 100 MB", self.run)
@@ -263,8 +263,8 @@ class Hdf5Reader:
         if not lengths and problems:
             raise RigDataError(problems[:_LISTED])
         if not lengths:
-            what = "the group holds no dataset of numbers"
-            raise refuse(self.file, "", what, "Store one dataset per channel", self.run)
+            fault = "the group holds no dataset of numbers"
+            raise refuse(self.file, "", fault, "Store one dataset per channel", self.run)
         return max(lengths, key=lambda n: (lengths[n], n))
 
     def _checked_rate(self, attributes: Any) -> float | None:
@@ -309,9 +309,9 @@ class Hdf5Reader:
             for name in names:
                 dataset = self._dataset(group, name)
                 if dataset.shape[0] != length:
-                    what = f"has {dataset.shape[0]} samples, the others {length}"
+                    fault = f"has {dataset.shape[0]} samples, the others {length}"
                     raise refuse(
-                        self.file, f"dataset {name}", what, "Store all channels of a run with one length", self.run
+                        self.file, f"dataset {name}", fault, "Store all channels of a run with one length", self.run
                     )
                 columns.append(self._samples(dataset, name, start, stop))
             return columns
@@ -321,8 +321,8 @@ class Hdf5Reader:
             with np.errstate(invalid="ignore"):  # a signalling NaN is a missing value as well
                 return np.asarray(dataset[start:stop], dtype=np.float64)
         except (OSError, RuntimeError) as error:  # what a filter says of damaged bytes
-            what = f"the stored samples are damaged ({_first_line(error)})"
-            raise refuse(self.file, f"dataset {name}", what, "Copy the file again from the rig", self.run) from error
+            fault = f"the stored samples are damaged ({_first_line(error)})"
+            raise refuse(self.file, f"dataset {name}", fault, "Copy the file again from the rig", self.run) from error
 
     def stored_hash(self) -> str:
         """SHA-256 of the run as it is stored: attributes, and packed bytes, which are quicker to read than samples."""

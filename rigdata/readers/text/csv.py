@@ -39,8 +39,8 @@ class CsvReader(CachedReader):
                 raise
             raise RigDataError([replace(p, cure=hint) for p in error.problems]) from error
         except (OSError, UnicodeError) as error:
-            what = f"cannot be read ({getattr(error, 'strerror', error)})"
-            raise refuse(self.file, "", what, "Check the file and its rights", self.run) from error
+            fault = f"cannot be read ({getattr(error, 'strerror', error)})"
+            raise refuse(self.file, "", fault, "Check the file and its rights", self.run) from error
 
     def names(self) -> tuple[str, ...]:
         """Names of all columns, "" where one has none."""
@@ -59,16 +59,16 @@ class CsvReader(CachedReader):
         used = {name for name, channel in self.channels.items() if channel.quantity != "ignore"}
         wanted = [name for name in head.names if name in used]
         if not wanted:
-            what = "holds none of the channels that are used"
-            raise refuse(self.file, "", what, "Check the channels' names", self.run)
+            fault = "holds none of the channels that are used"
+            raise refuse(self.file, "", fault, "Check the channels' names", self.run)
         if names is not None:
             first = clock_name if clock_name in wanted else wanted[0]
             wanted = [name for name in wanted if name == first or name in names]
         try:
             return read_table(Source(self.path, self.file, self.run, head, clock_name), wanted)
         except OSError as error:
-            what = f"cannot be read ({error})"
-            raise refuse(self.file, "", what, "Check the file and its rights", self.run) from error
+            fault = f"cannot be read ({error})"
+            raise refuse(self.file, "", fault, "Check the file and its rights", self.run) from error
 
     def _clock(self) -> Channel | None:
         return next((c for c in self.channels.values() if c.quantity == "time"), None)
@@ -95,8 +95,8 @@ class CsvReader(CachedReader):
         if len(back):
             before, after = times[back[0]], times[back[0] + 1]
             place = f"line {self._head().data_line + int(back[0]) + 1}, {place}"
-            what = f"time runs backwards ({before:g} s, then {after:g} s)"
-            raise refuse(self.file, place, what, "Sort or split the run", self.run)
+            fault = f"time runs backwards ({before:g} s, then {after:g} s)"
+            raise refuse(self.file, place, fault, "Sort or split the run", self.run)
         return times
 
     def problems(self) -> tuple[Problem, ...]:

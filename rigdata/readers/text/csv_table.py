@@ -57,8 +57,8 @@ def read_table(source: Source, names: Sequence[str]) -> Columns:
     problems = _judge_odd_lines(source, odd_lines) if odd_lines else ()
     if not odd_lines and length and _is_cut_inside_last_cell(source):
         length -= 1
-        what = "the last line is cut off inside its last number; taken without that line"
-        problems = (_cut_off(source, "last line", what),)
+        fault = "the last line is cut off inside its last number; taken without that line"
+        problems = (_cut_off(source, "last line", fault),)
     columns = {name: column[:length] for name, column in columns.items()}
     for column in columns.values():
         column.setflags(write=False)
@@ -134,8 +134,8 @@ def _parse(source: Source, names: Sequence[str], numbers: bool) -> tuple[dict[st
         except pa.ArrowInvalid as error:
             if numbers:
                 raise
-            what = f"cannot be parsed ({str(error).splitlines()[0][:160]})"
-            raise refuse(source.file, "", what, "Export the run again", source.run) from error
+            fault = f"cannot be parsed ({str(error).splitlines()[0][:160]})"
+            raise refuse(source.file, "", fault, "Export the run again", source.run) from error
     columns = {name: np.concatenate(column) for name, column in parts.items()}
     for name in stamped:
         cells = [None if cell is None or is_missing(cell) else cell for cell in columns[name]]
@@ -186,8 +186,8 @@ def _locate_text(source: Source, names: Sequence[str]) -> list[Problem]:
     return problems
 
 
-def _cut_off(source: Source, place: str, what: str) -> Problem:
-    return Problem("warning", source.file, place, what, "Copy the file again from the rig", source.run)
+def _cut_off(source: Source, place: str, fault: str) -> Problem:
+    return Problem("warning", source.file, place, fault, "Copy the file again from the rig", source.run)
 
 
 def _judge_odd_lines(source: Source, odd_lines: list[int]) -> tuple[Problem, ...]:
@@ -199,13 +199,13 @@ def _judge_odd_lines(source: Source, odd_lines: list[int]) -> tuple[Problem, ...
         if len(cells) != width and len(wrong) < _MOST_ODD:
             wrong.append((last, len(cells)))
     if len(odd_lines) == 1 and len(wrong) == 1 and wrong[0][0] == last and wrong[0][1] < width:
-        what = f"the last line is cut off ({wrong[0][1]} of {width} cells); taken without that line"
-        return (_cut_off(source, f"line {last}", what),)
+        fault = f"the last line is cut off ({wrong[0][1]} of {width} cells); taken without that line"
+        return (_cut_off(source, f"line {last}", fault),)
     remedy = "Check [csv] delimiter and decimal, or repair the line"
     problems = []
     for number, count in wrong[:_LISTED]:
-        what = f"has {count} cells, the names have {width}"
-        problems.append(Problem("error", source.file, f"line {number}", what, remedy, source.run))
+        fault = f"has {count} cells, the names have {width}"
+        problems.append(Problem("error", source.file, f"line {number}", fault, remedy, source.run))
     if not problems:
         raise refuse(source.file, "", f"{len(odd_lines)} lines have a wrong number of cells", remedy, source.run)
     raise RigDataError(problems)

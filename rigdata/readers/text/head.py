@@ -72,13 +72,13 @@ class _HeadFinder:
         self.lines = head_lines(path, self.encoding)
         self.is_whole = path.stat().st_size < HEAD
 
-    def _refuse(self, line: int | None, what: str, remedy: str) -> RigDataError:
-        return refuse(self.file, "" if line is None else f"line {line}", what, remedy, self.run)
+    def _refuse(self, line: int | None, fault: str, remedy: str) -> RigDataError:
+        return refuse(self.file, "" if line is None else f"line {line}", fault, remedy, self.run)
 
     def find(self) -> Head:
         if not any(line.strip() for line in self.lines):
-            what = "the file is empty" if self.is_whole else f"no line ends within the first {HEAD >> 10} kB"
-            raise self._refuse(None, what, "Export the run again")
+            fault = "the file is empty" if self.is_whole else f"no line ends within the first {HEAD >> 10} kB"
+            raise self._refuse(None, fault, "Export the run again")
         if self.channels or self.spec.names:
             header = self._header_without_names() if self.spec.names else self._header_by_channels()
             self._check_duplicates(header)
@@ -124,9 +124,9 @@ class _HeadFinder:
         if better is None or delimiter is None:
             raise self._refuse(line, f"holds no channel name ({wanted})", remedy)
         matched = 0 if stated is None else stated.matched
-        what = f"delimiter {delimiter!r} of the manifest finds {matched} channel names"
-        what += f", {better.delimiter!r} finds {better.matched}"
-        raise self._refuse(better.line, what, f"Set [csv] delimiter = {better.delimiter!r}, or leave it out")
+        fault = f"delimiter {delimiter!r} of the manifest finds {matched} channel names"
+        fault += f", {better.delimiter!r} finds {better.matched}"
+        raise self._refuse(better.line, fault, f"Set [csv] delimiter = {better.delimiter!r}, or leave it out")
 
     def _best(self, delimiters: Iterable[str], where: range) -> _NamesLine | None:
         """Find the line with most of the channel names; of equals the one that numbers follow."""
@@ -162,9 +162,9 @@ class _HeadFinder:
                 numbers = sum(looks_like(cell) or is_stamp(cell) for cell in cells)
                 if width <= len(cells) <= width + 1 and 0 < numbers >= width - 1:
                     return _NamesLine(number, delimiter, self.spec.names)
-        what = f"no line holds {width} numbers, as [csv] names has names"
+        fault = f"no line holds {width} numbers, as [csv] names has names"
         remedy = "Give one name per column, or delete [csv] names where the files name them"
-        raise self._refuse(None, what, remedy)
+        raise self._refuse(None, fault, remedy)
 
     def _header_by_numbers(self) -> tuple[_NamesLine, int]:
         """Names above the widest table of numbers, and the index of its first line."""
@@ -208,8 +208,8 @@ class _HeadFinder:
         for name in self.channels.intersection(header.names):
             columns = [str(i + 1) for i, cell in enumerate(header.names) if cell == name]
             if len(columns) > 1:
-                what = f"column name {name!r} is in columns {', '.join(columns)}"
-                raise self._refuse(header.line, what, "Give every column its own name; which one counts?")
+                fault = f"column name {name!r} is in columns {', '.join(columns)}"
+                raise self._refuse(header.line, fault, "Give every column its own name; which one counts?")
 
     def _first_sample(self, header: _NamesLine) -> int:
         """Index of the first line of samples: below the names and below lines of units."""
@@ -224,8 +224,8 @@ class _HeadFinder:
                 return number
             skipped += bool(cells)
             if skipped > _MAX_UNIT_LINES:
-                what = "is neither names, units nor numbers"
-                raise self._refuse(number + 1, what, "Check [csv] delimiter and decimal")
+                fault = "is neither names, units nor numbers"
+                raise self._refuse(number + 1, fault, "Check [csv] delimiter and decimal")
         raise self._refuse(header.line, "no samples follow the names", "Export the run again")
 
     def _decimal(self, sample: list[list[str]]) -> str | None:
@@ -238,8 +238,8 @@ class _HeadFinder:
             return stated or ("." if points else None)
         observed, example = (",", commas[0]) if len(commas) > len(points) else (".", points[0])
         if stated is not None and stated != observed:
-            what = f"decimal is {stated!r} in the manifest, but numbers look like {example!r}"
-            raise self._refuse(None, what, f"Set [csv] decimal = {observed!r}, or leave it out")
+            fault = f"decimal is {stated!r} in the manifest, but numbers look like {example!r}"
+            raise self._refuse(None, fault, f"Set [csv] decimal = {observed!r}, or leave it out")
         return observed
 
     def _names_of_all_cells(self, header: _NamesLine, sample: list[list[str]]) -> tuple[str, ...]:
@@ -250,13 +250,13 @@ class _HeadFinder:
         if len(names) < width:
             extra = [cell for row in sample if len(row) == width for cell in row[len(names) :]]
             if any(extra):
-                what = f"has {len(names)} names, but the samples have {width} cells (the first extra is {extra[0]!r})"
-                raise self._refuse(header.line, what, "Check [csv] delimiter and decimal; name every column")
+                fault = f"has {len(names)} names, but the samples have {width} cells (the first extra is {extra[0]!r})"
+                raise self._refuse(header.line, fault, "Check [csv] delimiter and decimal; name every column")
             return names + ("",) * (width - len(names))
         if any(names[width:]):
             named = len([name for name in names if name])
-            what = f"has {named} names, but the samples have {width} cells"
-            raise self._refuse(header.line, what, "Check [csv] delimiter and decimal")
+            fault = f"has {named} names, but the samples have {width} cells"
+            raise self._refuse(header.line, fault, "Check [csv] delimiter and decimal")
         return names[:width]
 
     def _units(self, header: _NamesLine, first: int, names: tuple[str, ...]) -> tuple[str, ...]:

@@ -130,8 +130,8 @@ class _LvmFile:
                 index_col=False, dtype=float, skip_blank_lines=False, quoting=3,
             )  # fmt: skip
         except ValueError as error:
-            what = f"has text among its numbers ({error})"
-            raise refuse(self.file, "", what, "Export the run again") from error
+            fault = f"has text among its numbers ({error})"
+            raise refuse(self.file, "", fault, "Export the run again") from error
         values = np.full((len(frame), width), np.nan)
         values[:, used] = frame.to_numpy(float)
         segment.blocks.append(values)
