@@ -98,49 +98,36 @@ def test_byte_order_mark_wins_over_a_wrong_encoding(tmp_path):
     expect_good(make(tmp_path, table().encode("utf-8-sig"), '[csv]\nencoding = "cp1252"\n'))
 
 
-def test_preamble_that_holds_delimiters_and_a_channel_name(tmp_path):
-    text = "a;b;c\r\nX1A;X1B;Zeit sind die Kanäle\r\n;;;\r\n" + table()
+QUOTED = "\n".join(",".join(f'"{v:.4f}"'.replace(".", ",") for v in row) for row in ROWS)
+ALIGNED = "\n".join("".join(f"{v:9.3f}" for v in row) for row in ROWS)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param("a;b;c\r\nX1A;X1B;Zeit sind die Kanäle\r\n;;;\r\n" + table(), id="preamble with a channel name"),
+        pytest.param(
+            "Zeit;X1A;X1B\r\nnone;of;these\r\nare;numbers;yet\r\n" + "x\r\n" * 6 + table(), id="list of channels above"
+        ),
+        pytest.param(
+            table().replace("Zeit;X1A;X1B", '"Zeit [s]";"X1A [µm]";X1B (µm)'), id="names with units and quotes"
+        ),
+        pytest.param("Zeit,X1A,X1B\n" + QUOTED + "\n", id="quoted numbers"),
+        pytest.param(table(tail=";"), id="trailing delimiter in samples"),
+        pytest.param(table(tail=";", names=("Zeit", "X1A", "X1B", "")), id="trailing delimiter everywhere"),
+        pytest.param(table() + "\r\n\r\n  \r\n", id="blank last lines"),
+        pytest.param(table() + ";;\r\n;;\r\n", id="last lines of bare delimiters"),
+        pytest.param(table().rstrip(), id="no end of the last line"),
+        pytest.param(table().replace(";", " ; ").replace(" ; 1", " ; +1"), id="blanks and plus signs"),
+        pytest.param("  Zeit      X1A      X1B\n" + ALIGNED + "\n", id="aligned columns"),
+        pytest.param(
+            (table().replace("\r\n", ";schön, 1\r\n").replace("X1B;schön, 1", "X1B;Bemerkung")).encode("cp1252"),
+            id="text in a column that is not described",
+        ),
+    ],
+)
+def test_spellings_that_real_exports_have(tmp_path, text):
     expect_good(make(tmp_path, text))
-
-
-def test_channel_list_in_the_preamble_is_not_the_names_line(tmp_path):
-    expect_good(make(tmp_path, "Zeit;X1A;X1B\r\nnone;of;these\r\nare;numbers;yet\r\n" + "x\r\n" * 6 + table()))
-
-
-def test_names_with_units_in_brackets_and_quotes(tmp_path):
-    text = table().replace("Zeit;X1A;X1B", '"Zeit [s]";"X1A [µm]";X1B (µm)')
-    expect_good(make(tmp_path, text))
-
-
-def test_quoted_numbers(tmp_path):
-    rows = "\n".join(",".join(f'"{v:.4f}"'.replace(".", ",") for v in row) for row in ROWS)
-    expect_good(make(tmp_path, "Zeit,X1A,X1B\n" + rows + "\n"))
-
-
-def test_trailing_delimiter_in_samples_only_and_everywhere(tmp_path):
-    expect_good(make(tmp_path, table(tail=";")))
-    expect_good(make(tmp_path, table(tail=";", names=("Zeit", "X1A", "X1B", ""))))
-
-
-def test_blank_last_lines(tmp_path):
-    expect_good(make(tmp_path, table() + "\r\n\r\n  \r\n"))
-
-
-def test_last_lines_of_bare_delimiters(tmp_path):
-    expect_good(make(tmp_path, table() + ";;\r\n;;\r\n"))
-
-
-def test_no_newline_at_the_end(tmp_path):
-    expect_good(make(tmp_path, table().rstrip()))
-
-
-def test_blanks_around_numbers_and_plus_signs(tmp_path):
-    expect_good(make(tmp_path, table().replace(";", " ; ").replace(" ; 1", " ; +1")))
-
-
-def test_space_aligned_columns(tmp_path):
-    lines = ["  Zeit      X1A      X1B"] + ["".join(f"{v:9.3f}" for v in row) for row in ROWS]
-    expect_good(make(tmp_path, "\n".join(lines) + "\n"))
 
 
 @pytest.mark.parametrize("mark", [m for m in MISSING if m not in {"*", "?"}])
@@ -187,11 +174,6 @@ def test_missing_times_are_filled_in(tmp_path):
     assert make(tmp_path, "\r\n".join(lines)).record("X1A").time[3] == pytest.approx(1.5)
 
 
-def test_time_running_backwards_is_refused_with_its_line(tmp_path):
-    lines = PREAMBLE + table().replace("5,0000;", "1,0000;")
-    refused(make(tmp_path, lines), "line 16, column Zeit", "backwards")
-
-
 def test_truncated_last_line_is_left_out_with_a_warning(tmp_path):
     run = make(tmp_path, table().rstrip()[:-12])
     assert run.length == len(ROWS) - 1
@@ -207,49 +189,38 @@ def test_last_line_cut_inside_its_last_number(tmp_path):
     assert "cut off" in run.reader.problems()[0].what
 
 
-def test_line_with_too_few_cells_in_the_middle(tmp_path):
-    lines = table().split("\r\n")
-    lines[10] = lines[10].rpartition(";")[0]
-    refused(make(tmp_path, "\r\n".join(lines)), "line 11", "has 2 cells, the names have 3")
+def with_line(number: int, old: str, new: str, text: str) -> str:
+    """`text` with another spelling in one of its lines, counted from 1."""
+    lines = text.split("\r\n")
+    assert old in lines[number - 1]
+    lines[number - 1] = lines[number - 1].replace(old, new, 1)
+    return "\r\n".join(lines)
 
 
-def test_line_with_too_many_cells(tmp_path):
-    lines = table().split("\r\n")
-    lines[10] += ";7"
-    refused(make(tmp_path, "\r\n".join(lines)), "line 11", "has 4 cells")
+FOUR_COLUMNS = table(names=("Zeit", "X1A", "X1B", "X1A"), rows=[(*r, 9.0) for r in ROWS])
+TWO_TEXTS = with_line(21, ";", ";x", with_line(15, ";", ";abc", PREAMBLE + table()))
 
 
-def test_text_in_a_numeric_column(tmp_path):
-    lines = (PREAMBLE + table()).split("\r\n")
-    lines[14] = lines[14].replace(";", ";abc", 1)
-    lines[20] = lines[20].replace(";", ";x", 1)
-    refused(make(tmp_path, "\r\n".join(lines)), "line 15, column 2 (X1A)", "'abc", "not a number", "1 more")
-
-
-def test_cp1252_text_in_a_numeric_column(tmp_path):
-    refused(make(tmp_path, table().encode().replace(b"6,5000;", b"\xfcber;")), "line 7, column 2 (X1A)", "'über'")
-
-
-def test_text_in_a_column_that_is_not_described_does_not_matter(tmp_path):
-    lines = table().split("\r\n")
-    lines = [line + (";Bemerkung" if i == 0 else ";schön, 1;".rstrip(";")) for i, line in enumerate(lines) if line]
-    expect_good(make(tmp_path, "\r\n".join(lines).encode("cp1252")))
-
-
-def test_duplicate_names_are_refused_with_their_columns(tmp_path):
-    rows = [(*r, 9.0) for r in ROWS]
-    run = make(tmp_path, table(names=("Zeit", "X1A", "X1B", "X1A"), rows=rows))
-    refused(run, "line 1", "'X1A'", "columns 2, 4")
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (with_line(11, ";-20", "-20", table()), ("line 11", "has 2 cells, the names have 3")),
+        (with_line(11, ";", ";7;", table()), ("line 11", "has 4 cells")),
+        (TWO_TEXTS, ("line 15, column 2 (X1A)", "'abc", "not a number", "1 more")),
+        (table().encode().replace(b"6,5000;", b"\xfcber;"), ("line 7, column 2 (X1A)", "'über'")),
+        (PREAMBLE + table().replace("5,0000;", "1,0000;"), ("line 16, column Zeit", "backwards")),
+        (FOUR_COLUMNS, ("line 1", "'X1A'", "columns 2, 4")),
+        (table(names=("a", "b", "c")), ("no line holds a channel name", "X1A")),
+    ],
+)
+def test_a_fault_is_named_with_line_and_column(tmp_path, text, says):
+    refused(make(tmp_path, text), *says)
 
 
 def test_missing_channel_names_the_nearest_column(tmp_path):
     run = make(tmp_path, table(names=("Zeit", "X1A", "X1b")))
     assert run.record("X1A").values[0] == pytest.approx(1.5e-6)
     refused(run, "channel X1B", "missing", "Did you mean 'X1b'", channel="X1B")
-
-
-def test_no_line_holds_the_names(tmp_path):
-    refused(make(tmp_path, table(names=("a", "b", "c"))), "no line holds a channel name", "X1A")
 
 
 @pytest.mark.parametrize(
