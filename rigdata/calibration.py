@@ -80,6 +80,11 @@ class Channel:
         Of `zero`, one standard deviation, SI.
     clock : str
         Channels of one clock share a letter; "" where the manifest says nothing.
+
+    Examples
+    --------
+    >>> Channel("L1H", "force", unit="V", gain=2000.0, zero=50.0).to_si(np.array([0.0, 1.0]))
+    array([  50., 2050.])
     """
 
     name: str

@@ -20,6 +20,11 @@ class OperatingPoint:
         [rad/s]; zero in dry tests.
     excitation : float
         Excitation frequency [rad/s]; zero where nothing is excited.
+
+    Examples
+    --------
+    >>> print(OperatingPoint(5000.0, shaft_speed=2 * np.pi * 22))
+    5000 N at -90 deg, shaft 22 Hz
     """
 
     static_load: float

@@ -27,6 +27,11 @@ class Record:
         Nominal sample rate [Hz].
     axis : float or None
         Direction of the positive reading [rad, counter-clockwise from +X].
+
+    Examples
+    --------
+    >>> Record("X1A", "displacement", np.zeros(3), np.array([0.0, 0.1, 0.2]), rate=10.0, axis=np.pi / 4)
+    <Record X1A: displacement at 45 deg, 3 samples at 10 Hz>
     """
 
     name: str
@@ -60,6 +65,12 @@ class VectorRecord:
         Nominal sample rate [Hz].
     names : tuple of str
         The channels it was made from, two as a rule.
+
+    Examples
+    --------
+    >>> force = ti.load_campaign(demo).run("d-05000-25-01").vector("force")
+    >>> force.names, force.values.shape
+    (('L1H', 'L1V'), (2000, 2))
     """
 
     quantity: str

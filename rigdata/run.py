@@ -43,6 +43,14 @@ class Run:
         ``"sine"``, ``"multisine"``, ``"sweep"``, ``"random"`` or ``"impact"``.
     band : (float, float) or None
         Lowest and highest frequency excited [Hz].
+
+    Examples
+    --------
+    >>> run = ti.load_campaign(demo).run("d-05000-25-01")
+    >>> run
+    <Run d-05000-25-01: dynamic, 5000 N at -90 deg, shaft 22 Hz, excited at 25 Hz>
+    >>> len(run.vector("force"))
+    2000
     """
 
     id: str
@@ -118,6 +126,11 @@ class Run:
         ------
         RigDataError
             The manifest has no such channel, or the file cannot give it.
+
+        Examples
+        --------
+        >>> ti.load_campaign(demo).run("d-05000-25-01").record("X1A", 0, 100)
+        <Record X1A: displacement at 45 deg, 100 samples at 1000 Hz>
         """
         channel = self.channels.get(name)
         if channel is None:
@@ -155,6 +168,11 @@ class Run:
         ------
         RigDataError
             Fewer than two channels, all of them along one line, or the file cannot give them.
+
+        Examples
+        --------
+        >>> ti.load_campaign(demo).run("d-05000-25-01").vector("displacement", 0, 100).values.shape
+        (100, 2)
         """
         channels = self._vector_channels(quantity)
         names = tuple(c.name for c in channels)
