@@ -6,8 +6,11 @@ import math
 import warnings
 from pathlib import Path
 
+import h5py
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.io import savemat
 
 from rigdata import RigDataError, load_campaign
 from rigdata.readers import series
@@ -89,21 +92,18 @@ def write_mf4(path: Path) -> None:
         file.save(path, overwrite=True)
 
 
-def write_mat5(path: Path) -> None:
-    from scipy.io import savemat
+ALL = {"t": TIME, "X1A": X, "L1H": F, "T1": np.interp(TIME, SLOW, T)}
 
-    slow = np.interp(TIME, SLOW, T)
-    savemat(path, {"t": TIME, "X1A": X, "L1H": F, "T1": slow, "note": "text"}, oned_as="column")
+
+def write_mat5(path: Path) -> None:
+    savemat(path, {**ALL, "note": "text"}, oned_as="column")
 
 
 def write_mat73(path: Path) -> None:
     # the library behind MATLAB's save -v7.3 is HDF5; MATLAB puts 512 bytes of its own text in front
-    import h5py
-
     with h5py.File(path, "w", userblock_size=512) as file:
-        for name, values in (("t", TIME), ("X1A", X), ("L1H", F), ("T1", np.interp(TIME, SLOW, T))):
-            data = file.create_dataset(name, data=values[None, :])
-            data.attrs["MATLAB_class"] = np.bytes_("double")
+        for name, values in ALL.items():
+            file.create_dataset(name, data=values[None, :]).attrs["MATLAB_class"] = np.bytes_("double")
         text = file.create_dataset("note", data=np.frombuffer(b"t\0e\0", dtype="uint16"))
         text.attrs["MATLAB_class"] = np.bytes_("char")
     with path.open("r+b") as stream:
@@ -111,10 +111,7 @@ def write_mat73(path: Path) -> None:
 
 
 def write_parquet(path: Path) -> None:
-    import pandas as pd
-
-    frame = pd.DataFrame({"Time": TIME, "X1A": X, "L1H": F, "T1": np.interp(TIME, SLOW, T), "who": "me"})
-    frame.to_parquet(path, index=False)
+    pd.DataFrame({**ALL, "who": "me"}).to_parquet(path, index=False)
 
 
 def write_catman(path: Path) -> None:
@@ -208,8 +205,6 @@ def test_a_missing_library_is_named_with_its_extra(tmp_path, monkeypatch):
 
 
 def test_links_out_of_a_matlab_file_are_refused(tmp_path):
-    import h5py
-
     with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
         file["x"] = h5py.ExternalLink("/etc/passwd", "/x")
     with pytest.raises(RigDataError, match="is a link"):
@@ -224,8 +219,6 @@ def test_an_empty_file_is_called_empty(tmp_path, suffix):
 
 
 def test_a_matlab_file_without_vectors_says_what_it_holds(tmp_path):
-    from scipy.io import savemat
-
     savemat(tmp_path / "a.mat", {"gain": 2.0, "note": "bearing 3"})
     with pytest.raises(RigDataError, match="no vector of at least 8 numbers, only gain, note"):
         read_foreign(tmp_path / "a.mat", "a.mat")
@@ -249,8 +242,6 @@ def test_long_channels_wait_in_files_and_read_as_short_ones_do(tmp_path, monkeyp
 
 def test_a_campaign_keeps_few_columns_however_many_runs_it_has(tmp_path):
     cache = ReadingCache(limit=3 * 8 * COUNT)
-    from scipy.io import savemat
-
     for i in range(6):
         savemat(tmp_path / f"{i}.mat", {"X1A": X + i, "fs": RATE})
         reader = ForeignReader(tmp_path / f"{i}.mat", f"{i}.mat", "r", {}, cache=cache)
@@ -268,14 +259,16 @@ def test_the_fastest_clock_wins_and_what_is_outside_is_missing():
     slow = Series("b", "K", np.array([0.0, 1.0]), np.array([0.2, 0.8]))
     columns = on_one_clock([slow, fast], "f")
     assert columns.length == 11
-    assert np.isnan(columns.values["b"][[0, 1, 9, 10]]).all()
-    np.testing.assert_allclose(columns.values["b"][2:9], np.linspace(0, 1, 7), atol=1e-12)
+    expected = np.interp(fast.time, slow.time, slow.values, left=np.nan, right=np.nan)
+    np.testing.assert_allclose(columns.values["b"], expected, atol=1e-12)
+    assert np.isfinite(expected).tolist() == [False] * 2 + [True] * 7 + [False] * 2
     assert "b (" in columns.problems[0].what
 
 
-def test_twins_in_two_groups_get_their_groups_name():
-    columns = on_one_clock([Series("a", "", np.zeros(3), group="g1"), Series("a", "", np.ones(3), group="g2")], "f")
-    assert list(columns.values) == ["g1.a", "g2.a"]
+@pytest.mark.parametrize(("groups", "names"), [(("g1", "g2"), ["g1.a", "g2.a"]), (("", ""), ["a", "a_2"])])
+def test_channels_of_one_name_get_their_groups_name_or_a_number(groups, names):
+    columns = on_one_clock([Series("a", "", np.zeros(3), group=group) for group in groups], "f")
+    assert list(columns.values) == names
 
 
 def test_only_these_suffixes_are_foreign(tmp_path):
@@ -286,22 +279,19 @@ def test_only_these_suffixes_are_foreign(tmp_path):
 
 
 def test_a_rate_is_asked_for_where_the_file_knows_none(tmp_path):
-    from scipy.io import savemat
-
     savemat(tmp_path / "a.mat", {"X1A": X})
     with pytest.raises(RigDataError, match="sample_rate"):
         ForeignReader(tmp_path / "a.mat", "a.mat", "r", {}).rate()
     assert ForeignReader(tmp_path / "a.mat", "a.mat", "r", {}, stated_rate=500.0).time(0, 3)[2] == pytest.approx(0.004)
 
 
-@pytest.mark.parametrize("name", ["Zeit", "TIME [s]", "Time  1 - default sample rate", "t", "t [ms]", "Temps"])
+TIMES = ("Zeit", "TIME [s]", "Time  1 - default sample rate", "t", "t [ms]", "Temps")
+OTHERS = ("T", "T1", "Temperature", "Timer", "X1A", "torque", "Tempo1", "")
+
+
+@pytest.mark.parametrize("name", TIMES + OTHERS)
 def test_times_by_name(name):
-    assert is_time(name)
-
-
-@pytest.mark.parametrize("name", ["T", "T1", "Temperature", "Timer", "X1A", "torque", "Tempo1", ""])
-def test_no_times_by_name(name):
-    assert not is_time(name)
+    assert is_time(name) == (name in TIMES)
 
 
 def test_times_in_other_units():
