@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import html.parser
 import re
+from pathlib import Path
 
+import matplotlib
 import pytest
 
+import tpjb_ident.report
 from tpjb_ident.report.drawing.picture import add_legend, new_picture
 from tpjb_ident.report.figure import panel, save_panels, svg_text
-from tpjb_ident.report.page import Page, Section, Table, render_page
+from tpjb_ident.report.page import Page, Section, Table, render_page, render_section
 
 HOSTILE = "<script>alert(1)</script>\"'& <img src=x onerror=alert(2)> $\\frac{a}{b}$ \x1b[31m\u202e"
 
@@ -73,6 +78,7 @@ def test_nothing_from_outside_becomes_markup(page_and_svg):
     assert [a for t, a in tags if t == "script"] == [{}]  # our own, held by its hash
     assert not [a for _, attrs in tags for a in attrs if a.startswith("on")]
     assert page_and_svg[0].count("&lt;script&gt;") >= 10
+    assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f\u202a-\u202e]", page_and_svg[0])
 
 
 def test_nothing_is_loaded_from_anywhere(page_and_svg):
@@ -82,10 +88,6 @@ def test_nothing_is_loaded_from_anywhere(page_and_svg):
             assert value is None or value.startswith("#"), (tag, name, value)
     assert not re.search(r"@import|url\((?!#)", page_and_svg[0])
     assert "default-src 'none'" in page_and_svg[0]
-
-
-def test_control_characters_do_not_reach_the_page(page_and_svg):
-    assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f\u202a-\u202e]", page_and_svg[0])
 
 
 def test_ids_are_unique_and_every_reference_has_its_target(page_and_svg):
@@ -114,28 +116,28 @@ def test_text_in_figures_is_text(page_and_svg):
     assert "&lt;b&gt;" in file
 
 
-def test_the_same_figure_gives_the_same_bytes(page_and_svg):
+def test_the_same_figure_gives_the_same_bytes_and_leaves_no_global_setting(page_and_svg):
+    before = dict(matplotlib.rcParams)
     figure, axes = new_picture("x", "y")
     axes.plot([0, 1], [1, 0], marker="s")
     assert svg_text(panel("two", "second", figure, "g").figure, "two") == page_and_svg[1]["two"]
-
-
-def test_no_global_matplotlib_setting_is_left_behind():
-    import matplotlib
-
-    before = dict(matplotlib.rcParams)
-    figure, _ = new_picture("x", "y")
-    svg_text(figure, "z")
     assert dict(matplotlib.rcParams) == before
 
 
+def test_a_section_alone_is_as_safe_and_brings_its_style():
+    figure, _ = new_picture(HOSTILE.partition("$")[0], "y")
+    text = render_section(
+        Section(HOSTILE, [HOSTILE], [panel("p", HOSTILE, figure, "")], [Table(HOSTILE, ["a"], [[HOSTILE]])])
+    )
+    tags = parsed(text)
+    assert not [t for t, attrs in tags if t in ("img", "script") or any(a.startswith("on") for a in attrs)]
+    assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f\u202a-\u202e]", text)
+    assert ":host" in text
+    assert "prefers-color-scheme: dark" in text
+    assert text.count('<figure id="p"') == 1
+
+
 def test_the_only_script_is_ours_and_the_policy_lets_no_other_run(page_and_svg):
-    import base64
-    import hashlib
-    from pathlib import Path
-
-    import tpjb_ident.report
-
     (script,) = re.findall(r"<script>(.*?)</script>", page_and_svg[0], flags=re.S)
     source = Path(tpjb_ident.report.__file__).parent / "templates" / "sort.js"
     assert script.strip() == source.read_text(encoding="utf-8").strip()
