@@ -8,8 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from tpjb_ident.pivot.blocks import LAW_NAMES, PivotSettings
-from tpjb_ident.pivot.fit import LAWS, contact_onset, contact_onset_se
+from tpjb_ident.pivot import law_fit
+from tpjb_ident.pivot.blocks import PivotSettings
+from tpjb_ident.pivot.fit import contact_onset, contact_onset_se
 from tpjb_ident.pivot.law_fit import (
     ALIKE,
     HOPELESS,
@@ -20,6 +21,7 @@ from tpjb_ident.pivot.law_fit import (
     shared_priors,
     with_shared_shape,
 )
+from tpjb_ident.pivot.laws import LAWS
 
 REFERENCE = 2000.0
 
@@ -134,7 +136,7 @@ def test_settings_without_sense_are_refused(fields, message):
 
 def test_settings_with_sense_are_taken():
     assert PivotSettings(laws=("linear",), block=0.02, drift_rate=1e-12).laws == ("linear",)
-    assert set(LAW_NAMES) == set(LAWS)
+    assert set(PivotSettings().laws) == set(LAWS)
 
 
 def with_information(information, own, shape, law="power", share_evidence=0.0):
@@ -179,29 +181,31 @@ def test_a_law_that_no_other_pad_likes_has_no_shape_to_share(share, asked):
     assert "power" not in shared_priors([pad, pad], [np.array([0.0, 1.0]), np.array([1.0, 0.0])], pad=1)
 
 
-def test_both_priors_count_alike_and_the_better_fit_stays():
+def test_both_priors_count_alike_and_the_better_fit_stays(monkeypatch):
     own = LAWS["power"].prior_precision
     pads = [[with_information(np.array([[900.0]]), own, [0.7]), fitted("linear")] for _ in range(2)]
     weights = [np.array([0.8, 0.2])] * 2
     for evidence, winner in ((2.0, 0.66), (-2.0, 0.7)):
         again = with_information(np.array([[900.0]]), own, [0.66], share_evidence=evidence)
-        shared = with_shared_shape(pads, weights, [lambda fit, prior, again=again: again] * 2)
+        monkeypatch.setattr(law_fit, "fit_law", lambda *_, again=again, **__: again)
+        shared = with_shared_shape(pads, weights, [None, None])
         assert shared[0][0].shape[0] == winner
         assert shared[0][0].log_evidence == pytest.approx(math.log(0.5 * (1.0 + math.exp(evidence))))
         assert shared[0][1] is pads[0][1]
 
 
 @pytest.mark.parametrize(("behind", "asked"), [(HOPELESS - 1.0, True), (HOPELESS + 1.0, False)])
-def test_a_hopeless_law_is_not_fitted_again(behind, asked):
+def test_a_hopeless_law_is_not_fitted_again(behind, asked, monkeypatch):
     own = LAWS["power"].prior_precision
     poor = with_information(np.array([[900.0]]), own, [0.7], share_evidence=-behind)
     pads = [[poor, fitted("linear")], [with_information(np.array([[900.0]]), own, [0.7]), fitted("linear")]]
     calls = []
 
-    def refit(fit, prior):
-        calls.append(fit)
-        return fit
+    def refit(law, contact, data, prior, start):
+        calls.append(data)
+        return poor if data == "first" else pads[1][0]
 
-    shared = with_shared_shape(pads, [np.array([0.5, 0.5])] * 2, [refit, lambda fit, prior: fit])
-    assert (calls == [poor]) is asked
+    monkeypatch.setattr(law_fit, "fit_law", refit)
+    shared = with_shared_shape(pads, [np.array([0.5, 0.5])] * 2, ["first", "second"])
+    assert ("first" in calls) is asked
     assert shared[0][0].log_evidence == pytest.approx(-behind)

@@ -13,8 +13,9 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot import pads_table, pivot_table, pivots_text, write_pivots
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps, measure_loop
 from tpjb_ident.pivot.dry_record import PadDirection
-from tpjb_ident.pivot.fit import LAWS, contact_onset, contact_onset_se
+from tpjb_ident.pivot.fit import contact_onset, contact_onset_se
 from tpjb_ident.pivot.law_fit import FitData, fit_law, keep_likely, posterior_weights
+from tpjb_ident.pivot.laws import LAWS
 
 REFERENCE = 2000.0
 LOADS = np.array([50.0, 250.0, 1000.0, 2000.0, 4000.0, 8000.0])

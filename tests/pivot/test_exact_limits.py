@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tpjb_ident.pivot.fit import LAWS
 from tpjb_ident.pivot.law_fit import CONTACT_GAP, FitData, ShapePrior, fit_law
+from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.steps import find_holds
 
 RATE = 500.0

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy import integrate, optimize
 
-from tpjb_ident.pivot.fit import LAWS
 from tpjb_ident.pivot.law_fit import (
     CONTACT_GAP,
     CONTACT_LOAD_SPREAD,
@@ -17,7 +16,7 @@ from tpjb_ident.pivot.law_fit import (
     ShapePrior,
     fit_law,
 )
-from tpjb_ident.pivot.laws import BEND_SPREAD, FIXED, NODES, SLOPE_SPREAD, TYPICAL_SLOPE, SplineLaw
+from tpjb_ident.pivot.laws import BEND_SPREAD, FIXED, LAWS, NODES, SLOPE_SPREAD, TYPICAL_SLOPE, SplineLaw
 
 LOAD = np.linspace(250.0, 5000.0, 24)
 REFERENCE = 2000.0

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tpjb_ident.pivot.fit import LAWS
+from tpjb_ident.pivot.laws import LAWS
 
 LOADS = np.geomspace(0.03, 4.5, 60)
 

@@ -100,7 +100,21 @@ def test_a_record_may_begin_and_end_within_a_ramp(slope):
 def samples(load, start=0.0, rate=RATE, keep=slice(None)):
     time = start + np.arange(len(load)) / rate
     vector = np.column_stack([0.5 * load, -load])
-    return Samples(time[keep], vector[keep], 1e-9 * vector[keep], load[keep], 0.0)
+    return Samples(time[keep], vector[keep], 1e-9 * vector[keep], -np.pi / 2)
+
+
+@pytest.mark.parametrize("angle", [-1.2, 0.4, 2.9])
+def test_a_vector_is_taken_apart(angle):
+    load, across = np.linspace(100.0, 3000.0, 500), angle + np.pi / 2
+    forces = np.outer(load, [np.cos(angle), np.sin(angle)])
+    moves = np.outer(1e-9 * load, [np.cos(across), np.sin(across)])
+    one = Samples(np.arange(500) / RATE, forces, moves, angle)
+    np.testing.assert_allclose(one.along, load)
+    blocks = cut_blocks(one, (), 0.1)
+    np.testing.assert_allclose(blocks.load, 100.0 + 2900.0 / 499 * RATE * blocks.time)
+    np.testing.assert_allclose(blocks.across_load, 0.0, atol=1e-9)
+    np.testing.assert_allclose(blocks.deflection, 0.0, atol=1e-15)
+    np.testing.assert_allclose(blocks.across, 1e-9 * blocks.load)
 
 
 @pytest.mark.parametrize("start", [0.0, 500.0])
@@ -112,9 +126,10 @@ def test_a_ramp_is_cut_into_halves_of_the_length(start):
     np.testing.assert_allclose(np.diff(blocks.time), 0.05, atol=2e-3)
     np.testing.assert_allclose(blocks.duration, 0.05, atol=2.1e-3)
     assert blocks.duration.sum() == pytest.approx(10.0, abs=3e-3)
-    np.testing.assert_allclose(blocks.load[:, 1], -(100.0 + 400.0 * (blocks.time - start)), rtol=1e-9)
-    np.testing.assert_allclose(blocks.load[:, 0], -0.5 * blocks.load[:, 1], rtol=1e-12)
-    np.testing.assert_allclose(blocks.displacement, 1e-9 * blocks.load, rtol=1e-12)
+    np.testing.assert_allclose(blocks.load, 100.0 + 400.0 * (blocks.time - start), rtol=1e-9)
+    np.testing.assert_allclose(blocks.across_load, 0.5 * blocks.load, rtol=1e-12)
+    np.testing.assert_allclose(blocks.deflection, 1e-9 * blocks.load, rtol=1e-12)
+    np.testing.assert_allclose(blocks.across, 1e-9 * blocks.across_load, rtol=1e-12)
     np.testing.assert_allclose(blocks.rate, 400.0, rtol=1e-9)
     np.testing.assert_allclose(blocks.load_spread, 0.0, atol=1e-9)
     assert set(blocks.hold) == {-1}
@@ -155,7 +170,7 @@ def test_a_level_in_noise_has_the_spread_of_its_mean():
     load = 1000.0 + 20.0 * noise(20_000)
     blocks = cut_blocks(samples(load), (Hold(0.0, 40.0, 1000.0, 1),), 0.2)
     np.testing.assert_allclose(blocks.load_spread, 20.0 / np.sqrt(100.0), rtol=0.03)
-    assert np.std(blocks.load[:, 1]) == pytest.approx(2.0, rel=0.15)
+    assert np.std(blocks.load) == pytest.approx(2.0, rel=0.15)
 
 
 @pytest.mark.parametrize(("lost", "kept"), [(23, True), (28, False)])

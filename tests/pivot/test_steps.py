@@ -112,7 +112,7 @@ def test_missing_values_are_left_out():
 
 def make_samples(time, load):
     vector = np.column_stack([np.zeros_like(load), -load])
-    return Samples(time, vector, 1e-9 * vector, load, 0.0)
+    return Samples(time, vector, 1e-9 * vector, -np.pi / 2)
 
 
 def test_blocks_average_holds_and_ramps():
@@ -120,7 +120,7 @@ def test_blocks_average_holds_and_ramps():
     holds = find_holds(time, load)
     blocks = cut_blocks(make_samples(time, load), holds, 0.1)
     for k, (_, _, level) in enumerate(truth):
-        assert blocks.load[blocks.hold == k, 1] == pytest.approx(-level, rel=1e-3)
+        assert blocks.load[blocks.hold == k] == pytest.approx(level, rel=1e-3)
         assert (blocks.rate[blocks.hold == k] == 0.0).all()
     moving = blocks.hold < 0
     assert np.median(blocks.rate[moving]) == pytest.approx(500.0 / 0.3, rel=0.1)
@@ -132,7 +132,7 @@ def test_blocks_of_a_long_record_stay_few():
     load = 10.0 * time + 100.0
     blocks = cut_blocks(make_samples(time, load), (), 0.1)
     assert len(blocks) <= 2 * MOST_BLOCKS
-    assert blocks.load[:, 1] == pytest.approx(-(10.0 * blocks.time + 100.0), rel=1e-9)
+    assert blocks.load == pytest.approx(10.0 * blocks.time + 100.0, rel=1e-9)
 
 
 def test_a_block_that_lost_its_samples_is_dropped():
@@ -151,6 +151,6 @@ def test_a_ramp_with_noise_does_not_turn_but_a_reversal_does():
     assert len(turned) == 1
     assert blocks.time[turned[0]] == pytest.approx(6.0, abs=0.3)
     assert (blocks.branch[:20] == 1).all()
-    stuck = sticking(-blocks.load[:, 1], blocks.branch)
+    stuck = sticking(blocks.load, blocks.branch)
     assert stuck.any()
     assert np.all(np.abs(blocks.time[stuck] - 6.3) < 0.5)

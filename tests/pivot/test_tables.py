@@ -13,8 +13,8 @@ import pytest
 from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot.curve import EXTRAPOLATION_SPREAD, Hysteresis, PivotCurve, PivotSteps, measure_loop
 from tpjb_ident.pivot.dry_record import PadDirection
-from tpjb_ident.pivot.fit import LAWS
 from tpjb_ident.pivot.law_fit import LawFit
+from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.tables import load_grid, pads_table, pivot_table, pivots_text, table_loads, write_pivots
 
 REFERENCE, SCALE = 2000.0, 4e-9

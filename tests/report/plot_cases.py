@@ -23,8 +23,8 @@ from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.clearance.polygon import corners
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
 from tpjb_ident.pivot.dry_record import PadDirection
-from tpjb_ident.pivot.fit import LAWS
 from tpjb_ident.pivot.law_fit import LawFit
+from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.report import plots
 from tpjb_ident.slow_records.noise import NoiseModel
 

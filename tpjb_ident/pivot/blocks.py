@@ -1,4 +1,4 @@
-"""Short averages of a dry-pivot record: what the curve is fitted to.
+"""Short averages of a dry-pivot record on the axes of its pad: what the curve is fitted to.
 
 Averaging 0.1 s keeps all that a slow test can tell, takes the mains out, and leaves some hundred numbers
 whose covariance can be written down in full. Averages on ramps are shorter, so that the curve is straight
@@ -9,88 +9,99 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.errors import ArgumentError
+from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.steps import Hold
 from tpjb_ident.slow_records.bad_samples import piece_means
-
-LAW_NAMES: tuple[str, ...] = ("hertz-line", "hertz-point", "power", "linear", "point-in-series", "bilinear", "spline")
-
-
-@dataclass(frozen=True)
-class PivotSettings:
-    """Settings of `fit_pivots`; the defaults suit staircase tests of some seconds to minutes."""
-
-    laws: tuple[str, ...] = LAW_NAMES
-    block: float = 0.1
-    longest_glitch: int = 60
-    load_angle_limit: float = math.radians(8.0)
-    displacement_angle_limit: float = math.radians(30.0)
-    angle_warning: float = math.radians(4.0)
-    friction_share: float = 0.003
-    friction_share_se: float = 0.003
-    lag_allowance: float = 0.002
-    contact_tolerance: float = 0.05
-    drift_rate: float = 1.0e-8
-    bad_hold_limit: float = 5.0
-    on_refusal: Literal["raise", "few", "skip"] = "raise"
-
-    def __post_init__(self) -> None:
-        unknown = [name for name in self.laws if name not in LAW_NAMES]
-        if unknown or not self.laws:
-            raise ArgumentError(f"laws must name some of {', '.join(LAW_NAMES)}, got {unknown or 'none'}")
-        for name in ("block", "longest_glitch", "lag_allowance", "contact_tolerance", "drift_rate"):
-            if not getattr(self, name) > 0:
-                raise ArgumentError(f"{name} must be positive, got {getattr(self, name)}")
-
 
 TURN = 0.02  # of the load range: a smaller way back is noise
 MOST_BLOCKS = 220  # the covariance is a full matrix: keep it small
 
 
 @dataclass(frozen=True)
-class Blocks:
-    """Averages over m pieces of record, in order of time."""
+class PivotSettings:
+    """Settings of `fit_pivots`; the defaults suit staircase tests of some seconds to minutes."""
 
-    time: FloatArray
-    duration: FloatArray
-    load: FloatArray
-    displacement: FloatArray
-    load_spread: FloatArray
-    rate: FloatArray
-    hold: IntArray
-    branch: IntArray
+    laws: tuple[str, ...] = tuple(LAWS)
+    block: float = 0.1  #: [s]
+    longest_glitch: int = 60  #: samples
+    load_angle_limit: float = math.radians(8.0)
+    displacement_angle_limit: float = math.radians(30.0)
+    angle_warning: float = math.radians(4.0)
+    friction_share: float = 0.003
+    friction_share_se: float = 0.003
+    lag_allowance: float = 0.002  #: [s]
+    contact_tolerance: float = 0.05
+    drift_rate: float = 1.0e-8  #: [m/s]
+    bad_hold_limit: float = 5.0  #: standard errors
+    on_refusal: Literal["raise", "few", "skip"] = "raise"
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.laws if name not in LAWS]
+        if unknown or not self.laws:
+            raise ArgumentError(f"laws must name some of {', '.join(LAWS)}, got {unknown or 'none'}")
+        for name in ("block", "longest_glitch", "lag_allowance", "contact_tolerance", "drift_rate"):
+            if not getattr(self, name) > 0:
+                raise ArgumentError(f"{name} must be positive, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Averages over m pieces of record, (m,) each, in order of time, along and across the pad's direction."""
+
+    time: FloatArray  #: [s]
+    duration: FloatArray  #: [s]
+    load: FloatArray  #: along the pad, outward positive [N]
+    across_load: FloatArray  #: counter-clockwise positive [N]
+    deflection: FloatArray  #: along the pad, from the probes' zero [m]
+    across: FloatArray  #: [m]
+    load_spread: FloatArray  #: standard error of the load [N]
+    rate: FloatArray  #: of the load [N/s], zero within holds
+    hold: IntArray  #: number of the hold, -1 on ramps
+    branch: IntArray  #: +1 loading, -1 unloading
 
     def __len__(self) -> int:
         return len(self.time)
 
-    def take(self, keep: BoolArray) -> Blocks:
-        """The blocks where `keep` (m,) is true."""
-        return Blocks(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
+    def take(self, chosen: BoolArray) -> Blocks:
+        """The blocks where `chosen` (m,) is true."""
+        return Blocks(*(getattr(self, column.name)[chosen] for column in fields(self)))
 
 
 @dataclass(frozen=True)
 class Samples:
     """One dry record on one time base, missing values and glitches left out."""
 
-    time: FloatArray
-    load: FloatArray
-    displacement: FloatArray
-    along: FloatArray
-    lost: float
+    time: FloatArray  #: (n,) [s]
+    load: FloatArray  #: (n, 2) [N]
+    displacement: FloatArray  #: (n, 2) [m]
+    angle: float  #: of the pad [rad]
+
+    @property
+    def along(self) -> FloatArray:
+        """Load along the pad (n,) [N]."""
+        return np.asarray(self.load @ pad_axes(self.angle)[0])
+
+
+def pad_axes(angle: float) -> FloatArray:
+    """Rows: unit vectors along and across a pad direction [rad], (2, 2)."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, s], [-s, c]])
 
 
 def cut_blocks(samples: Samples, holds: tuple[Hold, ...], length: float) -> Blocks:
-    """Average a record piece by piece."""
+    """Average a record piece by piece of `length` [s], half of it on ramps."""
+    load_along = samples.along
     span = float(samples.time[-1] - samples.time[0])
     held = sum(hold.duration for hold in holds)
     length = length * max(1.0, (held + 2.0 * (span - held)) / length / MOST_BLOCKS)
-    edges, number = _edges(samples, holds, length)
+    edges, number = _edges(samples.time, holds, length)
     first = np.searchsorted(samples.time, edges[:, 0], side="left")
     last = np.searchsorted(samples.time, edges[:, 1], side="left")
     count = last - first
@@ -99,30 +110,37 @@ def cut_blocks(samples: Samples, holds: tuple[Hold, ...], length: float) -> Bloc
     whole = count >= np.maximum(3, 0.5 * (edges[:, 1] - edges[:, 0]) / period)
     first, last, count, number = first[whole], last[whole], count[whole], number[whole]
     time = piece_means(samples.time[:, None], first, last)[:, 0]
-    along = piece_means(samples.along[:, None], first, last)[:, 0]
+    along = piece_means(load_along[:, None], first, last)[:, 0]
     rate = np.where(number >= 0, 0.0, np.gradient(along, time) if len(time) > 1 else 0.0)
+    axes = pad_axes(samples.angle)
+    load = piece_means(samples.load, first, last) @ axes.T
+    displacement = piece_means(samples.displacement, first, last) @ axes.T
+    # white noise of single samples from differences: ramps and levels drop out
+    sample_noise = 1.4826 * float(np.median(np.abs(np.diff(load_along, 2)))) / np.sqrt(6.0)
+    of_hold = np.array([hold.branch for hold in holds] + [0], dtype=int)
     return Blocks(
         time=time,
         duration=np.asarray(count * period),
-        load=piece_means(samples.load, first, last),
-        displacement=piece_means(samples.displacement, first, last),
-        load_spread=_sample_noise(samples.along) / np.sqrt(count),
+        load=load[:, 0],
+        across_load=load[:, 1],
+        deflection=displacement[:, 0],
+        across=displacement[:, 1],
+        load_spread=sample_noise / np.sqrt(count),
         rate=np.asarray(rate),
         hold=number,
-        branch=_branches(number, along, holds),
+        branch=np.asarray(np.where(number >= 0, of_hold[number], _directions(along))),
     )
 
 
-def _edges(samples: Samples, holds: tuple[Hold, ...], length: float) -> tuple[FloatArray, IntArray]:
+def _edges(time: FloatArray, holds: tuple[Hold, ...], length: float) -> tuple[FloatArray, IntArray]:
     """Start and stop of every piece (m, 2) [s] and its hold number (m,)."""
     pieces: list[tuple[float, float, int]] = []
-    position = float(samples.time[0])
-    end = float(samples.time[-1])
+    position = float(time[0])
     for number, hold in enumerate(holds):
         pieces += _split(position, hold.start, 0.5 * length, -1)
         pieces += _split(hold.start, hold.stop, length, number)
         position = hold.stop
-    pieces += _split(position, end, 0.5 * length, -1)
+    pieces += _split(position, float(time[-1]), 0.5 * length, -1)
     table = np.array(pieces, dtype=float).reshape(-1, 3)
     return table[:, :2], table[:, 2].astype(int)
 
@@ -131,15 +149,8 @@ def _split(start: float, stop: float, length: float, number: int) -> list[tuple[
     """Equal pieces of about `length` between two moments."""
     if stop - start < 0.4 * length:
         return []
-    n = max(1, round((stop - start) / length))
-    cuts = np.linspace(start, stop, n + 1)
+    cuts = np.linspace(start, stop, max(1, round((stop - start) / length)) + 1)
     return [(float(a), float(b), number) for a, b in itertools.pairwise(cuts)]
-
-
-def _branches(number: IntArray, along: FloatArray, holds: tuple[Hold, ...]) -> IntArray:
-    """+1 loading, -1 unloading."""
-    of_hold = np.array([hold.branch for hold in holds] + [0], dtype=int)
-    return np.asarray(np.where(number >= 0, of_hold[number], _directions(along)))
 
 
 def _directions(load: FloatArray) -> IntArray:
@@ -147,21 +158,15 @@ def _directions(load: FloatArray) -> IntArray:
     if not len(load):  # a logger too slow for a single piece
         return np.zeros(0, dtype=int)
     turn = TURN * float(np.ptp(load))
-    off = load - load[0]
-    now = 1 if off[int(np.argmax(np.abs(off) > turn))] >= 0.0 else -1
-    sense = np.full(len(load), now)
+    travel = load - load[0]
+    direction = 1 if travel[int(np.argmax(np.abs(travel) > turn))] >= 0.0 else -1
+    sense = np.full(len(load), direction)
     farthest = 0
     for k in range(len(load)):
-        if now * (load[k] - load[farthest]) >= 0.0:
+        if direction * (load[k] - load[farthest]) >= 0.0:
             farthest = k
-        elif now * (load[farthest] - load[k]) > turn:
-            now = -now
-            sense[farthest + 1 :] = now
+        elif direction * (load[farthest] - load[k]) > turn:
+            direction = -direction
+            sense[farthest + 1 :] = direction
             farthest = k
     return sense
-
-
-def _sample_noise(load: FloatArray) -> float:
-    """White noise of single load samples [N], from differences: ramps and levels drop out."""
-    second = np.diff(load, 2)
-    return 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0)

@@ -15,7 +15,7 @@ from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.dry_record import PadDirection
 from tpjb_ident.pivot.law_fit import FRICTION, OFFSET, SCALE, LawFit
-from tpjb_ident.presentation import Presented, shown_by
+from tpjb_ident.presentation import Presented
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,43 +53,44 @@ class Hysteresis:
 def measure_loop(
     load: FloatArray, deflection: FloatArray, covariance: FloatArray, branch: IntArray
 ) -> Hysteresis | None:
-    """Area between loading and unloading points."""
+    """Area between loading and unloading points (n,) at loads [N]; covariance (n, n) of the deflections [m]."""
     up, down = branch > 0, branch < 0
     if up.sum() < 2 or down.sum() < 2:
         return None
-    low = max(load[up].min(), load[down].min())
-    high = min(load[up].max(), load[down].max())
+    low = float(max(load[up].min(), load[down].min()))
+    high = float(min(load[up].max(), load[down].max()))
     if not high > low:
         return None
     grid = np.linspace(low, high, 200)
     width = np.zeros(len(grid))
-    gains = np.zeros((2, 200, len(load)))
-    for k, mask in enumerate((down, up)):
-        order = np.flatnonzero(mask)[np.argsort(load[mask], kind="stable")]
-        gains[k][:, order] = _interpolation(grid, load[order])
-        width += (1 if k == 0 else -1) * (gains[k][:, order] @ deflection[order])
+    gain = np.zeros((200, len(load)))
+    for sign, members in ((1.0, down), (-1.0, up)):
+        order = np.flatnonzero(members)[np.argsort(load[members], kind="stable")]
+        weights = _interpolation(grid, load[order])
+        gain[:, order] = sign * weights
+        width += sign * (weights @ deflection[order])
     # trapezoid weights times interpolation weights: the area is linear in the points, so is its error
     trapezoid = np.full(len(grid), grid[1] - grid[0])
     trapezoid[[0, -1]] *= 0.5
     energy = float(trapezoid @ width)
-    sensitivity = trapezoid @ (gains[0] - gains[1])
-    energy_se = float(np.sqrt(max(sensitivity @ covariance @ sensitivity, 0.0)))
+    sensitivity = trapezoid @ gain
+    energy_se = math.sqrt(max(float(sensitivity @ covariance @ sensitivity), 0.0))
     ends = np.interp([low, high], np.sort(load[up]), deflection[up][np.argsort(load[up])])
-    stored = math.pi / 4.0 * float(high - low) * abs(float(ends[1] - ends[0]))
+    stored = math.pi / 4.0 * (high - low) * abs(float(ends[1] - ends[0]))
     if stored == 0.0:
         return None
-    return Hysteresis(energy, energy_se, energy / stored, energy_se / stored, (float(low), float(high)))
+    return Hysteresis(energy, energy_se, energy / stored, energy_se / stored, (low, high))
 
 
 def _interpolation(grid: FloatArray, knots: FloatArray) -> FloatArray:
-    """Weights (grid, knots) of linear interpolation at sorted knots; equal knots are told apart by a hair."""
+    """Weights (grid, knots) of linear interpolation at sorted knots; equal knots are set apart by a hair."""
     x = knots + 1e-9 * max(float(np.ptp(knots)), 1.0) * np.arange(len(knots))
     cell = np.clip(np.searchsorted(x, grid) - 1, 0, len(x) - 2)
-    right = np.clip((grid - x[cell]) / (x[cell + 1] - x[cell]), 0.0, 1.0)
+    share = np.clip((grid - x[cell]) / (x[cell + 1] - x[cell]), 0.0, 1.0)
     weights = np.zeros((len(grid), len(x)))
     rows = np.arange(len(grid))
-    weights[rows, cell] = 1.0 - right
-    weights[rows, cell + 1] += right
+    weights[rows, cell] = 1.0 - share
+    weights[rows, cell + 1] += share
     return weights
 
 
@@ -130,7 +131,7 @@ class PivotSteps:
 class PivotCurve(Presented):
     """Load-deflection curve of one pad's pivot, housing included.
 
-    The displacement is measured between shaft and housing, so pivot, pad back and housing seat all give:
+    The displacement is measured between shaft and housing, so pivot, pad back and housing seat all deflect:
     `includes_housing` is True, and no further housing compliance may be put in series with this curve.
 
     The curve is that of the most likely law; the intervals also hold the spread of the other likely laws
@@ -141,7 +142,7 @@ class PivotCurve(Presented):
     pad : int
         Number, from 1.
     angle : float
-        PadDirection of the pad [rad].
+        Direction of the pad [rad].
     steps : PivotSteps
         The points.
     fits : tuple of LawFit
@@ -208,10 +209,10 @@ class PivotCurve(Presented):
         deflection : array_like
             [m], not negative.
         """
-        wanted = np.asarray(deflection, dtype=float)
-        if np.any(~(wanted >= 0.0)):
+        values = np.asarray(deflection, dtype=float)
+        if np.any(~(values >= 0.0)):
             raise ArgumentError("deflection must be zero or positive, and not NaN")
-        return np.array([self._invert(float(x)) for x in wanted.ravel()]).reshape(wanted.shape)
+        return np.array([self._invert(float(x)) for x in values.ravel()]).reshape(values.shape)
 
     def _invert(self, deflection: float) -> float:
         if deflection == 0.0:
@@ -300,10 +301,9 @@ class PivotCurve(Presented):
             [N]
         """
         values = np.maximum(_loads(load).ravel(), 1e-6 * self.valid_to)
-        beyond = EXTRAPOLATION_SPREAD * self._beyond(values)
-        return self._joint([np.log(fit.compliance(values)) for fit in self.fits], [
-            fit.log_compliance_gradient(values) for fit in self.fits
-        ]) + np.diag(beyond**2)  # fmt: skip
+        logs = [np.log(fit.compliance(values)) for fit in self.fits]
+        gradients = [fit.log_compliance_gradient(values) for fit in self.fits]
+        return self._log_covariance(values, logs, gradients)
 
     def reading_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Deflection that the steps should show while loading, and its interval.
@@ -330,11 +330,12 @@ class PivotCurve(Presented):
         variance = np.zeros(len(flat))
         for fit, weight in zip(self.fits, self.weights, strict=True):
             reading, gradient = fit.reading_gradient(applied, up)
-            own = np.einsum("ij,jk,ik->i", gradient, fit.covariance, gradient)
-            variance += weight * (own + (reading - centre) ** 2)
+            fit_variance = np.einsum("ij,jk,ik->i", gradient, fit.covariance, gradient)
+            variance += weight * (fit_variance + (reading - centre) ** 2)
         half = self._quantile(level) * np.sqrt(variance)
         value = centre - self.law.theta[OFFSET]
-        return tuple(np.asarray(part).reshape(values.shape) for part in (value, value - half, value + half))  # type: ignore[return-value]
+        shape = values.shape
+        return value.reshape(shape), (value - half).reshape(shape), (value + half).reshape(shape)
 
     def is_extrapolated(self, load: ArrayLike) -> BoolArray:
         """True where a load lies outside what was measured with full contact.
@@ -350,26 +351,26 @@ class PivotCurve(Presented):
     def _spread(self, load: FloatArray, secant: bool) -> FloatArray:
         """Standard deviation of ln(stiffness): each law's own, and the laws' about the leading one."""
         flat = np.maximum(load.ravel(), 1e-6 * self.valid_to)
-        value = [np.log(fit.deflection(flat) if secant else fit.compliance(flat)) for fit in self.fits]
-        gradient = [
-            fit.log_deflection_gradient(flat) if secant else fit.log_compliance_gradient(flat) for fit in self.fits
-        ]
-        total = np.diag(self._joint(value, gradient)) + (EXTRAPOLATION_SPREAD * self._beyond(flat)) ** 2
-        return np.asarray(np.sqrt(total)).reshape(load.shape)
+        if secant:
+            logs = [np.log(fit.deflection(flat)) for fit in self.fits]
+            gradients = [fit.log_deflection_gradient(flat) for fit in self.fits]
+        else:
+            logs = [np.log(fit.compliance(flat)) for fit in self.fits]
+            gradients = [fit.log_compliance_gradient(flat) for fit in self.fits]
+        variance = np.diag(self._log_covariance(flat, logs, gradients))
+        return np.asarray(np.sqrt(variance)).reshape(load.shape)
 
-    def _joint(self, value: list[FloatArray], gradient: list[FloatArray]) -> FloatArray:
-        """Covariance (n, n) of logarithms: each law's own, and the laws' about the leading one."""
-        total = np.zeros((len(value[0]), len(value[0])))
-        for fit, weight, logs, slopes in zip(self.fits, self.weights, value, gradient, strict=True):
-            aside = logs - value[0]
-            total += weight * (slopes @ fit.covariance @ slopes.T + np.outer(aside, aside))
-        return total
+    def _log_covariance(self, load: FloatArray, logs: list[FloatArray], gradients: list[FloatArray]) -> FloatArray:
+        """Covariance (n, n) of a logarithm (n,) of each law at loads (n,) [N], gradients (n, p).
 
-    def _beyond(self, load: FloatArray) -> FloatArray:
-        """By how many e-folds loads (n,) lie outside the points."""
-        return np.asarray(
-            np.log(np.maximum(np.maximum(load / self.valid_to, float(np.min(self.steps.load)) / load), 1.0))
-        )
+        Each law's own, the laws' about the leading one, and what extrapolation by so many e-folds adds.
+        """
+        total = np.zeros((len(load), len(load)))
+        for fit, weight, log, gradient in zip(self.fits, self.weights, logs, gradients, strict=True):
+            difference = log - logs[0]
+            total += weight * (gradient @ fit.covariance @ gradient.T + np.outer(difference, difference))
+        outside = np.maximum(load / self.valid_to, float(np.min(self.steps.load)) / load)
+        return total + np.diag((EXTRAPOLATION_SPREAD * np.log(np.maximum(outside, 1.0))) ** 2)
 
     def _quantile(self, level: float) -> float:
         if not 0.0 < level < 1.0:
@@ -378,8 +379,9 @@ class PivotCurve(Presented):
 
     def to_frame(self) -> pd.DataFrame:
         """Rows of ``pivot_curves.csv``."""
-        frame: pd.DataFrame = shown_by("pivot.tables", "pivot_table")([self])
-        return frame
+        from tpjb_ident.pivot.tables import pivot_table
+
+        return pivot_table([self])
 
     def plot(self, **options: Any) -> Any:
         """Draw the stiffness over the load; see `tpjb_ident.report.plots.pivot_stiffness`.
@@ -389,24 +391,21 @@ class PivotCurve(Presented):
         **options
             ``formula``, ``loads``, ``secant``, ``level``, ``title``.
         """
-        return shown_by("report.plots", "pivot_stiffness")([self], **options)
+        from tpjb_ident.report.plots import pivot_stiffness
+
+        return pivot_stiffness([self], **options)
 
     def __str__(self) -> str:
-        parameters = ", ".join(
-            f"{n} = {v:.4g} (se {s:.2g})"
-            for n, v, s in zip(
-                self.law.names[SCALE:],
-                self.law.theta[SCALE:],
-                np.sqrt(np.diag(self.law.covariance))[SCALE:],
-                strict=True,
-            )
-        )
-        at = 0.5 * self.valid_to
-        lo, hi = (float(x) for x in self.stiffness_band(at))
+        errors = np.sqrt(np.diag(self.law.covariance))
+        estimates = list(zip(self.law.names, self.law.theta, errors, strict=True))[SCALE:]
+        parameters = ", ".join(f"{name} = {estimate:.4g} (se {se:.2g})" for name, estimate, se in estimates)
+        middle = 0.5 * self.valid_to
+        lo, hi = (float(limit) for limit in self.stiffness_band(middle))
         share = f"{100 * self.weights[0]:.0f} %"
+        value = float(self.stiffness(middle))
         lines = [
             f"pad {self.pad} at {math.degrees(self.angle):g} deg: {self.law.name} ({share}), {parameters}",
-            f"  tangent stiffness at {at:.0f} N: {float(self.stiffness(at)):.4g} N/m (95 %: {lo:.4g} to {hi:.4g})",
+            f"  tangent stiffness at {middle:.0f} N: {value:.4g} N/m (95 %: {lo:.4g} to {hi:.4g})",
             f"  holds from {self.valid_from:.0f} to {self.valid_to:.0f} N; load {self.load_direction}",
         ]
         if self.onset_load > 0.0:

@@ -24,7 +24,6 @@ extrapolation sane where the records say nothing, and it makes the laws' evidenc
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -78,9 +77,8 @@ class Law(Protocol):
         """
 
 
-@dataclass(frozen=True)
 class _Shape:
-    """Name, parameters and prior, common to all laws."""
+    """Name, parameters and prior, common to all laws but the spline; (k,) each."""
 
     name: str
     parameters: tuple[str, ...] = ()
@@ -114,8 +112,7 @@ def _log(u: FloatArray) -> FloatArray:
 class Linear(_Shape):
     """Constant compliance."""
 
-    def __init__(self) -> None:
-        super().__init__("linear")
+    name = "linear"
 
     def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Deflection shape and its derivative; see `Law.phi`."""
@@ -129,8 +126,7 @@ class Linear(_Shape):
 class HertzPoint(_Shape):
     """Sphere on flat: deflection as W^(2/3) (paper, Eq. 16)."""
 
-    def __init__(self) -> None:
-        super().__init__("hertz-point")
+    name = "hertz-point"
 
     def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Deflection shape and its derivative; see `Law.phi`."""
@@ -144,8 +140,12 @@ class HertzPoint(_Shape):
 class HertzLine(_Shape):
     """Cylinder in cylinder: deflection as W (A - ln W) (paper, Eq. 17); kappa = 1 / (A - 1 - ln W_r)."""
 
-    def __init__(self) -> None:
-        super().__init__("hertz-line", ("kappa",), (0.08,), (0.05,), (0.0,), (0.45,))
+    name = "hertz-line"
+    parameters = ("kappa",)
+    mean = (0.08,)
+    spread = (0.05,)
+    low = (0.0,)
+    high = (0.45,)
 
     def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Deflection shape and its derivative; see `Law.phi`."""
@@ -154,8 +154,7 @@ class HertzLine(_Shape):
 
     def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Compliance shape and its derivative; see `Law.psi`."""
-        # at very small or very large loads the logarithm leaves the law's range: the compliance stays
-        # positive
+        # at very small or very large loads the logarithm leaves the law's range: the compliance stays positive
         log = np.minimum(_log(u), 0.98 / max(q[0], 1e-12))
         return 1.0 - q[0] * log, -log[:, None]
 
@@ -163,8 +162,12 @@ class HertzLine(_Shape):
 class Power(_Shape):
     """Deflection as W^p."""
 
-    def __init__(self) -> None:
-        super().__init__("power", ("p",), (0.85,), (0.15,), (0.3,), (1.3,))
+    name = "power"
+    parameters = ("p",)
+    mean = (0.85,)
+    spread = (0.15,)
+    low = (0.3,)
+    high = (1.3,)
 
     def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Deflection shape and its derivative; see `Law.phi`."""
@@ -181,8 +184,12 @@ class Power(_Shape):
 class PointInSeries(_Shape):
     """Sphere on flat with a linear compliance in series: lam is the linear share at the reference load."""
 
-    def __init__(self) -> None:
-        super().__init__("point-in-series", ("lam",), (0.5,), (0.25,), (0.0,), (1.0,))
+    name = "point-in-series"
+    parameters = ("lam",)
+    mean = (0.5,)
+    spread = (0.25,)
+    low = (0.0,)
+    high = (1.0,)
 
     def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Deflection shape and its derivative; see `Law.phi`."""
@@ -198,10 +205,13 @@ class PointInSeries(_Shape):
 class Bilinear(_Shape):
     """Two compliances with a bend between them at u = b; r is the first over the second."""
 
+    name = "bilinear"
+    parameters = ("log r", "log b")
+    mean = (0.0, 0.0)
+    spread = (0.5, 0.5)
+    low = (-2.0, -1.6)
+    high = (2.0, 1.0)
     width = 0.1  # of the bend, as a share of b
-
-    def __init__(self) -> None:
-        super().__init__("bilinear", ("log r", "log b"), (0.0, 0.0), (0.5, 0.5), (-2.0, -1.6), (2.0, 1.0))
 
     def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Deflection shape and its derivative; see `Law.phi`."""
@@ -232,45 +242,37 @@ SLOPE_SPREAD = 0.25
 BEND_SPREAD = 0.2  # change of that slope from node to node, standard deviation
 
 
-def _prior() -> tuple[FloatArray, FloatArray]:
-    """Mean (k,) and precision (k, k): a slope at the reference load, and small bends."""
-    free = np.delete(np.arange(len(NODES)), FIXED)
+def _spline_precision() -> FloatArray:
+    """Precision (k, k) of the prior: a slope at the reference load, and small bends (k: free nodes)."""
     slopes = np.zeros((len(NODES) - 1, len(NODES)))
     gaps = np.diff(NODES)
     for j in range(len(NODES) - 1):
         slopes[j, j], slopes[j, j + 1] = -1.0 / gaps[j], 1.0 / gaps[j]
     bends = np.diff(slopes, axis=0) / BEND_SPREAD
-    rows = np.vstack([bends, slopes[FIXED] / SLOPE_SPREAD])[:, free]
-    return TYPICAL_SLOPE * NODES[free], rows.T @ rows
+    rows = np.delete(np.vstack([bends, slopes[FIXED] / SLOPE_SPREAD]), FIXED, axis=1)
+    return np.asarray(rows.T @ rows)
 
 
-@dataclass(frozen=True)
-class SplineLaw:
-    """Monotone smoothing spline; the shape parameters are ln(compliance) at the nodes."""
+class SplineLaw(_Shape):
+    """Monotone smoothing spline; the shape parameters are ln(compliance) at the free nodes.
 
-    name: str = "spline"
-    prior: tuple[FloatArray, FloatArray] = field(default_factory=_prior, repr=False)
+    The logarithm of the compliance is piecewise linear in the logarithm of the load. Whatever its values, the
+    deflection rises with load; where the points end, the last slope goes on as a power law. Its bends are held
+    down by a prior (a random walk of the slope), which is what a smoothing spline is (Wahba, 1990), and which
+    also widens the band outside the points.
+    """
 
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Names of the free nodes."""
-        return tuple(f"ln psi({np.exp(x):.2g})" for k, x in enumerate(NODES) if k != FIXED)
-
-    @property
-    def prior_mean(self) -> FloatArray:
-        """(k,) a gentle power law."""
-        return self.prior[0]
+    name = "spline"
+    parameters = tuple(f"ln psi({np.exp(x):.2g})" for x in np.delete(NODES, FIXED))
+    mean = tuple(TYPICAL_SLOPE * np.delete(NODES, FIXED))
+    low = (-4.0,) * len(mean)  # wide: nothing here can break monotony
+    high = (4.0,) * len(mean)
+    precision = _spline_precision()
 
     @property
     def prior_precision(self) -> FloatArray:
         """(k, k) what holds the bends down."""
-        return self.prior[1]
-
-    @property
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Wide: nothing here can break monotony."""
-        k = len(NODES) - 1
-        return np.full(k, -4.0), np.full(k, 4.0)
+        return self.precision
 
     def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Compliance shape and its derivative; see `Law.psi`."""
@@ -285,9 +287,8 @@ class SplineLaw:
         columns = np.column_stack([weighted, weighted[:, None] * np.delete(GRID_WEIGHTS, FIXED, axis=1)])
         # below the grid the compliance is a power of the load, integrable whatever the slope says
         slope = max((logs[1] - logs[0]) / (NODES[1] - NODES[0]), -0.9)
-        total = np.vstack(
-            [np.zeros(columns.shape[1]), np.cumsum(0.5 * GRID_STEP * (columns[1:] + columns[:-1]), axis=0)]
-        )
+        trapezoids = 0.5 * GRID_STEP * (columns[1:] + columns[:-1])
+        total = np.vstack([np.zeros(columns.shape[1]), np.cumsum(trapezoids, axis=0)])
         below = columns[0] / (1.0 + slope)
         # that share changes with the slope, so with the first two nodes (both free: the fixed one lies higher up)
         turn = below[0] / (1.0 + slope) / (NODES[1] - NODES[0])
@@ -309,11 +310,11 @@ class SplineLaw:
 def _interpolation(x: FloatArray) -> FloatArray:
     """Weights (n, nodes) of linear interpolation in ln u; linear extrapolation beyond the ends."""
     cell = np.clip(np.searchsorted(NODES, x) - 1, 0, len(NODES) - 2)
-    right = (x - NODES[cell]) / (NODES[cell + 1] - NODES[cell])
+    share = (x - NODES[cell]) / (NODES[cell + 1] - NODES[cell])
     weights = np.zeros((len(x), len(NODES)))
     rows = np.arange(len(x))
-    weights[rows, cell] = 1.0 - right
-    weights[rows, cell + 1] = right
+    weights[rows, cell] = 1.0 - share
+    weights[rows, cell + 1] = share
     return weights
 
 
@@ -322,3 +323,6 @@ GRID, GRID_STEP = np.linspace(
 )  # ln u on which the compliance is integrated
 GRID_LOAD = np.exp(GRID)
 GRID_WEIGHTS = _interpolation(GRID)
+LAWS: dict[str, Law] = {
+    law.name: law for law in (HertzLine(), HertzPoint(), Power(), Linear(), PointInSeries(), Bilinear(), SplineLaw())
+}

@@ -9,18 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import Problem
 from tpjb_ident.pivot.blocks import PivotSettings
-from tpjb_ident.pivot.dry_record import (
-    DryRecord,
-    PadDirection,
-    axial_channels,
-    displacement_direction,
-    load_direction,
-    mistakes,
-    refusal,
-)
-from tpjb_ident.slow_records.noise import NoiseModel
+from tpjb_ident.pivot.dry_record import DryRecord, PadDirection, PickupSignature, axial_channels, refusal
 
 ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
 ASIDE_SPREAD = 5.0  # robust standard deviations of the campaign's own runs, where they stand less orderly than that
@@ -30,11 +21,13 @@ CURE = "Check the run's pad number, the channels' axes, polarities and order, an
 FEWEST = 4
 #: Slack when the spring's own movement is compared with what was read, as a share of it.
 SLACK = 0.1
+MATCHES = 30.0  # chi-square below which two runs show one signature (6 degrees of freedom; by chance above: 4e-5)
+CLEARER = 25.0  # by which a mistake undone must lower it
 
 
 @dataclass(frozen=True)
 class Structure:
-    """A compliance that explains the directions of all dry tests."""
+    """A compliance [m/N] in one direction [rad] that explains the directions of all dry tests."""
 
     compliance: float
     direction: float
@@ -55,69 +48,82 @@ class Structure:
 
 
 def check_directions(
-    record: DryRecord,
-    noise: NoiseModel,
-    settings: PivotSettings,
-    pad_angles: FloatArray,
-    structure: Structure | None = None,
-) -> tuple[PadDirection, PadDirection]:
-    """Directions of load and displacement, or a refusal."""
-    load = load_direction(record.projection, record.blocks)
-    displacement = displacement_direction(record.projection, record.blocks, noise)
-    for quantity, found, limit in (
-        ("force", load, settings.load_angle_limit),
-        ("displacement", displacement, settings.displacement_angle_limit),
-    ):
-        if quantity == "displacement" and structure is not None:
+    record: DryRecord, settings: PivotSettings, pad_angles: FloatArray, structure: Structure | None = None
+) -> None:
+    """Refuse a record whose load or displacement points elsewhere than at its pad; `pad_angles` (n_pads,) [rad]."""
+    pointing = [("force", record.load_direction, settings.load_angle_limit)]
+    if structure is None:
+        pointing.append(("displacement", record.displacement_direction, settings.displacement_angle_limit))
+    for quantity, direction, limit in pointing:
+        if not abs(direction.angle) > limit:
             continue
-        if abs(found.angle) > limit:
-            guess = _suspect(record, load, displacement, settings, pad_angles)
-            raise _elsewhere(record, quantity, found, limit, guess)
-    return load, displacement
+        degrees = math.degrees(direction.angle)
+        reading = "opposite to" if abs(degrees) > 135.0 else "away from"
+        what = (
+            f"says pad {record.pad} at {math.degrees(record.angle):g} deg, but its {quantity} grows {degrees:+.1f} deg "
+            f"{reading} that direction (limit {math.degrees(limit):g} deg): {_suspect(record, settings, pad_angles)}"
+        )
+        raise refusal(record.run, f"{quantity} channels", what, CURE)
 
 
-def structure_of(records: Sequence[DryRecord], noise: NoiseModel, settings: PivotSettings) -> Structure | None:
-    """One compliance that explains displacements beyond their limit.
-
-    None where none is beyond, or none explains them.
-    """
-    moved = [displacement_direction(r.projection, r.blocks, noise) for r in records]
-    loads = [load_direction(r.projection, r.blocks) for r in records]
-    if any(abs(d.angle) > settings.load_angle_limit for d in loads):
-        return None
-    if not any(abs(d.angle) > settings.displacement_angle_limit for d in moved):
-        return None
-    slopes = [float(np.polyfit(r.projection.load, r.projection.deflection, 1)[0]) for r in records]
-    return structure_behind([r.angle for r in records], slopes, moved, settings.displacement_angle_limit)
-
-
-def _elsewhere(record: DryRecord, quantity: str, direction: PadDirection, limit: float, guess: str) -> RigDataError:
-    degrees = math.degrees(direction.angle)
-    reading = "opposite to" if abs(degrees) > 135.0 else "away from"
-    what = (
-        f"says pad {record.pad} at {math.degrees(record.angle):g} deg, but its {quantity} grows {degrees:+.1f} deg "
-        f"{reading} that direction (limit {math.degrees(limit):g} deg): {guess}"
-    )
-    return refusal(record.run, f"{quantity} channels", what, CURE)
-
-
-def _suspect(
-    record: DryRecord, load: PadDirection, displacement: PadDirection, settings: PivotSettings, pad_angles: FloatArray
-) -> str:
+def _suspect(record: DryRecord, settings: PivotSettings, pad_angles: FloatArray) -> str:
     """Which of wrong pad, wrong channel and wrong angle explains both directions."""
-    off_load = abs(load.angle) > settings.load_angle_limit
-    off_move = abs(displacement.angle) > settings.displacement_angle_limit
-    together = abs(math.remainder(load.angle - displacement.angle, 2 * math.pi)) < settings.displacement_angle_limit
-    if off_load and together:
-        turned = [abs(math.remainder(record.angle + load.angle - a, 2 * math.pi)) for a in pad_angles]
-        nearest = int(np.argmin(turned))
-        if turned[nearest] < settings.load_angle_limit:
+    load, moved = record.load_direction.angle, record.displacement_direction.angle
+    load_elsewhere = abs(load) > settings.load_angle_limit
+    moved_elsewhere = abs(moved) > settings.displacement_angle_limit
+    together = abs(math.remainder(load - moved, 2 * math.pi)) < settings.displacement_angle_limit
+    if load_elsewhere and together:
+        distances = [abs(math.remainder(record.angle + load - angle, 2 * math.pi)) for angle in pad_angles]
+        nearest = int(np.argmin(distances))
+        if distances[nearest] < settings.load_angle_limit:
             return f"wrong pad: load and displacement both point at pad {nearest + 1}"
-        return f"wrong angle: load and displacement turn together by {math.degrees(load.angle):+.0f} deg"
-    if off_load != off_move:
-        which = "force" if off_load else "displacement"
-        return f"wrong channel: the other vector points at the pad, so {which} channels are exchanged or reversed"
+        return f"wrong angle: load and displacement turn together by {math.degrees(load):+.0f} deg"
+    if load_elsewhere != moved_elsewhere:
+        quantity = "force" if load_elsewhere else "displacement"
+        return f"wrong channel: the other vector points at the pad, so {quantity} channels are exchanged or reversed"
     return "wrong pad, wrong channel or wrong angle: load and displacement point neither at a pad nor the same way"
+
+
+def structure_of(records: Sequence[DryRecord], settings: PivotSettings) -> Structure | None:
+    """One compliance that explains displacements beyond their limit; None where none is beyond or explains them."""
+    limit = settings.displacement_angle_limit
+    directions = [record.displacement_direction for record in records]
+    if any(abs(record.load_direction.angle) > settings.load_angle_limit for record in records):
+        return None
+    if not any(abs(direction.angle) > limit for direction in directions):
+        return None
+    slopes = [float(np.polyfit(record.blocks.load, record.blocks.deflection, 1)[0]) for record in records]
+    return structure_behind([record.angle for record in records], slopes, directions, limit)
+
+
+def structure_behind(
+    angles: Sequence[float], slopes: Sequence[float], directions: Sequence[PadDirection], limit: float
+) -> Structure | None:
+    """Look for one compliance behind displacements that point elsewhere than at their pads.
+
+    Where a pad at phi with normal n is pushed with the load W, a structure with the symmetric compliance S moves the
+    shaft by W S n beside what the pivot deflects, W c n. Across the pad that is
+
+        t . S n = (S_yy - S_xx) / 2 sin 2 phi + S_xy cos 2 phi,
+
+    two numbers for all pads. Exchanged channels make a similar pattern, but one that no spring can: a spring of this
+    size along its own direction would move the shaft further along some pads than it moved.
+    """
+    phi, along = np.asarray(angles, float), np.asarray(slopes, float)
+    if len(set(np.round(phi, 6))) < FEWEST or np.any(along <= 0.0):
+        return None
+    if any(abs(direction.angle) >= 0.5 * math.pi for direction in directions):
+        return None
+    across = along * np.tan([direction.angle for direction in directions])
+    design = np.column_stack([np.sin(2 * phi), np.cos(2 * phi)])
+    p, q = np.linalg.lstsq(design, across, rcond=None)[0]
+    # t . S n = -(D / 2) sin 2 (phi - psi) = -(D / 2) (sin 2 phi cos 2 psi - cos 2 phi sin 2 psi)
+    structure = Structure(2.0 * math.hypot(p, q), 0.5 * math.atan2(q, -p))
+    across_residual = across - np.array([structure.across(float(angle)) for angle in phi])
+    pivot_alone = along - np.array([structure.along(float(angle)) for angle in phi])
+    if np.any(pivot_alone < -SLACK * along) or np.any(np.abs(across_residual) > math.tan(limit) * along):
+        return None
+    return structure
 
 
 def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
@@ -130,47 +136,30 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
     """
     if len({record.pad for record in records}) < 3:
         return []
-    starts = np.array([record.blocks.displacement[int(np.argmin(record.projection.load))] for record in records])
-    outward = np.array([[math.cos(r.angle), math.sin(r.angle)] for r in records])
-    centre, reach = _centre(starts, outward)
+    outward = np.array([[math.cos(record.angle), math.sin(record.angle)] for record in records])
     tangent = np.column_stack([-outward[:, 1], outward[:, 0]])
+    lowest = [int(np.argmin(record.blocks.load)) for record in records]
+    along_pad = np.array([record.blocks.deflection[k] for record, k in zip(records, lowest, strict=True)])
+    across_pad = np.array([record.blocks.across[k] for record, k in zip(records, lowest, strict=True)])
+    starts = along_pad[:, None] * outward + across_pad[:, None] * tangent
+    centre, distance = _centre(starts, outward)
     asides = np.sum((starts - centre) * tangent, axis=1)
-    limit = max(ASIDE * reach, ASIDE_SPREAD * 1.4826 * float(np.median(np.abs(asides))))
+    limit = max(ASIDE * distance, ASIDE_SPREAD * 1.4826 * float(np.median(np.abs(asides))))
     problems = []
     for record, start, normal, aside in zip(records, starts, outward, asides, strict=True):
         along = float((start - centre) @ normal)
-        if abs(aside) > limit or abs(along - reach) > ALONG * reach:
+        if abs(aside) > limit or abs(along - distance) > ALONG * distance:
             what = (
                 f"run {record.run.id}: the shaft stands {1e6 * along:.0f} um toward pad {record.pad} and "
                 f"{1e6 * aside:+.0f} um beside it, while the other dry runs of this campaign say "
-                f"{1e6 * reach:.0f} um toward it: channels exchanged or wrong pad"
+                f"{1e6 * distance:.0f} um toward it: channels exchanged or wrong pad"
             )
             problems.append(Problem("error", record.run.file, "displacement channels", what, CURE, run=record.run.id))
     return problems
 
 
-def check_pickup(records: Sequence[DryRecord]) -> list[Problem]:
-    """Runs whose mains pick-up is that of exchanged or reversed channels.
-
-    While the other runs agree with each other.
-    """
-    pairs: dict[str, list[str]] = {}
-    for name, channel in (axial_channels(records[0].run) if records else {}).items():
-        pairs.setdefault(str(channel.quantity), []).append(name)
-    found = mistakes([r.pickup for r in records], [(p[0], p[1]) for p in pairs.values() if len(p) == 2])
-    problems = []
-    for record, mistake in zip(records, found, strict=True):
-        if mistake is not None:
-            what = (
-                f"run {record.run.id}: {mistake.what}: then its mains pick-up is that of {mistake.agree} other dry "
-                "runs, and as it stands it is not: wrong channel"
-            )
-            problems.append(Problem("error", record.run.file, "channels", what, CURE, run=record.run.id))
-    return problems
-
-
-def _centre(starts: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, float]:
-    """Centre (2,) and distance that most starts agree on: start = centre + distance * outward, robustly."""
+def _centre(starts: FloatArray, outward: FloatArray) -> tuple[FloatArray, float]:
+    """Centre (2,) and distance that most starts (m, 2) agree on: start = centre + distance * outward, robustly."""
     m = len(starts)
     design = np.zeros((2 * m, 3))
     design[0::2, 0] = design[1::2, 1] = 1.0
@@ -187,31 +176,78 @@ def _centre(starts: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, float]
     return solution[:2], abs(float(solution[2]))
 
 
-def structure_behind(
-    angles: Sequence[float], slopes: Sequence[float], moved: Sequence[PadDirection], limit: float
-) -> Structure | None:
-    """Look for one compliance behind displacements that point elsewhere than at their pads.
+def check_pickup(records: Sequence[DryRecord]) -> list[Problem]:
+    """Runs whose mains pick-up is that of exchanged or reversed channels, while most other runs agree."""
+    pairs: dict[str, list[str]] = {}
+    for name, channel in (axial_channels(records[0].run) if records else {}).items():
+        pairs.setdefault(str(channel.quantity), []).append(name)
+    named = mistakes([record.pickup for record in records], [(p[0], p[1]) for p in pairs.values() if len(p) == 2])
+    problems = []
+    for record, mistake in zip(records, named, strict=True):
+        if mistake is not None:
+            text, agree = mistake
+            what = (
+                f"run {record.run.id}: {text}: then its mains pick-up is that of {agree} other dry "
+                "runs, and as it stands it is not: wrong channel"
+            )
+            problems.append(Problem("error", record.run.file, "channels", what, CURE, run=record.run.id))
+    return problems
 
-    Where a pad at phi with normal n is pushed with the load W, a structure with the symmetric compliance S moves the
-    shaft by W S n beside what the pivot gives, W c n. Across the pad that is
 
-        t . S n = (S_yy - S_xx) / 2 sin 2 phi + S_xy cos 2 phi,
+def mistakes(
+    pickups: Sequence[PickupSignature | None], pairs: Sequence[tuple[str, str]]
+) -> list[tuple[str, int] | None]:
+    """What the signatures say of every run: nothing, or a mistake and how many other runs, most of them, confirm it."""
+    named: list[tuple[str, int] | None] = []
+    for number, signature in enumerate(pickups):
+        if signature is None:
+            named.append(None)
+            continue
+        comparable = [
+            pickup
+            for k, pickup in enumerate(pickups)
+            if k != number and pickup is not None and pickup.channels == signature.channels
+        ]
+        named.append(_mistake(signature, comparable, pairs))
+    return named
 
-    two numbers for all pads. Exchanged channels make a similar pattern, but one that no spring can: a spring of this
-    size along its own direction would move the shaft further along some pads than it moved.
-    """
-    phi, along = np.asarray(angles, float), np.asarray(slopes, float)
-    if len(set(np.round(phi, 6))) < FEWEST or np.any(along <= 0.0):
+
+def _mistake(
+    signature: PickupSignature, comparable: Sequence[PickupSignature], pairs: Sequence[tuple[str, str]]
+) -> tuple[str, int] | None:
+    """The mistake that, undone, makes a signature that of most runs it now differs from."""
+    sizes = [(pickup, _mismatch(signature, pickup)) for pickup in comparable]
+    different = [(pickup, size) for pickup, size in sizes if size > MATCHES]
+    needed = max(2, math.ceil(len(comparable) / 2))
+    if len(different) < needed:
         return None
-    if any(abs(d.angle) >= 0.5 * math.pi for d in moved):
-        return None
-    across = along * np.tan([d.angle for d in moved])
-    design = np.column_stack([np.sin(2 * phi), np.cos(2 * phi)])
-    p, q = np.linalg.lstsq(design, across, rcond=None)[0]
-    # t . S n = -(D / 2) sin 2 (phi - psi) = -(D / 2) (sin 2 phi cos 2 psi - cos 2 phi sin 2 psi)
-    found = Structure(2.0 * math.hypot(p, q), 0.5 * math.atan2(q, -p))
-    left = np.array([a - found.across(float(f)) for f, a in zip(phi, across, strict=True)])
-    own = np.array([a - found.along(float(f)) for f, a in zip(phi, along, strict=True)])
-    if np.any(own < -SLACK * along) or np.any(np.abs(left) > math.tan(limit) * along):
-        return None
-    return found
+    likeliest: tuple[str, int] | None = None
+    for what, undone in _undone(signature, pairs):
+        agree = sum(_mismatch(undone, pickup) < min(MATCHES, size - CLEARER) for pickup, size in different)
+        if agree >= needed and (likeliest is None or agree > likeliest[1]):
+            likeliest = (what, agree)
+    return likeliest
+
+
+def _undone(signature: PickupSignature, pairs: Sequence[tuple[str, str]]) -> list[tuple[str, PickupSignature]]:
+    """A run's signature with every simple mistake undone."""
+    names, size, noise = signature.channels, signature.size, signature.noise
+    variants = []
+    for first, second in pairs:
+        order = np.arange(len(names))
+        order[[names.index(first), names.index(second)]] = names.index(second), names.index(first)
+        variants.append((f"{first} and {second} are exchanged", PickupSignature(names, size[order], noise[order])))
+    for i, name in enumerate(names):
+        turned = np.ones(len(names))
+        turned[i] = -1.0
+        variants.append((f"{name} is reversed", PickupSignature(names, size * turned, noise)))
+    return variants
+
+
+def _mismatch(a: PickupSignature, b: PickupSignature) -> float:
+    """Chi-square of one signature being the other's, times one complex factor."""
+    variance = b.noise**2
+    for _ in range(3):
+        factor = complex(np.vdot(b.size / variance, a.size) / np.vdot(b.size / variance, b.size))
+        variance = a.noise**2 + abs(factor) ** 2 * b.noise**2
+    return 2.0 * float(np.sum(np.abs(a.size - factor * b.size) ** 2 / variance))

@@ -6,7 +6,7 @@ record. A record without holds (one continuous ramp) simply has none.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,10 +22,10 @@ MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
 class Hold:
     """One stretch of constant load."""
 
-    start: float
-    stop: float
-    level: float
-    branch: int
+    start: float  #: [s]
+    stop: float  #: [s]
+    level: float  #: [N]
+    branch: int  #: +1 reached from below, -1 from above
 
     @property
     def duration(self) -> float:
@@ -35,22 +35,29 @@ class Hold:
 
 @dataclass(frozen=True)
 class _Bins:
-    """Medians over whole mains periods: time (m,), load (m,), width [s], noise of one median [N]."""
+    """Medians over whole mains periods."""
 
-    time: FloatArray
-    load: FloatArray
-    width: float
-    noise: float
+    time: FloatArray  #: (m,) [s]
+    load: FloatArray  #: (m,) [N]
+    width: float  #: [s]
+    noise: float  #: of one median [N]
 
 
 def find_holds(time: FloatArray, load: FloatArray) -> tuple[Hold, ...]:
-    """Find the holds of a load programme."""
+    """Find the holds of a load programme: time (n,) [s], load along the pad (n,) [N]."""
     bins = _bin(time, load)
     if len(bins.time) < 8:
         return ()
     rate = np.gradient(bins.load, bins.time)
-    runs = _runs(np.abs(rate) < _still_rate(bins))
-    holds = [hold for run in _merge(runs, bins) if (hold := _settle(run, bins)) is not None]
+    # noise adds to the way, but at most a tenth of what the second limit is above it
+    mean_rate = float(np.sum(np.abs(np.diff(bins.load)))) / float(bins.time[-1] - bins.time[0])
+    still_rate = max(STILL * mean_rate, 3.0 * bins.noise / (np.sqrt(2.0) * bins.width))
+    runs = _runs(np.abs(rate) < still_rate)
+    holds = []
+    for run in _merge(runs, bins):
+        hold = _settle(run, bins)
+        if hold is not None:
+            holds.append(hold)
     return tuple(_with_branches(holds, float(bins.load[0]), SETTLED * bins.noise))
 
 
@@ -62,19 +69,13 @@ def _bin(time: FloatArray, load: FloatArray) -> _Bins:
     edges = np.flatnonzero(np.diff(label)) + 1
     starts, stops = np.r_[0, edges], np.r_[edges, len(time)]
     whole = (stops - starts) >= 0.5 * np.median(stops - starts)
-    medians = np.array([np.median(load[a:b]) for a, b in zip(starts[whole], stops[whole], strict=True)])
-    times = np.array([np.mean(time[a:b]) for a, b in zip(starts[whole], stops[whole], strict=True)])
+    bounds = list(zip(starts[whole], stops[whole], strict=True))
+    medians = np.array([np.median(load[a:b]) for a, b in bounds])
+    times = np.array([np.mean(time[a:b]) for a, b in bounds])
     second = np.diff(medians, 2) if len(medians) > 2 else np.zeros(1)
     # a second difference of white noise has variance 6; its median does not feel the ramps' corners
     noise = 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0)
     return _Bins(times, medians, width, noise)
-
-
-def _still_rate(bins: _Bins) -> float:
-    """Rate [N/s] below which the load counts as held."""
-    # noise adds to the way, but at most a tenth of what the second limit is above it
-    mean_rate = float(np.sum(np.abs(np.diff(bins.load)))) / float(bins.time[-1] - bins.time[0])
-    return max(STILL * mean_rate, 3.0 * bins.noise / (np.sqrt(2.0) * bins.width))
 
 
 def _runs(mask: BoolArray) -> list[tuple[int, int]]:
@@ -88,9 +89,9 @@ def _merge(runs: list[tuple[int, int]], bins: _Bins) -> list[tuple[int, int]]:
     merged: list[tuple[int, int]] = []
     for run in runs:
         if merged and run[0] - merged[-1][1] <= 2:
-            left = np.median(bins.load[merged[-1][0] : merged[-1][1]])
-            right = np.median(bins.load[run[0] : run[1]])
-            if abs(right - left) < 6.0 * bins.noise:
+            level_before = np.median(bins.load[merged[-1][0] : merged[-1][1]])
+            level = np.median(bins.load[run[0] : run[1]])
+            if abs(level - level_before) < 6.0 * bins.noise:
                 merged[-1] = (merged[-1][0], run[1])
                 continue
         merged.append(run)
@@ -125,6 +126,6 @@ def _with_branches(holds: list[Hold], first_load: float, noise: float) -> list[H
         if k == 0 and len(holds) > 1 and abs(hold.level - first_load) < max(noise, 1e-3 * abs(hold.level)):
             # the record starts on its first hold: it came the way the programme goes on
             branch = 1 if holds[1].level >= hold.level else -1
-        marked.append(Hold(hold.start, hold.stop, hold.level, branch))
+        marked.append(replace(hold, branch=branch))
         previous = hold.level
     return marked
