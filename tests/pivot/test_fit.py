@@ -11,7 +11,7 @@ import pytest
 
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import RigDataError
-from tests.pivot.test_assemble import ANGLES, CHANNELS, REACH, SCALE, channel, check, record, vectors
+from tests.pivot.test_assemble import ANGLES, CHANNELS, REACH, SCALE, channel, record, vectors
 from tests.pivot.test_assemble import Run as FirstPad
 from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.fit import fit_pivots
@@ -138,19 +138,6 @@ def test_runs_that_stand_less_orderly_are_allowed_more():
 
     assert placed(0.35) == []
     assert placed(0.9) == ["3+0.9"]
-
-
-@pytest.mark.parametrize(
-    ("turn", "guess"),
-    [
-        ((170.0, -170.0), "turn together by .170"),
-        ((-172.0, 175.0), "turn together by -172"),
-        ((40.0, 40.0), "turn together by .40"),
-    ],
-)
-def test_directions_are_compared_around_the_circle(turn, guess):
-    with pytest.raises(RigDataError, match=f"wrong angle: load and displacement {guess}"):
-        check(record(turn=tuple(np.radians(turn))))
 
 
 def test_repeated_readings_are_counted_beside_the_longest_stretch():

@@ -82,18 +82,12 @@ def fit_pivots(
     settings = settings or PivotSettings()
     angles = np.asarray(pivot_angles, dtype=float)
     records, problems = _read(campaign, angles, settings)
-    problems += check_placement(records) + check_pickup(records)
-    refused = {problem.run for problem in problems}
     noise = noise_within_holds(records, settings.drift_rate) if records else NoiseModel(1.0, 1.0, 1.0)
     records = [replace(r, displacement_direction=displacement_direction(r.blocks, noise)) for r in records]
-    structure = structure_of(records, settings)
+    problems += check_placement(records) + check_pickup(records) + check_directions(records, settings, angles)
+    refused = {problem.run for problem in problems}
     pads: dict[int, list[DryRecord]] = {}
     for record in records:
-        try:
-            check_directions(record, settings, angles, structure)
-        except RigDataError as error:
-            problems += error.problems
-            continue
         if record.run.id not in refused:
             pads.setdefault(record.pad, []).append(record)
     reasons = {str(problem.run): problem.what for problem in reversed(problems)}
@@ -102,7 +96,7 @@ def fit_pivots(
         raise RigDataError(problems)
     for number, pad_records in pads.items():
         pads[number] = [replace(record, good=~bad_blocks(record, noise, settings)) for record in pad_records]
-    curves = _fit_pads([pads[number] for number in sorted(pads)], settings, str(structure or ""))
+    curves = _fit_pads([pads[number] for number in sorted(pads)], settings, str(structure_of(records, settings) or ""))
     if not reasons:
         return curves
     listed = Condition("runs-refused", "; ".join(f"{run} ({reasons[run]})" for run in sorted(reasons)))

@@ -11,7 +11,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.problem import Problem
 from tpjb_ident.pivot.blocks import PivotSettings
-from tpjb_ident.pivot.dry_record import DryRecord, PadDirection, PickupSignature, axial_channels, refusal
+from tpjb_ident.pivot.dry_record import DryRecord, PadDirection, PickupSignature, axial_channels
 
 ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
 ASIDE_SPREAD = 5.0  # robust standard deviations of the campaign's own runs, where they stand less orderly than that
@@ -47,23 +47,30 @@ class Structure:
         )
 
 
-def check_directions(
-    record: DryRecord, settings: PivotSettings, pad_angles: FloatArray, structure: Structure | None = None
-) -> None:
-    """Refuse a record whose load or displacement points elsewhere than at its pad; `pad_angles` (n_pads,) [rad]."""
-    pointing = [("force", record.load_direction, settings.load_angle_limit)]
-    if structure is None:
-        pointing.append(("displacement", record.displacement_direction, settings.displacement_angle_limit))
-    for quantity, direction, limit in pointing:
-        if not abs(direction.angle) > limit:
-            continue
-        degrees = math.degrees(direction.angle)
-        reading = "opposite to" if abs(degrees) > 135.0 else "away from"
-        what = (
-            f"says pad {record.pad} at {math.degrees(record.angle):g} deg, but its {quantity} grows {degrees:+.1f} deg "
-            f"{reading} that direction (limit {math.degrees(limit):g} deg): {_suspect(record, settings, pad_angles)}"
-        )
-        raise refusal(record.run, f"{quantity} channels", what, CURE)
+def check_directions(records: Sequence[DryRecord], settings: PivotSettings, pad_angles: FloatArray) -> list[Problem]:
+    """Records whose load or displacement points elsewhere than at their pad; `pad_angles` (n_pads,) [rad]."""
+    structure = structure_of(records, settings)
+    problems = []
+    for record in records:
+        pointing = [("force", record.load_direction, settings.load_angle_limit)]
+        if structure is None:
+            pointing.append(("displacement", record.displacement_direction, settings.displacement_angle_limit))
+        for quantity, direction, limit in pointing:
+            if abs(direction.angle) > limit:
+                degrees = math.degrees(direction.angle)
+                reading = "opposite to" if abs(degrees) > 135.0 else "away from"
+                what = (
+                    f"run {record.run.id} says pad {record.pad} at {math.degrees(record.angle):g} deg, but its "
+                    f"{quantity} grows {degrees:+.1f} deg {reading} that direction "
+                    f"(limit {math.degrees(limit):g} deg): {_suspect(record, settings, pad_angles)}"
+                )
+                problems.append(_problem(record, f"{quantity} channels", what))
+                break
+    return problems
+
+
+def _problem(record: DryRecord, place: str, what: str) -> Problem:
+    return Problem("error", record.run.file, place, what, CURE, run=record.run.id)
 
 
 def _suspect(record: DryRecord, settings: PivotSettings, pad_angles: FloatArray) -> str:
@@ -154,7 +161,7 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
                 f"{1e6 * aside:+.0f} um beside it, while the other dry runs of this campaign say "
                 f"{1e6 * distance:.0f} um toward it: channels exchanged or wrong pad"
             )
-            problems.append(Problem("error", record.run.file, "displacement channels", what, CURE, run=record.run.id))
+            problems.append(_problem(record, "displacement channels", what))
     return problems
 
 
@@ -190,7 +197,7 @@ def check_pickup(records: Sequence[DryRecord]) -> list[Problem]:
                 f"run {record.run.id}: {text}: then its mains pick-up is that of {agree} other dry "
                 "runs, and as it stands it is not: wrong channel"
             )
-            problems.append(Problem("error", record.run.file, "channels", what, CURE, run=record.run.id))
+            problems.append(_problem(record, "channels", what))
     return problems
 
 
