@@ -1,4 +1,7 @@
-"""The forms in which coefficients leave: by name, where each is written. A new one is a file and a line here."""
+"""Coefficients sorted by static point, as every export wants them, and the forms in which they leave.
+
+A new form is a file with a writer and a line in `FORMATS`.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from rigdata.arrays import BoolArray, FloatArray
 from rigdata.near_names import nearest_name
 from tpjb_ident.condition_kinds import ERRORS
 from tpjb_ident.errors import TpjbError
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_COLUMNS, coefficient_column
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,16 +73,17 @@ class StaticPoint:
     @property
     def flags(self) -> tuple[str, ...]:
         """A sentence per frequency that has something against it."""
-        return tuple(
-            f"{'' if ok else 'NOT TO BE TRUSTED, '}at {omega / (2 * math.pi):g} Hz: {said}"
-            for omega, said, ok in zip(self.frequency, self.quality, self.trusted, strict=True)
-            if said != "ok"
-        )
+        flags = []
+        for omega, text, trusted in zip(self.frequency, self.quality, self.trusted, strict=True):
+            if text != "ok":
+                warning = "" if trusted else "NOT TO BE TRUSTED, "
+                flags.append(f"{warning}at {omega / (2 * math.pi):g} Hz: {text}")
+        return tuple(flags)
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """What of a table can leave."""
+    """What of a table can leave: the points, and where others stand, those that are doubtful with the reasons."""
 
     points: tuple[StaticPoint, ...]
     left_out: tuple[str, ...] = ()
@@ -97,12 +101,15 @@ def static_points(frame: pd.DataFrame, force: bool = False) -> Chosen:
     if not finite.any():
         raise ExportError("no point of the table has finite coefficients. Identify or predict again.")
     usable = frame[finite]
-    reasons = [doubts(row) for _, row in usable.iterrows()]
-    doubtful = tuple(f"{_place(row)}: {why}" for (_, row), why in zip(usable.iterrows(), reasons, strict=True) if why)
-    usable = usable.assign(_trusted=[not why for why in reasons], _doubts=reasons)
-    chosen = usable if force else usable[usable["_trusted"]]
-    points = [_point(keys, group) for keys, group in chosen.groupby(list(STATIC_COLUMNS), sort=True)]
-    return Chosen(tuple(points), left_out, doubtful)
+    reasons, doubtful = [], []
+    for _, row in usable.iterrows():
+        reasons.append(distrust(row))
+        if reasons[-1]:
+            doubtful.append(f"{_place(row)}: {reasons[-1]}")
+    usable = usable.assign(_trusted=[not reason for reason in reasons], _reasons=reasons)
+    exported = usable if force else usable[usable["_trusted"]]
+    points = [_point(keys, group) for keys, group in exported.groupby(list(STATIC_COLUMNS), sort=True)]
+    return Chosen(tuple(points), left_out, tuple(doubtful))
 
 
 def _place(row: pd.Series) -> str:
@@ -110,50 +117,51 @@ def _place(row: pd.Series) -> str:
 
 
 def _point(keys: tuple[float, float, float], group: pd.DataFrame) -> StaticPoint:
+    load, direction, speed = (float(key) for key in keys)
     ordered = group.sort_values("excitation_Hz")
     if ordered["excitation_Hz"].duplicated().any():
-        raise ExportError(f"the point {keys[0]:g} N stands twice at one frequency. Export one method at a time.")
+        raise ExportError(f"the point {load:g} N stands twice at one frequency. Export one method at a time.")
     omega = 2 * math.pi * ordered["excitation_Hz"].to_numpy(dtype=float)
-    values, low, high = (
-        {short: _numbers(ordered, column + end) for short, column in COLUMNS.items()} for end in ("", "_lo", "_hi")
-    )
-    quality = ordered["quality"] if "quality" in ordered else ordered.get("status")
-    said = [""] * len(ordered) if quality is None else list(quality)
-    words = tuple(_with_doubts(text, why) for text, why in zip(said, ordered["_doubts"], strict=True))
-    return StaticPoint(
-        float(keys[0]), float(keys[1]), float(keys[2]), omega, values, low, high, words,
-        ordered["_trusted"].to_numpy(bool),
-    )  # fmt: skip
+    values, low, high = (_coefficients(ordered, end) for end in ("", "_lo", "_hi"))
+    column = "quality" if "quality" in ordered else "status"
+    texts = list(ordered[column]) if column in ordered else [""] * len(ordered)
+    flags = tuple(_with_reasons(text, reason) for text, reason in zip(texts, ordered["_reasons"], strict=True))
+    trusted = ordered["_trusted"].to_numpy(bool)
+    return StaticPoint(load, direction, speed, omega, values, low, high, flags, trusted)
 
 
-def _with_doubts(quality: object, doubts: str) -> str:
+def _coefficients(table: pd.DataFrame, end: str) -> dict[str, FloatArray]:
+    """Columns of K and C with an ending, NaN where the table has none."""
+    empty = np.full(len(table), np.nan)
+    columns = {short: name + end for short, name in COLUMNS.items()}
+    return {s: table[name].to_numpy(dtype=float) if name in table else empty for s, name in columns.items()}
+
+
+def _with_reasons(quality: object, reasons: str) -> str:
     """Named conditions of a row with what forbids trust, each once; ``"ok"`` if there is nothing."""
     names = quality.split("; ") if isinstance(quality, str) and quality not in ("", "ok") else []
-    return "; ".join(dict.fromkeys([*names, *(part for part in doubts.split("; ") if part)])) or "ok"
+    names += [reason for reason in reasons.split("; ") if reason]
+    return "; ".join(dict.fromkeys(names)) or "ok"
 
 
-def _numbers(table: pd.DataFrame, column: str) -> FloatArray:
-    return table[column].to_numpy(dtype=float) if column in table else np.full(len(table), np.nan)
-
-
-def doubts(row: Mapping[str, Any]) -> str:
+def distrust(row: Mapping[str, Any]) -> str:
     """Say why a row of coefficients is not to be trusted.
 
     A film's direct stiffness and damping are positive by the sign convention of CONTRIBUTING; a wrong polarity of a
     probe or cell turns the sign of one or of all of them.
     """
     quality = row.get("quality")
-    found = [name for name in quality.split("; ") if name in ERRORS] if isinstance(quality, str) else []
-    if row.get("converged") is False or str(row.get("converged")) == "False":
-        found.append("the model did not converge")
+    reasons = [name for name in quality.split("; ") if name in ERRORS] if isinstance(quality, str) else []
+    if str(row.get("converged")) == "False":
+        reasons.append("the model did not converge")
     for name in ("kxx", "kyy", "cxx", "cyy"):
-        column = coefficient_column(name)
+        column = COLUMNS[name]
         value, high = float(row[column]), float(row.get(f"{column}_hi", math.nan))
         kind = KINDS[name[0]]
         if (high if math.isfinite(high) else value) < 0:
             size = f"{value / kind.display_scale:.4g} {kind.display_unit}"
-            found.append(f"{name} is negative ({size}): check polarity and axes of probes and cells")
-    return "; ".join(found)
+            reasons.append(f"{name} is negative ({size}): check polarity and axes of probes and cells")
+    return "; ".join(reasons)
 
 
 #: Writes points into an existing folder; the text says where they come from.

@@ -6,19 +6,17 @@ per excitation frequency; which one belongs into a model depends on what is comp
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
-from tpjb_ident.exports.formats import StaticPoint
+from tpjb_ident.exports.formats import COLUMNS, StaticPoint
 from tpjb_ident.exports.table import INTERVALS
 from tpjb_ident.runtime.tables import printable, write_text
-from tpjb_ident.schema import ENTRIES
 
 
 def ross_text(point: StaticPoint, source: str) -> str:
@@ -43,17 +41,12 @@ def ross_text(point: StaticPoint, source: str) -> str:
         f'tag = "{point.tag}"',
     ]  # fmt: skip
     if several:
-        lines.append(f"frequency = {_list(point.frequency)}")
+        lines.append(f"frequency = {point.frequency.tolist()}")
     values = dict(point.coefficients)
-    zero = np.zeros(len(point.frequency))
     for name in ("kzz", "czz", "mxx", "mxy", "myx", "myy", "mzz"):
-        values[name] = zero
-    lines += [f"{name} = {_list(values[name])}" for name in sorted(values)]
+        values[name] = np.zeros(len(point.frequency))
+    lines += [f"{name} = {values[name].tolist()}" for name in sorted(values)]
     return "\n".join(lines) + "\n"
-
-
-def _list(values: FloatArray) -> str:
-    return "[" + ", ".join(repr(float(v)) for v in values) + "]"
 
 
 def write_ross(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
@@ -64,15 +57,14 @@ def write_ross(folder: Path, points: tuple[StaticPoint, ...], source: str) -> No
 
 @dataclass(frozen=True)
 class SpeedTable:
-    """Coefficients over shaft speed, of one static load and one excitation frequency."""
+    """Coefficients over n shaft speeds, of one static load and one excitation frequency."""
 
-    load: float
-    direction: float
-    frequency: float
-    speed: FloatArray = field(repr=False)
-    k: FloatArray = field(repr=False)
-    c: FloatArray = field(repr=False)
-    trusted: BoolArray = field(repr=False)
+    load: float  #: [N]
+    direction: float  #: [deg]
+    frequency: float  #: [rad/s]; NaN where it is the running speed
+    speed: FloatArray = field(repr=False)  #: (n,) [Hz]
+    values: FloatArray = field(repr=False)  #: (n, 8) kxx .. kyy [N/m], cxx .. cyy [N s/m]
+    trusted: BoolArray = field(repr=False)  #: (n,)
 
     @property
     def name(self) -> str:
@@ -81,7 +73,7 @@ class SpeedTable:
         return f"{self.load:.0f}N_{self.direction:g}deg_{line}"
 
     @property
-    def words(self) -> str:
+    def title(self) -> str:
         """What it is, in one line."""
         line = "the running speed" if np.isnan(self.frequency) else f"{self.frequency / (2 * np.pi):g} Hz"
         return f"static load {self.load:g} N at {self.direction:g} deg, excitation at {line}"
@@ -89,86 +81,84 @@ class SpeedTable:
     @property
     def warning(self) -> str:
         """Which speeds are not to be trusted, empty if all are."""
-        speeds = ", ".join(f"{60 * speed:.6g}" for speed, ok in zip(self.speed, self.trusted, strict=True) if not ok)
+        speeds = ", ".join(f"{60 * speed:.6g}" for speed in self.speed[~self.trusted])
         return f"NOT TO BE TRUSTED at {speeds} rpm" if speeds else ""
+
+    def rows(self, separator: str) -> list[str]:
+        """One line per speed: rpm and the eight coefficients."""
+        lines = []
+        for speed, values in zip(self.speed, self.values, strict=True):
+            lines.append(separator.join([f"{60.0 * speed:.6g}", *(f"{value:.8e}" for value in values)]))
+        return lines
 
 
 def speed_tables(points: tuple[StaticPoint, ...]) -> tuple[SpeedTable, ...]:
     """Sort coefficients by load, direction and excitation frequency, each over shaft speed."""
-    rows = []
-    for p in points:
-        for i, omega in enumerate(p.frequency):
-            synchronous = abs(omega - 2 * np.pi * p.speed) < 1e-6 * omega
-            k, c = ([p.coefficients[f"{kind}{e}"][i] for e in ENTRIES] for kind in "kc")
+    groups: dict[tuple[float, float, float], list[tuple[float, list[float], bool]]] = {}
+    for point in points:
+        for i, omega in enumerate(point.frequency):
+            synchronous = abs(omega - 2 * np.pi * point.speed) < 1e-6 * omega
             line = -1.0 if synchronous else round(float(omega), 9)
-            rows.append(((p.load, p.direction, line), p.speed, k, c, bool(p.trusted[i])))
-    rows.sort(key=lambda row: (row[0], row[1]))
-    out = []
-    for (load, direction, line), group in itertools.groupby(rows, key=lambda row: row[0]):
-        own = list(group)
-        out.append(
-            SpeedTable(
-                load, direction, float("nan") if line < 0 else line, np.array([r[1] for r in own]),
-                np.array([r[2] for r in own]), np.array([r[3] for r in own]), np.array([r[4] for r in own]),
-            )
-        )  # fmt: skip
-    return tuple(out)
+            coefficients = [point.coefficients[name][i] for name in COLUMNS]
+            rows = groups.setdefault((point.load, point.direction, line), [])
+            rows.append((point.speed, coefficients, bool(point.trusted[i])))
+    tables = []
+    for load, direction, line in sorted(groups):
+        by_speed = sorted(groups[load, direction, line], key=lambda row: row[0])
+        columns = [np.array(column) for column in zip(*by_speed, strict=True)]
+        tables.append(SpeedTable(load, direction, math.nan if line < 0 else line, *columns))
+    return tuple(tables)
 
 
-def _rows(table: SpeedTable) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-    yield from zip(60.0 * table.speed, table.k, table.c, strict=True)
+def _write_by_speed(
+    program: str,
+    text: Callable[[SpeedTable, str], list[str]],
+    folder: Path,
+    points: tuple[StaticPoint, ...],
+    source: str,
+) -> None:
+    """One file per load and excitation frequency."""
+    for table in speed_tables(points):
+        lines = text(table, printable(source).replace("\n", " "))
+        write_text(folder / f"{program}_{table.name}.txt", "\n".join(lines) + "\n")
 
 
-def _xltrc_text(table: SpeedTable, source: str) -> str:
+def _xltrc(table: SpeedTable, source: str) -> list[str]:
     """Tab-separated table in the order of XLTRC's user-defined bearing sheet: paste it below the sheet's head."""
-    names = [f"{kind}{e}" for kind in "KC" for e in ENTRIES]
-    head = "\t".join(["Speed (rpm)", *(f"{n} ({'N/m' if n[0] == 'K' else 'N-s/m'})" for n in names)])
-    lines = [f"* {_one_line(source)}", f"* {table.words}; SI units", f"* 95 % intervals and flags: {INTERVALS}"]
-    lines += [f"* {table.warning}"] if table.warning else []
-    lines.append(head)
-    lines += ["\t".join([f"{rpm:.6g}", *(f"{v:.8e}" for v in (*k, *c))]) for rpm, k, c in _rows(table)]
-    return "\n".join(lines) + "\n"
+    units = {"k": "N/m", "c": "N-s/m"}
+    head = ["Speed (rpm)", *(f"{name.capitalize()} ({units[name[0]]})" for name in COLUMNS)]
+    remarks = [source, f"{table.title}; SI units", f"95 % intervals and flags: {INTERVALS}"]
+    remarks += [table.warning] if table.warning else []
+    return [*(f"* {remark}" for remark in remarks), "\t".join(head), *table.rows("\t")]
 
 
-def _dyrobes_text(table: SpeedTable, source: str) -> str:
+def _dyrobes(table: SpeedTable, source: str) -> list[str]:
     """External bearing file of Dyrobes: points, unit system 4 (N, m, s), 8 coefficients, then one line per speed."""
-    lines = [f"{len(table.speed)}, 4, 8, 0, 0, 0, 0   {_one_line(source)}; {table.words}{_appendix(table)}"]
-    lines += [", ".join([f"{rpm:.6g}", *(f"{v:.8e}" for v in (*k, *c))]) for rpm, k, c in _rows(table)]
-    return "\n".join(lines) + "\n"
+    remarks = [source, table.title, f"intervals and flags: {INTERVALS}"]
+    remarks += [table.warning] if table.warning else []
+    return [f"{len(table.speed)}, 4, 8, 0, 0, 0, 0   {'; '.join(remarks)}", *table.rows(", ")]
 
 
-def _ansys_text(table: SpeedTable, source: str) -> str:
+def _ansys(table: SpeedTable, source: str) -> list[str]:
     """File that ANSYS reads for COMBI214: titles, count and unit keys (0: SI; 1: rpm to rad/s), K and C by speed."""
-    third = table.warning or f"K11 .. K22, C11 .. C22 in N/m, N s/m; intervals: {INTERVALS}"
-    lines = [_one_line(source)[:80], table.words[:80], third[:80]]
-    lines.append(f"{len(table.speed):10d}{0:10d}{1:10d}")
-    for i, (rpm, k, c) in enumerate(_rows(table), start=1):
-        lines.append(f"{i:10d}{rpm:10.2f}")
-        lines += ["".join(f"{v:15.7E}" for v in values) for values in (k, c)]
-    return "\n".join(lines) + "\n"
-
-
-def _appendix(table: SpeedTable) -> str:
-    return f"; intervals and flags: {INTERVALS}" + (f"; {table.warning}" if table.warning else "")
-
-
-def _one_line(text: str) -> str:
-    return printable(text).replace("\n", " ")
+    remark = table.warning or f"K11 .. K22, C11 .. C22 in N/m, N s/m; intervals: {INTERVALS}"
+    lines = [source[:80], table.title[:80], remark[:80], f"{len(table.speed):10d}{0:10d}{1:10d}"]
+    for i, (speed, values) in enumerate(zip(table.speed, table.values, strict=True), start=1):
+        lines.append(f"{i:10d}{60.0 * speed:10.2f}")
+        lines += ["".join(f"{value:15.7E}" for value in part) for part in (values[:4], values[4:])]
+    return lines
 
 
 def write_xltrc(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
     """Write xltrc_*.txt, one per load and excitation frequency."""
-    for table in speed_tables(points):
-        write_text(folder / f"xltrc_{table.name}.txt", _xltrc_text(table, source))
+    _write_by_speed("xltrc", _xltrc, folder, points, source)
 
 
 def write_dyrobes(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
     """Write dyrobes_*.txt, one per load and excitation frequency."""
-    for table in speed_tables(points):
-        write_text(folder / f"dyrobes_{table.name}.txt", _dyrobes_text(table, source))
+    _write_by_speed("dyrobes", _dyrobes, folder, points, source)
 
 
 def write_ansys(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
     """Write ansys_*.txt, one per load and excitation frequency."""
-    for table in speed_tables(points):
-        write_text(folder / f"ansys_{table.name}.txt", _ansys_text(table, source))
+    _write_by_speed("ansys", _ansys, folder, points, source)

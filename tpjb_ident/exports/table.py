@@ -28,24 +28,18 @@ def coefficient_table(points: tuple[StaticPoint, ...]) -> pd.DataFrame:
     """One row per static point and frequency."""
     import pandas as pd
 
-    parts = [
-        pd.DataFrame(
-            {
-                "static_load_N": p.load,
-                "static_load_direction_deg": p.direction,
-                "shaft_speed_rpm": 60 * p.speed,
-                "frequency_rad_per_s": p.frequency,
-                **{
-                    COLUMNS[name] + end: part[name]
-                    for name in COLUMNS
-                    for end, part in (("", p.coefficients), ("_lo", p.low), ("_hi", p.high))
-                },
-                "quality": list(p.quality),
-                "trusted": p.trusted,
-            }
-        )
-        for p in points
-    ]
+    parts = []
+    for point in points:
+        columns: dict[str, Any] = {
+            "static_load_N": point.load,
+            "static_load_direction_deg": point.direction,
+            "shaft_speed_rpm": 60 * point.speed,
+            "frequency_rad_per_s": point.frequency,
+        }
+        for short, name in COLUMNS.items():
+            for end, values in (("", point.coefficients), ("_lo", point.low), ("_hi", point.high)):
+                columns[name + end] = values[short]
+        parts.append(pd.DataFrame({**columns, "quality": list(point.quality), "trusted": point.trusted}))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -109,11 +103,15 @@ def write_excel(folder: Path, points: tuple[StaticPoint, ...], source: str) -> N
                 sheet.cell(row, column).font = Font(color="C00000")
     sheet.freeze_panes = "A2"
     about = book.create_sheet("about")
-    lines = (printable(source), "K = Re h, C = Im h / omega at the excitation frequency; SI units.",
-             "frequency_rad_per_s is the excitation; the shaft speed is constant along it.",
-             "_lo and _hi: 95 % interval, random and calibration errors together; empty for a prediction.",
-             "quality: named conditions, explained in the report; trusted: FALSE was exported against advice.",
-             *(flag for p in points for flag in (f"{p.load:g} N {text}" for text in p.flags)))  # fmt: skip
+    lines = [
+        printable(source),
+        "K = Re h, C = Im h / omega at the excitation frequency; SI units.",
+        "frequency_rad_per_s is the excitation; the shaft speed is constant along it.",
+        "_lo and _hi: 95 % interval, random and calibration errors together; empty for a prediction.",
+        "quality: named conditions, explained in the report; trusted: FALSE was exported against advice.",
+    ]
+    for point in points:
+        lines += [f"{point.load:g} N {flag}" for flag in point.flags]
     for row, line in enumerate(lines, start=1):
         _text(about.cell(row, 1), line)
     write_atomic(folder / f"{NAME}.xlsx", lambda part: book.save(part))
@@ -149,9 +147,8 @@ def write_mat(folder: Path, points: tuple[StaticPoint, ...], source: str) -> Non
             _matrices(p.low, "k"), _matrices(p.high, "k"), _matrices(p.low, "c"), _matrices(p.high, "c"),
             np.array([printable(text) for text in p.quality], dtype=object), p.trusted,
         )  # fmt: skip
-    path = folder / "bearing_coefficients.mat"
     content = {"bearing": array, "source": printable(source)}
-    write_atomic(path, lambda part: savemat(part, content, oned_as="column", appendmat=False))
+    write_atomic(folder / f"{NAME}.mat", lambda part: savemat(part, content, oned_as="column", appendmat=False))
 
 
 def _matrices(values: dict[str, FloatArray], kind: str) -> FloatArray:

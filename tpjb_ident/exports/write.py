@@ -77,7 +77,7 @@ def export(
         Nothing is left that can be trusted.
     """
     form = export_format(to)
-    frame, known = _table(source)
+    frame, origin = _table(source)
     chosen = static_points(frame, force)
     if not chosen.points:
         reasons = "\n".join(chosen.doubtful[:5])
@@ -85,7 +85,7 @@ def export(
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     before = {path.name for path in target.iterdir()}
-    form.writer(target, chosen.points, f"tpjb-ident: coefficients of {name or known}")
+    form.writer(target, chosen.points, f"tpjb-ident: coefficients of {name or origin}")
     if not form.holds_intervals:
         write_intervals(target, chosen.points)
     files = tuple(sorted(path.name for path in target.iterdir() if path.name not in before))
@@ -96,8 +96,7 @@ def result_table(path: Path) -> Path | None:
     """Find the table of coefficients in an output folder of tpjb."""
     if path.is_file() and path.suffix == ".csv":
         return path
-    found = [path / name for name in RESULT_TABLES if (path / name).is_file()]
-    return found[0] if found else None
+    return next((path / name for name in RESULT_TABLES if (path / name).is_file()), None)
 
 
 def read_result_table(path: Path) -> pd.DataFrame:
