@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, sentences
-from tpjb_ident.presentation import Presented, shown_by
+from tpjb_ident.presentation import Presented
 from tpjb_ident.slow_records.bad_samples import slow_samples
 from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
 
@@ -109,7 +110,9 @@ class Locus(Presented):
         **options
             ``polygons``, ``predicted``, ``drawing``, ``title``.
         """
-        return shown_by("report.plots", "clearance_and_locus")(locus=self, **options)
+        from tpjb_ident.report.plots import clearance_and_locus
+
+        return clearance_and_locus(locus=self, **options)
 
     def __str__(self) -> str:
         radii = [1e6 * float(np.hypot(*p.position)) for p in self.points]
@@ -137,62 +140,65 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     RigDataError
         When the campaign has no locus runs, or half of them or more cannot be used. Fewer are left out, and the status
         names them.
+
+    Examples
+    --------
+    >>> locus = ti.measure_locus(ti.load_campaign(demo))
+    >>> print(locus.points[0].position.shape, locus.status[0])
+    (2,) no-centre
     """
     runs = campaign.of_kind("locus")
     if not runs:
         raise RigDataError(
             Problem("error", "campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
         )
-    found, refused = _usable(runs)
-    orders, read = list(found), list(found.values())
-    noise = _noise(read)
+    records, refused = _usable(runs)
+    noise = _noise(list(records.values()))
     centre = np.zeros(2) if polygon is None else polygon.centre
-    drift = _drift(found, noise, centre)
-    known = np.isfinite(drift.rate).all()
-    drifts, drift_variance = (drift.rate, drift.variance) if known else (np.zeros(2), 0.0)
+    drift, drift_variance = _drift(records, noise, centre)
+    correction = np.nan_to_num(drift)
     # with the bearing's centre from the same probes their zero falls out
     zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
     centre_covariance = zero if polygon is None else polygon.centre_covariance
     points = []
-    for order, record in zip(orders, read, strict=True):
+    for order, record in records.items():
         run = runs[order]
-        position = record.position - drifts * order - centre
+        position = record.position - correction * order - centre
         variance = (noise.mean_variance(record.span) + order**2 * drift_variance) * np.eye(2)
         points.append(
             LocusPoint(run.id, run.point, record.load, record.direction, position, variance + centre_covariance)
         )
     points.sort(key=lambda p: (p.point.static_load, p.point.shaft_speed, _from_down(p.point.static_load_direction)))
-    status = (*_status(points, polygon, drift.rate), *refused)
-    return Locus(tuple(points), np.asarray(centre), drift.rate, status)
+    return Locus(tuple(points), np.asarray(centre), drift, (*_status(points, polygon, drift), *refused))
 
 
-def _usable(runs: Sequence[Run]) -> tuple[dict[int, _Read], tuple[Condition, ...]]:
+def _usable(runs: Sequence[Run]) -> tuple[dict[int, _Record], tuple[Condition, ...]]:
     """Runs that can be used, by their number in the order of testing, and a condition that names the others."""
-    found: dict[int, _Read] = {}
+    records: dict[int, _Record] = {}
     problems: list[Problem] = []
     for order, run in enumerate(runs):
         try:
-            found[order] = _read(run)
+            records[order] = _read(run)
         except RigDataError as error:
             problems += error.problems
-    if 2 * len(found) <= len(runs):
+    if 2 * len(records) <= len(runs):
         raise RigDataError(problems)
     reasons = {str(p.run): p.what for p in reversed(problems)}
     listed = "; ".join(f"{run} ({reasons[run]})" for run in reasons)
-    return found, (Condition("runs-refused", listed),) if reasons else ()
+    return records, (Condition("runs-refused", listed),) if reasons else ()
 
 
 @dataclass(frozen=True)
-class _Read:
-    """One locus run: mean position and load, and block averages (m, 2) for the noise."""
+class _Record:
+    """One locus run: mean position and load, and block averages for the noise."""
 
     point: OperatingPoint
-    position: FloatArray
-    load: float
-    direction: float
-    span: float
-    block_time: FloatArray
-    blocks: FloatArray
+    position: FloatArray  #: (2,) [m]
+    load: float  #: [N]
+    direction: float  #: [rad]
+    span: float  #: [s]
+    block_time: FloatArray  #: (m,) [s]
+    blocks: FloatArray  #: (m, 2) [m]
 
 
 def _from_down(direction: float) -> float:
@@ -200,7 +206,7 @@ def _from_down(direction: float) -> float:
     return (direction + math.pi / 2 + 1e-9) % (2 * math.pi)
 
 
-def _read(run: Run) -> _Read:
+def _read(run: Run) -> _Record:
     time, force, place, good = slow_samples(run)
     if good.sum() < 50 or good.mean() < 0.5:
         what = f"locus run {run.id} has only {int(good.sum())} usable samples of {len(good)}"
@@ -209,19 +215,20 @@ def _read(run: Run) -> _Read:
     design = _turning(time, run.point.shaft_speed)
     mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
     # what turns with the shaft (runout, unbalance) averages out only over whole turns: take it off
-    still = place - design[:, 1:] @ mean[1:, :2]
+    steady = place - design[:, 1:] @ mean[1:, :2]
     label = np.floor((time - time[0]) / BLOCK).astype(int)
-    parts = [label == k for k in np.unique(label)]
-    parts = [part for part in parts if part.sum() > 0.5 * np.median([p.sum() for p in parts])]
+    count = np.bincount(label)
+    usual = np.median(count[count > 0])
+    parts = [label == k for k in np.flatnonzero(count > 0.5 * usual)]
     load = mean[0, 2:]
-    return _Read(
+    return _Record(
         point=run.point,
         position=np.asarray(mean[0, :2], dtype=float),
         load=float(np.hypot(*load)),
         direction=float(np.arctan2(load[1], load[0])),
         span=float(time[-1] - time[0]),
         block_time=np.array([time[part].mean() for part in parts]),
-        blocks=np.array([still[part].mean(axis=0) for part in parts]),
+        blocks=np.array([steady[part].mean(axis=0) for part in parts]),
     )
 
 
@@ -234,14 +241,12 @@ def _turning(time: FloatArray, speed: float) -> FloatArray:
     return np.column_stack(columns)
 
 
-def _noise(read: list[_Read]) -> NoiseModel:
+def _noise(records: list[_Record]) -> NoiseModel:
     """Noise of the probes, pooled over all runs."""
-    some = read[:: max(1, len(read) // NOISE_RUNS)]
-    series = [
-        NoiseSeries(r.block_time, np.full(len(values), BLOCK), values, np.ones((len(values), 1)))
-        for r in some
-        for values in r.blocks.T
-    ]
+    series = []
+    for record in records[:: max(1, len(records) // NOISE_RUNS)]:
+        time, m = record.block_time, len(record.block_time)
+        series += [NoiseSeries(time, np.full(m, BLOCK), values, np.ones((m, 1))) for values in record.blocks.T]
     if max(len(s.time) for s in series) <= 3:
         # records of a few tenths of a second show no noise over seconds: take the scatter within each run
         scatter = float(np.mean([np.var(s.values) for s in series])) + 1e-18
@@ -249,67 +254,57 @@ def _noise(read: list[_Read]) -> NoiseModel:
     return estimate_noise(series, DRIFT_RATE)
 
 
-@dataclass(frozen=True)
-class _Drift:
-    """Drift per run: `rate` (2,) [m], NaN where nothing was repeated, and the variance [m^2] of either component."""
-
-    rate: FloatArray
-    variance: float
-
-
-def _drift(found: dict[int, _Read], noise: NoiseModel, centre: FloatArray) -> _Drift:
-    """Drift from repeats of one set point.
+def _drift(records: dict[int, _Record], noise: NoiseModel, centre: FloatArray) -> tuple[FloatArray, float]:
+    """Drift per run (2,) [m] from repeats of one set point, NaN without any, and the variance [m^2] of a component.
 
     Runs are evenly spaced in time as far as anyone knows: the drift is taken as proportional to the run's number. A
     repeat meets its set point otherwise than the first time: by as much, times its distance from the centre, the shaft
     may stand elsewhere without any drift.
     """
-    pairs = []
-    for i, first in found.items():
-        for j, other in found.items():
-            if i < j and _same_set_point(first.point, other.point):
-                miss = math.hypot(
-                    other.load / max(first.load, 1e-300) - 1.0,
-                    math.remainder(other.direction - first.direction, 2 * math.pi),
-                )
-                elsewhere = miss * float(np.hypot(*(first.position - centre)))
-                variance = noise.mean_variance(first.span) + noise.mean_variance(other.span) + elsewhere**2
-                pairs.append((j - i, other.position - first.position, variance))
-    if not pairs:
-        return _Drift(np.full(2, np.nan), np.nan)
-    apart = np.array([p[0] for p in pairs], dtype=float)
-    moved = np.array([p[1] for p in pairs])
-    weight = apart / (apart @ apart)
-    return _Drift(weight @ moved, float(weight**2 @ np.array([p[2] for p in pairs])))
+    runs_between, shifts, variances = [], [], []
+    for (i, first), (j, repeat) in itertools.combinations(records.items(), 2):
+        if not _same_set_point(first.point, repeat.point):
+            continue
+        load_miss = repeat.load / max(first.load, 1e-300) - 1.0
+        miss = math.hypot(load_miss, math.remainder(repeat.direction - first.direction, 2 * math.pi))
+        elsewhere = miss * float(np.hypot(*(first.position - centre)))
+        runs_between.append(float(j - i))
+        shifts.append(repeat.position - first.position)
+        variances.append(noise.mean_variance(first.span) + noise.mean_variance(repeat.span) + elsewhere**2)
+    if not shifts:
+        return np.full(2, np.nan), 0.0
+    intervals = np.array(runs_between)
+    weight = intervals / (intervals @ intervals)
+    return weight @ np.array(shifts), float(weight**2 @ np.array(variances))
 
 
-def _same_set_point(one: OperatingPoint, other: OperatingPoint) -> bool:
-    turn = abs(math.remainder(one.static_load_direction - other.static_load_direction, 2 * math.pi))
-    same = one.static_load == other.static_load and one.shaft_speed == other.shaft_speed
+def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
+    turn = abs(math.remainder(first.static_load_direction - second.static_load_direction, 2 * math.pi))
+    same = first.static_load == second.static_load and first.shaft_speed == second.shaft_speed
     return same and turn < SAME_DIRECTION
 
 
 def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, drift: FloatArray) -> tuple[Condition, ...]:
-    found = []
+    status = []
     if polygon is None:
-        found.append(Condition("no-centre", "positions from the probes' zero, no clearance polygon given"))
+        status.append(Condition("no-centre", "positions from the probes' zero, no clearance polygon given"))
     if np.isnan(drift).any():
-        found.append(Condition("drift-unknown", "no load direction was repeated"))
-    missed = [
-        p.run
-        for p in points
-        if abs(p.load - p.point.static_load) > LOAD_MISS * max(p.point.static_load, 1.0)
-        or abs(math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)) > DIRECTION_MISS
-    ]
+        status.append(Condition("drift-unknown", "no load direction was repeated"))
+    missed = []
+    for p in points:
+        load_miss = abs(p.load - p.point.static_load) / max(p.point.static_load, 1.0)
+        turn = abs(math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi))
+        if load_miss > LOAD_MISS or turn > DIRECTION_MISS:
+            missed.append(p.run)
     if missed:
-        found.append(Condition("load-off-set-point", ", ".join(missed)))
+        status.append(Condition("load-off-set-point", ", ".join(missed)))
     if polygon is not None:
         behind = [p.run for p in points if _behind(p, polygon)]
         if behind:
-            found.append(Condition("outside-polygon", ", ".join(behind)))
-    return tuple(found)
+            status.append(Condition("outside-polygon", ", ".join(behind)))
+    return tuple(status)
 
 
 def _behind(point: LocusPoint, polygon: ClearancePolygon) -> bool:
-    """True where the shaft lies behind a pad's unloaded face by more than any pivot gives."""
+    """True where the shaft lies behind a pad's unloaded face by more than any pivot deflects."""
     return bool(np.nanmax(directions(polygon.angles) @ point.position - 1.5 * polygon.clearance) > 0.0)

@@ -12,11 +12,11 @@ from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.vector import directions
 from tpjb_ident.clearance.polygon import Centre, CentreRule, SideFit, corners, find_centre, fit_sides, gain_ratio
-from tpjb_ident.clearance.sweep import Touch, read_sweep
+from tpjb_ident.clearance.sweep import ContactIntervals, read_sweep
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.curve import PivotCurve
-from tpjb_ident.presentation import Presented, shown_by
+from tpjb_ident.presentation import Presented
 from tpjb_ident.schema import TANGENT
 from tpjb_ident.slow_records.noise import NoiseModel
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rigdata.operating_point import OperatingPoint
 
 FEWEST_BLOCKS = 4  # per pad
-SAME_WARMTH = 4.0  # [K]
+SAME_TEMPERATURE = 4.0  # [K]
 IRREGULAR = 3.0  # standard errors
 UNEQUAL = 0.02  # gains of two probes: twice what a usual certificate leaves open
 GAIN_ERRORS = 4.0  # standard errors, of few sides
@@ -48,7 +48,7 @@ class ClearancePolygon(Presented):
         Nominal pad directions [rad].
     centre, centre_covariance : (2,), (2, 2) ndarray
         Reading of the bearing centre [m], by `centre_rule`; see `tpjb_ident.clearance.polygon` for what that means. The
-        covariance holds the wander of the probes' zero from run to run, as far as this run's drift tells.
+        covariance holds the drift of the probes' zero from run to run, as far as this run's drift tells.
     clearance, clearance_se : (n,) ndarray
         Per pad at zero push load [m]; NaN where the pad was not reached.
     clearance_pushed, clearance_pushed_se : (n,) ndarray
@@ -60,7 +60,8 @@ class ClearancePolygon(Presented):
     push_load : float
         As measured [N].
     pivot_scale, pivot_scale_se : float
-        By how much the pivots give in the sweep, over what the curves say; 1 when both tests agree. NaN without curves.
+        By how much the pivots deflect in the sweep, over what the curves say; 1 when both tests
+        agree. NaN without curves.
     noise : NoiseModel
         Of the displacement channels in this run.
     temperature : float
@@ -114,11 +115,6 @@ class ClearancePolygon(Presented):
             }
         )
 
-    @property
-    def regular(self) -> bool:
-        """Whether all clearances are one and the same, within their errors or half a micrometre."""
-        return "irregular" not in self.status
-
     def plot(self, **options: Any) -> Any:
         """Draw the polygon; see `tpjb_ident.report.plots.clearance_and_locus`.
 
@@ -127,7 +123,9 @@ class ClearancePolygon(Presented):
         **options
             ``locus``, ``predicted``, ``drawing``, ``title``.
         """
-        return shown_by("report.plots", "clearance_and_locus")(self, **options)
+        from tpjb_ident.report.plots import clearance_and_locus
+
+        return clearance_and_locus(self, **options)
 
     def __str__(self) -> str:
         pads = ", ".join(
@@ -152,8 +150,8 @@ def measure_clearance(
     pivot_angles : sequence of float
         Pad directions [rad], pad #1 first.
     curves : sequence of PivotCurve, optional
-        What the pivots give under the push load is taken off with them; without them it is extrapolated from the sweep
-        itself, less surely.
+        The pivots' deflection under the push load is taken off with them; without them it is extrapolated from the
+        sweep itself, less surely.
     rule : {"least-absolute", "least-squares"}
         Convention for the centre, see `tpjb_ident.clearance.polygon`.
 
@@ -165,6 +163,13 @@ def measure_clearance(
     ------
     RigDataError
         When there is no such run, or it does not go around.
+
+    Examples
+    --------
+    >>> angles = [pad.pivot_angle for pad in ti.load_bearing(rocker).pads]
+    >>> polygon = ti.measure_clearance(ti.load_campaign(demo), angles)
+    >>> polygon.clearance.shape
+    (5,)
     """
     runs = campaign.of_kind("clearance")
     if not runs:
@@ -182,21 +187,20 @@ def measure_run(
 ) -> ClearancePolygon:
     """Measure the polygon of one run; parameters as `measure_clearance`."""
     angles = np.asarray(pivot_angles, dtype=float)
-    touch = read_sweep(run, angles)
-    reached = np.bincount(touch.pad, minlength=len(angles)) >= FEWEST_BLOCKS
+    contact = read_sweep(run, angles)
+    reached = np.bincount(contact.pad, minlength=len(angles)) >= FEWEST_BLOCKS
     if reached.sum() < 3:
         what = f"clearance run {run.id} reaches {int(reached.sum())} of {len(angles)} pads"
         raise RigDataError(Problem("error", run.file, "record", what, "Check pad angles and channels", run=run.id))
-    fit = fit_sides(touch, angles, reached, curves)
+    fit = fit_sides(contact, angles, reached, curves)
     pads = np.flatnonzero(reached)
     centre = find_centre(angles[pads], fit.distance[pads], fit.covariance[np.ix_(pads, pads)], rule)
-    found = _polygon(run, touch, angles, fit, centre, rule)
-    return replace(found, status=(*found.status, *_gains_differ(run, found), *_extrapolated(touch.push, curves)))
+    polygon = _polygon(run, contact, angles, fit, centre)
+    status = (*polygon.status, *_gains_differ(run, polygon), *_extrapolated(contact.push, curves))
+    return replace(polygon, status=status, centre_rule=rule)
 
 
-def _polygon(
-    run: Run, touch: Touch, angles: FloatArray, fit: SideFit, centre: Centre, rule: CentreRule
-) -> ClearancePolygon:
+def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideFit, centre: Centre) -> ClearancePolygon:
     """Clearances about the centre, with the errors of both."""
     n = directions(angles)
     pads = np.flatnonzero(np.isfinite(fit.distance))
@@ -210,45 +214,42 @@ def _polygon(
     se[pads] = np.maximum(np.sqrt(np.diag(map_ @ covariance @ map_.T)), common)
     fitted = angles + fit.tilt
     # another run meets the probes' zero elsewhere: by about what it drifts within this one
-    wander = (fit.noise.drift * float(np.ptp(touch.time))) ** 2 * np.eye(2)
-    found = np.full((len(angles), 2), np.nan)
-    if len(pads) == len(angles):
-        found = corners(fitted, clearance)
+    drift = (fit.noise.drift * float(np.ptp(contact.time))) ** 2 * np.eye(2)
+    reached_all = len(pads) == len(angles)
     return ClearancePolygon(
         run=run.id,
         point=run.point,
         angles=angles,
         centre=centre.position,
-        centre_covariance=centre.gain[:2] @ covariance @ centre.gain[:2].T + wander,
+        centre_covariance=centre.gain[:2] @ covariance @ centre.gain[:2].T + drift,
         clearance=clearance,
         clearance_se=se,
-        clearance_pushed=clearance + fit.give,
-        clearance_pushed_se=np.hypot(se, fit.give_se),
+        clearance_pushed=clearance + fit.deflection,
+        clearance_pushed_se=np.hypot(se, fit.deflection_se),
         fitted_angle=fitted,
         fitted_angle_se=fit.tilt_se,
-        corners=found,
-        push_load=touch.push,
+        corners=corners(fitted, clearance) if reached_all else np.full((len(angles), 2), np.nan),
+        push_load=contact.push,
         pivot_scale=fit.scale,
         pivot_scale_se=fit.scale_se,
         noise=fit.noise,
         temperature=_mean_temperature(run),
-        centre_rule=rule,
         status=_status(fit, clearance, se, len(pads)),
     )
 
 
-def _gains_differ(run: Run, found: ClearancePolygon) -> tuple[Condition, ...]:
+def _gains_differ(run: Run, polygon: ClearancePolygon) -> tuple[Condition, ...]:
     """One probe reads more than the other: sizes do not tell, the angles between the sides do."""
     probes = [c for c in run.channels.values() if c.quantity == "displacement" and c.axis is not None]
     if len(probes) != 2:
         return ()
     first, second = probes
     axes = (float(first.axis or 0.0), float(second.axis or 0.0))
-    ratio = gain_ratio(found.angles, found.fitted_angle - found.angles, found.fitted_angle_se, axes)
-    if not abs(ratio.value) > max(UNEQUAL, GAIN_ERRORS * ratio.se):
+    ratio, se = gain_ratio(polygon.angles, polygon.fitted_angle - polygon.angles, polygon.fitted_angle_se, axes)
+    if not abs(ratio) > max(UNEQUAL, GAIN_ERRORS * se):
         return ()
-    share = f"{100 * abs(ratio.value):.1f} % (se {100 * ratio.se:.1f} %)"
-    more = "more" if ratio.value > 0 else "less"
+    share = f"{100 * abs(ratio):.1f} % (se {100 * se:.1f} %)"
+    more = "more" if ratio > 0 else "less"
     detail = f"the sides stand as if {first.name} read {share} {more} than {second.name}"
     return (Condition("probe-gains-differ", detail),)
 
@@ -266,9 +267,13 @@ def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[Con
 
 def _mean_temperature(run: Run) -> float:
     """Mean over time and over all temperature channels of a run [K]; NaN without any."""
-    names = [name for name, channel in run.channels.items() if channel.quantity == "temperature"]
-    records = [np.asarray(run.record(name).values) for name in names]
-    means = [float(np.mean(v[np.isfinite(v)])) for v in records if np.isfinite(v).any()]
+    means = []
+    for name, channel in run.channels.items():
+        if channel.quantity == "temperature":
+            values = np.asarray(run.record(name).values)
+            values = values[np.isfinite(values)]
+            if len(values):
+                means.append(float(np.mean(values)))
     return float(np.mean(means)) if means else float("nan")
 
 
@@ -277,123 +282,83 @@ def coldest_run(runs: Sequence[Run]) -> Run:
     if len(runs) == 1:
         return runs[0]
     slowest = min(run.point.shaft_speed for run in runs)
-    slow = [(run, _mean_temperature(run)) for run in runs if run.point.shaft_speed == slowest]
-    cold = float(np.nanmin([t for _, t in slow])) if np.isfinite([t for _, t in slow]).any() else np.nan
+    slow = [run for run in runs if run.point.shaft_speed == slowest]
+    temperatures = [_mean_temperature(run) for run in slow]
+    coldest = min((t for t in temperatures if np.isfinite(t)), default=np.nan)
     # a temperature that nobody measured does not rule a sweep out
-    fit = [run for run, t in slow if not t > cold + SAME_WARMTH]
-    return min(fit, key=lambda run: run.point.static_load)
+    cold = [run for run, t in zip(slow, temperatures, strict=True) if not t > coldest + SAME_TEMPERATURE]
+    return min(cold, key=lambda run: run.point.static_load)
 
 
 def _status(fit: SideFit, clearance: FloatArray, se: FloatArray, reached: int) -> tuple[Condition, ...]:
-    found = []
+    status = []
     if reached < len(clearance):
         missing = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(clearance)))
-        found.append(Condition("pads-not-reached", missing))
+        status.append(Condition("pads-not-reached", missing))
     if np.isnan(fit.scale):
-        found.append(Condition("give-from-sweep", "no pivot curves, zero load extrapolated from the sweep alone"))
+        status.append(Condition("give-from-sweep", "no pivot curves, zero load extrapolated from the sweep alone"))
     elif abs(fit.scale - 1.0) > max(IRREGULAR * fit.scale_se, DISAGREES):
-        detail = f"they give {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say"
-        found.append(Condition("pivots-disagree", detail))
+        detail = f"they deflect {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say"
+        status.append(Condition("pivots-disagree", detail))
     spread = np.abs(clearance - np.nanmedian(clearance))
     # below half a micrometre a difference between pads is of no consequence, however well it is measured
-    odd = np.flatnonzero(spread > np.maximum(IRREGULAR * se, 0.5e-6))
-    if len(odd):
-        apart = ", ".join(f"pad #{k + 1} {1e6 * (clearance[k] - np.nanmedian(clearance)):+.1f} µm" for k in odd)
-        found.append(Condition("irregular", f"{apart} from the median of all: worn, damaged or wrongly assembled"))
+    deviating = np.flatnonzero(spread > np.maximum(IRREGULAR * se, 0.5e-6))
+    if len(deviating):
+        offsets = 1e6 * (clearance - np.nanmedian(clearance))
+        listed = ", ".join(f"pad #{k + 1} {offsets[k]:+.1f} µm" for k in deviating)
+        status.append(Condition("irregular", f"{listed} from the median of all: worn, damaged or wrongly assembled"))
     turn = np.nanmean(fit.tilt)
     if abs(turn) > IRREGULAR * np.sqrt(np.nanmean(fit.tilt_se**2) / reached) and abs(turn) > 5e-3:
-        found.append(Condition("frame-turned", f"all sides by {np.degrees(turn):+.2f} deg"))
+        status.append(Condition("frame-turned", f"all sides by {np.degrees(turn):+.2f} deg"))
     if fit.misfit > 4.0:
-        found.append(Condition("misfit", "the scatter exceeds the noise"))
-    return tuple(found)
+        status.append(Condition("misfit", "the scatter exceeds the noise"))
+    return tuple(status)
 
 
 RISE = 0.2  # of the lighter push load: less tells nothing of the stiffness
 
 
-@dataclass(frozen=True)
-class RadialStiffness:
-    """Pivot stiffness from two sweeps with different push loads."""
-
-    load: float
-    stiffness: FloatArray
-    stiffness_se: FloatArray
-
-
-def radial_stiffness(light: ClearancePolygon, heavy: ClearancePolygon) -> RadialStiffness:
-    """Secant between two push loads of the same bearing in the same condition."""
+def radial_stiffness(light: ClearancePolygon, heavy: ClearancePolygon) -> tuple[float, FloatArray, FloatArray]:
+    """Secant between two push loads of the same bearing: mean load [N], stiffness (n,) [N/m] and its standard error."""
     rise = heavy.push_load - light.push_load
     if rise <= RISE * light.push_load:
         loads = f"{light.push_load:.0f} and {heavy.push_load:.0f} N"
         raise ArgumentError(f"push loads must differ by a fifth at least, heavy after light; got {loads}")
-    # each about its own centre: a zero that wandered between the runs is no give
-    give = heavy.clearance_pushed - light.clearance_pushed
+    # each about its own centre: a zero that drifted between the runs is no deflection
+    deflection = heavy.clearance_pushed - light.clearance_pushed
     se = np.hypot(heavy.clearance_pushed_se, light.clearance_pushed_se)
-    stiffness = rise / give
-    load = 0.5 * (heavy.push_load + light.push_load)
-    return RadialStiffness(load, np.asarray(stiffness), np.asarray(np.abs(stiffness / give) * se))
+    stiffness = rise / deflection
+    return 0.5 * (heavy.push_load + light.push_load), stiffness, np.abs(stiffness / deflection) * se
 
 
-@dataclass(frozen=True)
-class ClearanceChange:
-    """Growth of the clearance from one condition to another."""
-
-    per_pad: FloatArray
-    per_pad_se: FloatArray
-    mean: float
-    mean_se: float
-    centre_shift: FloatArray
-
-
-def clearance_change(before: ClearancePolygon, after: ClearancePolygon) -> ClearanceChange:
-    """How much the clearance at zero load changed, as from cold to hot."""
+def clearance_change(before: ClearancePolygon, after: ClearancePolygon) -> tuple[FloatArray, FloatArray]:
+    """Growth (n,) [m] of the clearance at zero load per pad, as from cold to hot, and its standard error."""
     if before.angles.shape != after.angles.shape or not np.allclose(before.angles, after.angles, atol=1e-6):
         raise ArgumentError("both polygons must be of one bearing: their pad directions differ")
-    shift = after.centre - before.centre
-    per_pad = after.clearance - before.clearance
-    se = np.hypot(before.clearance_se, after.clearance_se)
-    known = np.isfinite(per_pad)
-    # pads that do not surround the shaft evenly: a shift of the centre must not pass for growth
-    design = np.column_stack([np.ones(known.sum()), directions(before.angles[known])])
-    mean = np.linalg.lstsq(design, per_pad[known], rcond=None)[0][0]
-    mean_se = float(np.sqrt(np.linalg.inv(design.T @ design)[0, 0] * np.mean(se[known] ** 2)))
-    return ClearanceChange(per_pad, se, float(mean), mean_se, shift)
+    return after.clearance - before.clearance, np.hypot(before.clearance_se, after.clearance_se)
 
 
 def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> pd.DataFrame:
     """Every other polygon against one: `clearance_pairs.csv`, one row per pad."""
     import pandas as pd
 
-    rows = []
-    for other in others:
-        change = clearance_change(base, other)
-        light, heavy = sorted((base, other), key=lambda p: p.push_load)
-        same = _same_condition(base, other)
-        spring = radial_stiffness(light, heavy) if same and _rises(light, heavy) else None
-        for k in range(len(base.angles)):
-            row = {
-                "run": other.run,
-                "against": base.run,
-                "compared": "push load" if same else "condition",
-                "pad": k + 1,
-                "change_m": change.per_pad[k],
-                "change_m_se": change.per_pad_se[k],
-            }
-            if spring is not None:
-                row |= {
-                    "load_N": spring.load,
-                    TANGENT: spring.stiffness[k],
-                    f"{TANGENT}_se": spring.stiffness_se[k],
-                }
-            rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def _same_condition(one: ClearancePolygon, other: ClearancePolygon) -> bool:
-    """Whether two sweeps were made at one speed and one temperature (or nobody knows better)."""
-    apart = abs(one.temperature - other.temperature)
-    return one.point.shaft_speed == other.point.shaft_speed and not apart > SAME_WARMTH
-
-
-def _rises(light: ClearancePolygon, heavy: ClearancePolygon) -> bool:
-    return heavy.push_load - light.push_load > RISE * light.push_load
+    frames = []
+    for polygon in others:
+        change, change_se = clearance_change(base, polygon)
+        light, heavy = sorted((base, polygon), key=lambda p: p.push_load)
+        # one speed and one temperature, or nobody knows better
+        warmer = abs(base.temperature - polygon.temperature) > SAME_TEMPERATURE
+        same = base.point.shaft_speed == polygon.point.shaft_speed and not warmer
+        columns: dict[str, object] = {
+            "run": polygon.run,
+            "against": base.run,
+            "compared": "push load" if same else "condition",
+            "pad": np.arange(1, len(base.angles) + 1),
+            "change_m": change,
+            "change_m_se": change_se,
+        }
+        if same and heavy.push_load - light.push_load > RISE * light.push_load:
+            load, stiffness, stiffness_se = radial_stiffness(light, heavy)
+            columns |= {"load_N": load, TANGENT: stiffness, f"{TANGENT}_se": stiffness_se}
+        frames.append(pd.DataFrame(columns))
+    return pd.concat(frames, ignore_index=True)

@@ -1,6 +1,15 @@
-"""Geometry of the clearance polygon: where its centre lies, and where its corners are.
+r"""The clearance polygon: its sides fitted to a sweep, where its centre lies, and where its corners are.
 
-The sweep gives one distance per pad from the probes' zero. Five distances hold five clearances and two
+*Sides.* One average while pad k is touched says
+
+    along = d_k - a_k s + g delta_k(W) + m delta_k(P) [(W/P)^(2/3) - W/P] + n_k . e(t)
+
+with s the place along the side, a_k the angle by which the side is turned, delta_k(W) the pivot's deflection under
+the load that the pad carries by its dry curve, and e(t) the noise and drift of the probes, which all pads share.
+The push P lies below the loads of the dry tests, so the curve is extrapolated there: g (near 1) and m (free) let
+the sweep correct its size and its shape, the same for all pads. Generalised least squares over all averages.
+
+*Centre.* The sweep gives one distance per pad from the probes' zero. Five distances hold five clearances and two
 coordinates of the centre: two too many. A shift of the centre by c changes the clearances by -n_k . c, and
 nothing in the polygon tells such a change from real differences between the pads. So the centre is a
 convention:
@@ -24,37 +33,36 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.vector import directions
-from tpjb_ident.clearance.sweep import Touch
+from tpjb_ident.clearance.sweep import ContactIntervals
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 
 CentreRule = Literal["least-absolute", "least-squares"]
 EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
-
-
-@dataclass(frozen=True)
-class GainRatio:
-    """How much more the first probe reads than the second, as the sides of a polygon tell."""
-
-    value: float
-    se: float
-    turn: float
+DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
+TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
+SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better than a sweep of 200 N
+SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
+CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the deflection, where no curve says it
+CLIP = 5.0  # robust standard deviations
+SLIDING = 0.03  # of the deflection: while the shaft slides, its next pad may already carry a little
+ONE_SIGMA = 0.6826895
 
 
 @dataclass(frozen=True)
 class Centre:
     """Centre of a polygon of sides n_k . p = d_k."""
 
-    position: FloatArray
-    clearance: float
-    gain: FloatArray
+    position: FloatArray  #: (2,) [m]
+    clearance: float  #: common to all sides [m]
+    gain: FloatArray  #: (3, n) of position and clearance with respect to the distances
 
 
 def find_centre(
     angles: FloatArray, distances: FloatArray, covariance: FloatArray, rule: CentreRule = "least-absolute"
 ) -> Centre:
-    """Centre of a clearance polygon."""
+    """Centre of a clearance polygon: angles (n,) [rad], distances (n,) [m] with covariance (n, n)."""
     design = np.column_stack([directions(angles), np.ones(len(angles))])
     if len(angles) < 3 or np.linalg.cond(design) > 1e3:
         raise ArgumentError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
@@ -64,10 +72,10 @@ def find_centre(
     gain = np.zeros((3, len(angles)), dtype=float)
     for _ in range(1 if rule == "least-squares" else 400):
         gain = np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights)
-        new: FloatArray = np.asarray(gain @ distances, dtype=float)
-        moved = float(np.max(np.abs(new - solution)))
-        solution = new
-        if moved < 1e-12:
+        updated: FloatArray = np.asarray(gain @ distances, dtype=float)
+        change = float(np.max(np.abs(updated - solution)))
+        solution = updated
+        if change < 1e-12:
             break
         # Huber's weights with the bend at the measurement error: absolute beyond it, square within
         weights = 1.0 / np.maximum(np.abs(distances - design @ solution) / error, 1.0)
@@ -75,7 +83,7 @@ def find_centre(
 
 
 def corners(angles: FloatArray, clearances: FloatArray) -> FloatArray:
-    """Corners between neighbouring sides."""
+    """Corners (n, 2) [m] between neighbouring sides: angles (n,) [rad], clearances (n,) [m]."""
     n = directions(angles)
     following = np.roll(n, -1, axis=0)
     systems = np.stack([n, following], axis=1)
@@ -83,8 +91,10 @@ def corners(angles: FloatArray, clearances: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(systems, sides[..., None])[..., 0])
 
 
-def gain_ratio(angles: FloatArray, tilt: FloatArray, tilt_se: FloatArray, axes: tuple[float, float]) -> GainRatio:
-    """Fit a common turn and unequal gains to the turns of the sides.
+def gain_ratio(
+    angles: FloatArray, tilt: FloatArray, tilt_se: FloatArray, axes: tuple[float, float]
+) -> tuple[float, float]:
+    """How much more the first probe reads than the second, and its standard error, as the turns (n,) of the sides tell.
 
     A probe that reads (1 + g) times the truth stretches the measured plane along its axis. What it does to sizes cannot
     be told from another clearance or another stiffness; what it does to directions can, since the pads' directions are
@@ -95,138 +105,141 @@ def gain_ratio(angles: FloatArray, tilt: FloatArray, tilt_se: FloatArray, axes: 
 
     which no common turn of the frame imitates. A gain that both probes share leaves all directions as they are.
     """
-    known = np.isfinite(tilt) & np.isfinite(tilt_se) & (tilt_se > 0)
-    rows = np.array([[np.cos(a), np.sin(a)] for a in axes])
-    if known.sum() < 4 or abs(np.linalg.det(rows)) < 0.05:
-        return GainRatio(np.nan, np.nan, np.nan)
-    n = directions(angles)[known]
-    own, dual = rows[0], np.linalg.inv(rows)[:, 0]
-    shear = -(n @ dual) * (n[:, 0] * own[1] - n[:, 1] * own[0])
-    design = np.column_stack([np.ones(len(n)), shear]) / tilt_se[known, None]
-    target = tilt[known] / tilt_se[known]
+    usable = np.isfinite(tilt) & np.isfinite(tilt_se) & (tilt_se > 0)
+    rows = directions(np.array(axes))
+    if usable.sum() < 4 or abs(np.linalg.det(rows)) < 0.05:
+        return np.nan, np.nan
+    n = directions(angles)[usable]
+    probe, dual = rows[0], np.linalg.inv(rows)[:, 0]
+    shear = -(n @ dual) * (n[:, 0] * probe[1] - n[:, 1] * probe[0])
+    design = np.column_stack([np.ones(len(n)), shear]) / tilt_se[usable, None]
+    target = tilt[usable] / tilt_se[usable]
     covariance = np.linalg.inv(design.T @ design)
-    turn, value = covariance @ design.T @ target
-    chi_square = float(np.sum((target - design @ np.array([turn, value])) ** 2)) / (len(target) - 2)
-    return GainRatio(float(value), float(np.sqrt(covariance[1, 1] * max(chi_square, 1.0))), float(turn))
-
-
-DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
-TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
-SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better than a sweep of 200 N
-SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
-CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the give, where no curve says it
-CLIP = 5.0  # robust standard deviations
-SLIDING = 0.03  # of the give: while the shaft slides, its next pad may already carry a little
+    solution = covariance @ design.T @ target
+    chi_square = float(np.sum((target - design @ solution) ** 2)) / (len(target) - 2)
+    return float(solution[1]), float(np.sqrt(covariance[1, 1] * max(chi_square, 1.0)))
 
 
 @dataclass(frozen=True)
 class SideFit:
-    """Sides of a polygon, from the probes' zero."""
+    """The n sides of a polygon, from the probes' zero; NaN where a pad was not reached."""
 
-    distance: FloatArray
-    tilt: FloatArray
-    tilt_se: FloatArray
-    covariance: FloatArray
-    give: FloatArray
-    give_se: FloatArray
-    scale: float
+    distance: FloatArray  #: (n,) [m]
+    tilt: FloatArray  #: (n,) [rad]
+    tilt_se: FloatArray  #: (n,) [rad]
+    covariance: FloatArray  #: (n, n) of the distances [m^2]
+    deflection: FloatArray  #: (n,) of the pivots under the push [m]
+    deflection_se: FloatArray  #: (n,) [m]
+    scale: float  #: g; NaN without curves
     scale_se: float
     noise: NoiseModel
     misfit: float
 
 
-def _known_give(curves: Sequence[PivotCurve], pad: IntArray, load: FloatArray) -> FloatArray:
+def _pivot_deflection(curves: Sequence[PivotCurve], pad: IntArray, load: FloatArray) -> FloatArray:
     """Deflection (m,) [m] of pads (m,) (index from 0) at loads (m,) [N]; zero for pads without a curve."""
-    give = np.zeros(len(load))
+    deflection = np.zeros(len(load))
     for curve in curves:
-        mine = pad == curve.pad - 1
-        give[mine] = curve.deflection(np.maximum(load[mine], 0.0))
-    return give
+        members = pad == curve.pad - 1
+        deflection[members] = curve.deflection(np.maximum(load[members], 0.0))
+    return deflection
 
 
 @dataclass(frozen=True)
 class _System:
     """The used averages, whitened together."""
 
-    touch: Touch
-    place: FloatArray
-    whitener: FloatArray
-    pads: IntArray
-    count: int
+    contact: ContactIntervals  #: m averages
+    place: FloatArray  #: (m,) along the side [m]
+    whitener: FloatArray  #: (m, m) [1/m]
+    pads: IntArray  #: (r,) reached, from 0
+    count: int  #: of all pads
     noise: NoiseModel
 
+    @property
+    def of_pad(self) -> FloatArray:
+        """Columns (m, r): one where the average is of that reached pad."""
+        return (self.contact.pad[:, None] == self.pads[None, :]).astype(float)
 
-def fit_sides(touch: Touch, angles: FloatArray, reached: BoolArray, curves: Sequence[PivotCurve] | None) -> SideFit:
-    """Fit all sides of a sweep."""
-    place = _place_along_side(touch, angles, reached)
-    usable = reached[touch.pad] & _consistent(touch, place)
-    used, place = touch.take(usable), place[usable]
+    @property
+    def design(self) -> FloatArray:
+        """Columns (m, 2 r): distance and turn of every reached side."""
+        return np.hstack([self.of_pad, -self.of_pad * self.place[:, None]])
+
+
+def fit_sides(
+    contact: ContactIntervals, angles: FloatArray, reached: BoolArray, curves: Sequence[PivotCurve] | None
+) -> SideFit:
+    """Fit all sides of a sweep: angles (n,) [rad] of the pads, reached (n,)."""
+    place = _place_along_side(contact, angles, reached)
+    usable = reached[contact.pad] & _consistent(contact, place)
+    used, place = contact.take(usable), place[usable]
     noise = _noise(used, place)
-    give = _known_give(curves or (), used.pad, used.load)
-    whitener = _whitener(used, angles, noise, SLIDING * give * used.alone)
+    deflection = _pivot_deflection(curves or (), used.pad, used.load)
+    whitener = _whitener(used, angles, noise, SLIDING * deflection * used.alone)
     system = _System(used, place, whitener, np.flatnonzero(reached), len(angles), noise)
     return _solve_unknown(system) if curves is None else _solve_known(system, curves)
 
 
-def _place_along_side(touch: Touch, angles: FloatArray, reached: BoolArray) -> FloatArray:
+def _place_along_side(contact: ContactIntervals, angles: FloatArray, reached: BoolArray) -> FloatArray:
     """Place (m,) on each side, from the foot of the polygon's centre."""
     pads = np.flatnonzero(reached)
-    far = np.array([np.quantile(touch.along[touch.pad == k], 0.9) for k in pads])
+    far = np.array([np.quantile(contact.along[contact.pad == k], 0.9) for k in pads])
     design = np.column_stack([directions(angles[pads]), np.ones(len(pads))])
     centre = np.linalg.lstsq(design, far, rcond=None)[0][:2]
     tangents = np.column_stack([-np.sin(angles), np.cos(angles)])
-    return np.asarray(touch.across - (tangents @ centre)[touch.pad])
+    return np.asarray(contact.across - (tangents @ centre)[contact.pad])
 
 
 def _smooth_side(load: FloatArray, place: FloatArray) -> FloatArray:
-    """Columns (m, 4) that span one side: its place, its turn, and any way in which its pivot gives."""
+    """Columns (m, 4) that span one side: its place, its turn, and any way in which its pivot deflects."""
     return np.column_stack([np.ones_like(load), np.cbrt(load) ** 2, load, place / 1e-4])
 
 
-def _consistent(touch: Touch, place: FloatArray) -> BoolArray:
+def _consistent(contact: ContactIntervals, place: FloatArray) -> BoolArray:
     """False for averages that do not lie on their side: the shaft was on its way, or a glitch was left."""
-    keep = np.ones(len(touch.time), dtype=bool)
-    for k in np.unique(touch.pad):
-        mine = np.flatnonzero(touch.pad == k)
-        design = _smooth_side(np.maximum(touch.load[mine], 0.0) / touch.push, place[mine])
-        good = np.ones(len(mine), dtype=bool)
+    keep = np.ones(len(contact.time), dtype=bool)
+    for k in np.unique(contact.pad):
+        members = np.flatnonzero(contact.pad == k)
+        design = _smooth_side(np.maximum(contact.load[members], 0.0) / contact.push, place[members])
+        good = np.ones(len(members), dtype=bool)
         for _ in range(8):
             if good.sum() < 8:
                 break
-            beta = np.linalg.lstsq(design[good], touch.along[mine][good], rcond=None)[0]
-            residual = touch.along[mine] - design @ beta
+            beta = np.linalg.lstsq(design[good], contact.along[members][good], rcond=None)[0]
+            residual = contact.along[members] - design @ beta
             centre = np.median(residual[good])
             spread = 1.4826 * np.median(np.abs(residual[good] - centre))
             # ten nanometres: what 16 bits resolve, so that a noise-free record keeps its averages
-            new = np.abs(residual - centre) < CLIP * max(float(spread), 1e-8)
-            if np.array_equal(new, good):
+            updated = np.abs(residual - centre) < CLIP * max(float(spread), 1e-8)
+            if np.array_equal(updated, good):
                 break
-            good = new
-        keep[mine] = good
+            good = updated
+        keep[members] = good
     return keep
 
 
-def _noise(touch: Touch, place: FloatArray) -> NoiseModel:
+def _noise(contact: ContactIntervals, place: FloatArray) -> NoiseModel:
     """Noise of the probes as the sweep itself shows it, about smooth sides."""
     series = []
-    for k in np.unique(touch.pad):
-        mine = touch.pad == k
-        mean = _smooth_side(np.maximum(touch.load[mine], 0.0) / touch.push, place[mine])
-        series.append(NoiseSeries(touch.time[mine], touch.duration[mine], touch.along[mine], mean))
+    for k in np.unique(contact.pad):
+        members = contact.pad == k
+        mean = _smooth_side(np.maximum(contact.load[members], 0.0) / contact.push, place[members])
+        series.append(NoiseSeries(contact.time[members], contact.duration[members], contact.along[members], mean))
     return estimate_noise(series, DRIFT_RATE)
 
 
-def _whitener(touch: Touch, angles: FloatArray, noise: NoiseModel, unsure: FloatArray) -> FloatArray:
+def _whitener(contact: ContactIntervals, angles: FloatArray, noise: NoiseModel, unsure: FloatArray) -> FloatArray:
     """Inverse Cholesky factor of the covariance of the averages; all pads share the two probes.
 
     `unsure` (m,) is a standard deviation of each average by itself [m].
     """
-    n = directions(angles)[touch.pad]
-    centred = touch.time - touch.time.mean()
-    same = touch.time[:, None] == touch.time[None, :]
+    n = directions(angles)[contact.pad]
+    centred = contact.time - contact.time.mean()
+    same = contact.time[:, None] == contact.time[None, :]
     covariance = (n @ n.T) * (
-        noise.white * same / touch.duration
-        + noise.flicker * flicker_kernel(touch.time)
+        noise.white * same / contact.duration
+        + noise.flicker * flicker_kernel(contact.time)
         + noise.drift**2 * np.outer(centred, centred)
     )
     covariance[np.diag_indices_from(covariance)] *= 1.0 + 1e-9
@@ -234,56 +247,51 @@ def _whitener(touch: Touch, angles: FloatArray, noise: NoiseModel, unsure: Float
     return np.linalg.inv(np.linalg.cholesky(covariance))
 
 
-def _design(system: _System) -> FloatArray:
-    """Columns (m, 2 r): distance and turn of every reached side."""
-    of_pad = (system.touch.pad[:, None] == system.pads[None, :]).astype(float)
-    return np.hstack([of_pad, -of_pad * system.place[:, None]])
-
-
 def _solve_known(system: _System, curves: Sequence[PivotCurve]) -> SideFit:
-    """Sides with the pivots' give from their curves, times one common factor near one."""
-    every = np.arange(system.count)
-    full = _known_give(curves, every, np.full(system.count, system.touch.push))
-    give = _known_give(curves, system.touch.pad, system.touch.load)
-    w = np.maximum(system.touch.load, 0.0) / system.touch.push
-    shape = full[system.touch.pad] * (np.cbrt(w) ** 2 - w)
-    design = np.column_stack([_design(system), shape, give])
+    """Sides with the pivots' deflections from their curves, times one common factor near one."""
+    pad, push = system.contact.pad, system.contact.push
+    full = _pivot_deflection(curves, np.arange(system.count), np.full(system.count, push))
+    deflection = _pivot_deflection(curves, pad, system.contact.load)
+    w = np.maximum(system.contact.load, 0.0) / push
+    shape = full[pad] * (np.cbrt(w) ** 2 - w)
+    design = np.column_stack([system.design, shape, deflection])
     prior, mean = np.zeros(design.shape[1]), np.zeros(design.shape[1])
     prior[-2:] = SHAPE_SPREAD**-2, SCALE_SPREAD**-2
     mean[-1] = 1.0
     beta, covariance, misfit = _least_squares(system, design, prior, mean)
-    own = np.zeros(system.count)
+    deflection_se = np.zeros(system.count)
     for curve in curves:
-        lo, hi = curve.secant_band(system.touch.push, 0.6826895)
-        own[curve.pad - 1] = full[curve.pad - 1] * 0.5 * float(np.log(hi / lo))
-    part = _part(system, beta, covariance, misfit)
-    # an error of a curve shifts its side by the share of the give that the sweep's averages carry on the mean
-    carried = np.array([np.mean(give[system.touch.pad == k]) if k in system.pads else 0.0 for k in every])
+        lo, hi = curve.secant_band(push, ONE_SIGMA)
+        deflection_se[curve.pad - 1] = full[curve.pad - 1] * 0.5 * float(np.log(hi / lo))
+    sides = _sides(system, beta, covariance, misfit)
+    # an error of a curve shifts its side by the share of the deflection that the sweep's averages carry on the mean
+    carried = np.zeros(system.count)
+    for k in system.pads:
+        carried[k] = np.mean(deflection[pad == k])
     share = np.divide(carried, full, out=np.zeros_like(full), where=full > 0)
     return replace(
-        part,
-        covariance=part.covariance + np.diag((share * own) ** 2),
-        give=beta[-1] * full,
-        give_se=own,
+        sides,
+        covariance=sides.covariance + np.diag((share * deflection_se) ** 2),
+        deflection=beta[-1] * full,
+        deflection_se=deflection_se,
         scale=float(beta[-1]),
         scale_se=float(np.sqrt(covariance[-1, -1])),
     )
 
 
 def _solve_unknown(system: _System) -> SideFit:
-    """Sides with every pivot's give fitted in proportion to its load, and one curvature for all pads."""
-    of_pad = (system.touch.pad[:, None] == system.pads[None, :]).astype(float)
-    w = np.maximum(system.touch.load, 0.0) / system.touch.push
-    design = np.column_stack([_design(system), of_pad * w[:, None], np.cbrt(w) ** 2 - w])
+    """Sides with every pivot's deflection fitted in proportion to its load, and one curvature for all pads."""
+    w = np.maximum(system.contact.load, 0.0) / system.contact.push
+    design = np.column_stack([system.design, system.of_pad * w[:, None], np.cbrt(w) ** 2 - w])
     prior = np.zeros(design.shape[1])
     prior[-1] = CURVATURE_SPREAD**-2
     beta, covariance, misfit = _least_squares(system, design, prior, np.zeros(design.shape[1]))
-    part = _part(system, beta, covariance, misfit)
+    sides = _sides(system, beta, covariance, misfit)
     r = len(system.pads)
-    give, se = np.full(system.count, np.nan), np.full(system.count, np.nan)
-    give[system.pads] = beta[2 * r : 3 * r]
+    deflection, se = np.full(system.count, np.nan), np.full(system.count, np.nan)
+    deflection[system.pads] = beta[2 * r : 3 * r]
     se[system.pads] = np.sqrt(np.diag(covariance)[2 * r : 3 * r])
-    return replace(part, give=give, give_se=se)
+    return replace(sides, deflection=deflection, deflection_se=se)
 
 
 def _least_squares(
@@ -295,7 +303,7 @@ def _least_squares(
     prior[r : 2 * r] = TILT_SPREAD**-2
     unit = np.max(np.abs(design), axis=0)
     x = system.whitener @ (design / unit)
-    y = system.whitener @ system.touch.along
+    y = system.whitener @ system.contact.along
     scaled = np.diag(prior / unit**2)
     covariance = np.linalg.inv(x.T @ x + scaled)
     beta = covariance @ (x.T @ y + scaled @ (mean * unit))
@@ -305,8 +313,8 @@ def _least_squares(
     return beta / unit, covariance / np.outer(unit, unit), misfit
 
 
-def _part(system: _System, beta: FloatArray, covariance: FloatArray, misfit: float) -> SideFit:
-    """Distances and turns of all pads, NaN where not reached; without what the pivots give."""
+def _sides(system: _System, beta: FloatArray, covariance: FloatArray, misfit: float) -> SideFit:
+    """Distances and turns of all pads, NaN where not reached; without the pivots' deflections."""
     r, pads = len(system.pads), system.pads
     empty = np.full(system.count, np.nan)
     distance, tilt, tilt_se = empty.copy(), empty.copy(), empty.copy()

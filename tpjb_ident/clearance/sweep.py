@@ -7,7 +7,7 @@ So the force vector says how much each pad carries, and the position says which 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,81 +22,65 @@ if TYPE_CHECKING:
 
 
 BLOCK = 0.1  # [s]; five mains periods
-CONTACT_DEPTH = 1.0e-6  # [m]: a pad counts as touched within this of its farthest position, plus its own give
+CONTACT_DEPTH = 1.0e-6  # [m]: a pad counts as touched within this of its farthest position, plus its deflection
 SHORTEST = 5  # samples in a piece
 MOVING = 2.0  # robust standard deviations of the speed in corners above which the shaft is still on its way
-LARGEST_GIVE = 6.0e-6  # [m], of a pivot under the push load where no curve says it
+LARGEST_DEFLECTION = 6.0e-6  # [m], of a pivot under the push load where no curve says it
 TURN_NEEDED = 2.0 * np.pi * 0.97
 
 
 @dataclass(frozen=True)
-class Touch:
-    """Averages during which a pad was touched: m pieces, each of one pad."""
+class ContactIntervals:
+    """Averages during which a pad was touched: m pieces, (m,) each, of one pad each."""
 
-    time: FloatArray
-    duration: FloatArray
-    pad: IntArray
-    along: FloatArray
-    across: FloatArray
-    load: FloatArray
-    push: float
-    alone: BoolArray
+    time: FloatArray  #: [s]
+    duration: FloatArray  #: [s]
+    pad: IntArray  #: from 0
+    along: FloatArray  #: place of the shaft in the pad's direction [m]
+    across: FloatArray  #: [m]
+    load: FloatArray  #: that the pad carries [N]
+    alone: BoolArray  #: no other pad was touched
+    push: float  #: of the sweep [N]
 
-    def take(self, keep: BoolArray) -> Touch:
-        """The averages where `keep` (m,) is true."""
-        of_piece = ("time", "duration", "pad", "along", "across", "load", "alone")
-        return replace(self, **{name: getattr(self, name)[keep] for name in of_piece})
+    def take(self, chosen: BoolArray) -> ContactIntervals:
+        """The averages where `chosen` (m,) is true."""
+        columns = {f.name: getattr(self, f.name)[chosen] for f in fields(self) if f.name != "push"}
+        return replace(self, **columns)
 
 
-def read_sweep(run: Run, angles: FloatArray) -> Touch:
-    """Read a run of kind ``clearance``."""
+def read_sweep(run: Run, angles: FloatArray) -> ContactIntervals:
+    """Read a run of kind ``clearance``; angles (n,) [rad] of the pads."""
     time, load, position, good = slow_samples(run)
     if good.sum() < 200:
         raise _refused(run, f"has only {int(good.sum())} usable samples", "Repeat the sweep")
     load, position, time = load[good], position[good], time[good]
-    _check_turn(run, load, position, time)
-    push = float(np.median(np.hypot(*load.T)))
-    touched = _touched(position, angles, np.full(len(angles), CONTACT_DEPTH + LARGEST_GIVE))
-    carried = _carried(load, angles, touched)
-    swept = _Swept(time, position, touched, carried, push)
-    return _blocks(swept, angles, _piece_length(run.point.shaft_speed))
-
-
-def _piece_length(shaft_speed: float) -> float:
-    """Length of the averages [s]: whole turns of a shaft that turns, so that its runout averages out."""
-    turn = 2.0 * np.pi / shaft_speed if shaft_speed > 0.0 else BLOCK
-    return float(turn * max(round(BLOCK / turn), 1))
+    _check_turn(run, load, position)
+    # whole turns of a shaft that turns: its runout averages out
+    turn = 2.0 * np.pi / run.point.shaft_speed if run.point.shaft_speed > 0.0 else BLOCK
+    return _average(time, load, position, angles, float(turn * max(round(BLOCK / turn), 1)))
 
 
 def _refused(run: Run, what: str, cure: str) -> RigDataError:
     return RigDataError(Problem("error", run.file, "record", f"clearance run {run.id} {what}", cure, run=run.id))
 
 
-def _check_turn(run: Run, load: FloatArray, position: FloatArray, time: FloatArray) -> None:
+def _check_turn(run: Run, load: FloatArray, position: FloatArray) -> None:
     """Refuse a load that does not go around, and a shaft that goes elsewhere than the load."""
     step = max(1, len(load) // 400)
     whole = len(load) // step * step
-    load_mean = load[:whole].reshape(-1, step, 2).mean(axis=1)
-    place = position[:whole].reshape(-1, step, 2).mean(axis=1)
+    load_mean, place = (part[:whole].reshape(-1, step, 2).mean(axis=1) for part in (load, position))
     angle = np.unwrap(np.arctan2(load_mean[:, 1], load_mean[:, 0]))
     if np.ptp(angle) < TURN_NEEDED:
         what = f"turns its load through {np.degrees(np.ptp(angle)):.0f} deg only"
         raise _refused(run, what, "Sweep the load once around, 360 deg or more")
     place = place - 0.5 * (place.max(axis=0) + place.min(axis=0))
-    lag = np.angle(np.sum((place[:, 0] + 1j * place[:, 1]) * np.exp(-1j * angle)))
-    size = np.hypot(*place.T).mean()
-    together = abs(np.mean((place[:, 0] + 1j * place[:, 1]) * np.exp(-1j * angle))) / max(size, 1e-300)
-    if abs(lag) > np.radians(30.0) or together < 0.7:
-        what = f"has a shaft that does not follow its load ({np.degrees(lag):+.0f} deg away, coherence {together:.2f})"
+    in_load_frame = (place[:, 0] + 1j * place[:, 1]) * np.exp(-1j * angle)
+    lag = np.angle(np.sum(in_load_frame))
+    coherence = abs(np.mean(in_load_frame)) / max(np.hypot(*place.T).mean(), 1e-300)
+    if abs(lag) > np.radians(30.0) or coherence < 0.7:
+        what = f"has a shaft that does not follow its load ({np.degrees(lag):+.0f} deg away, coherence {coherence:.2f})"
         cure = "Check order, axes and polarity of the displacement and force channels"
         raise _refused(run, what, cure)
-
-
-def _touched(position: FloatArray, angles: FloatArray, depth: FloatArray) -> BoolArray:
-    """Which pads (n_samples, n) the shaft touches: it lies within `depth` of where it was farthest out."""
-    out = position @ directions(angles).T
-    farthest = np.quantile(out, 0.995, axis=0)
-    return np.asarray(out > farthest - depth)
 
 
 def _carried(load: FloatArray, angles: FloatArray, touched: BoolArray) -> FloatArray:
@@ -118,20 +102,14 @@ def _carried(load: FloatArray, angles: FloatArray, touched: BoolArray) -> FloatA
     return carried
 
 
-@dataclass(frozen=True)
-class _Swept:
-    """Samples of a sweep: time (m,) [s], position (m, 2) [m], touched pads, their loads (m, n) [N], push load [N]."""
-
-    time: FloatArray
-    position: FloatArray
-    touched: BoolArray
-    carried: FloatArray
-    push: float
-
-
-def _blocks(swept: _Swept, angles: FloatArray, length: float) -> Touch:
-    """Average per pad over pieces of `length` seconds in which the same pads are touched."""
-    time, touched = swept.time, swept.touched
+def _average(
+    time: FloatArray, load: FloatArray, position: FloatArray, angles: FloatArray, length: float
+) -> ContactIntervals:
+    """Average per pad over pieces of `length` [s] in which the same pads are touched."""
+    # the shaft touches a pad within some micrometres of where it was farthest out
+    outward = position @ directions(angles).T
+    touched = np.asarray(outward > np.quantile(outward, 0.995, axis=0) - (CONTACT_DEPTH + LARGEST_DEFLECTION))
+    carried = _carried(load, angles, touched)
     state = touched @ (1 << np.arange(len(angles)))
     piece = np.floor((time - time[0]) / length).astype(int)
     cuts = np.flatnonzero((np.diff(state) != 0) | (np.diff(piece) != 0)) + 1
@@ -141,29 +119,29 @@ def _blocks(swept: _Swept, angles: FloatArray, length: float) -> Touch:
     count = (stops - starts).astype(float)
     period = float(time[-1] - time[0]) / (len(time) - 1)
     moment = piece_means(time[:, None], starts, stops)[:, 0]
-    place = piece_means(swept.position, starts, stops)
-    load = piece_means(np.nan_to_num(swept.carried), starts, stops)
-    lost = piece_means(np.isnan(swept.carried).astype(float), starts, stops) > 0.0
-    usable = touched[starts] & ~lost & _at_rest(moment, place, touched[starts])[:, None]
-    row, pad = np.nonzero(usable)
+    place = piece_means(position, starts, stops)
+    pad_load = piece_means(np.nan_to_num(carried), starts, stops)
+    lost = piece_means(np.isnan(carried).astype(float), starts, stops) > 0.0
+    pads_touched = touched[starts]
+    row, pad = np.nonzero(pads_touched & ~lost & _settled(moment, place, pads_touched)[:, None])
     tangent = np.column_stack([-np.sin(angles), np.cos(angles)])
-    return Touch(
+    return ContactIntervals(
         time=moment[row],
         duration=count[row] * period,
         pad=pad,
         along=np.sum(place[row] * directions(angles)[pad], axis=1),
         across=np.sum(place[row] * tangent[pad], axis=1),
-        load=load[row, pad],
-        push=swept.push,
-        alone=touched[starts][row].sum(axis=1) == 1,
+        load=pad_load[row, pad],
+        alone=pads_touched[row].sum(axis=1) == 1,
+        push=float(np.median(np.hypot(*load.T))),
     )
 
 
-def _at_rest(time: FloatArray, place: FloatArray, touched: BoolArray) -> BoolArray:
+def _settled(time: FloatArray, place: FloatArray, touched: BoolArray) -> BoolArray:
     """True for pieces (m,) in which the shaft lies in a corner, or slides along one pad.
 
     A shaft that comes to a corner slowly is near the second pad before it touches it: only when it moves no faster
-    than the pivots give does the corner hold it.
+    than the pivots deflect does the corner hold it.
     """
     corner = touched.sum(axis=1) == 2
     if corner.sum() < 8:
@@ -173,6 +151,6 @@ def _at_rest(time: FloatArray, place: FloatArray, touched: BoolArray) -> BoolArr
     ordinary = float(np.median(speed[corner]))
     spread = 1.4826 * float(np.median(np.abs(speed[corner] - ordinary)))
     moving = corner & (speed >= ordinary + MOVING * spread)
-    # the piece beside a moving one hides a rest of the way below the noise, and would do so at every corner
+    # the piece beside a moving one hides a remainder of the way below the noise, and would do so at every corner
     beside = np.r_[moving[1:], False] | np.r_[False, moving[:-1]]
     return np.asarray(~corner | ~(moving | beside))
