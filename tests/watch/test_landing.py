@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from tpjb_ident.watch.landing import Landings
+from tpjb_ident.watch.landing import NewFiles
 
 
 class Clock:
@@ -15,9 +15,9 @@ class Clock:
         return self.now
 
 
-def landings(settle: float = 5.0) -> tuple[Landings, Clock]:
+def landings(settle: float = 5.0) -> tuple[NewFiles, Clock]:
     clock = Clock(1_000_000.0)
-    return Landings(settle, clock, clock), clock
+    return NewFiles(settle, clock, clock), clock
 
 
 def touched(path, text: str, at: float):

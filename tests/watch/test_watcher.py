@@ -16,7 +16,7 @@ from rigdata.virtual_rig import Fault, write_campaign
 from tests.command_line import tpjb
 from tests.good_campaigns import rocker_rig
 from tpjb_ident.dynamic.settings import IdentifySettings
-from tpjb_ident.watch.landing import Landings
+from tpjb_ident.watch.landing import NewFiles
 from tpjb_ident.watch.measured import Measuring
 from tpjb_ident.watch.watcher import Watcher
 
@@ -56,7 +56,7 @@ def land(source, live, *runs):
 
 
 def watcher(live, settle: float = 0.0) -> Watcher:
-    return Watcher(live, Landings(settle), Measuring(IdentifySettings()))
+    return Watcher(live, NewFiles(settle), Measuring(IdentifySettings()))
 
 
 def states(snapshot) -> dict[str, str]:

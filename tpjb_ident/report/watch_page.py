@@ -14,7 +14,7 @@ from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.report.plots.coefficients import direct_coefficients
 from tpjb_ident.rounding import with_interval
 from tpjb_ident.runtime.tables import write_text
-from tpjb_ident.watch.next_steps import described, lacking, said
+from tpjb_ident.watch.next_steps import described, lacking, located
 
 if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.point_result import PointResult
@@ -145,7 +145,7 @@ def _records_table(snapshot: Snapshot) -> Table:
     landed = sorted((s for s in snapshot.states if s.landed), key=lambda s: s.landed, reverse=True)
     rows = []
     for s in landed:
-        remarks = [said(f.problem) for f in s.findings if f.problem.severity != "note"][:3]
+        remarks = [located(f.problem) for f in s.findings if f.problem.severity != "note"][:3]
         remarks += [f"not in the manifest; {why[s.run.id]}"] if s.run.id in why else []
         rows.append([s.landed[11:19], s.run.id, described(s.run), WORDS[s.state], "; ".join(remarks)])
     return Table("Newest first", ["time", "run", "set points", "verdict", "why"], rows, frozenset(range(5)))

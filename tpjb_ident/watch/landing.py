@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign, run_in_file
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
+from rigdata.vector import directions
 
 
 @dataclass(frozen=True)
@@ -29,14 +30,14 @@ class FileState:
 def file_state(path: Path) -> FileState | None:
     """State of an ordinary file; None where there is none, or none that may be looked at."""
     try:
-        found = path.stat()
+        status = path.stat()
     except OSError:
         return None
-    return FileState(found.st_size, found.st_mtime_ns, found.st_ino) if path.is_file() else None
+    return FileState(status.st_size, status.st_mtime_ns, status.st_ino) if path.is_file() else None
 
 
-class Landings:
-    """Follows files until they rest."""
+class NewFiles:
+    """Follows files until they are stable."""
 
     def __init__(
         self,
@@ -48,12 +49,12 @@ class Landings:
         self._since: dict[Path, tuple[FileState, float]] = {}
 
     def look(self, paths: Iterable[Path]) -> tuple[dict[Path, FileState], list[Path]]:
-        """Files at rest with their state, and those that are still being written.
+        """Stable files with their state, and those that are still being written.
 
         An empty file is still being written: a logger has opened it and holds the samples back.
         """
-        resting: dict[Path, FileState] = {}
-        moving: list[Path] = []
+        stable: dict[Path, FileState] = {}
+        written: list[Path] = []
         now = self._steady()
         for path in paths:
             state = file_state(path)
@@ -66,17 +67,17 @@ class Landings:
                 age = self._clock() - 1e-9 * state.changed if before is None else 0.0
                 self._since[path] = (state, now - max(0.0, age))
             if state.size > 0 and now - self._since[path][1] >= self._settle:
-                resting[path] = state
+                stable[path] = state
             else:
-                moving.append(path)
-        return resting, moving
+                written.append(path)
+        return stable, written
 
 
 #: What loggers and people append to the name of a record that is made again.
 _AGAIN = re.compile(r"[-_. (]*(?:r|rep|repeat|again|copy|wdh|bis|v|no|nr)?[-_. ]*\d{0,4}[a-d]?\)?", re.IGNORECASE)
 #: How near the record must be to a planned set point: load vector and frequency as shares, direction [rad].
 NEAR_LOAD, NEAR_LINE, NEAR_DIRECTION = 0.1, 0.01, math.radians(10.0)
-#: The planned line must hold this share of the swinging of the force.
+#: The planned line must hold this share of the oscillationing of the force.
 _DRIVEN = 0.5
 
 
@@ -93,22 +94,21 @@ class Unplanned:
 def place_record(campaign: Campaign, path: Path, done: frozenset[str]) -> Unplanned:
     """Find the planned run that a record is, or repeats."""
     file = path.relative_to(campaign.path).as_posix()
-    taken = {run.id for run in campaign.runs}
-    named = [r for r in campaign.runs if _named_like(path.stem, r.id)]
+    named = [run for run in campaign.runs if _named_like(path.stem, run.id)]
     if named:
-        like = max(named, key=lambda r: len(r.id))
-        again = "repeats" if like.id in done else "is"
-        own = path.stem if path.stem not in taken else file
-        return Unplanned(file, run_in_file(like, path, file, own), like.id, f"{again} {like.id} by its name")
-    try:
-        found = _by_content(campaign, path, file)
-    except RigDataError as error:
-        return Unplanned(file, None, "", f"cannot be read ({error.problems[0].what})")
-    if found is None:
+        planned: Run | None = max(named, key=lambda run: len(run.id))
+        evidence = "its name"
+    else:
+        try:
+            planned, evidence = _by_content(campaign, path, file), "load and line"
+        except RigDataError as error:
+            return Unplanned(file, None, "", f"cannot be read ({error.problems[0].what})")
+    if planned is None:
         return Unplanned(file, None, "", "no planned run has its load, frequency and direction")
-    again = "repeats" if found.id in done else "is"
-    own = path.stem if path.stem not in taken else file
-    return Unplanned(file, run_in_file(found, path, file, own), found.id, f"{again} {found.id} by load and line")
+    run_id = file if any(run.id == path.stem for run in campaign.runs) else path.stem
+    relation = "repeats" if planned.id in done else "is"
+    text = f"{relation} {planned.id} by {evidence}"
+    return Unplanned(file, run_in_file(planned, path, file, run_id), planned.id, text)
 
 
 def _named_like(stem: str, run_id: str) -> bool:
@@ -117,7 +117,7 @@ def _named_like(stem: str, run_id: str) -> bool:
 
 def _by_content(campaign: Campaign, path: Path, file: str) -> Run | None:
     """The one planned dynamic or locus run whose mean force and line the record shows; None if none or several."""
-    candidates = [r for r in campaign.runs if r.kind in ("dynamic", "locus")]
+    candidates = [run for run in campaign.runs if run.kind in ("dynamic", "locus")]
     if not candidates:
         return None
     trial = run_in_file(candidates[0], path, file, path.stem)
@@ -125,25 +125,23 @@ def _by_content(campaign: Campaign, path: Path, file: str) -> Run | None:
     force = force[np.isfinite(force).all(axis=1)]
     if len(force) < 16:
         return None
-    fitting = [r for r in candidates if _fits(r, force, rate)]
-    tests = {(r.kind, r.point, r.excitation_direction) for r in fitting}
+    fitting = [run for run in candidates if _fits(run, force, rate)]
+    tests = {(run.kind, run.point, run.excitation_direction) for run in fitting}
     return fitting[0] if len(tests) == 1 else None
 
 
 def _fits(run: Run, force: FloatArray, rate: float) -> bool:
     point = run.point
     # the housing is pulled the way the film carries the shaft: cells read the load on the shaft, reversed or not
-    planned = point.static_load * np.array(
-        [math.cos(point.static_load_direction), math.sin(point.static_load_direction)]
-    )
+    planned = point.static_load * directions(np.array([point.static_load_direction]))[0]
     mean = force.mean(axis=0)
     if min(np.linalg.norm(mean - planned), np.linalg.norm(mean + planned)) > NEAR_LOAD * point.static_load:
         return False
-    swing = force - mean
-    size = float(np.sqrt((swing**2).sum(axis=1).mean()))
+    oscillation = force - mean
+    size = float(np.sqrt((oscillation**2).sum(axis=1).mean()))
     if run.kind != "dynamic":
         return size < 0.02 * point.static_load
-    phasor = _line(swing, point.excitation_hz, rate)
+    phasor = _line(oscillation, point.excitation_hz, rate)
     if np.linalg.norm(phasor) < _DRIVEN * size * math.sqrt(2.0):
         return False
     if run.excitation_direction is None:
@@ -153,18 +151,18 @@ def _fits(run: Run, force: FloatArray, rate: float) -> bool:
     return abs((away + math.pi / 2) % math.pi - math.pi / 2) < NEAR_DIRECTION
 
 
-def _line(values: FloatArray, frequency: float, rate: float) -> np.ndarray:
+def _line(values: FloatArray, frequency: float, rate: float) -> ComplexArray:
     """Phasor of every column at the strongest bin near a frequency [Hz]."""
     time = np.arange(len(values)) / rate
     window = np.hanning(len(values))[:, None]
-    tries = frequency * (1.0 + NEAR_LINE * np.linspace(-1.0, 1.0, 9))
-    phasors = [
-        2.0 * (values * window * np.exp(-2j * math.pi * f * time)[:, None]).sum(axis=0) / window.sum() for f in tries
-    ]
+    phasors = []
+    for trial in frequency * (1.0 + NEAR_LINE * np.linspace(-1.0, 1.0, 9)):
+        carrier = np.exp(-2j * math.pi * trial * time)[:, None]
+        phasors.append(2.0 * (values * window * carrier).sum(axis=0) / window.sum())
     return max(phasors, key=lambda p: float(np.linalg.norm(p)))
 
 
-def unplanned_problem(found: Sequence[Unplanned]) -> list[Problem]:
+def unplanned_problems(unplanned: Sequence[Unplanned]) -> list[Problem]:
     """What to do with records that nothing was found for."""
     cure = "Add a [[runs]] table for it to campaign.toml, or move it out of the folder"
-    return [Problem("warning", one.file, "", one.why, cure) for one in found if one.run is None]
+    return [Problem("warning", record.file, "", record.why, cure) for record in unplanned if record.run is None]

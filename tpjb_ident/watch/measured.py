@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rigdata.campaign import Campaign
-from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigError
-from rigdata.run import Run
 from tpjb_ident.clearance.measure import ClearancePolygon, measure_clearance
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.results.identification import Identification
@@ -51,82 +48,58 @@ class Measuring:
     pad_angles: tuple[float, ...] = ()
     store: RunStore | None = None
     _took: float = 0.0
-    _seen: dict[str, frozenset[object]] = field(default_factory=dict)
+    _observed: dict[str, frozenset[tuple[str, object]]] = field(default_factory=dict)
     _last: Measured = field(default_factory=Measured)
 
     def update(self, campaign: Campaign, marks: dict[str, object]) -> Measured:
-        """Results of a campaign of the runs that count."""
+        """Results of a campaign of the runs that count; `marks` by run change with its record."""
         refusals: list[str] = []
         last = self._last
-        found = Measured(
-            self._identified(campaign, marks, last.identification, refusals),
-            self._pivots(campaign, marks, last.curves, refusals),
-            self._clearance(campaign, marks, last.polygon, refusals),
-        )
-        self._last = replace(found, refusals=tuple(refusals))
+        identification, curves, polygon = self._identify(campaign, marks, refusals), last.curves, last.polygon
+        if self.pad_angles and self._news(campaign, "dry_pivot", marks):
+            curves = ()
+            if campaign.of_kind("dry_pivot"):
+                try:
+                    curves = fit_pivots(campaign, self.pad_angles, PivotSettings(on_refusal="skip"))
+                except REFUSALS as error:
+                    refusals.append(f"pivots: {error}")
+        if self.pad_angles and self._news(campaign, "clearance", marks):
+            polygon = None
+            if campaign.of_kind("clearance"):
+                try:
+                    polygon = measure_clearance(campaign, self.pad_angles)
+                except REFUSALS as error:
+                    refusals.append(f"clearance: {error}")
+        self._last = Measured(identification, curves, polygon, tuple(refusals))
         return self._last
 
-    def _news(self, part: str, runs: Sequence[Run], marks: dict[str, object]) -> set[str]:
-        """Ids of runs that came, changed or went since the last time."""
-        now = frozenset((run.id, marks.get(run.id)) for run in runs)
-        before = self._seen.get(part, frozenset())
-        self._seen[part] = frozenset(now)
-        return {str(pair[0]) for pair in now ^ before}  # type: ignore[index]
+    def _news(self, campaign: Campaign, kind: str, marks: dict[str, object]) -> set[str]:
+        """Ids of runs of a kind that came, changed or went since the last time."""
+        current = frozenset((run.id, marks.get(run.id)) for run in campaign.of_kind(kind))
+        before = self._observed.get(kind, frozenset())
+        self._observed[kind] = current
+        return {run_id for run_id, _ in current ^ before}
 
-    def _identified(
-        self, campaign: Campaign, marks: dict[str, object], last: Identification | None, refusals: list[str]
-    ) -> Identification | None:
-        runs = campaign.of_kind("dynamic")
-        news = self._news("dynamic", runs, marks)
-        if not runs or not news:
-            return last if runs else None
-        chosen = campaign
+    def _identify(self, campaign: Campaign, marks: dict[str, object], refusals: list[str]) -> Identification | None:
+        """Coefficients of all points, or of those with news where all would take too long."""
+        news, last = self._news(campaign, "dynamic", marks), self._last.identification
+        points = {run.point for run in campaign.of_kind("dynamic")}
+        if not points or not news:
+            return last if points else None
+        selected = campaign
         if self._took > PATIENCE and last is not None:
-            touched = {run.point for run in runs if run.id in news}
-            chosen = replace(
-                campaign, runs=tuple(r for r in campaign.runs if r.point in touched or r.kind != "dynamic")
-            )
+            changed = {run.point for run in campaign.of_kind("dynamic") if run.id in news}
+            runs = [run for run in campaign.runs if run.point in changed or run.kind != "dynamic"]
+            selected = replace(campaign, runs=tuple(runs))
         began = time.monotonic()
         try:
-            found = identify(chosen, self.settings, store=self.store)
+            identification = identify(selected, self.settings, store=self.store)
         except REFUSALS as error:
             refusals.append(f"identification: {error}")
             return last
-        if chosen is campaign:
+        if selected is campaign or last is None:
             self._took = time.monotonic() - began
-            return found
-        return _joined(last, found, {run.point for run in runs})
-
-    def _pivots(
-        self, campaign: Campaign, marks: dict[str, object], last: tuple[PivotCurve, ...], refusals: list[str]
-    ) -> tuple[PivotCurve, ...]:
-        runs = campaign.of_kind("dry_pivot")
-        news = self._news("dry_pivot", runs, marks)
-        if not runs or not self.pad_angles or not news:
-            return last if runs else ()
-        try:
-            return fit_pivots(campaign, self.pad_angles, PivotSettings(on_refusal="skip"))
-        except REFUSALS as error:
-            refusals.append(f"pivots: {error}")
-            return ()
-
-    def _clearance(
-        self, campaign: Campaign, marks: dict[str, object], last: ClearancePolygon | None, refusals: list[str]
-    ) -> ClearancePolygon | None:
-        runs = campaign.of_kind("clearance")
-        news = self._news("clearance", runs, marks)
-        if not runs or not self.pad_angles or not news:
-            return last if runs else None
-        try:
-            return measure_clearance(campaign, self.pad_angles)
-        except REFUSALS as error:
-            refusals.append(f"clearance: {error}")
-            return None
-
-
-def _joined(last: Identification | None, found: Identification, wanted: set[OperatingPoint]) -> Identification:
-    """The new points in the place of the old ones of the same set point."""
-    if last is None:
-        return found
-    points = {p.point: p for p in (*last.points, *found.points) if p.point in wanted}
-    return replace(found, points=tuple(points[k] for k in sorted(points)))
+            return identification
+        # the new points in the place of the old ones of the same set point
+        joined = {p.point: p for p in (*last.points, *identification.points) if p.point in points}
+        return replace(identification, points=tuple(joined[point] for point in sorted(joined)))

@@ -17,8 +17,9 @@ from tpjb_ident.check.observation import Observation
 from tpjb_ident.dynamic.results.point_result import PointResult
 
 State = Literal["to run", "being written", "good", "look", "repeat", "replaced"]
-#: Warnings of the check that only another record mends: what was lost cannot be calibrated back.
+#: Warnings of the check that only another record repairs: what was lost cannot be calibrated back.
 LOST_SAMPLES = ("clipped", "dead", "empty", "missing", "stuck", "gap", "jitter", "short", "no excitation", "step")
+GRAVITY = ("error", "warning", "note")
 #: A finding in so many runs at least, and in this share of those of their kinds, is not the runs' fault.
 COMMON_RUNS, COMMON_SHARE = 3, 1 / 3
 
@@ -47,31 +48,32 @@ class RunStatus:
 
 def judge_states(
     runs: Sequence[Run],
-    seen: Sequence[Observation],
+    observations: Sequence[Observation],
     landed: Mapping[str, str],
     planned: frozenset[str],
-    moving: frozenset[str],
+    written: frozenset[str],
 ) -> tuple[list[RunStatus], list[list[Finding]]]:
     """State of every run, and the findings that so many runs share that no repeat will cure them."""
-    common = _common([one.report.found for one in seen], [one.run.kind for one in seen])
-    shared = {id(f) for group in common for f in group}
-    found = {one.run.id: [f for f in one.report.found if id(f) not in shared] for one in seen}
+    common = _common(observations)
+    shared = {id(finding) for group in common for finding in group}
+    of_run: dict[str, list[Finding]] = {}
+    for observation in observations:
+        findings = [finding for finding in observation.report.found if id(finding) not in shared]
+        of_run[observation.run.id] = sorted(findings, key=lambda f: GRAVITY.index(f.problem.severity))
     states = []
     for run in runs:
-        own = tuple(sorted(found.get(run.id, []), key=lambda f: ("error", "warning", "note").index(f.problem.severity)))
-        state: State = "to run"
-        if run.id in moving:
+        findings = of_run.get(run.id, [])
+        state: State = "good"
+        if run.id in written:
             state = "being written"
-        elif run.id in found:
-            state = _state(own)
-        states.append(RunStatus(run, state, own, landed.get(run.id, ""), run.id in planned))
+        elif run.id not in of_run:
+            state = "to run"
+        elif any(_forces_repeat(finding) for finding in findings):
+            state = "repeat"
+        elif any(finding.problem.severity == "warning" for finding in findings):
+            state = "look"
+        states.append(RunStatus(run, state, tuple(findings), landed.get(run.id, ""), run.id in planned))
     return _replaced(states), common
-
-
-def _state(findings: Sequence[Finding]) -> State:
-    if any(_forces_repeat(f) for f in findings):
-        return "repeat"
-    return "look" if any(f.problem.severity == "warning" for f in findings) else "good"
 
 
 def _forces_repeat(finding: Finding) -> bool:
@@ -79,20 +81,20 @@ def _forces_repeat(finding: Finding) -> bool:
     return severity == "error" or (severity == "warning" and finding.key.startswith(LOST_SAMPLES))
 
 
-def _common(found: Sequence[Sequence[Finding]], kinds: Sequence[str]) -> list[list[Finding]]:
+def _common(observations: Sequence[Observation]) -> list[list[Finding]]:
     """Findings that a third of the runs of their kinds have alike; notes are nobody's trouble."""
     groups: dict[str, list[Finding]] = {}
-    of_kind: dict[str, set[str]] = {}
-    for findings, kind in zip(found, kinds, strict=True):
-        for finding in findings:
+    kinds: dict[str, set[str]] = {}
+    for observation in observations:
+        for finding in observation.report.found:
             if finding.problem.severity != "note":
                 groups.setdefault(finding.key, []).append(finding)
-                of_kind.setdefault(finding.key, set()).add(kind)
+                kinds.setdefault(finding.key, set()).add(observation.run.kind)
     common = []
     for key, group in groups.items():
-        concerned = {f.problem.run for f in group}
-        alike = sum(kind in of_kind[key] for kind in kinds)
-        if len(concerned) >= COMMON_RUNS and len(concerned) >= COMMON_SHARE * alike:
+        affected = {finding.problem.run for finding in group}
+        comparable = sum(observation.run.kind in kinds[key] for observation in observations)
+        if len(affected) >= COMMON_RUNS and len(affected) >= COMMON_SHARE * comparable:
             common.append(group)
     return common
 
@@ -100,21 +102,19 @@ def _common(found: Sequence[Sequence[Finding]], kinds: Sequence[str]) -> list[li
 def _replaced(states: Sequence[RunStatus]) -> list[RunStatus]:
     """A bad run is replaced by a later one of the same test that is better."""
     done = [s for s in states if s.counts]
-    return [
-        replace(s, state="replaced")
-        if s.state == "repeat" and any(_same_test(s.run, d.run) and d.landed >= s.landed for d in done)
-        else s
-        for s in states
-    ]
+    updated = []
+    for status in states:
+        better = [d for d in done if _test(d.run) == _test(status.run) and d.landed >= status.landed]
+        updated.append(replace(status, state="replaced") if status.state == "repeat" and better else status)
+    return updated
 
 
-def _same_test(one: Run, other: Run) -> bool:
-    alike = one.kind == other.kind and one.point == other.point and one.id != other.id
-    return alike and (one.excitation_direction, one.pad, one.branch) == (
-        other.excitation_direction, other.pad, other.branch)  # fmt: skip
+def _test(run: Run) -> tuple[object, ...]:
+    """What two records have in common that repeat one test."""
+    return run.kind, run.point, run.excitation_direction, run.pad, run.branch
 
 
-#: From so many records in a row with one fault on, the sensor is to be mended before another one is made.
+#: From so many records in a row with one fault on, the sensor is to be repaired before another one is made.
 IN_A_ROW = 2
 _LISTED = 4
 
@@ -140,7 +140,7 @@ def next_steps(
     return [
         *stop,
         *_repeats([s for s in states if s.run.id not in stopped], at),
-        *(_mend(group) for group in common),
+        *(_repair(group) for group in common),
         *_more(states, points, within),
         *_next(states, at),
     ]
@@ -182,7 +182,7 @@ def lacking(point: PointResult) -> str:
     return f"no K and C from {point.n_records} records: {why}"
 
 
-def said(problem: Problem) -> str:
+def located(problem: Problem) -> str:
     """What is wrong and where, without the file's name."""
     return f"{problem.place}: {problem.what}" if problem.place else problem.what
 
@@ -205,7 +205,7 @@ def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
             stopped.update(row)
             runs = tuple(reversed(row))
             p = finding.problem
-            text = f"Stop: {said(p)}, in the last {len(row)} records ({_named(runs)}). {p.cure}, then repeat them."
+            text = f"Stop: {located(p)}, in the last {len(row)} records ({_named(runs)}). {p.cure}, then repeat them."
             steps.append(Step("stop", text, runs))
     return steps, stopped
 
@@ -216,7 +216,7 @@ def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
         problem = status.first
         if status.state != "repeat" or problem is None:
             continue
-        run, why = status.run, f"{said(problem)}. {problem.cure}."
+        run, why = status.run, f"{located(problem)}. {problem.cure}."
         if run.kind not in ("dynamic", "locus"):
             now.append(Step("repeat", f"Repeat {run.id} ({described(run)}): {why}", (run.id,)))
         elif at is None or _set_up(run) == _set_up(at):
@@ -228,10 +228,10 @@ def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
     return now + later
 
 
-def _mend(group: Sequence[Finding]) -> Step:
+def _repair(group: Sequence[Finding]) -> Step:
     problem = group[0].problem
     runs = tuple(dict.fromkeys(str(f.problem.run) for f in group))
-    text = f"Look into this, it is in {len(runs)} runs alike ({_named(runs)}): {said(problem)}. {problem.cure}."
+    text = f"Look into this, it is in {len(runs)} runs alike ({_named(runs)}): {located(problem)}. {problem.cure}."
     return Step("mend", text, runs)
 
 
@@ -249,11 +249,11 @@ def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: fl
         place = f"{point.point.static_load / 1e3:g} kN, {point.point.excitation_hz:g} Hz"
         share = f"{name} is known to {100 * widest:.1f} %, {100 * within:g} % is wanted"
         random_alone, n = records
-        rest = within**2 - max(0.0, widest**2 - random_alone**2)
-        if rest <= 0.25 * within**2:
+        random_allowed = within**2 - max(0.0, widest**2 - random_alone**2)
+        if random_allowed <= 0.25 * within**2:
             steps.append(Step("more", f"{place}: {share}; calibration sets that, more records do not help."))
             continue
-        more = math.ceil(n * (random_alone**2 / rest - 1.0))
+        more = math.ceil(n * (random_alone**2 / random_allowed - 1.0))
         many = f"about {more} more record{'s' if more > 1 else ''} like those there would do"
         steps.append(Step("more", f"{place}: {share}; {many}.", point.runs))
     return steps
@@ -265,24 +265,23 @@ def _widest(point: PointResult) -> tuple[float, str, tuple[float, int]]:
     half = est.half_width()
     random = est.half_width(systematic=False)
     shares = []
-    for part, names in ((0, ("kxx", "kyy")), (4, ("cxx", "cyy"))):
-        mean = 0.5 * (abs(est.vector[part]) + abs(est.vector[part + 3]))
-        shares += [(float(half[part + j] / mean), n, float(random[part + j] / mean)) for j, n in zip((0, 3), names)]
-    finite = [s for s in shares if math.isfinite(s[0])]
-    if not finite:
-        return math.nan, "", (math.nan, 1)
-    share, name, own = max(finite)
-    return share, name, (own, point.n_records)
+    for name, i, pair in (("kxx", 0, (0, 3)), ("kyy", 3, (0, 3)), ("cxx", 4, (4, 7)), ("cyy", 7, (4, 7))):
+        mean = 0.5 * (abs(est.vector[pair[0]]) + abs(est.vector[pair[1]]))
+        share = float(half[i] / mean)
+        if math.isfinite(share):
+            shares.append((share, name, float(random[i] / mean)))
+    widest, name, random_share = max(shares, default=(math.nan, "", math.nan))
+    return widest, name, (random_share, point.n_records)
 
 
 def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
     waiting = [s.run for s in states if s.state == "to run"]
     if not waiting:
-        left = [s for s in states if s.state in ("repeat", "being written")]
-        return [] if left else [Step("next", "Every run of the plan has landed.")]
-    same = [
-        run for run in waiting if at is not None and run.kind in ("dynamic", "locus") and _set_up(run) == _set_up(at)
-    ]
+        unfinished = [s for s in states if s.state in ("repeat", "being written")]
+        return [] if unfinished else [Step("next", "Every run of the plan has landed.")]
+    same = []
+    if at is not None:
+        same = [run for run in waiting if run.kind in ("dynamic", "locus") and _set_up(run) == _set_up(at)]
     run = (same or waiting)[0]
     more = f"{len(same) - 1} more at this load" if len(same) > 1 else f"{len(waiting) - 1} more in the plan"
     change = "" if same or at is None else " (new set-up)"
@@ -291,22 +290,22 @@ def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
 
 def plan_lacks(runs: Sequence[Run], n_pads: int) -> list[str]:
     """What a plan leaves out that the results will want."""
-    found = []
-    single: dict[OperatingPoint, set[float | None]] = {}
+    lacks = []
+    directions_of: dict[OperatingPoint, set[float | None]] = {}
     for run in runs:
         if run.kind == "dynamic":
-            single.setdefault(run.point, set()).add(run.excitation_direction)
-    lonely = [p for p, directions in single.items() if len(directions) == 1 and None not in directions]
+            directions_of.setdefault(run.point, set()).add(run.excitation_direction)
+    lonely = [p for p, directions in directions_of.items() if len(directions) == 1 and None not in directions]
     if lonely:
         first = ", ".join(f"{p.static_load / 1e3:g} kN {p.excitation_hz:g} Hz" for p in lonely[:3])
-        found.append(f"{len(lonely)} operating points have one excitation direction ({first}): K and C need two.")
+        lacks.append(f"{len(lonely)} operating points have one excitation direction ({first}): K and C need two.")
     pads = {run.pad for run in runs if run.kind == "dry_pivot"}
     without = [f"#{pad}" for pad in range(1, n_pads + 1) if pad not in pads]
     if n_pads and without:
-        found.append(f"No dry load steps on pad {', '.join(without)}: its pivot's stiffness stays unknown.")
+        lacks.append(f"No dry load steps on pad {', '.join(without)}: its pivot's stiffness stays unknown.")
     if not any(run.kind == "clearance" for run in runs):
-        found.append("No clearance sweep: positions count from the probes' zero, and clearances stay the drawing's.")
-    return found
+        lacks.append("No clearance sweep: positions count from the probes' zero, and clearances stay the drawing's.")
+    return lacks
 
 
 def _named(runs: Sequence[str]) -> str:

@@ -16,7 +16,7 @@ from tpjb_ident.check.campaign import judged
 from tpjb_ident.check.findings import Finding
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.runtime.provenance import sha256
-from tpjb_ident.watch.landing import FileState, Landings, Unplanned, file_state, place_record, unplanned_problem
+from tpjb_ident.watch.landing import FileState, NewFiles, Unplanned, file_state, place_record, unplanned_problems
 from tpjb_ident.watch.measured import Measured, Measuring
 from tpjb_ident.watch.next_steps import RunStatus, Step, judge_states, next_steps, plan_lacks
 
@@ -44,7 +44,7 @@ class Snapshot:
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _Observed:
     """A record as it was read; `mark` changes when its file or its description does."""
 
     mark: object
@@ -59,12 +59,12 @@ class Watcher:
     """Follows one campaign folder."""
 
     folder: Path
-    landings: Landings
+    files: NewFiles
     measuring: Measuring
     within: float | None = None
     _campaign: Campaign | None = None
     _manifest: FileState | None = None
-    _seen: dict[str, _Seen] = field(default_factory=dict)
+    _observed: dict[str, _Observed] = field(default_factory=dict)
     _placed: dict[Path, tuple[FileState, Unplanned]] = field(default_factory=dict)
     _last: tuple[object, ...] = ()
 
@@ -74,19 +74,19 @@ class Watcher:
             return None
         campaign, problems = self._opened()
         planned = {run.file: self.folder / run.file for run in campaign.runs}
-        known = {path.resolve() for path in campaign.files.values()}
-        beside = [p for p in records_below(self.folder) if p.resolve() not in known]
-        resting, moving = self.landings.look([*planned.values(), *beside])
-        seen = (self._manifest, tuple(problems), tuple(resting.items()), tuple(moving))
-        if seen == self._last:
+        listed = {path.resolve() for path in campaign.files.values()}
+        unlisted = [path for path in records_below(self.folder) if path.resolve() not in listed]
+        stable, written = self.files.look([*planned.values(), *unlisted])
+        state = (self._manifest, tuple(problems), tuple(stable.items()), tuple(written))
+        if state == self._last:
             return None
-        placed = self._place(campaign, beside, resting, frozenset(r.id for r in campaign.runs
-                                                                 if planned[r.file] in resting))  # fmt: skip
-        runs = [*campaign.runs, *(one.run for one in placed if one.run is not None)]
-        new = self._observe(runs, resting)
+        done = frozenset(run.id for run in campaign.runs if planned[run.file] in stable)
+        placed = self._place(campaign, unlisted, stable, done)
+        runs = [*campaign.runs, *(record.run for record in placed if record.run is not None)]
+        new = self._observe(runs, stable)
         # a record that changed while it was read is looked at again: the next look must not take this one for it
-        self._last = seen if all(file_state(p) == s for p, s in resting.items()) else ()
-        return self._snapshot(campaign, runs, placed, problems, {p.resolve() for p in moving}, new)
+        self._last = state if all(file_state(p) == s for p, s in stable.items()) else ()
+        return self._snapshot(campaign, runs, placed, problems, {p.resolve() for p in written}, new)
 
     @property
     def waits(self) -> bool:
@@ -94,7 +94,7 @@ class Watcher:
         return not self._last or bool(self._last[3])
 
     def look_again(self) -> None:
-        """Have the next look tell everything, changed or not: what this one told could not be written."""
+        """Have the next look report everything, changed or not: the report of this one could not be written."""
         self._last = ()
 
     def _opened(self) -> tuple[Campaign, list[Problem]]:
@@ -108,45 +108,44 @@ class Watcher:
         except RigDataError as error:
             if self._campaign is None:
                 raise
-            told = Problem("warning", MANIFEST_NAME, "", "cannot be read as it is; the watch goes on with the last one "
-                           "that could be", "Finish editing it")  # fmt: skip
-            return self._campaign, [told, *error.problems]
+            what = "cannot be read as it is; the watch goes on with the last one that could be"
+            problem = Problem("warning", MANIFEST_NAME, "", what, "Finish editing it")
+            return self._campaign, [problem, *error.problems]
         self._placed.clear()
         return self._campaign, []
 
     def _place(
-        self, campaign: Campaign, beside: list[Path], resting: dict[Path, FileState], done: frozenset[str]
+        self, campaign: Campaign, unlisted: list[Path], stable: dict[Path, FileState], done: frozenset[str]
     ) -> list[Unplanned]:
         placed = []
-        for path in beside:
-            state = resting.get(path)
+        for path in unlisted:
+            state = stable.get(path)
             if state is None:
                 continue
-            known = self._placed.get(path)
-            if known is None or known[0] != state:
-                self._placed[path] = known = (state, place_record(campaign, path, done))
-            placed.append(known[1])
+            if path not in self._placed or self._placed[path][0] != state:
+                self._placed[path] = (state, place_record(campaign, path, done))
+            placed.append(self._placed[path][1])
         return placed
 
-    def _observe(self, runs: list[Run], resting: dict[Path, FileState]) -> list[str]:
+    def _observe(self, runs: list[Run], stable: dict[Path, FileState]) -> list[str]:
         """Read what is new; forget what is gone. Ids of the runs with news."""
         new = []
-        kept: dict[str, _Seen] = {}
+        observed: dict[str, _Observed] = {}
         for run in runs:
             path = self.folder / run.file
-            state = resting.get(path)
+            state = stable.get(path)
             if state is None:
                 continue
             mark = (state, run.kind, run.point, run.excitation_direction, run.pad, run.branch, repr(run.channels))
-            before = self._seen.get(run.id)
+            before = self._observed.get(run.id)
             if before is not None and before.mark == mark:
-                kept[run.id] = before
+                observed[run.id] = before
                 continue
-            found = _Seen(mark, observe(run), _iso(state), _digest(path), seconds(run))
+            record = _Observed(mark, observe(run), _iso(state), _digest(path), seconds(run))
             if file_state(path) == state:
-                kept[run.id] = found
+                observed[run.id] = record
                 new.append(run.id)
-        self._seen = kept
+        self._observed = observed
         return new
 
     def _snapshot(
@@ -155,26 +154,35 @@ class Watcher:
         runs: list[Run],
         placed: list[Unplanned],
         problems: list[Problem],
-        moving: set[Path],
+        written: set[Path],
         new: list[str],
     ) -> Snapshot:
-        landed = [run for run in runs if run.id in self._seen]
-        seen = judged(replace(campaign, runs=tuple(landed)), [self._seen[run.id].observation for run in landed])
-        _name_cut_records(seen, [self._seen[run.id].seconds for run in landed])
-        when = {run.id: self._seen[run.id].landed for run in landed}
+        landed = tuple(run for run in runs if run.id in self._observed)
+        records = [self._observed[run.id] for run in landed]
+        observations = judged(replace(campaign, runs=landed), [record.observation for record in records])
+        _name_cut_records(observations, [record.seconds for record in records])
+        when = {run.id: record.landed for run, record in zip(landed, records, strict=True)}
         planned = frozenset(run.id for run in campaign.runs)
-        written = frozenset(run.id for run in runs if (self.folder / run.file).resolve() in moving)
-        done = {one.like for one in placed if one.run is not None}
-        listed = [r for r in runs if r.id in self._seen or r.id in written or r.id not in done]
-        states, common = judge_states(listed, seen, when, planned, written)
-        good = tuple(s.run for s in states if s.counts)
-        marks = {run_id: one.mark for run_id, one in self._seen.items()}
+        open_runs = frozenset(run.id for run in runs if (self.folder / run.file).resolve() in written)
+        done = {record.like for record in placed if record.run is not None}
+        listed = [run for run in runs if run.id in self._observed or run.id in open_runs or run.id not in done]
+        states, common = judge_states(listed, observations, when, planned, open_runs)
+        good = tuple(status.run for status in states if status.counts)
+        marks = {run_id: record.mark for run_id, record in self._observed.items()}
         measured = self.measuring.update(replace(campaign, runs=good), marks)
         steps = next_steps(states, common, measured.points, self.within)
         lacks = plan_lacks(runs, len(self.measuring.pad_angles))
-        told = [*problems, *campaign.notes, *unplanned_problem(placed)]
-        return Snapshot(campaign, tuple(states), tuple(steps), tuple(lacks), measured, tuple(told), tuple(new),
-                        {run.file: self._seen[run.id].digest for run in landed}, tuple(placed))  # fmt: skip
+        return Snapshot(
+            campaign=campaign,
+            states=tuple(states),
+            steps=tuple(steps),
+            lacks=tuple(lacks),
+            measured=measured,
+            problems=(*problems, *campaign.notes, *unplanned_problems(placed)),
+            new=tuple(new),
+            hashes={run.file: record.digest for run, record in zip(landed, records, strict=True)},
+            placed=tuple(placed),
+        )
 
 
 def _iso(state: FileState) -> str:
@@ -198,16 +206,18 @@ def seconds(run: Run) -> float:
         return 0.0
 
 
-def _name_cut_records(seen: Sequence[Observation], lengths: Sequence[float]) -> None:
+def _name_cut_records(observations: Sequence[Observation], lengths: Sequence[float]) -> None:
     """Note records below `WHOLE` of the median length of their kind, before everything else that follows from it."""
     of_kind: dict[str, list[float]] = {}
-    for one, length in zip(seen, lengths, strict=True):
+    for observation, length in zip(observations, lengths, strict=True):
         if length > 0:
-            of_kind.setdefault(one.run.kind, []).append(length)
-    for one, length in zip(seen, lengths, strict=True):
-        usual = median(of_kind[one.run.kind]) if one.run.kind in of_kind else 0.0
-        if 0 < length < WHOLE * usual and len(of_kind[one.run.kind]) > 2:
+            of_kind.setdefault(observation.run.kind, []).append(length)
+    for observation, length in zip(observations, lengths, strict=True):
+        same_kind = of_kind.get(observation.run.kind, [0.0])
+        usual = median(same_kind)
+        if 0 < length < WHOLE * usual and len(same_kind) > 2:
+            cure = "Copy it again from the logger, or repeat the run"
             what = f"{length:.3g} s long, the others of its kind {usual:.3g} s: cut off, or not written to its end"
-            one.report.say("short record", "error", "record", what, "Copy it again from the logger, or repeat the run")
-            found: list[Finding] = one.report.found
+            observation.report.say("short record", "error", "record", what, cure)
+            found: list[Finding] = observation.report.found
             found.insert(0, found.pop())

@@ -104,7 +104,7 @@ def _open_watch(folder: Path, bearing: Path | None, kept: Path, settle: float, w
     from rigdata.campaign import load_campaign
     from tpjb_ident.dynamic.runs.run_store import RunStore
     from tpjb_ident.dynamic.settings import IdentifySettings
-    from tpjb_ident.watch.landing import Landings
+    from tpjb_ident.watch.landing import NewFiles
     from tpjb_ident.watch.measured import Measuring
     from tpjb_ident.watch.watcher import Watcher
 
@@ -122,7 +122,7 @@ def _open_watch(folder: Path, bearing: Path | None, kept: Path, settle: float, w
             angles = tuple(pad.pivot_angle for pad in pads)
             clearance = min(pad.assembled_clearance for pad in pads)
     settings = IdentifySettings(clearance=clearance, keep_weights=False)
-    return Watcher(folder, Landings(settle), Measuring(settings, angles, RunStore(kept)), within)
+    return Watcher(folder, NewFiles(settle), Measuring(settings, angles, RunStore(kept)), within)
 
 
 def _write_results(target: Path, folder: Path, snapshot: Snapshot, refresh: int, settings: dict[str, Any]) -> None:
