@@ -106,8 +106,6 @@ class ClearancePolygon(Presented):
                 "pad_angle_deg": np.degrees(self.angles),
                 "fitted_angle_deg": np.degrees(self.fitted_angle),
                 "fitted_angle_deg_se": np.degrees(self.fitted_angle_se),
-                "corner_x_m": self.corners[:, 0],
-                "corner_y_m": self.corners[:, 1],
                 "push_load_N": self.push_load,
                 "shaft_speed_Hz": self.point.shaft_speed_hz,
                 "temperature_K": self.temperature,

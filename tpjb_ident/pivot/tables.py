@@ -6,6 +6,7 @@ denser than any reader's interpolation can spoil; no parameters are written, so 
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import sentences
 from tpjb_ident.errors import ArgumentError
-from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.pivot.curve import Hysteresis, PivotCurve
 from tpjb_ident.runtime.tables import write_text
 from tpjb_ident.schema import SECANT, TANGENT
 
@@ -49,7 +50,7 @@ def pivot_table(
         Pad loads [N]; default `load_grid`.
     formula : callable, optional
         ``formula(pad, load)`` gives the printed formula's (secant, tangent) stiffness [N/m]; adds the
-        ``formula_*`` columns and the ratios measured / formula (paper: 2-3 times softer, so 0.3 to 0.5).
+        ``formula_*`` columns (paper: measured pivots are 2-3 times softer).
     level : float
         Coverage of the intervals.
 
@@ -59,6 +60,13 @@ def pivot_table(
         ``pad``, ``force_N``, ``deflection_m``, ``stiffness_N_per_m`` (tangent) with ``_lo``, ``_hi``,
         ``secant_N_per_m`` likewise, ``law``, ``extrapolated`` (outside the measured loads) and
         ``contact_complete``.
+
+    Examples
+    --------
+    >>> pads = ti.load_bearing(rocker).pads
+    >>> curves = ti.fit_pivots(ti.load_campaign(demo), [pad.pivot_angle for pad in pads])
+    >>> list(ti.pivot_table(curves, np.array([1000.0, 2000.0])).columns[:4])
+    ['pad', 'force_N', 'deflection_m', 'stiffness_N_per_m']
     """
     import pandas as pd
 
@@ -94,28 +102,22 @@ def _rows(curve: PivotCurve, loads: FloatArray, formula: Formula | None, level: 
         columns |= {
             f"formula_{SECANT}": printed[:, 0],
             "formula_tangent_N_per_m": printed[:, 1],
-            "ratio_secant": secant / printed[:, 0],
-            "ratio_secant_lo": secant_lo / printed[:, 0],
-            "ratio_secant_hi": secant_hi / printed[:, 0],
-            "ratio_tangent": stiffness / printed[:, 1],
-            "ratio_tangent_lo": lo / printed[:, 1],
-            "ratio_tangent_hi": hi / printed[:, 1],
         }
     return pd.DataFrame(columns)
 
 
 def pads_table(curves: Sequence[PivotCurve]) -> pd.DataFrame:
-    """What a curve says beside its values."""
+    """One row per pad: law, limits, directions, loop, status."""
     import pandas as pd
 
     rows = []
+    no_loop = Hysteresis(math.nan, math.nan, math.nan, math.nan, (math.nan, math.nan))
     for curve in curves:
-        loop = curve.hysteresis
+        loop = curve.hysteresis or no_loop
         rows.append(
             {
                 "pad": curve.pad,
                 "law": curve.law.name,
-                "law_share": float(sum(w for f, w in zip(curve.fits, curve.weights) if f.name == curve.law.name)),
                 "valid_from_N": curve.valid_from,
                 "valid_to_N": curve.valid_to,
                 "onset_N": curve.onset_load,
@@ -124,10 +126,10 @@ def pads_table(curves: Sequence[PivotCurve]) -> pd.DataFrame:
                 "load_off_pad_deg_se": math.degrees(curve.load_direction.se),
                 "displacement_off_pad_deg": math.degrees(curve.displacement_direction.angle),
                 "displacement_off_pad_deg_se": math.degrees(curve.displacement_direction.se),
-                "loop_energy_J": math.nan if loop is None else loop.energy,
-                "loop_energy_J_se": math.nan if loop is None else loop.energy_se,
-                "loss_factor": math.nan if loop is None else loop.loss_factor,
-                "loss_factor_se": math.nan if loop is None else loop.loss_factor_se,
+                "loop_energy_J": loop.energy,
+                "loop_energy_J_se": loop.energy_se,
+                "loss_factor": loop.loss_factor,
+                "loss_factor_se": loop.loss_factor_se,
                 "includes_housing": curve.includes_housing,
                 "relative_calibration": curve.relative_calibration,
                 "runs": ", ".join(curve.runs),
@@ -179,6 +181,14 @@ def write_pivots(path: str | Path, curves: Sequence[PivotCurve], source: str) ->
     -------
     Path
         The destination.
+
+    Examples
+    --------
+    >>> pads = ti.load_bearing(rocker).pads
+    >>> curves = ti.fit_pivots(ti.load_campaign(demo), [pad.pivot_angle for pad in pads])
+    >>> laws = ti.load_pivots(ti.write_pivots("pivots.toml", curves, "demo"))
+    >>> len(laws)
+    5
     """
     target = Path(path)
     write_text(target, pivots_text(curves, source))
@@ -186,7 +196,7 @@ def write_pivots(path: str | Path, curves: Sequence[PivotCurve], source: str) ->
 
 
 def pad_table(curve: PivotCurve) -> dict[str, Any]:
-    """Numbers of one pad as they stand in the file, rounded.
+    """Numbers of one pad as they are in the file, rounded.
 
     What is made of them is what a reader of the file makes.
     """
@@ -219,19 +229,22 @@ class _Number(float):
 
 
 def _rounded(values: FloatArray, digits: int) -> list[_Number]:
-    texts = (f"{value:.{digits}g}" for value in values)
-    # TOML tells integers from floats: a reader of floats should meet only floats
-    return [_Number(text if any(c in text for c in ".en") else text + ".0") for text in texts]
+    numbers = []
+    for value in values:
+        text = f"{value:.{digits}g}"
+        # TOML tells integers from floats: a reader of floats should meet only floats
+        numbers.append(_Number(text if any(mark in text for mark in ".en") else f"{text}.0"))
+    return numbers
 
 
 def _toml(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(number.text for number in value) + "]"
-    return value.text if isinstance(value, _Number) else _quoted(value) if isinstance(value, str) else str(value)
+    if isinstance(value, _Number):
+        return value.text
+    return _quoted(value) if isinstance(value, str) else str(value)
 
 
 def _quoted(text: str) -> str:
-    escaped = "".join(
-        c if c >= " " and c != "\x7f" else f"\\u{ord(c):04x}" for c in text.replace("\\", "\\\\").replace('"', '\\"')
-    )
-    return f'"{escaped}"'
+    escaped = json.dumps(text, ensure_ascii=False)  # a TOML string but for DEL, which TOML does not allow
+    return escaped.replace("\x7f", "\\u007f")
