@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from tpjb_ident.conditions import Condition
-from tpjb_ident.pivot import pads_table, pivot_table, pivots_text, write_pivots
-from tpjb_ident.pivot.curve import PivotCurve, PivotSteps, measure_loop
-from tpjb_ident.pivot.dry_record import PadDirection
+from tests.pivot.test_tables import curve as stated_curve
+from tpjb_ident.pivot import pivot_table, write_pivots
+from tpjb_ident.pivot.curve import measure_loop
 from tpjb_ident.pivot.fit import contact_onset, contact_onset_se
 from tpjb_ident.pivot.law_fit import FitData, fit_law, keep_likely, posterior_weights
 from tpjb_ident.pivot.laws import LAWS
@@ -21,10 +19,8 @@ REFERENCE = 2000.0
 LOADS = np.array([50.0, 250.0, 1000.0, 2000.0, 4000.0, 8000.0])
 
 
-def data(load, deflection, noise=2e-8, branch=None):
-    friction = (0.0, 0.05) if branch is not None else (0.0, 1e-4)
-    branch = np.ones(len(load)) if branch is None else branch
-    return FitData(load, deflection, branch, np.eye(len(load)) / noise, REFERENCE, friction)
+def data(load, deflection, noise=2e-8):
+    return FitData(load, deflection, np.ones(len(load)), np.eye(len(load)) / noise, REFERENCE, (0.0, 1e-4))
 
 
 def rocker(load):
@@ -39,22 +35,7 @@ def fit(name="hertz-line", contact=False, gap=0.0, seed=0, noise=2e-8):
 
 
 def curve(**changes):
-    load = np.linspace(500.0, 5000.0, 10)
-    steps = PivotSteps(load, rocker(load), np.full(10, 1e-8), 0 * load, 0 * load, np.ones(10, dtype=int), np.ones(10))
-    whole = PivotCurve(
-        pad=1,
-        angle=-np.pi / 2,
-        steps=steps,
-        fits=(fit(),),
-        weights=np.ones(1),
-        onset_load=0.0,
-        onset_load_se=0.0,
-        valid_from=250.0,
-        valid_to=5000.0,
-        load_direction=PadDirection(0.02, 0.001),
-        displacement_direction=PadDirection(0.1, 0.01),
-    )
-    return replace(whole, **changes)
+    return stated_curve(**{"fits": (fit(),), "valid_from": 250.0, **changes})
 
 
 def test_the_fit_finds_the_law_behind_noisy_points():
@@ -106,22 +87,6 @@ def test_evidence_prefers_the_true_law_and_sees_contact_loss():
         assert np.all(np.diff(shares) <= 0)
 
 
-def test_friction_is_found_from_both_branches():
-    up = np.linspace(250.0, 5000.0, 80)
-    load, branch = np.r_[up, up[::-1]], np.r_[np.ones(80), -np.ones(80)]
-    deflection = rocker(load * (1 - 0.03 * branch))
-    found = fit_law(LAWS["hertz-line"], False, data(load, deflection, 1e-8, branch))
-    assert found.theta[1] == pytest.approx(0.03, abs=0.001)
-    assert found.deflection(LOADS[1:]) == pytest.approx(rocker(LOADS[1:]), rel=0.005)
-
-
-def test_load_and_deflection_are_inverse():
-    c = curve()
-    assert c.load(c.deflection(LOADS)) == pytest.approx(LOADS, rel=1e-6)
-    assert c.load(0.0) == 0.0
-    assert c.deflection(LOADS.reshape(2, 3)).shape == (2, 3)
-
-
 def test_tangent_and_secant():
     c = curve()
     step = 0.1
@@ -131,37 +96,12 @@ def test_tangent_and_secant():
     assert np.all(c.stiffness(LOADS) > c.secant(LOADS))
 
 
-def test_bands_enclose_and_widen_beyond_the_points():
-    c = curve()
-    lo, hi = c.stiffness_band(LOADS)
-    assert np.all((lo < c.stiffness(LOADS)) & (c.stiffness(LOADS) < hi))
-    narrow = c.stiffness_band(LOADS, 0.5)
-    assert np.all((narrow[0] > lo) & (narrow[1] < hi))
-    se = c.relative_stiffness_se([5000.0, 8000.0, 12000.0])
-    assert se[0] < se[1] < se[2]
-    assert c.is_extrapolated([100.0, 300.0, 5000.0, 5001.0]).tolist() == [True, False, False, True]
-
-
-def test_other_laws_widen_the_band():
-    two = curve(fits=(fit(), fit("hertz-point")), weights=np.array([0.7, 0.3]))
-    assert np.all(two.relative_stiffness_se(LOADS) > curve().relative_stiffness_se(LOADS))
-    assert two.stiffness(LOADS) == pytest.approx(curve().stiffness(LOADS))
-
-
 @pytest.mark.parametrize("bad", [-1.0, np.nan, [100.0, -5.0]])
 def test_impossible_loads_are_refused(bad):
     with pytest.raises(ValueError, match="load"):
         curve().stiffness(bad)
     with pytest.raises(ValueError, match="deflection"):
         curve().load(bad)
-
-
-def test_it_says_what_it_is():
-    text = str(curve(status=(Condition("bad-steps", "1 left out"),)))
-    assert "pad 1" in text
-    assert "hertz-line" in text
-    assert "bad-steps" in text
-    assert curve().includes_housing is True
 
 
 def test_table_has_the_contract_columns_and_the_formula_beside():
@@ -194,34 +134,6 @@ def test_toml_carries_the_tangent(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_toml_is_written_whole_or_not_at_all(tmp_path):
-    target = tmp_path / "pivots.toml"
-    target.write_text("old")
-    with pytest.raises(ValueError, match="at least one"):
-        write_pivots(target, [], "a")
-    assert target.read_text() == "old"
-    assert "includes_housing = true" in pivots_text([curve()], "a")
-
-
-def test_loop_area_of_friction():
-    # a linear pivot with friction mu: between the branches lies 2 s mu F, integrated over F
-    s, mu = 1e-9, 0.02
-    load = np.linspace(500.0, 5000.0, 181)
-    up, down = s * load * (1 - mu), s * load * (1 + mu)
-    loop = measure_loop(
-        np.r_[load, load[::-1]],
-        np.r_[up, down[::-1]],
-        np.diag(np.full(362, 1e-9) ** 2),
-        np.r_[np.ones(181, dtype=int), -np.ones(181, dtype=int)],
-    )
-    area = s * mu * (5000.0**2 - 500.0**2)
-    assert loop.energy == pytest.approx(area, rel=1e-4)
-    assert loop.loss_factor == pytest.approx(area / (np.pi / 4 * 4500.0 * (up[-1] - up[0])), rel=1e-3)
-    assert loop.load_range == (500.0, 5000.0)
-    assert 0 < loop.energy_se < 0.05 * loop.energy
-    assert measure_loop(load, up, np.eye(181) * 1e-18, np.ones(181, dtype=int)) is None
-
-
 def test_a_drift_from_up_to_down_is_an_error_of_the_whole_loop():
     load = np.linspace(500.0, 5000.0, 10)
     both, branch = np.r_[load, load[::-1]], np.r_[np.ones(10, dtype=int), -np.ones(10, dtype=int)]
@@ -243,14 +155,3 @@ def test_steps_show_what_the_law_says_with_its_way_into_contact():
     # tight among the points, wider beyond them
     assert width[2] < 0.05e-6
     assert width[3] > 2 * width[2]
-
-
-def test_one_row_per_pad_says_what_the_curve_holds():
-    frame = pads_table(
-        [curve(), curve(pad=2, onset_load=1800.0, onset_load_se=60.0, status=(Condition("contact-incomplete", "x"),))]
-    )
-    assert frame["includes_housing"].all()
-    assert frame["onset_N"].tolist() == [0.0, 1800.0]
-    assert frame["status"].tolist() == ["ok", "contact-incomplete: x"]
-    assert frame["load_off_pad_deg"].iloc[0] == pytest.approx(np.degrees(0.02))
-    assert np.isnan(frame["loop_energy_J"]).all()

@@ -38,12 +38,6 @@ def test_holds_without_noise_have_their_exact_level_branch_and_length():
         assert 0.8 < hold.duration < 1.02
 
 
-@pytest.mark.parametrize(("levels", "branch"), [((2000.0, 3000.0, 4000.0), 1), ((4000.0, 3000.0, 2000.0), -1)])
-def test_a_record_that_starts_on_a_hold_goes_on_the_way_of_the_programme(levels, branch):
-    holds = find_holds(*staircase(levels, start=levels[0]))
-    assert [hold.branch for hold in holds] == [branch] * 3
-
-
 def test_time_and_load_may_be_counted_from_anywhere_and_in_any_unit():
     time, load = staircase((1000.0, 2500.0, 4000.0))
     load = load + 2.0 * np.random.default_rng(1).standard_normal(len(load))
@@ -54,23 +48,6 @@ def test_time_and_load_may_be_counted_from_anywhere_and_in_any_unit():
         assert (b.start - 32.0, b.stop - 32.0) == pytest.approx((a.start, a.stop), abs=1e-9)
         assert b.level == pytest.approx(1024.0 * a.level)
         assert b.branch == a.branch
-
-
-def test_a_hold_must_last():
-    """Ten hundredths of a second are too short to average; half a second is not."""
-    assert [h.level for h in find_holds(*staircase((1000.0, 2000.0, 3000.0), hold=0.5))] == [1000.0, 2000.0, 3000.0]
-    assert find_holds(*staircase((1000.0, 2000.0, 3000.0), hold=0.1)) == ()
-    time, load = staircase((1000.0,))
-    assert find_holds(time[:100], load[:100]) == ()
-
-
-def test_noise_does_not_split_a_hold_nor_move_its_level():
-    time, load = staircase((1000.0, 2000.0, 3000.0), hold=3.0)
-    for seed in range(5):
-        noisy = load + 20.0 * np.random.default_rng(seed).standard_normal(len(load))
-        holds = find_holds(time, noisy)
-        assert [h.level for h in holds] == pytest.approx((1000.0, 2000.0, 3000.0), abs=6.0)
-        assert all(h.duration > 2.7 for h in holds)
 
 
 def shape(name, *values):

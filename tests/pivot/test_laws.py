@@ -82,12 +82,3 @@ def test_point_contact_tangent_is_one_and_a_half_secants():
     none = np.zeros(0)
     secant = LOADS / law.phi(LOADS, none)[0]
     assert 1.0 / law.psi(LOADS, none)[0] == pytest.approx(1.5 * secant, rel=1e-12)
-
-
-def test_a_spline_can_be_a_power_law():
-    law, power = LAWS["spline"], LAWS["power"]
-    from tpjb_ident.pivot.laws import FIXED, NODES
-
-    q = np.delete(-0.3 * NODES, FIXED)
-    assert law.psi(LOADS, q)[0] == pytest.approx(power.psi(LOADS, np.array([0.7]))[0], rel=1e-9)
-    assert law.phi(LOADS, q)[0] == pytest.approx(power.phi(LOADS, np.array([0.7]))[0], rel=2e-4)

@@ -9,12 +9,10 @@ import pytest
 
 from tpjb_ident.pivot.dry_record import measure_pickup
 from tpjb_ident.pivot.law_fit import (
-    ALIKE,
     FitData,
     ShapePrior,
     fit_law,
     posterior_weights,
-    shared_priors,
     with_shared_shape,
 )
 from tpjb_ident.pivot.laws import LAWS
@@ -35,19 +33,6 @@ def data(lam, low=250.0, seed=0, noise=1.5e-8):
 
 def fits(one):
     return [fit_law(LAWS[name], False, one) for name in NAMES]
-
-
-def test_the_prior_is_what_the_other_pads_say():
-    pads = [data(lam, seed=k) for k, lam in enumerate((0.10, 0.12, 0.14, 0.9))]
-    found = [fits(one) for one in pads]
-    prior = shared_priors(found, posterior_weights(found), pad=3)["point-in-series"]
-    own = LAWS["point-in-series"].prior_precision[0, 0] ** -0.5
-    assert prior.mean[0] == pytest.approx(0.12, abs=0.06)
-    assert prior.precision[0, 0] ** -0.5 == pytest.approx(ALIKE * own, rel=0.3)
-    # the pad's own fit takes no part in its prior
-    other = shared_priors([*found[:3], fits(data(0.3, seed=9))], posterior_weights(found), pad=3)["point-in-series"]
-    assert other.mean == pytest.approx(prior.mean, abs=0.02)
-    assert "hertz-point" not in shared_priors(found, posterior_weights(found), pad=0)
 
 
 def test_a_pad_that_shows_half_its_law_takes_the_shape_from_the_others():
@@ -98,14 +83,6 @@ def run(seed, frequency=50.0, size=4e-8, mistake=None, noise=3.5e-8):
     if mistake == "reversed":
         values["H"] = -values["H"]
     return measure_pickup(values, np.ones(len(t), dtype=bool), RATE)
-
-
-@pytest.mark.parametrize("frequency", [50.0, 60.0])
-def test_size_and_phase_of_the_mains(frequency):
-    found = run(1, frequency)
-    assert np.abs(found.size) == pytest.approx(4e-8, rel=0.1)
-    apart = np.angle(found.size[1] / found.size[0])
-    assert apart == pytest.approx(PHASES["B"] - PHASES["A"], abs=0.1)
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tpjb_ident.pivot.blocks import MOST_BLOCKS, Samples, cut_blocks
-from tpjb_ident.pivot.fit_data import sticking
 from tpjb_ident.pivot.steps import find_holds
 from tpjb_ident.slow_records.bad_samples import good_samples
 
@@ -56,20 +54,6 @@ def test_every_hold_is_found_and_nothing_else(name):
         assert hold.level == pytest.approx(level, rel=0.01, abs=8.0)
 
 
-def test_branches_of_a_cycle():
-    time, load, truth = programme(**CASES["cycle"])
-    holds = find_holds(time, load)
-    assert [h.branch for h in holds] == [1] * 10 + [-1] * 9
-    assert len(truth) == 19
-
-
-def test_an_overshoot_is_cut_off_the_front():
-    time, load, _ = programme(**CASES["overshoot"])
-    for hold in find_holds(time, load):
-        inside = (time >= hold.start) & (time < hold.stop)
-        assert np.ptp(load[inside]) < 0.02 * 500.0
-
-
 def test_a_continuous_ramp_has_no_holds():
     time = np.arange(6000) / RATE
     load = 250.0 + 400.0 * time + np.random.default_rng(1).normal(0.0, 2.6, len(time))
@@ -108,49 +92,3 @@ def test_missing_values_are_left_out():
     good = good_samples(values)
     assert not good[100:110].any()
     assert good[130:].all()
-
-
-def make_samples(time, load):
-    vector = np.column_stack([np.zeros_like(load), -load])
-    return Samples(time, vector, 1e-9 * vector, -np.pi / 2)
-
-
-def test_blocks_average_holds_and_ramps():
-    time, load, truth = programme(**CASES["up"])
-    holds = find_holds(time, load)
-    blocks = cut_blocks(make_samples(time, load), holds, 0.1)
-    for k, (_, _, level) in enumerate(truth):
-        assert blocks.load[blocks.hold == k] == pytest.approx(level, rel=1e-3)
-        assert (blocks.rate[blocks.hold == k] == 0.0).all()
-    moving = blocks.hold < 0
-    assert np.median(blocks.rate[moving]) == pytest.approx(500.0 / 0.3, rel=0.1)
-    assert np.all(np.diff(blocks.time) > 0)
-
-
-def test_blocks_of_a_long_record_stay_few():
-    time = np.arange(150_000) / RATE
-    load = 10.0 * time + 100.0
-    blocks = cut_blocks(make_samples(time, load), (), 0.1)
-    assert len(blocks) <= 2 * MOST_BLOCKS
-    assert blocks.load == pytest.approx(10.0 * blocks.time + 100.0, rel=1e-9)
-
-
-def test_a_block_that_lost_its_samples_is_dropped():
-    time = np.arange(5000) / RATE
-    load = 500.0 + 0.0 * time
-    keep = (time < 2.0) | (time > 2.45)
-    blocks = cut_blocks(make_samples(time[keep], load[keep]), (), 0.2)
-    assert not np.any((blocks.time > 2.1) & (blocks.time < 2.35))
-
-
-def test_a_ramp_with_noise_does_not_turn_but_a_reversal_does():
-    time = np.arange(6000) / RATE
-    load = 250.0 + 800.0 * np.minimum(time, 12.0 - time) + np.random.default_rng(1).normal(0.0, 30.0, len(time))
-    blocks = cut_blocks(make_samples(time, load), (), 0.1)
-    turned = np.flatnonzero(np.diff(blocks.branch))
-    assert len(turned) == 1
-    assert blocks.time[turned[0]] == pytest.approx(6.0, abs=0.3)
-    assert (blocks.branch[:20] == 1).all()
-    stuck = sticking(blocks.load, blocks.branch)
-    assert stuck.any()
-    assert np.all(np.abs(blocks.time[stuck] - 6.3) < 0.5)

@@ -102,6 +102,7 @@ def test_a_coverage_that_is_none_is_refused(level):
 
 def test_loads_are_found_far_beyond_the_points_and_none_is_negative():
     one = curve()
+    assert one.deflection(INSIDE.reshape(3, 1)).shape == (3, 1)
     np.testing.assert_allclose(one.load([0.0, 1e-6, 2e-5, 1e-3]), [0.0, 250.0, 5000.0, 250_000.0], rtol=1e-6)
     assert one.load(SCALE * INSIDE.reshape(1, 3)).shape == (1, 3)
     with pytest.raises(ValueError, match="deflection must be zero or positive"):
@@ -117,6 +118,8 @@ def test_a_curve_says_its_contact_loop_and_status():
     assert "holds from 400 to 5000 N; load +1.15 deg (se 0.06 deg) from the pad" in text
     assert "fully in contact from 812 N (se 31 N)" in text
     assert "loop from 500 to 4500 N: 0.0123 J (se 0.001), loss factor 0.0456 (se 0.002)" in text
+    assert "status: bad-steps: 1 left out" in str(curve(status=(Condition("bad-steps", "1 left out"),)))
+    assert str(curve()).startswith("pad 1 at -90 deg: linear (100 %)")
     assert "contact" not in str(curve())
     assert "status" not in str(curve())
     assert len(curve().steps) == 10
@@ -152,7 +155,12 @@ def test_the_printed_formula_stands_beside_what_was_measured():
     assert not [name for name in pivot_table([one]).columns if name.startswith("formula")]
 
 
-def test_tables_of_nothing_are_refused():
+def test_tables_of_nothing_are_refused(tmp_path):
+    target = tmp_path / "pivots.toml"
+    target.write_text("old")
+    with pytest.raises(ValueError, match="at least one"):
+        write_pivots(target, [], "a")
+    assert target.read_text() == "old"
     with pytest.raises(ValueError, match="at least one PivotCurve"):
         pivot_table([])
     for loads in ([0.0], [-1.0], [math.nan], [100.0, 0.0]):
@@ -173,6 +181,10 @@ def test_one_row_tells_all_of_a_pad():
     assert row.load_off_pad_deg_se == pytest.approx(math.degrees(0.001))
     assert row.displacement_off_pad_deg == pytest.approx(math.degrees(0.1))
     assert row.displacement_off_pad_deg_se == pytest.approx(math.degrees(0.01))
+    plain = pads_table([curve(onset_load=1800.0)]).iloc[0]
+    assert (plain.onset_N, plain.status, bool(plain.includes_housing)) == (1800.0, "ok", True)
+    assert math.isnan(plain.loop_energy_J)
+    assert plain.load_off_pad_deg == pytest.approx(math.degrees(0.02))
     assert (row.runs, row.status, row.relative_calibration) == ("p-1, p-2", "misfit: a; samples-lost", 0.004)
 
 
