@@ -16,7 +16,7 @@ from tpjb_ident.pivot.law_fit import (
     ShapePrior,
     fit_law,
 )
-from tpjb_ident.pivot.laws import BEND_SPREAD, FIXED, LAWS, NODES, SLOPE_SPREAD, TYPICAL_SLOPE, SplineLaw
+from tpjb_ident.pivot.laws import BEND_SPREAD, FIXED, LAWS, NODES, SLOPE_SPREAD, TYPICAL_SLOPE
 
 LOAD = np.linspace(250.0, 5000.0, 24)
 REFERENCE = 2000.0
@@ -257,7 +257,7 @@ def test_a_prior_from_elsewhere_pulls_by_its_share():
 
 def prior_distance(logs):
     """Squared distance of a curve of ln(compliance) from the spline's prior mean."""
-    law = SplineLaw()
+    law = LAWS["spline"]
     apart = np.delete(logs, FIXED) - law.prior_mean
     return float(apart @ law.prior_precision @ apart)
 
@@ -272,18 +272,18 @@ def test_the_prior_of_a_spline_is_a_slope_and_its_bends():
             hinge = np.maximum(NODES - NODES[node], 0.0) if node > FIXED else np.minimum(NODES - NODES[node], 0.0)
             assert prior_distance(TYPICAL_SLOPE * NODES + 0.3 * hinge) == pytest.approx((0.3 / BEND_SPREAD) ** 2)
     assert NODES[FIXED] == 0.0
-    assert len(SplineLaw().parameters) == len(SplineLaw().prior_mean) == len(NODES) - 1
-    assert SplineLaw().parameters[0] == "ln psi(0.08)"
+    assert len(LAWS["spline"].parameters) == len(LAWS["spline"].prior_mean) == len(NODES) - 1
+    assert LAWS["spline"].parameters[0] == "ln psi(0.08)"
 
 
 def test_between_and_beyond_its_nodes_a_spline_is_a_power():
     q = np.delete(np.array([0.5, 0.4, 0.3, 0.1, 0.0, -0.1, -0.3, -0.4]), FIXED)
     every = np.insert(q, FIXED, 0.0)
-    at_nodes = SplineLaw().psi(np.exp(NODES), q)[0]
+    at_nodes = LAWS["spline"].psi(np.exp(NODES), q)[0]
     np.testing.assert_allclose(np.log(at_nodes), every, atol=1e-12)
-    middle = SplineLaw().psi(np.exp(0.5 * (NODES[1:] + NODES[:-1])), q)[0]
+    middle = LAWS["spline"].psi(np.exp(0.5 * (NODES[1:] + NODES[:-1])), q)[0]
     np.testing.assert_allclose(np.log(middle), 0.5 * (every[1:] + every[:-1]), atol=1e-12)
-    beyond = np.log(SplineLaw().psi(np.exp(np.array([NODES[-1] + 0.7, NODES[0] - 0.7])), q)[0])
+    beyond = np.log(LAWS["spline"].psi(np.exp(np.array([NODES[-1] + 0.7, NODES[0] - 0.7])), q)[0])
     ends = np.diff(every)[[-1, 0]] / np.diff(NODES)[[-1, 0]]
     np.testing.assert_allclose(beyond, every[[-1, 0]] + 0.7 * np.array([1, -1]) * ends, atol=1e-12)
 
@@ -291,7 +291,7 @@ def test_between_and_beyond_its_nodes_a_spline_is_a_power():
 @pytest.mark.parametrize("slope", [-0.4, -0.15, 0.2])
 def test_a_splines_deflection_is_the_integral_of_its_compliance(slope):
     q = np.delete(slope * NODES + 0.1 * np.sin(3 * NODES) - 0.1 * math.sin(0.0), FIXED)
-    law = SplineLaw()
+    law = LAWS["spline"]
     for u in (0.01, 0.3, 1.0, 3.7):
         x = math.log(u) + np.linspace(-20.0, 0.0, 4001)
         integral = integrate.simpson(np.exp(x) * law.psi(np.exp(x), q)[0], x=x)

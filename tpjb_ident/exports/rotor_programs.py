@@ -6,6 +6,7 @@ per excitation frequency; which one belongs into a model depends on what is comp
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -149,16 +150,6 @@ def _ansys(table: SpeedTable, source: str) -> list[str]:
     return lines
 
 
-def write_xltrc(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write xltrc_*.txt, one per load and excitation frequency."""
-    _write_by_speed("xltrc", _xltrc, folder, points, source)
-
-
-def write_dyrobes(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write dyrobes_*.txt, one per load and excitation frequency."""
-    _write_by_speed("dyrobes", _dyrobes, folder, points, source)
-
-
-def write_ansys(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write ansys_*.txt, one per load and excitation frequency."""
-    _write_by_speed("ansys", _ansys, folder, points, source)
+write_xltrc = functools.partial(_write_by_speed, "xltrc", _xltrc)
+write_dyrobes = functools.partial(_write_by_speed, "dyrobes", _dyrobes)
+write_ansys = functools.partial(_write_by_speed, "ansys", _ansys)

@@ -18,6 +18,7 @@ from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps, measure_loop
 from tpjb_ident.pivot.dry_record import (
     DryRecord,
+    axial_channels,
     displacement_direction,
     noise_about_curve,
     noise_within_holds,
@@ -158,7 +159,7 @@ def assemble_curve(
         load_direction=first.load_direction,
         displacement_direction=first.displacement_direction,
         hysteresis=_loop(steps, law),
-        relative_calibration=_calibration(first.run.channels, first.angle),
+        relative_calibration=_calibration(axial_channels(first.run), first.angle),
         runs=tuple(record.run.id for record in records),
     )
     return replace(curve, status=tuple(_status(curve, records, settings, structure)))
@@ -222,12 +223,9 @@ def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:
 
 def _calibration(channels: Mapping[str, Channel], angle: float) -> float:
     """Relative standard uncertainty of the stiffness from the certificates of probes and cells."""
-    total = 0.0
-    for quantity in ("displacement", "force"):
-        members = [c for c in channels.values() if c.quantity == quantity and c.axis is not None]
-        # two channels at right angles share a direction as the squares of their cosines
-        total += sum((math.cos((c.axis or 0.0) - angle) ** 2 * (c.uncertainty or 0.0)) ** 2 for c in members)
-    return math.sqrt(total)
+    # two channels at right angles share a direction as the squares of their cosines
+    shares = [math.cos((c.axis or 0.0) - angle) ** 2 * (c.uncertainty or 0.0) for c in channels.values()]
+    return math.sqrt(sum(share**2 for share in shares))
 
 
 def _status(

@@ -12,7 +12,7 @@ hertz-line       1 - kappa ln u                      line contact (rocker): the 
 hertz-point      u^(-1/3)                            point contact (sphere)
 power            u^(p-1)                             contact of any conformity
 linear           1                                   housing, shim, flexure
-point-in-series  (1-lam) u^(-1/3) + lam              sphere on a housing that gives
+point-in-series  (1-lam) u^(-1/3) + lam              sphere on a compliant housing
 bilinear         1 + (r-1)/{1 + exp[(u-b)/(b/10)]}   two contacts one after the other; a play before the
                                                      first is the contact loss that every law may carry
 spline           exp(piecewise linear in ln u)       no physics: only monotone and smooth
@@ -29,6 +29,9 @@ from typing import Protocol
 import numpy as np
 
 from rigdata.arrays import FloatArray
+
+#: Values (n,) and their derivative (n, k) with respect to the shape parameters.
+WithDerivative = tuple[FloatArray, FloatArray]
 
 
 class Law(Protocol):
@@ -54,7 +57,7 @@ class Law(Protocol):
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest shape parameters (k,), (k,) at which the law is monotone."""
 
-    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         """Deflection shape (n,) and its derivative with respect to q (n, k).
 
         Parameters
@@ -65,7 +68,7 @@ class Law(Protocol):
             Parameters of the shape.
         """
 
-    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         """Compliance shape (n,) and its derivative with respect to q (n, k).
 
         Parameters
@@ -109,35 +112,31 @@ def _log(u: FloatArray) -> FloatArray:
     return np.log(np.maximum(u, 1e-9))
 
 
-class Linear(_Shape):
+class _Linear(_Shape):
     """Constant compliance."""
 
     name = "linear"
 
-    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Deflection shape and its derivative; see `Law.phi`."""
+    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         return u, _no_parameters(u)
 
-    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compliance shape and its derivative; see `Law.psi`."""
+    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         return np.ones_like(u), _no_parameters(u)
 
 
-class HertzPoint(_Shape):
+class _HertzPoint(_Shape):
     """Sphere on flat: deflection as W^(2/3) (paper, Eq. 16)."""
 
     name = "hertz-point"
 
-    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Deflection shape and its derivative; see `Law.phi`."""
+    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         return 1.5 * np.cbrt(u) ** 2, _no_parameters(u)
 
-    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compliance shape and its derivative; see `Law.psi`."""
+    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         return 1.0 / np.cbrt(np.maximum(u, 1e-9)), _no_parameters(u)
 
 
-class HertzLine(_Shape):
+class _HertzLine(_Shape):
     """Cylinder in cylinder: deflection as W (A - ln W) (paper, Eq. 17); kappa = 1 / (A - 1 - ln W_r)."""
 
     name = "hertz-line"
@@ -147,19 +146,17 @@ class HertzLine(_Shape):
     low = (0.0,)
     high = (0.45,)
 
-    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Deflection shape and its derivative; see `Law.phi`."""
+    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         fall = u * (1.0 - _log(u))
         return u + q[0] * fall, fall[:, None]
 
-    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compliance shape and its derivative; see `Law.psi`."""
+    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         # at very small or very large loads the logarithm leaves the law's range: the compliance stays positive
         log = np.minimum(_log(u), 0.98 / max(q[0], 1e-12))
         return 1.0 - q[0] * log, -log[:, None]
 
 
-class Power(_Shape):
+class _Power(_Shape):
     """Deflection as W^p."""
 
     name = "power"
@@ -169,19 +166,17 @@ class Power(_Shape):
     low = (0.3,)
     high = (1.3,)
 
-    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Deflection shape and its derivative; see `Law.phi`."""
+    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         p = q[0]
         value = np.maximum(u, 0.0) ** p / p
         return value, (value * (_log(u) - 1.0 / p))[:, None]
 
-    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compliance shape and its derivative; see `Law.psi`."""
+    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         value = np.maximum(u, 1e-9) ** (q[0] - 1.0)
         return value, (value * _log(u))[:, None]
 
 
-class PointInSeries(_Shape):
+class _PointInSeries(_Shape):
     """Sphere on flat with a linear compliance in series: lam is the linear share at the reference load."""
 
     name = "point-in-series"
@@ -191,18 +186,16 @@ class PointInSeries(_Shape):
     low = (0.0,)
     high = (1.0,)
 
-    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Deflection shape and its derivative; see `Law.phi`."""
+    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         point = 1.5 * np.cbrt(u) ** 2
         return (1.0 - q[0]) * point + q[0] * u, (u - point)[:, None]
 
-    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compliance shape and its derivative; see `Law.psi`."""
+    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         point = 1.0 / np.cbrt(np.maximum(u, 1e-9))
         return (1.0 - q[0]) * point + q[0], (1.0 - point)[:, None]
 
 
-class Bilinear(_Shape):
+class _Bilinear(_Shape):
     """Two compliances with a bend between them at u = b; r is the first over the second."""
 
     name = "bilinear"
@@ -213,15 +206,13 @@ class Bilinear(_Shape):
     high = (2.0, 1.0)
     width = 0.1  # of the bend, as a share of b
 
-    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Deflection shape and its derivative; see `Law.phi`."""
+    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         r, b = np.exp(q)
         soft, slope_u, _ = self._bend(u, b)
         # the bent part is b g(u / b) with g homogeneous: d/d(log b) = g b - u g'
         return u + (r - 1.0) * soft, np.column_stack([r * soft, (r - 1.0) * (soft - u * slope_u)])
 
-    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compliance shape and its derivative; see `Law.psi`."""
+    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         r, b = np.exp(q)
         _, step, curve = self._bend(u, b)
         return 1.0 + (r - 1.0) * step, np.column_stack([r * step, -(r - 1.0) * u * curve])
@@ -253,7 +244,7 @@ def _spline_precision() -> FloatArray:
     return np.asarray(rows.T @ rows)
 
 
-class SplineLaw(_Shape):
+class _Spline(_Shape):
     """Monotone smoothing spline; the shape parameters are ln(compliance) at the free nodes.
 
     The logarithm of the compliance is piecewise linear in the logarithm of the load. Whatever its values, the
@@ -274,14 +265,12 @@ class SplineLaw(_Shape):
         """(k, k) what holds the bends down."""
         return self.precision
 
-    def psi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compliance shape and its derivative; see `Law.psi`."""
+    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         weights = _interpolation(np.log(np.maximum(u, 1e-9)))
         value = np.exp(weights @ np.insert(q, FIXED, 0.0))
         return value, np.delete(weights, FIXED, axis=1) * value[:, None]
 
-    def phi(self, u: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Deflection shape and its derivative; see `Law.phi`."""
+    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         logs = np.insert(q, FIXED, 0.0)
         weighted = GRID_LOAD * np.exp(GRID_WEIGHTS @ logs)  # d phi / d ln u on the grid
         columns = np.column_stack([weighted, weighted[:, None] * np.delete(GRID_WEIGHTS, FIXED, axis=1)])
@@ -318,11 +307,17 @@ def _interpolation(x: FloatArray) -> FloatArray:
     return weights
 
 
-GRID, GRID_STEP = np.linspace(
-    np.log(2e-3), np.log(25.0), 320, retstep=True
-)  # ln u on which the compliance is integrated
+# ln u on which the compliance is integrated
+GRID, GRID_STEP = np.linspace(np.log(2e-3), np.log(25.0), 320, retstep=True)
 GRID_LOAD = np.exp(GRID)
 GRID_WEIGHTS = _interpolation(GRID)
-LAWS: dict[str, Law] = {
-    law.name: law for law in (HertzLine(), HertzPoint(), Power(), Linear(), PointInSeries(), Bilinear(), SplineLaw())
-}
+ALL: tuple[Law, ...] = (
+    _HertzLine(),
+    _HertzPoint(),
+    _Power(),
+    _Linear(),
+    _PointInSeries(),
+    _Bilinear(),
+    _Spline(),
+)
+LAWS = {law.name: law for law in ALL}

@@ -42,8 +42,8 @@ class RunStatus:
     @property
     def first(self) -> Problem | None:
         """The gravest finding that has a say in the state."""
-        grave = [f for f in self.findings if _forces_repeat(f)] or list(self.findings)
-        return grave[0].problem if grave else None
+        grave = [finding for finding in self.findings if _forces_repeat(finding)]
+        return (*grave, *self.findings)[0].problem if self.findings else None
 
 
 def judge_states(
@@ -116,6 +116,8 @@ def _test(run: Run) -> tuple[object, ...]:
 
 #: From so many records in a row with one fault on, the sensor is to be repaired before another one is made.
 IN_A_ROW = 2
+#: Kinds of runs with a turning shaft.
+TURNING = ("dynamic", "locus")
 _LISTED = 4
 
 
@@ -148,13 +150,21 @@ def next_steps(
 
 def here(states: Sequence[RunStatus]) -> Run | None:
     """The running test that landed last: what the rig stands at."""
-    landed = [s for s in states if s.landed and s.run.kind in ("dynamic", "locus")]
-    return max(reversed(landed), key=lambda s: s.landed).run if landed else None
+    last: RunStatus | None = None
+    for status in states:
+        turning = status.run.kind in TURNING
+        if status.landed and turning and (last is None or status.landed >= last.landed):
+            last = status
+    return last.run if last else None
 
 
 def _set_up(run: Run) -> tuple[float, float, float]:
     """Load [N], its direction [rad] and speed [rad/s]: what takes time to change at the rig."""
     return run.point.static_load, run.point.static_load_direction, run.point.shaft_speed
+
+
+def _load(point: OperatingPoint) -> str:
+    return f"{point.static_load / 1e3:g} kN at {point.static_load_direction_deg:g} deg"
 
 
 def described(run: Run) -> str:
@@ -164,7 +174,7 @@ def described(run: Run) -> str:
         return f"dry load steps on pad #{run.pad}, {run.branch}"
     if run.kind == "clearance":
         return "clearance sweep"
-    words = [f"{p.static_load / 1e3:g} kN at {p.static_load_direction_deg:g} deg", f"shaft {p.shaft_speed_hz:g} Hz"]
+    words = [_load(p), f"shaft {p.shaft_speed_hz:g} Hz"]
     if p.excitation:
         words.append(f"excited at {p.excitation_hz:g} Hz")
     if run.excitation_direction is not None:
@@ -217,14 +227,17 @@ def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
         if status.state != "repeat" or problem is None:
             continue
         run, why = status.run, f"{located(problem)}. {problem.cure}."
-        if run.kind not in ("dynamic", "locus"):
-            now.append(Step("repeat", f"Repeat {run.id} ({described(run)}): {why}", (run.id,)))
-        elif at is None or _set_up(run) == _set_up(at):
-            now.append(Step("repeat", f"Repeat {run.id} before you change the load: {why}", (run.id,)))
+        same_set_up = at is None or _set_up(run) == _set_up(at)
+        when = f"when you are back at {_load(run.point)}, {run.point.shaft_speed_hz:g} Hz"
+        if run.kind not in TURNING:
+            when = f"({described(run)})"
+        elif same_set_up:
+            when = "before you change the load"
+        step = Step("repeat", f"Repeat {run.id} {when}: {why}", (run.id,))
+        if same_set_up or run.kind not in TURNING:
+            now.append(step)
         else:
-            load = f"{run.point.static_load / 1e3:g} kN at {run.point.static_load_direction_deg:g} deg"
-            speed = f"{run.point.shaft_speed_hz:g} Hz"
-            later.append(Step("repeat", f"Repeat {run.id} when you are back at {load}, {speed}: {why}", (run.id,)))
+            later.append(step)
     return now + later
 
 
@@ -243,24 +256,23 @@ def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: fl
     for point in points:
         if any(s.state in ("to run", "being written", "repeat") and s.run.point == point.point for s in states):
             continue
-        widest, name, records = _widest(point)
+        widest, name, random_alone = _widest(point)
         if not widest > within:
             continue
         place = f"{point.point.static_load / 1e3:g} kN, {point.point.excitation_hz:g} Hz"
         share = f"{name} is known to {100 * widest:.1f} %, {100 * within:g} % is wanted"
-        random_alone, n = records
         random_allowed = within**2 - max(0.0, widest**2 - random_alone**2)
         if random_allowed <= 0.25 * within**2:
             steps.append(Step("more", f"{place}: {share}; calibration sets that, more records do not help."))
             continue
-        more = math.ceil(n * (random_alone**2 / random_allowed - 1.0))
+        more = math.ceil(point.n_records * (random_alone**2 / random_allowed - 1.0))
         many = f"about {more} more record{'s' if more > 1 else ''} like those there would do"
         steps.append(Step("more", f"{place}: {share}; {many}.", point.runs))
     return steps
 
 
-def _widest(point: PointResult) -> tuple[float, str, tuple[float, int]]:
-    """Half interval of the direct coefficient known worst, as a share of their mean; its random part; records."""
+def _widest(point: PointResult) -> tuple[float, str, float]:
+    """Half interval of the direct coefficient known worst, as a share of their mean, and its random part."""
     est = point.stiffness
     half = est.half_width()
     random = est.half_width(systematic=False)
@@ -270,8 +282,7 @@ def _widest(point: PointResult) -> tuple[float, str, tuple[float, int]]:
         share = float(half[i] / mean)
         if math.isfinite(share):
             shares.append((share, name, float(random[i] / mean)))
-    widest, name, random_share = max(shares, default=(math.nan, "", math.nan))
-    return widest, name, (random_share, point.n_records)
+    return max(shares, default=(math.nan, "", math.nan))
 
 
 def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
@@ -281,7 +292,7 @@ def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
         return [] if unfinished else [Step("next", "Every run of the plan has landed.")]
     same = []
     if at is not None:
-        same = [run for run in waiting if run.kind in ("dynamic", "locus") and _set_up(run) == _set_up(at)]
+        same = [run for run in waiting if run.kind in TURNING and _set_up(run) == _set_up(at)]
     run = (same or waiting)[0]
     more = f"{len(same) - 1} more at this load" if len(same) > 1 else f"{len(waiting) - 1} more in the plan"
     change = "" if same or at is None else " (new set-up)"
