@@ -33,7 +33,7 @@ from tpjb_ident.pivot.fit_data import (
 )
 from tpjb_ident.pivot.law_fit import LawFit
 from tpjb_ident.pivot.laws import LAWS
-from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement
+from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, structure_behind
 from tpjb_ident.pivot.steps import Hold
 from tpjb_ident.slow_records.bad_samples import refuse_flat_channels
 from tpjb_ident.slow_records.noise import NoiseModel
@@ -507,3 +507,38 @@ def test_a_hold_that_slipped_takes_the_ramps_beside_it_along():
     off = 8e-7 * (hold == 4)
     found = np.flatnonzero(bad_blocks(noisy(made, 6, off), NOISE, PivotSettings()))
     np.testing.assert_array_equal(found, np.arange(4 * 8, 5 * 8 + 2))
+
+
+LIMIT = math.radians(30.0)
+
+
+def behind(compliance, pivot=2e-9, mirror=None):
+    """Slopes along the pads and directions of the displacements behind a 2 x 2 compliance."""
+    slopes, moved = [], []
+    for angle in ANGLES:
+        normal = np.array([math.cos(angle), math.sin(angle)])
+        shift = compliance @ normal + pivot * normal
+        shift = shift if mirror is None else mirror @ shift
+        along, across = shift @ normal, shift @ [-normal[1], normal[0]]
+        slopes.append(along)
+        moved.append(PadDirection(math.atan2(across, along), 1e-3))
+    return slopes, moved
+
+
+@pytest.mark.parametrize("direction", [-70.0, 0.0, 20.0, 90.0])
+def test_a_spring_of_one_direction_is_found_with_its_size(direction):
+    axis = np.array([math.cos(math.radians(direction)), math.sin(math.radians(direction))])
+    found = structure_behind(ANGLES, *behind(4e-9 * np.outer(axis, axis)), LIMIT)
+    assert found is not None
+    assert found.compliance == pytest.approx(4e-9)
+    assert math.cos(2 * (found.direction - math.radians(direction))) == pytest.approx(1.0)
+
+
+def test_exchanged_probes_are_no_structure():
+    swapped = np.array([[0.0, 1.0], [1.0, 0.0]])
+    assert structure_behind(ANGLES, *behind(np.zeros((2, 2)), mirror=swapped), LIMIT) is None
+
+
+def test_three_pads_are_too_few():
+    slopes, moved = behind(4e-9 * np.diag([1.0, 0.0]))
+    assert structure_behind(ANGLES[:3], slopes[:3], moved[:3], LIMIT) is None

@@ -11,7 +11,6 @@ from scipy.interpolate import PchipInterpolator
 from tests.pivot.test_tables import curve as stated_curve
 from tpjb_ident.pivot import pivot_table, write_pivots
 from tpjb_ident.pivot.curve import measure_loop
-from tpjb_ident.pivot.fit import contact_onset, contact_onset_se
 from tpjb_ident.pivot.law_fit import FitData, fit_law, keep_likely, posterior_weights
 from tpjb_ident.pivot.laws import LAWS
 
@@ -38,35 +37,12 @@ def curve(**changes):
     return stated_curve(**{"fits": (fit(),), "valid_from": 250.0, **changes})
 
 
-def test_the_fit_finds_the_law_behind_noisy_points():
-    found = fit(seed=3)
-    tangent = 7e-11 * (17.95 - np.log(LOADS))
-    error = np.log(found.compliance(LOADS) / tangent)
-    gradient = found.log_compliance_gradient(LOADS)
-    se = np.sqrt(np.einsum("ij,jk,ik->i", gradient, found.covariance, gradient))
-    assert np.all(np.abs(error[1:]) < 4 * se[1:])
-    assert np.abs(error[2:5]).max() < 0.02
-    assert found.theta[0] == pytest.approx(3e-5, abs=1e-7)
-
-
 def test_standard_errors_are_those_of_repeated_fits():
     fits = [fit(seed=s) for s in range(60)]
     scatter = np.std([np.log(f.compliance(LOADS[2:5])) for f in fits], axis=0)
     gradient = fits[0].log_compliance_gradient(LOADS[2:5])
     stated = np.sqrt(np.einsum("ij,jk,ik->i", gradient, fits[0].covariance, gradient))
     assert stated == pytest.approx(scatter, rel=0.4)
-
-
-def test_contact_loss_is_told_from_the_pivot():
-    found = fit(contact=True, gap=3e-6, seed=1)
-    assert found.theta[-2] == pytest.approx(3e-6, rel=0.1)
-    assert np.exp(found.theta[-1]) == pytest.approx(500.0, rel=0.06)
-    load = np.linspace(100.0, 6000.0, 60_000)
-    missing = 3e-6 / 500.0 * np.exp(-load / 500.0)
-    true = load[missing > 0.05 * 7e-11 * (17.95 - np.log(load))].max()
-    assert contact_onset(found, 0.05) == pytest.approx(true, rel=0.1)
-    assert 0.0 < contact_onset_se(found, 0.05) < 0.2 * true
-    assert contact_onset(fit(), 0.05) == 0.0
 
 
 def test_evidence_prefers_the_true_law_and_sees_contact_loss():

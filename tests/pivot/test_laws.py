@@ -75,10 +75,3 @@ def test_line_contact_is_the_printed_rocker_formula():
     assert ours == pytest.approx(printed, rel=1e-12)
     tangent = front / 2.0 / (logarithm - 1.0 / 3.0)
     assert 1.0 / (scale * law.psi(load / reference, np.array([kappa]))[0]) == pytest.approx(tangent, rel=1e-12)
-
-
-def test_point_contact_tangent_is_one_and_a_half_secants():
-    law = LAWS["hertz-point"]
-    none = np.zeros(0)
-    secant = LOADS / law.phi(LOADS, none)[0]
-    assert 1.0 / law.psi(LOADS, none)[0] == pytest.approx(1.5 * secant, rel=1e-12)

@@ -198,7 +198,7 @@ def _smooth_side(load: FloatArray, place: FloatArray) -> FloatArray:
 
 def _consistent(contact: ContactIntervals, place: FloatArray) -> BoolArray:
     """False for averages that do not lie on their side: the shaft was on its way, or a glitch was left."""
-    keep = np.ones(len(contact.time), dtype=bool)
+    consistent = np.ones(len(contact.time), dtype=bool)
     for k in np.unique(contact.pad):
         members = np.flatnonzero(contact.pad == k)
         design = _smooth_side(np.maximum(contact.load[members], 0.0) / contact.push, place[members])
@@ -215,8 +215,8 @@ def _consistent(contact: ContactIntervals, place: FloatArray) -> BoolArray:
             if np.array_equal(updated, good):
                 break
             good = updated
-        keep[members] = good
-    return keep
+        consistent[members] = good
+    return consistent
 
 
 def _noise(contact: ContactIntervals, place: FloatArray) -> NoiseModel:

@@ -93,12 +93,12 @@ def _carried(load: FloatArray, angles: FloatArray, touched: BoolArray) -> FloatA
     carried[single, pad] = np.sum(load[single] * n[pad], axis=1)
     for i in range(len(angles)):
         j = (i + 1) % len(angles)
-        both = np.flatnonzero((count == 2) & touched[:, i] & touched[:, j])
-        share = np.linalg.solve(n[[i, j]].T, load[both].T)
+        pair = np.flatnonzero((count == 2) & touched[:, i] & touched[:, j])
+        share = np.linalg.solve(n[[i, j]].T, load[pair].T)
         # past a pad's own direction its neighbour would have to pull: the pad carries all, friction holds the shaft
         alone_i, alone_j = share[1] < 0.0, share[0] < 0.0
-        carried[both, i] = np.where(alone_i, load[both] @ n[i], np.maximum(share[0], 0.0))
-        carried[both, j] = np.where(alone_j, load[both] @ n[j], np.maximum(share[1], 0.0))
+        carried[pair, i] = np.where(alone_i, load[pair] @ n[i], np.maximum(share[0], 0.0))
+        carried[pair, j] = np.where(alone_j, load[pair] @ n[j], np.maximum(share[1], 0.0))
     return carried
 
 

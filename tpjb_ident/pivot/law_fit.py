@@ -293,7 +293,7 @@ def _pad_weights(candidates: Sequence[LawFit], law_prior: Mapping[str, float]) -
 
 
 def keep_likely(fits: Sequence[LawFit], weights: FloatArray) -> tuple[tuple[LawFit, ...], FloatArray]:
-    """The fits that count, most likely first, with shares that sum to one."""
+    """The fits that count, most likely first, with shares (n,) that sum to one."""
     order = [k for k in np.argsort(-weights, kind="stable") if weights[k] >= SMALLEST_WEIGHT]
     shares = weights[order]
     return tuple(fits[k] for k in order), np.asarray(shares / shares.sum())

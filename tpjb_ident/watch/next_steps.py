@@ -138,7 +138,7 @@ def next_steps(
 ) -> list[Step]:
     """Everything to do, most urgent first."""
     stop, stopped = _stop(states)
-    at = here(states)
+    at = _current_run(states)
     return [
         *stop,
         *_repeats([s for s in states if s.run.id not in stopped], at),
@@ -148,7 +148,7 @@ def next_steps(
     ]
 
 
-def here(states: Sequence[RunStatus]) -> Run | None:
+def _current_run(states: Sequence[RunStatus]) -> Run | None:
     """The running test that landed last: what the rig stands at."""
     last: RunStatus | None = None
     for status in states:
