@@ -13,7 +13,10 @@ MOST_STEPS = 200
 
 
 def monotone_cubics(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Cubics through points that rise or fall where the points do, with a continuous tangent."""
+    """Cubics through points that rise or fall where the points do, with a continuous tangent.
+
+    `x` (n,), `y` (n, m); gives (4, n - 1, m).
+    """
     h = np.diff(x).reshape(-1, *([1] * (y.ndim - 1)))
     rise = np.diff(y, axis=0) / h
     slope = np.empty_like(y, dtype=float)
@@ -39,7 +42,7 @@ def _end(h0: FloatArray, h1: FloatArray, rise0: FloatArray, rise1: FloatArray) -
 
 
 def evaluated(x: FloatArray, coefficients: FloatArray, at: FloatArray) -> FloatArray:
-    """Values of `monotone_cubics`."""
+    """Values of `monotone_cubics`: `x` (n,), `coefficients` (4, n - 1, m), `at` (k,); gives (k, m)."""
     i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
     s = (at - x[i]).reshape(-1, *([1] * (coefficients.ndim - 2)))
     c = coefficients[:, i]

@@ -171,7 +171,7 @@ def _impedance(setup: Setup, equilibrium: Equilibrium, lines: FloatArray) -> tup
 def solve_as_it_runs(
     setup: Setup, force: FloatArray, speed: float, start: Equilibrium | None = None
 ) -> tuple[Setup, Equilibrium]:
-    """Find the equilibrium with the clearances that belong to its own temperatures."""
+    """Find the equilibrium with the clearances that belong to its own temperatures: `force` (2,) [N]."""
     growth = setup.growth
     if growth is not None and growth.journal is not None:
         given = grown(setup.bearing, growth, setup.inlet_temperature, growth.journal)

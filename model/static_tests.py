@@ -25,12 +25,14 @@ class DryCurve:
     """A dry load-deflection curve as probes and cells read it."""
 
     pad: int
+    #: (n,): Component of the read force on the pad's direction [N].
     load: FloatArray
+    #: (n,): Component of the read displacement on the pad's direction, from zero load [m].
     deflection: FloatArray
 
 
 def dry_curve(setup: Setup, pad: int, load: FloatArray) -> DryCurve:
-    """Predict a dry test on one pad."""
+    """Predict a dry test on one pad: `load` (n,) [N]."""
     law, angle = setup.pivots[pad - 1], setup.bearing.pads[pad - 1].pivot_angle
     normal = np.array([math.cos(angle), math.sin(angle)])
     structure = float(normal @ setup.structure @ normal)
@@ -44,8 +46,11 @@ def dry_curve(setup: Setup, pad: int, load: FloatArray) -> DryCurve:
 class PolygonSides:
     """The clearance polygon as the probes read it: per pad the distance of its side from the bearing centre."""
 
+    #: (n_pads,): At zero push load [m].
     clearance: FloatArray
+    #: (n_pads,): With the pivots and the structure given way under the push load [m].
     pushed: FloatArray
+    #: (n_pads,): Direction of each side's normal [rad].
     angle: FloatArray
 
 
@@ -95,6 +100,6 @@ def _step_share(*points: tuple[float, float, float, FloatArray]) -> float:
 
 
 def locus(setup: Setup, load: float, directions: FloatArray, speed: float) -> FloatArray:
-    """Journal positions over load directions, as read."""
+    """Journal positions over load directions, as read: `directions` (n,) [rad]; gives (n, 2) [m]."""
     points = [(load, float(d), speed, np.array([speed])) for d in directions]
     return np.array([p.position if p.converged else (math.nan, math.nan) for p in sweep(setup, points)])

@@ -45,6 +45,8 @@ def flexing_impedance(
     is the slope of the static locus with pads that bend; for a stiff pad it is the rigid one. A pad's axial tilt
     (`model.pad.bending.AxialTilt`) is one more column of S_ab, and leaves by its own equation of motion about the
     pivot.
+
+    `position` (2,) [m], `omega` (n,) [rad/s].
     """
     work, weights = film.work, force_weights(film.grid)
     conductance = conductances(film.grid, work, film.pad.pad_clearance, *film.approach(position))
@@ -135,6 +137,8 @@ def friction_impedance(own: ComplexArray, drive: FloatArray, stick: float, slip:
     journal, X and Y each excited alone.
 
     T. K. Caughey, ASME J. Appl. Mech. 27 (1960) 640 (harmonic response of the bilinear hysteretic element).
+
+    `drive` (n, 2) [N m].
     """
     if not slip > 0.0:
         return np.zeros_like(own)
@@ -153,8 +157,10 @@ class PadMatrices:
     """Full matrices of one pad in (x, y, theta, eta), Eq. (11) and (12)."""
 
     number: int
+    #: (4, 4): film [N/m, N/rad, N m/rad]; damping the same times s.
     stiffness: FloatArray
     damping: FloatArray
+    #: (2, 2) each: Eq. (12), in (theta, eta); a rigid pivot has infinite k_eta.
     pad_mass: FloatArray
     pad_damping: FloatArray
     pad_stiffness: FloatArray
@@ -211,7 +217,7 @@ def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
 def reduce_pads(
     pads: list[PadMatrices], omega: FloatArray, vibration: float = 0.0, beside: list[ComplexArray] | None = None
 ) -> ComplexArray:
-    """Eq. (10): the bearing's 2 x 2 impedance at every excitation frequency."""
+    """Eq. (10): the bearing's 2 x 2 impedance at every excitation frequency; `omega` (n,) [rad/s]."""
     total = np.zeros((len(omega), 2, 2), dtype=complex)
     for rigid in (False, True):  # a rigid pivot: eta takes no part
         alike = [k for k, pad in enumerate(pads) if math.isinf(pad.pad_stiffness[1, 1]) == rigid]
@@ -320,7 +326,7 @@ def _heat_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: F
 
 
 def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexArray:
-    """What the structure around a bearing makes of its impedance."""
+    """What the structure around a bearing makes of its impedance: `omega` (n,) [rad/s]."""
     if setup.added_mass:
         h = h - (omega**2)[:, None, None] * setup.added_mass * np.eye(2)
     if any(setup.series_compliance):

@@ -43,7 +43,10 @@ from rigdata.arrays import BoolArray, FloatArray
 def jfo_slopes(
     grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, sharp: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Solve for the derivatives by a, b, da/dt, db/dt; then the mass flows."""
+    """Solve for the derivatives by a, b, da/dt, db/dt; then the mass flows.
+
+    `x` (unknowns, 1); gives weight (nt + 1, nz + 1) [m^2], slopes (unknowns, 4).
+    """
     nz = work.pressure.shape[1] - 1
     width = nz - grid.first
     band = np.empty((x.shape[0], 2 * width + 1))

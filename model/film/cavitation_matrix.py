@@ -21,10 +21,15 @@ from rigdata.arrays import BoolArray, FloatArray
 class FaceFlows(NamedTuple):
     """What the faces of the control volumes conduct and carry."""
 
+    #: (nt, nz + 1), (nt + 1, nz): Conductance rho h^3 / (12 mu) times length over distance [kg/s/Pa].
     along: FloatArray
     across: FloatArray
+    #: (nt, nz + 1): What the journal drags through a face along the arc that is full [kg/s].
     couette: FloatArray
+    #: (nt, nz + 1): Film thickness at those faces [m].
     height: FloatArray
+    #: (nz + 1,): What the journal drags over the leading edge at most [kg/s]: a gap that opens there is not
+    #: filled.
     supply: FloatArray
 
 
@@ -49,7 +54,10 @@ def face_flows(
 
 @inner
 def assemble_columns(band: FloatArray, faces: FaceFlows, ruptured: BoolArray, first: int) -> None:
-    """Fill the band: entry (row, column) stands at ``band[row, width + column - row]``."""
+    """Fill the band: entry (row, column) stands at ``band[row, width + column - row]``.
+
+    `band` (n, 2 width + 1), `ruptured` (nt + 1, nz + 1).
+    """
     gx, gz, couette = faces.along, faces.across, faces.couette
     nt, nz = gx.shape[0], gz.shape[1]
     width = nz - first
@@ -79,7 +87,7 @@ def assemble_columns(band: FloatArray, faces: FaceFlows, ruptured: BoolArray, fi
 
 @inner
 def factorise_columns(band: FloatArray) -> None:
-    """L U in place, without pivoting."""
+    """L U in place, without pivoting: `band` (n, 2 width + 1)."""
     n, width = band.shape[0], band.shape[1] // 2
     for k in range(n):
         pivot = 1.0 / band[k, width]
@@ -93,7 +101,7 @@ def factorise_columns(band: FloatArray) -> None:
 
 @inner
 def substitute_columns(band: FloatArray, x: FloatArray) -> None:
-    """Solve for the right-hand sides (n, m) in place."""
+    """Solve for the right-hand sides (n, m) in place: `band` (n, 2 width + 1), `x` (n, m)."""
     n, width, count = band.shape[0], band.shape[1] // 2, x.shape[1]
     for k in range(n):
         for r in range(1, min(width, n - 1 - k) + 1):

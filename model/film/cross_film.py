@@ -32,22 +32,35 @@ GRADING = 0.5
 class CrossFilm(NamedTuple):
     """What one film holds across its thickness; n cells, from the pad to the journal."""
 
+    #: (n + 1,): Of the cells, eta = y / h from 0 at the pad to 1 at the journal.
     edges: FloatArray
+    #: (nt + 1, nz + 1, n), degC
     temperature: FloatArray
+    #: (nt + 1, nz + 1): Of the pad's face [degC].
     face: FloatArray
+    #: (nt + 1, nz + 1, n): 1 / mu, as the pressure was solved with [1/(Pa s)].
     fluidity: FloatArray
+    #: (nt + 1, nz + 1): 1 / f0, the viscosity that shears [Pa s].
     shear: FloatArray
+    #: (nt + 1, nz + 1): e.
     centre: FloatArray
 
 
 class CrossOperator(NamedTuple):
     """The heat balances of one film, factorised; n = (nz + 1) * cells unknowns per station, cells fastest."""
 
+    #: (nt, n, 2 cells + 1): L and U of the balances at the later station, with 1 / U on the diagonal [W/K].
     factor: FloatArray
+    #: (nt, n, 5): What the earlier station adds: by the cell itself, the cells below and above, the lines before
+    #: and after.
     before: FloatArray
+    #: (nt, nz + 1, 2): Exchange with the journal at the earlier and the later station [W/K].
     journal: FloatArray
+    #: (nt, n): Dissipation [W], and what the balances take from it per kelvin, at the present temperature.
     made: FloatArray
+    #: (nz + 1, cells): Heat carried over the trailing edge per kelvin [W/K].
     carried: FloatArray
+    #: (nt, nz + 1, cells): Mass flow of the cells from station to station [kg/s].
     flows: FloatArray
 
     @classmethod
@@ -128,6 +141,8 @@ def cross_pressure_change(
     """Change of the pressure that new temperatures across the film will make.
 
     As `model.film.slopes.pressure_change`.
+
+    Gives (2,) [N].
     """
     shape = work.temperature.shape
     old, new, denser = np.empty(shape), np.empty(shape), np.empty(shape)

@@ -22,6 +22,8 @@ def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray
     """March three temperature fields: of fresh oil at zero with sources, per kelvin of the inlet, and of the journal.
 
     The equation is linear. Three numbers that do not wait for one another cost what one does.
+
+    `fields` (nt + 1, n, 3) [degC], `sources` (nt, n) [W]; gives (3,) [W].
     """
     n, cells = fields.shape[1], operator.carried.shape[1]
     taken = np.zeros(3)
@@ -69,6 +71,8 @@ def march_one(operator: CrossOperator, field: FloatArray, sources: FloatArray) -
     """`march_cross` for one field of fresh oil at zero beside a journal at zero.
 
     With sources in the lowest cells only.
+
+    `field` (nt + 1, n) [K], `sources` (nt, nz + 1) [W].
     """
     n, cells = field.shape[1], operator.carried.shape[1]
     taken = 0.0
@@ -106,7 +110,10 @@ def march_one(operator: CrossOperator, field: FloatArray, sources: FloatArray) -
 def face_temperature(
     work: FilmWork, edges: FloatArray, conductivity: float, field: FloatArray, taken: FloatArray, face: FloatArray
 ) -> None:
-    """Temperature of the pad's face, from the two cells next to it and the heat flux into the pad."""
+    """Temperature of the pad's face, from the two cells next to it and the heat flux into the pad.
+
+    `edges` (cells + 1,), `taken` (nt + 1, nz + 1) [W/m^2], `face` (nt + 1, nz + 1) [degC].
+    """
     cells = len(edges) - 1
     one, two = 0.5 * (edges[0] + edges[1]), 0.5 * (edges[1] + edges[2])
     for i in range(face.shape[0]):
@@ -119,7 +126,10 @@ def face_temperature(
 
 @inner
 def station_heat(grid: FilmGrid, flux: FloatArray) -> FloatArray:
-    """What a heat flux density into the pad takes between two stations."""
+    """What a heat flux density into the pad takes between two stations.
+
+    `flux` (nt + 1, nz + 1) [W/m^2]; gives (nt, nz + 1) [W].
+    """
     return 0.5 * grid.dx * (flux[1:] + flux[:-1]) * grid.height
 
 
@@ -135,6 +145,8 @@ def conduct(
     """Change temperatures so that the pad takes what it conducts at its face's new temperature, not at its old one.
 
     By how much the pad's coarser nodes change is found by GMRES: Y. Saad, SIAM J. Sci. Comput. 14 (1993) 461.
+
+    `missing` (nt + 1, nz + 1) [K].
     """
     flux, to_coarse, guess = pad
     right = np.dot(to_coarse, missing.copy().ravel())

@@ -28,7 +28,7 @@ LEAST_THINNING = 1e-6
 
 @compiled
 def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running, temperature: FloatArray) -> float:
-    """March the film temperature from the leading edge."""
+    """March the film temperature from the leading edge: `temperature` (nt + 1, nz + 1) [degC]."""
     rows, columns = temperature.shape
     fields = temperature.reshape((1, rows, columns))
     loss, sources = np.empty((rows, columns)), np.empty((1, rows, columns))
@@ -47,7 +47,10 @@ def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running,
 def march(
     grid: FilmGrid, work: FilmWork, running: Running, loss: FloatArray, fields: FloatArray, sources: FloatArray
 ) -> float:
-    """March any number of temperature fields that differ in their inlet and sources: the equation is linear."""
+    """March any number of temperature fields that differ in their inlet and sources: the equation is linear.
+
+    `loss` (nt + 1, nz + 1) [W/K], `fields` (m, nt + 1, nz + 1) [degC], `sources` (m, nt + 1, nz + 1) [W].
+    """
     nz, count = work.flow_z.shape[1], fields.shape[0]
     conduct = np.empty(nz)
     for j in range(nz):
@@ -113,7 +116,10 @@ def _march_lines(
 def heat_step(
     grid: FilmGrid, work: FilmWork, running: Running, thermal: tuple[float, float, float], shift: FloatArray
 ) -> tuple[float, float, float, float]:
-    """Temperature for the pressure at hand, and what it will do to that pressure: one call for one film."""
+    """Temperature for the pressure at hand, and what it will do to that pressure: one call for one film.
+
+    `shift` (unknowns,).
+    """
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     new = np.empty((nt + 1, nz + 1))
     limited = solve_energy(grid, work, thermal[0], running, new)

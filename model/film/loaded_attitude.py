@@ -32,9 +32,12 @@ class Branch:
     The rigid approach is Cp - Cb + n . (x, y): what `a` would be on a rigid pivot. It rises along the branch.
     """
 
+    #: (n,): Rigid approach, a and b [m]; below the first rigid approach the pad has no loaded attitude.
     rigid_approach: FloatArray
     approach: FloatArray
+    #: (n,): Rigid approach, a and b [m]; below the first rigid approach the pad has no loaded attitude.
     wedge: FloatArray
+    #: (n,), N
     load: FloatArray
 
     def at(self, rigid_approach: float) -> tuple[float, float]:
@@ -47,8 +50,11 @@ class Branch:
 class LoadedAttitude:
     """Attitudes that tilt freely, and their load, along the wedge."""
 
+    #: (n,): A(B).
     curvature: FloatArray
+    #: (n,): B, rising from 0.
     wedge: FloatArray
+    #: (n,): Radial force over mu U R^2 L / (Cp - a)^2.
     load: FloatArray
 
     def branch(self, clearance: float, scale: float, deflection: Callable[[float], float]) -> Branch:

@@ -10,7 +10,10 @@ from rigdata.arrays import BoolArray, FloatArray
 
 @inner
 def assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArray, first: int) -> None:
-    """Lower band of the matrix: row k holds its diagonal and the entries below it; ruptured nodes stand alone."""
+    """Lower band of the matrix: row k holds its diagonal and the entries below it; ruptured nodes stand alone.
+
+    `band` (n, width + 1), `gx` (nt, nz + 1) [kg/s/Pa], `gz` (nt + 1, nz) [kg/s/Pa], `ruptured` (nt + 1, nz + 1).
+    """
     nt, nz = gx.shape[0], gz.shape[1]
     width = nz - first
     for k in range(band.shape[0]):
@@ -120,7 +123,7 @@ _factorise_4, _substitute_4, _substitute_four_4 = _factoriser(4), _substitution(
 
 @inner
 def factorise(band: FloatArray) -> None:
-    """L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k]."""
+    """L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k]; `band` (n, width + 1)."""
     n, width = band.shape[0], band.shape[1] - 1
     if width == 6 and n > width:
         _factorise_6(band)
@@ -141,7 +144,7 @@ def factorise(band: FloatArray) -> None:
 
 @inner
 def substitute(band: FloatArray, x: FloatArray) -> None:
-    """Solve for one right-hand side in place, with the factor from `factorise`."""
+    """Solve for one right-hand side in place, with the factor from `factorise`: `band` (n, width + 1), `x` (n,)."""
     n, width = band.shape[0], band.shape[1] - 1
     if width == 6 and n > width:
         _substitute_6(band, x)
@@ -161,7 +164,10 @@ def substitute(band: FloatArray, x: FloatArray) -> None:
 
 @inner
 def substitute_four(band: FloatArray, x: FloatArray) -> None:
-    """`substitute` for the four derivatives side by side (n, 4): the inner loop fills a vector register."""
+    """`substitute` for the four derivatives side by side (n, 4): the inner loop fills a vector register.
+
+    `band` (n, width + 1), `x` (n, 4).
+    """
     n, width = band.shape[0], band.shape[1] - 1
     if width == 6 and n > width:
         _substitute_four_6(band, x)
@@ -186,7 +192,10 @@ def substitute_four(band: FloatArray, x: FloatArray) -> None:
 
 @inner
 def add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
-    """Add to the diagonal, mesh shape (nt + 1, nz + 1), before factorising."""
+    """Add to the diagonal, mesh shape (nt + 1, nz + 1), before factorising.
+
+    `band` (n, width + 1), `diagonal` (nt + 1, nz + 1) [kg/s/Pa].
+    """
     nt, nz = diagonal.shape[0] - 1, diagonal.shape[1] - 1
     for i in range(1, nt):
         for j in range(first, nz):
@@ -195,7 +204,7 @@ def add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
 
 @inner
 def substitute_many(band: FloatArray, x: FloatArray) -> None:
-    """`substitute` for any number of right-hand sides, (n, m)."""
+    """`substitute` for any number of right-hand sides, (n, m): `band` (n, width + 1), `x` (n, m)."""
     n, width, columns = band.shape[0], band.shape[1] - 1, x.shape[1]
     for k in range(n):
         for r in range(1, min(width, n - 1 - k) + 1):

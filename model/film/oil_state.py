@@ -31,7 +31,10 @@ def set_viscosity(work: FilmWork, oil: tuple[float, float, float, float]) -> Non
 
 @compiled
 def least_share(grid: FilmGrid, work: FilmWork, da: float, db: float, extra: FloatArray) -> float:
-    """Most negative relative change of the film thickness for a change of (a, b) and of its shape (may be empty)."""
+    """Most negative relative change of the film thickness for a change of (a, b) and of its shape (may be empty).
+
+    `extra` (nt + 1, nz + 1) [m].
+    """
     worst = 0.0
     for i in range(work.thickness.shape[0]):
         change = -(da * grid.cos[i] + db * grid.sin[i])

@@ -116,7 +116,10 @@ def _thickness(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: fl
 
 @compiled
 def conductances(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float) -> tuple[FloatArray, FloatArray]:
-    """Rho h^3 / (12 mu) times face length over distance, at the faces along and across."""
+    """Rho h^3 / (12 mu) times face length over distance, at the faces along and across.
+
+    Gives gx, gz (nt + 1, nz) [kg/s/Pa].
+    """
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     gx = np.empty((nt, nz + 1))
     gz = np.empty((nt + 1, nz))

@@ -16,7 +16,7 @@ from rigdata.arrays import FloatArray
 
 @inner
 def net_inflow(along: FloatArray, across: FloatArray, first: int, inflow: FloatArray) -> None:
-    """What flows into every control volume less what flows out."""
+    """What flows into every control volume less what flows out: `along` (nt, nz + 1, m), `across` (nt + 1, nz, m)."""
     nt, nz = along.shape[0], across.shape[1]
     for i in range(1, nt):
         for j in range(first, nz):
@@ -30,7 +30,7 @@ def net_inflow(along: FloatArray, across: FloatArray, first: int, inflow: FloatA
 
 @inner
 def keep_ruptured(work: FilmWork, first: int, inflow: FloatArray) -> None:
-    """Ruptured nodes keep their pressure: their rows have no right-hand side."""
+    """Ruptured nodes keep their pressure: their rows have no right-hand side; `inflow` (unknowns, m)."""
     nt, nz = work.pressure.shape[0] - 1, work.pressure.shape[1] - 1
     for i in range(1, nt):
         for j in range(first, nz):
@@ -49,6 +49,9 @@ def rupture_line(
     A dry node is reached by the share `wet` of the flow that would wet it; the pressure rises as the square of
     the distance from the rupture line, so that the line lies (0.5 + wet) steps from the last wet node. A linear
     profile that vanishes there has (wet - 0.5) / (wet + 0.5) of the wet node's value at the dry node.
+
+    `gx` (nt, nz + 1) [kg/s/Pa], `gz` (nt + 1, nz) [kg/s/Pa], `source` (nt + 1, nz + 1) [kg/s]; gives diagonal (nt + 1,
+    nz + 1) [kg/s/Pa], area (nt + 1, nz + 1) [m^2].
     """
     nt, nz = gx.shape[0], gz.shape[1]
     p, ruptured = work.pressure, work.ruptured
@@ -115,7 +118,10 @@ def derivatives(
 def shape_slopes(
     grid: FilmGrid, work: FilmWork, conductance: tuple[FloatArray, FloatArray], shapes: FloatArray
 ) -> FloatArray:
-    """Derivatives of the pressure by the amplitudes of shapes that are added to the film thickness."""
+    """Derivatives of the pressure by the amplitudes of shapes that are added to the film thickness.
+
+    `shapes` (nt + 1, nz + 1, m) [m]; gives (unknowns, m) [Pa per unit].
+    """
     p, h = work.pressure, work.thickness
     gx, gz = conductance
     nt, nz, count = gx.shape[0], gz.shape[1], shapes.shape[2]
@@ -141,7 +147,10 @@ def shape_slopes(
 
 @compiled
 def squeeze_slopes(grid: FilmGrid, work: FilmWork, shapes: FloatArray) -> FloatArray:
-    """Derivatives of the pressure by the rates of shapes that are added to the film thickness; as `shape_slopes`."""
+    """Derivatives of the pressure by the rates of shapes that are added to the film thickness; as `shape_slopes`.
+
+    Gives (unknowns, m) [Pa s per unit].
+    """
     nt, nz, count = work.flow_x.shape[0], work.flow_z.shape[1], shapes.shape[2]
     rhs = np.empty((work.unknown.shape[0], count))
     for i in range(1, nt):
@@ -159,7 +168,10 @@ def squeeze_slopes(grid: FilmGrid, work: FilmWork, shapes: FloatArray) -> FloatA
 def pressure_change(
     grid: FilmGrid, work: FilmWork, speed: float, oil: tuple[float, float, float, float], change: FloatArray
 ) -> FloatArray:
-    """Change of the pressure that the film's new temperature will make, to first order."""
+    """Change of the pressure that the film's new temperature will make, to first order.
+
+    `change` (unknowns,) [Pa]; gives (2,) [N].
+    """
     return change_by_oil(grid, work, speed, _fluidity(work, oil), change)
 
 
@@ -171,7 +183,7 @@ def change_by_oil(
     fluidity: tuple[FloatArray, FloatArray, FloatArray],
     change: FloatArray,
 ) -> FloatArray:
-    """`pressure_change` for given properties of the oil."""
+    """`pressure_change` for given properties of the oil: `fluidity` (nt + 1, nz + 1); gives (2,) [N]."""
     h = work.thickness
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     old, new, denser = fluidity

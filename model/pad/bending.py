@@ -32,13 +32,21 @@ SHAPES = 12
 class PadDeformation:
     """How a pad's face moves outward under its film; n = (nt + 1)(nz + 1) film nodes, raveled."""
 
+    #: (n, n): Deformation by pressure [m/Pa].
     compliance: FloatArray
+    #: (c, n): Temperatures of the pad's coarser nodes by those of the film.
     to_coarse: FloatArray
+    #: (n, c): Deformation by them [m/K].
     expansion: FloatArray
+    #: (n, c): Heat flux density into the pad by them [W/m^2/K].
     flux: FloatArray
+    #: (nt + 1, nz + 1, m): In which the pad gives way most.
     shapes: FloatArray
+    #: (m, n): Amplitudes of the shapes in a deformation.
     amplitudes: FloatArray
+    #: (m, unknowns): Amplitudes by the pressure at the film's unknown nodes.
     response: FloatArray
+    #: (2, unknowns): Radial and tangential force by that pressure [m^2].
     weights: FloatArray
 
 
@@ -54,7 +62,10 @@ class SolvedFilm(NamedTuple):
 class AxialTilt(NamedTuple):
     """A pad that is free to tilt along the shaft, about the axis across it through its pivot."""
 
+    #: (nt + 1, nz + 1): What a unit of axial tilt adds to h [m/rad].
     shape: FloatArray
+    #: (unknowns,): Moment by the pressure at the film's unknown nodes, less what grows with the pad's load
+    #: [m^3].
     weights: FloatArray
     stiffness: float
     moment: float
@@ -65,10 +76,14 @@ class BendingStep:
     """One pad's part of a Newton step."""
 
     forces: FilmForces
+    #: (nt + 1, nz + 1): Wanted less present deformation, without the shapes [m].
     mismatch: FloatArray
+    #: (m,): Change of the shapes' amplitudes at rest ...
     amplitude: FloatArray
+    #: (m, 2): ... and per (a, b).
     by_approach: FloatArray
     share: float
+    #: (3,): Its change at rest, and per (a, b) [rad, rad/m]; empty if it is not free.
     axial_tilt: FloatArray
 
 
@@ -125,7 +140,10 @@ def _softest_shapes(compliance: FloatArray, area: FloatArray) -> FloatArray:
 def wanted_shapes(
     bodies: list[PadDeformation], pressures: list[FloatArray], rises: list[FloatArray], factor: float
 ) -> list[FloatArray]:
-    """Deformation that every film asks of its pad, Eq. (6)-(8) [m]; pads of one shape are done in one product."""
+    """Deformation that every film asks of its pad, Eq. (6)-(8) [m]; pads of one shape are done in one product.
+
+    `pressures, rises` (nt + 1, nz + 1) [Pa].
+    """
     wanted: list[FloatArray] = [np.empty(0)] * len(bodies)
     for body in {id(b): b for b in bodies}.values():
         same = [k for k, b in enumerate(bodies) if b is body]
@@ -140,7 +158,7 @@ def wanted_shapes(
 def bending_step(
     body: PadDeformation | None, film: SolvedFilm, change: FloatArray, factor: float, axial: AxialTilt | None = None
 ) -> BendingStep:
-    """Close the loop of pressure, deformation and axial tilt for one pad."""
+    """Close the loop of pressure, deformation and axial tilt for one pad: `change` (nt + 1, nz + 1) [m]."""
     grid, work, wedge, forces = film
     least = forces.min_film
     if body is None:
@@ -185,7 +203,7 @@ def force_weights(grid: FilmGrid) -> FloatArray:
 
 
 def change_of_shape(body: PadDeformation | None, step: BendingStep, da: float, db: float) -> FloatArray:
-    """Change of the deformation that belongs to a move (da, db) of the film [m]."""
+    """Change of the deformation that belongs to a move (da, db) of the film [m]: gives (nt + 1, nz + 1) [m]."""
     if body is None:
         return step.mismatch
     return step.mismatch + body.shapes @ (step.amplitude + step.by_approach @ np.array([da, db]))

@@ -42,7 +42,7 @@ def factor_rows(rows: Iterable[BlockRow]) -> Iterator[BlockRow]:
 
 
 def forward_rows(factor: Iterable[BlockRow], rhs: Iterable[FloatArray]) -> Iterator[FloatArray]:
-    """Solve L Y = B, row by row of blocks."""
+    """Solve L Y = B, row by row of blocks: `rhs` (m, n_columns)."""
     known: dict[int, FloatArray] = {}
     for i, (row, given) in enumerate(zip(factor, rhs)):
         known = {j: known[j] for j in range(min(row), i)}
@@ -67,7 +67,7 @@ class BlockCholesky:
         return cls(tuple(factor_rows(rows)))
 
     def solve(self, rhs: FloatArray) -> FloatArray:
-        """Solve K X = B."""
+        """Solve K X = B: `rhs` (n_blocks, m, n_columns)."""
         out = np.stack(list(forward_rows(self.rows, rhs)))
         for i in reversed(range(len(self.rows))):
             row = self.rows[i]

@@ -16,6 +16,7 @@ from rigdata.arrays import FloatArray
 class Line:
     """Continuous Lagrange elements on an interval."""
 
+    #: (n_elements + 1,): Element ends, strictly increasing [m or rad].
     breaks: FloatArray
     degree: int = 2
 
@@ -98,7 +99,10 @@ def graded(start: float, stop: float, count: int, first: float, last: float) -> 
 
 
 def gauss_rule(breaks: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """Gauss-Legendre points and weights, `count` in every interval of `breaks`."""
+    """Gauss-Legendre points and weights, `count` in every interval of `breaks`.
+
+    `breaks` (n + 1,); gives points, weights (n, count).
+    """
     points, weights = np.polynomial.legendre.leggauss(count)
     size = np.diff(breaks)
     x = breaks[:-1, None] + 0.5 * size[:, None] * (points + 1.0)

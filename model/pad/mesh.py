@@ -141,7 +141,7 @@ class SectorMesh:
         return self.theta.n_nodes * self.z.n_nodes
 
     def held(self, face: PivotFace) -> BoolArray:
-        """Nodes on the pivot face, shape (n_theta, n_r, n_z)."""
+        """Nodes on the pivot face, (n_theta, n_r, n_z)."""
         slack = 1e-9
         angle = 0.5 * face.width / self.r.breaks[-1]
         in_arc = np.abs(self.theta.nodes) <= angle * (1 + slack)

@@ -65,11 +65,12 @@ class ElasticSector:
     """
 
     mesh: SectorMesh
+    #: (n_theta, 3, n_r, n_z) of bool: Degrees of freedom whose displacement is zero.
     fixed: BoolArray
 
     @classmethod
     def held_at(cls, mesh: SectorMesh, nodes: BoolArray, even: bool = True) -> ElasticSector:
-        """Hold some nodes, and make the mid-plane one of symmetry."""
+        """Hold some nodes, and make the mid-plane one of symmetry: `nodes` (n_theta, n_r, n_z)."""
         fixed = np.repeat(nodes[:, None], 3, axis=1)
         for component in (_W,) if even else (_U, _V):
             fixed[:, component, :, 0] = True
@@ -126,7 +127,10 @@ class ElasticSector:
         return self.mesh.per_gauss_point(lame), self.mesh.per_gauss_point(shear)
 
     def thermal_loads(self, temperature: FloatArray) -> Iterator[FloatArray]:
-        """Forces of hindered thermal expansion, the right-hand side of Eq. (7) in weak form, slab by slab."""
+        """Forces of hindered thermal expansion, the right-hand side of Eq. (7) in weak form, slab by slab.
+
+        `temperature` (n_theta, n_r, n_z, n_columns) [K].
+        """
         mesh = self.mesh
         n_theta, n_r, n_z, n_columns = temperature.shape
         lame, shear = self._lame()
@@ -149,6 +153,9 @@ class ElasticSector:
 
         With K = L L^T, E the unit radial forces on the film face and F the thermal loads, both results are products
         of L^-1 E and L^-1 F, summed slab by slab: the compliance is symmetric and positive semidefinite by build.
+
+        `temperature` (n_theta, n_r, n_z, n_columns) [K]; gives compliance (n_surface, n_surface) [m/N], expansion
+        (n_surface, n_columns) [m].
         """
         n_fields, n_surface = temperature.shape[3], self.mesh.n_surface
         compliance = np.zeros((n_surface, n_surface))
@@ -177,7 +184,10 @@ class ElasticSector:
 class HeatSolution:
     """What temperatures of the film face do to the half pad."""
 
+    #: (n_theta, n_r, n_z, n_columns): Temperature rise at the nodes [K], one field for every given one.
     temperature: FloatArray
+    #: (n_surface, n_columns): Heat that enters the pad at the nodes of the film face, weighted by their basis
+    #: functions [W].
     heat: FloatArray
 
 
@@ -187,6 +197,8 @@ def conduct(mesh: SectorMesh, convection: float, face: FloatArray, even: bool = 
     The film face takes the film's temperature (the film is adiabatic towards it in the baseline, so it has one); every
     other face loses heat to oil at the supply temperature through the film coefficient `back_convection`. All
     temperatures are rises above supply.
+
+    `face` (n_surface, n_columns) [K].
     """
     theta, n_r, n_z = mesh.theta, mesh.r.n_nodes, mesh.z.n_nodes
     given = np.arange(n_r * n_z) < n_z
@@ -258,8 +270,11 @@ class PadOperators:
 
     theta: Line
     z: Line
+    #: (n_surface, n_surface): Outward displacement per outward nodal force [m/N].
     compliance: FloatArray
+    #: (n_surface, n_temperatures): Outward displacement per temperature rise of the face's bilinear nodes [m/K].
     expansion: FloatArray
+    #: (n_surface, n_temperatures): Heat flux density from film into pad per temperature rise [W/m^2/K].
     flux: FloatArray
 
     @property

@@ -25,7 +25,9 @@ from rigdata.arrays import FloatArray
 class AxisMap:
     """One axis of the map."""
 
+    #: (n_face, n_film): G: integrals of face functions times film functions.
     gather: FloatArray
+    #: (n_film, n_face): M^-1 G^T: film values of a face function.
     project: FloatArray
 
 
@@ -58,6 +60,7 @@ class FilmMap:
 
     theta: AxisMap
     z: AxisMap
+    #: (n_coarse, n_film): Bilinear face values closest in the mean square to film values.
     coarse_theta: FloatArray
     coarse_z: FloatArray
 
@@ -115,7 +118,10 @@ class PadSolid:
 
     geometry: PadGeometry
     density: MeshDensity
+    #: (n_theta,): Film nodes along the arc [rad from the pivot].
     film_theta: FloatArray
+    #: (n_z,): Film nodes along the axis [m from the mid-plane]: 0 to L/2 for a symmetric film, whose mirror
+    #: image is included in every result, or -L/2 to L/2.
     film_z: FloatArray
     _parts: tuple[tuple[PadOperators, FilmMap], ...] = field(repr=False)
 

@@ -23,7 +23,7 @@ class Anderson:
         self._residuals.clear()
 
     def next(self, state: FloatArray, image: FloatArray) -> FloatArray:
-        """Return the next state."""
+        """Return the next state: `state, image` (n,); gives (n,)."""
         residual = image - state
         self._images.append(image)
         self._residuals.append(residual)

@@ -41,7 +41,10 @@ def aligned_tilt(setup: Setup, pivot_angle: float) -> float:
 
 
 def axial_tilt_of(setup: Setup, film: PadFilm, pressure: FloatArray, forces: FilmForces) -> AxialTilt:
-    """A pad's freedom to tilt along the shaft, and the moment that is not balanced."""
+    """A pad's freedom to tilt along the shaft, and the moment that is not balanced.
+
+    `pressure` (nt + 1, nz + 1) [Pa].
+    """
     grid, shape = film.grid, axial_shape(film.grid)
     hold = tilt_hold(setup, film.axial_tilt, float(forces.force[0]))
     moment = float((grid.area * shape * pressure).sum()) - hold.moment
@@ -50,7 +53,10 @@ def axial_tilt_of(setup: Setup, film: PadFilm, pressure: FloatArray, forces: Fil
 
 
 def shape_change(setup: Setup, film: PadFilm, da: float, db: float) -> tuple[FloatArray, float]:
-    """Change of a film's shape that belongs to a move (da, db) of it, and that of the pad's axial tilt in it."""
+    """Change of a film's shape that belongs to a move (da, db) of it, and that of the pad's axial tilt in it.
+
+    Gives change (nt + 1, nz + 1) [m].
+    """
     assert film.step is not None
     change = change_of_shape(film.deformation if setup.flexible_pads else None, film.step, da, db)
     if not setup.pads_follow:

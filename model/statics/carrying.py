@@ -55,7 +55,7 @@ def let_idle(film: PadFilm) -> None:
 
 
 def set_loaded(film: PadFilm, position: FloatArray) -> None:
-    """Put a pad on its loaded attitude for a journal position, or let it idle."""
+    """Put a pad on its loaded attitude for a journal position, or let it idle: `position` (2,) [m]."""
     assert film.branch is not None
     let_idle(film)
     film.idle = margin(film, position) <= 0.0
@@ -68,7 +68,7 @@ def set_loaded(film: PadFilm, position: FloatArray) -> None:
 
 
 def update_carrying(setup: Setup, films: list[PadFilm], position: FloatArray, surface_speed: float) -> bool:
-    """Let pads take up or shed their load as the journal's position has it; True if any did."""
+    """Let pads take up or shed their load as the journal's position has it; True if any did: `position` (2,) [m]."""
     changed = False
     for film in films:
         if film.branch is None or abs(margin(film, position)) < NEAR_EDGE:
@@ -138,6 +138,6 @@ def unloaded_pads(films: list[PadFilm], position: FloatArray) -> tuple[list[int]
 
 
 def longest_step(films: list[PadFilm], shift: FloatArray) -> float:
-    """Share of a step [m] that the journal may take."""
+    """Share of a step [m] that the journal may take: `shift` (2,) [m]."""
     least = min(f.pad.pad_clearance for f in films)
     return LONGEST_STEP * least / max(math.hypot(shift[0], shift[1]), 1e-30)

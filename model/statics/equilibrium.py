@@ -16,6 +16,7 @@ from rigdata.problem import Condition
 class Equilibrium:
     """A static solution."""
 
+    #: (2,): Journal centre from the bearing centre [m].
     position: FloatArray
     films: tuple[PadFilm, ...]
     iterations: int

@@ -190,7 +190,7 @@ def _film_answer(setup: Setup, film: PadFilm, part: FloatArray) -> FilmAnswer:
 
 
 def balance_heat(setup: Setup, order: list[PadFilm], parts: Sequence[FilmAnswer | None]) -> tuple[FloatArray, float]:
-    """Inlet temperature of every pad, and the journal's that keeps no heat."""
+    """Inlet temperature of every pad, and the journal's that keeps no heat: gives inlets (n,) [degC]."""
     n, supply = len(order), setup.inlet_temperature
     shares = mixing_shares(order, setup.mixing)
     matrix, right = np.eye(n + 1), np.full(n + 1, supply)

@@ -12,7 +12,7 @@ from rigdata.arrays import FloatArray
 
 
 def newton_step(setup: Setup, load: FloatArray, films: list[PadFilm]) -> tuple[float, FloatArray, FloatArray]:
-    """Solve the linearised equilibrium once."""
+    """Solve the linearised equilibrium once: `load` (2,) [N]; gives shift (2,) [m], moves (n_pads, 2) [rad]."""
     carrying = [f for f in films if f.forces is not None]
     residual, shift, moves = eliminate(load, pad_equations(setup, carrying))
     if setup.friction:

@@ -30,6 +30,7 @@ class PadFilm:
 
     number: int
     pad: Pad
+    #: (2,): Unit vectors at the pivot.
     normal: FloatArray
     tangent: FloatArray
     preload_distance: float
@@ -37,7 +38,9 @@ class PadFilm:
     grid: FilmGrid
     work: FilmWork
     inlet: float
+    #: (nt + 1, nz + 1): The pad's deformation, part of `work.extra` [m].
     bent: FloatArray
+    #: (unknowns,): The change of pressure from the one to the other [Pa].
     pressure_change: FloatArray
     deformation: PadDeformation | None = None
     step: BendingStep | None = None
@@ -89,7 +92,7 @@ class PadFilm:
         return 0.0 if self.deformation is None else -float(np.interp(0.0, self.grid.angle, self.bent[:, 0]))
 
     def rigid_approach(self, position: FloatArray) -> float:
-        """Approach a of the film if the pivot were rigid [m]."""
+        """Approach a of the film if the pivot were rigid [m]: `position` (2,) [m]."""
         return self.preload_distance + float(self.normal @ position)
 
     def approach(self, position: FloatArray) -> tuple[float, float]:
@@ -109,7 +112,7 @@ class PadFilm:
         self.forces = self.corrected = self.solver(self.grid, self.work, wedge, surface_speed, False)
 
     def rest(self, position: FloatArray, surface_speed: float, oil: Oil) -> None:
-        """Say what the film of an idle pad does; nothing for one that carries."""
+        """Say what the film of an idle pad does; nothing for one that carries: `position` (2,) [m]."""
         wedge = (self.pad.pad_clearance, self.rigid_approach(position))
         idle = self.idle or self.forces is None
         self.resting = resting_film(self.grid, wedge, surface_speed, oil, self.inlet, self.kept) if idle else None
@@ -151,7 +154,7 @@ class PadFilm:
 
 
 def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FloatArray]:
-    """Lay out every pad's film."""
+    """Lay out every pad's film: gives shifts (n, unknowns)."""
     bearing = setup.bearing
     symmetric = setup.misalignment[0] == 0.0
     across = setup.thermal == "thd"

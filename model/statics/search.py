@@ -31,9 +31,11 @@ class Search:
     """What an iteration carries along."""
 
     setup: Setup
+    #: (2,), N
     load: FloatArray
     speed: float
     films: list[PadFilm] = field(init=False)
+    #: (2,): Journal [m].
     position: FloatArray = field(default_factory=lambda: np.zeros(2))
     limited: float = 0.0
     journal: float = math.nan
@@ -44,6 +46,7 @@ class Search:
     warming: float = 0.0
     held: set[int] = field(default_factory=set)
     works: FilmWork = field(init=False)
+    #: (n, unknowns): Their changes of pressure.
     shifts: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -183,7 +186,7 @@ class Search:
         return np.concatenate(parts)
 
     def set_vector(self, state: FloatArray) -> None:
-        """Undo `vector`."""
+        """Undo `vector`: `state` (n,)."""
         self.position = state[:2] * MICROMETRE
         if self.setup.growth is not None:
             self._set_warmth(float(state[2]))

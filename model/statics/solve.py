@@ -24,7 +24,7 @@ FIRST_SHARE, LEAST_STEP = 0.25, 0.02
 
 
 def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equilibrium | None = None) -> Equilibrium:
-    """Find where the journal stands."""
+    """Find where the journal stands: `load` (2,) [N]."""
     search = Search(setup, np.asarray(load, float), speed)
     if start is not None and search.start_from(start):
         result = _iterated(search, cold=False)

@@ -13,7 +13,7 @@ DEPTH = 4
 
 @inner
 def mixed(images: FloatArray, residuals: FloatArray, count: int) -> FloatArray:
-    """Next state of a fixed-point iteration."""
+    """Next state of a fixed-point iteration: gives (n,)."""
     last = images[count - 1].copy()
     k = count - 1
     if k == 0:
@@ -43,7 +43,10 @@ def mixed(images: FloatArray, residuals: FloatArray, count: int) -> FloatArray:
 
 @inner
 def least_squares(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Least-squares solution of a symmetric system that may be singular, by Jacobi's rotations."""
+    """Least-squares solution of a symmetric system that may be singular, by Jacobi's rotations.
+
+    `matrix` (k, k), `right` (k,).
+    """
     k = len(right)
     vectors = np.zeros((k, k))
     for i in range(k):

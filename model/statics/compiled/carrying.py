@@ -22,6 +22,7 @@ EVERY = 4
 class Case(NamedTuple):
     """The numbers of one search."""
 
+    #: (2,), N
     load: FloatArray
     running: Running
     hold: tuple[float, float]

@@ -19,19 +19,30 @@ from rigdata.arrays import FloatArray
 class PadEquations(NamedTuple):
     """What a Newton step needs to know of the n pads that carry, in the (radial, tangential) frame of each."""
 
+    #: (n, 2, 2): Rows: unit vectors along the pivot (normal) and across it (tangent).
     frame: FloatArray
+    #: (n, 2): Of the film [N].
     force: FloatArray
+    #: (n, 2, 2): Its derivatives by (a, b) [N/m].
     stiffness: FloatArray
+    #: (n,): R_P [m].
     pivot_radius: FloatArray
+    #: (n,): Moment that holds the tilt back, over R_P [N].
     holding_force: FloatArray
+    #: (n, 2): Its derivatives by the tilt, k_theta / R_P [N/rad], and by the pad's load.
     holding_slopes: FloatArray
+    #: (n,): delta(W) less the present deflection [m].
     missing_deflection: FloatArray
+    #: (n,): d delta / d W [m/N].
     pivot_compliance: FloatArray
 
 
 @compiled
 def eliminate(load: FloatArray, pads: PadEquations) -> tuple[float, FloatArray, FloatArray]:
-    """Eliminate every pad's tilt and deflection, and solve for the journal's move."""
+    """Eliminate every pad's tilt and deflection, and solve for the journal's move.
+
+    `load` (2,) [N]; gives shift (2,) [m], moves (n, 2) [rad].
+    """
     n = pads.pivot_radius.shape[0]
     size = max(math.hypot(load[0], load[1]), 1.0)
     worst = 0.0

@@ -15,7 +15,10 @@ GOOD_ENOUGH = 0.002
 
 
 def first_position(load: FloatArray, normals: FloatArray, distances: FloatArray, branches: list[Branch]) -> FloatArray:
-    """Journal position that balances a load on tabulated isothermal films."""
+    """Journal position that balances a load on tabulated isothermal films.
+
+    `load` (2,) [N], `normals` (n_pads, 2), `distances` (n_pads,) [m]; gives (2,) [m].
+    """
     longest = max(len(b.rigid_approach) for b in branches)
     curves = np.full((len(branches), 2, longest), math.nan)
     for row, branch in zip(curves, branches, strict=True):
@@ -31,7 +34,10 @@ def first_position(load: FloatArray, normals: FloatArray, distances: FloatArray,
 def balance(
     load: FloatArray, pads: FloatArray, rigid: FloatArray, carried: FloatArray, lengths: IntArray, room: float
 ) -> FloatArray:
-    """Journal position [m] that balances a load on tabulated films."""
+    """Journal position [m] that balances a load on tabulated films.
+
+    `load` (2,) [N], `pads` (n, 3) [m], `rigid, carried` (n, r) [m], `lengths` (n,).
+    """
     size = math.hypot(load[0], load[1])
     position = np.zeros(2)
     if size == 0.0:

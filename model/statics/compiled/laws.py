@@ -64,7 +64,7 @@ def _row(law: PivotLaw) -> tuple[tuple[float, float, float, float], FloatArray] 
 
 @inner
 def deflection(law: FloatArray, curve: FloatArray, load: float) -> float:
-    """Give of a pivot, delta(W) [m]."""
+    """Give of a pivot, delta(W) [m]: `law` (4,), `curve` (5, m)."""
     if not load > 0.0 or law[0] == RIGID:
         return 0.0
     if law[0] == CONSTANT:

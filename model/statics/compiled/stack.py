@@ -31,42 +31,70 @@ class GridStack(NamedTuple):
 class PadStack(NamedTuple):
     """What a search leaves as it is."""
 
+    #: (n, 2, 2): Rows: unit vectors along the pivot (normal) and across it (tangent).
     frame: FloatArray
+    #: (n,): Cp - Cb, plus running changes [m].
     preload: FloatArray
+    #: (n,): R_P and Cp [m].
     pivot_radius: FloatArray
     clearance: FloatArray
+    #: (n,), degC
     inlet: FloatArray
+    #: (n, 2): Station before the pivot, and the pivot's place between it and the next one.
     pivot: FloatArray
+    #: (n, 4): The pivots, see `model.statics.compiled.laws`.
     laws: FloatArray
+    #: (n, 5, m): Measured ones.
     curves: FloatArray
+    #: (n, 3, r): Curvature, wedge and load of the loaded attitudes, see
+    #: `model.film.loaded_attitude.LoadedAttitude`.
     attitudes: FloatArray
+    #: (n,) of int: How many of the r there are.
     rows: IntArray
 
 
 class PadState(NamedTuple):
     """What a search changes besides the films' arrays."""
 
+    #: (2,): Journal [m].
     position: FloatArray
+    #: (n,): t [rad], eta [m].
     tilt: FloatArray
     deflection: FloatArray
+    #: (n,) of bool: Carries nothing; has a pressure.
     idle: BoolArray
     solved: BoolArray
+    #: (n,) of int: How often the pad has taken up or shed its load.
     changes: IntArray
+    #: (n, 4, r): Rigid approach, approach, wedge and load, see `model.film.loaded_attitude.Branch`.
     branch: FloatArray
+    #: (n,) of int: How many of the r there are; 0 before the first.
     length: IntArray
+    #: (n, 2): (a, b) that the pressure was solved with [m].
     wedge: FloatArray
+    #: (n, 2): As the pressure was solved, and at the temperature found since [N].
     force: FloatArray
     corrected: FloatArray
+    #: (n, 2, 2): [N/m], [N s/m]
     stiffness: FloatArray
     damping: FloatArray
+    #: (n,): Thinnest film [m].
     least: FloatArray
+    #: (n,) of int: See `model.film.reynolds.FilmForces`.
     steps: IntArray
+    #: (n,): Largest change of temperature that the last step asked for [K].
     heating: FloatArray
+    #: (n, unknowns): See `model.statics.pad_film.PadFilm.pressure_change`.
     shift: FloatArray
+    #: (n, 2): `corrected`, and ...
     felt: FloatArray
+    #: (n, 2, 2): ... `stiffness` with the pad giving way: what journal and pivot feel.
     felt_stiffness: FloatArray
+    #: (n, nt + 1, nz + 1): Deformation; what is missing of it besides the shapes of the Newton step [m]. Empty
+    #: for rigid pads.
     bent: FloatArray
     mismatch: FloatArray
+    #: (n, shapes, 3): Change of their amplitudes at rest, and per metre of a and b.
     amplitude: FloatArray
 
 

@@ -84,7 +84,7 @@ def solve_films(
 
 @inner
 def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArray, FloatArray]:
-    """Solve the linearised equilibrium once."""
+    """Solve the linearised equilibrium once: gives shift (2,), moves (n, 2)."""
     n = 0
     for m in range(len(state.tilt)):
         n += 1 if state.solved[m] else 0
