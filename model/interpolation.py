@@ -1,4 +1,4 @@
-"""Monotone cubics and bracketed roots: what little of scipy the model's first answer would wait for."""
+"""Monotone cubics and bracketed roots: scipy's would cost 0.5 s of the 3 s that the first prediction takes."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def monotone_cubics(x: FloatArray, y: FloatArray) -> FloatArray:
 
 def _end(h0: FloatArray, h1: FloatArray, rise0: FloatArray, rise1: FloatArray) -> FloatArray:
     slope = ((2.0 * h0 + h1) * rise0 - h0 * rise1) / (h0 + h1)
-    other = np.sign(slope) != np.sign(rise0)
+    reversed_ = np.sign(slope) != np.sign(rise0)
     steep = (np.sign(rise0) != np.sign(rise1)) & (np.abs(slope) > 3.0 * np.abs(rise0))
-    return np.asarray(np.where(other, 0.0, np.where(steep, 3.0 * rise0, slope)))
+    return np.asarray(np.where(reversed_, 0.0, np.where(steep, 3.0 * rise0, slope)))
 
 
 def evaluated(x: FloatArray, coefficients: FloatArray, at: FloatArray) -> FloatArray:
@@ -61,15 +61,15 @@ def bracketed_root(function: Callable[[float], float], low: float, high: float, 
         middle = 0.5 * (low + high)
         value = function(middle)
         scale = max(abs(value), abs(at_low), abs(at_high))
-        place, found = middle, value
+        place, at_place = middle, value
         if np.isfinite(scale) and value != 0.0:
             f, g, m = at_low / scale, at_high / scale, value / scale
             place = middle + (middle - low) * (1.0 if f > g else -1.0) * m / (m * m - f * g) ** 0.5
-            found = function(place)
-        if found == 0.0 or abs(place - last) < tolerance or abs(high - low) < tolerance:
+            at_place = function(place)
+        if at_place == 0.0 or abs(place - last) < tolerance or abs(high - low) < tolerance:
             return float(place)
         last = place
-        for x, y in sorted(((middle, value), (place, found))):
+        for x, y in sorted(((middle, value), (place, at_place))):
             if low < x < high:
                 if y * at_low > 0.0:
                     low, at_low = x, y

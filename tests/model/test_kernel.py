@@ -79,7 +79,7 @@ def test_without_numbas_cache_the_code_is_compiled_anew(monkeypatch):
 @pytest.mark.slow
 def test_where_nothing_can_be_written_the_code_is_compiled_and_the_cure_is_told(monkeypatch):
     monkeypatch.setattr(numba.core.caching.CacheImpl, "_locator_classes", [])
-    compilation._tell.cache_clear()
+    compilation._warn_once.cache_clear()
     twice, thrice = compilation.compiled(lambda x: 2.0 * x), compilation.compiled(lambda x: 3.0 * x)
     with pytest.warns(RuntimeWarning, match="TPJB_CACHE"):
         assert twice(3.0) == 6.0
