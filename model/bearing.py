@@ -185,6 +185,12 @@ class Bearing:
     oil : Oil
     tolerances : tuple of (str, float)
         Name and value of every line of ``[tolerances]``: how well the drawing is known, one standard deviation, SI.
+
+    Examples
+    --------
+    >>> bearing = ti.load_bearing(rocker)
+    >>> bearing.name, len(bearing.pads), f"{bearing.pads[0].preload:.2f}"
+    ('Rocker-backed five-pad bearing', 5, '0.38')
     """
 
     name: str

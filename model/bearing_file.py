@@ -88,6 +88,11 @@ def load_bearing(source: str | Path) -> Bearing:
     ------
     BearingError
         The file is missing, not TOML, has an unknown or missing key, a wrong unit or an impossible value.
+
+    Examples
+    --------
+    >>> print(f"{1e3 * ti.load_bearing(rocker).oil.viscosity(40.0):.1f} mPa s")
+    39.6 mPa s
     """
     if isinstance(source, str) and "\n" in source:
         return parse_bearing(source, "bearing")
@@ -147,10 +152,10 @@ def _section(data: dict[str, Any], key: str, name: str) -> dict[str, Any]:
             raise BearingError(f"{name}: section [{key}] is missing. Add it; see the bundled rocker.toml.")
         if not isinstance(section, dict):
             raise BearingError(f"{name}, {key}: must be a table, got {section!r}. Write it as [{key}].")
-    known = set(_KEYS[key]) | {k[len(key) + 1 if key else 0 :].split(".")[0] for k in _KEYS if _is_child(k, key)}
-    for unknown in set(section) - known:
+    keys = set(_KEYS[key]) | {k[len(key) + 1 if key else 0 :].split(".")[0] for k in _KEYS if _is_child(k, key)}
+    for unknown in set(section) - keys:
         place = f"[{key}] {unknown}" if key else f"[{unknown}]" if isinstance(section[unknown], dict) else unknown
-        raise BearingError(f"{name}, {place}: unknown key. {hint(unknown, sorted(known), 'Known keys:')}")
+        raise BearingError(f"{name}, {place}: unknown key. {hint(unknown, sorted(keys), 'Known keys:')}")
     return section
 
 
@@ -172,46 +177,46 @@ def _read_section(section: dict[str, Any], key: str, name: str) -> dict[str, Any
     if key == "tolerances":
         return {entry: _read_tolerance(value, entry, name) for entry, value in section.items()}
     for entry, dimension in _KEYS[key].items():
-        where = f"{name}, [{key}] {entry}" if key else f"{name}, {entry}"
+        place = f"{name}, [{key}] {entry}" if key else f"{name}, {entry}"
         if entry not in section:
             if entry in _OPTIONAL and not material:
                 continue
-            raise BearingError(f"{where}: missing. Add it with its unit; see the bundled rocker.toml.")
-        out[entry] = _read_value(section[entry], entry, dimension, where)
+            raise BearingError(f"{place}: missing. Add it with its unit; see the bundled rocker.toml.")
+        out[entry] = _read_value(section[entry], entry, dimension, place)
     return out
 
 
 def _read_tolerance(value: Any, entry: str, name: str) -> float:
-    where = f"{name}, [tolerances] {entry}"
+    place = f"{name}, [tolerances] {entry}"
     try:
-        number = float(parse_quantity(value, _TOLERANCES[entry], where))
+        number = float(parse_quantity(value, _TOLERANCES[entry], place))
     except UnitError as error:
         raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
     if not 0.0 <= number < math.inf:
-        raise BearingError(f"{where}: must be zero or more, got {value!r}.")
+        raise BearingError(f"{place}: must be zero or more, got {value!r}.")
     return number
 
 
-def _read_value(value: Any, entry: str, dimension: str, where: str) -> Any:
+def _read_value(value: Any, entry: str, dimension: str, place: str) -> Any:
     if dimension == "text":
         if not isinstance(value, str):
-            raise BearingError(f"{where}: must be text, got {value!r}. Put it in quotes.")
+            raise BearingError(f"{place}: must be text, got {value!r}. Put it in quotes.")
         return value
     if isinstance(value, list) and entry in _PER_PAD:
         if any(isinstance(v, list) for v in value):
-            raise BearingError(f"{where}: must be a list of quantities, not of lists.")
-        return tuple(_read_value(v, entry, dimension, f"{where}[{i}]") for i, v in enumerate(value))
+            raise BearingError(f"{place}: must be a list of quantities, not of lists.")
+        return tuple(_read_value(v, entry, dimension, f"{place}[{i}]") for i, v in enumerate(value))
     try:
-        number = parse_quantity(value, dimension, where)
+        number = parse_quantity(value, dimension, place)
     except UnitError as error:
         raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
     if dimension == "temperature":
         number = round(number - ZERO_CELSIUS, 9)  # the decimals of the file, not those of the difference
     signed = dimension == "temperature" or entry == "pivot_angles"
     if not signed and (number < 0 or (number == 0 and entry not in _MAY_BE_ZERO)):
-        raise BearingError(f"{where}: must be positive, got {value!r}.")
+        raise BearingError(f"{place}: must be positive, got {value!r}.")
     if entry == "poissons_ratio" and not number < 0.5:
-        raise BearingError(f"{where}: must be below 0.5, got {value!r}. Steel has 0.3.")
+        raise BearingError(f"{place}: must be below 0.5, got {value!r}. Steel has 0.3.")
     return number
 
 

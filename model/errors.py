@@ -19,8 +19,10 @@ class OptionError(ModelError):
     """A mesh, a model of heat or cavitation, or another option that there is not; names the nearest there is."""
 
 
-def check_known(what: str, name: object, known: Iterable[str]) -> None:
+def check_known(option: str, name: object, choices: Iterable[str]) -> None:
     """Refuse an option's value that there is not."""
-    names = list(known)
+    names = list(choices)
     if name not in names:
-        raise OptionError(f"{what} must be one of {', '.join(names)}, got {name!r}. {hint(name, names, 'Use one of')}")
+        raise OptionError(
+            f"{option} must be one of {', '.join(names)}, got {name!r}. {hint(name, names, 'Use one of')}"
+        )

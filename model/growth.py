@@ -24,9 +24,9 @@ class Growth:
     expansion: tuple[float, float] = (11.5e-6, 11.5e-6)
 
     def __post_init__(self) -> None:
-        given = [t for t in (self.reference, self.housing, self.journal) if t is not None]
-        if not all(math.isfinite(t) and -50.0 <= t <= 300.0 for t in given):
-            raise OptionError(f"temperatures of Growth must lie between -50 and 300 degC, got {given}")
+        temperatures = [t for t in (self.reference, self.housing, self.journal) if t is not None]
+        if not all(math.isfinite(t) and -50.0 <= t <= 300.0 for t in temperatures):
+            raise OptionError(f"temperatures of Growth must lie between -50 and 300 degC, got {temperatures}")
         if len(self.expansion) != 2 or not all(0.0 <= a < 1e-4 for a in self.expansion):
             raise OptionError(f"expansion must be two numbers from 0 to 1e-4 1/K, got {self.expansion!r}")
 

@@ -100,7 +100,7 @@ class MeasuredPivot:
         """
         if not self.includes_housing:
             return self
-        give = np.diff(self.deflection_points)
-        alone = np.maximum(give - compliance * np.diff(self.load), LEAST_SHARE * give)
+        deflections = np.diff(self.deflection_points)
+        alone = np.maximum(deflections - compliance * np.diff(self.load), LEAST_SHARE * deflections)
         points = np.concatenate([[0.0], np.cumsum(alone)])
         return replace(self, deflection_points=points)

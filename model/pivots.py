@@ -240,12 +240,12 @@ def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
 
 
 def _other_choice(name: str) -> str:
-    said = hint(name, NAMED_LAWS, "Use one of")
-    return said if said.startswith("Did") else "Use rigid, kirk, kirk-secant or a pivots.toml."
+    advice = hint(name, NAMED_LAWS, "Use one of")
+    return advice if advice.startswith("Did") else "Use rigid, kirk, kirk-secant or a pivots.toml."
 
 
 def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ...]:
-    """Read measured pivot laws from a ``pivots.toml`` (schema ``tpjb-pivots/1``), pad #1 first.
+    r"""Read measured pivot laws from a ``pivots.toml`` (schema ``tpjb-pivots/1``), pad #1 first.
 
     Parameters
     ----------
@@ -261,6 +261,14 @@ def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ..
     ------
     BearingError
         Missing or broken file, a pad left out, or a curve that does not rise.
+
+    Examples
+    --------
+    >>> lines = ['schema = "tpjb-pivots/1"', "[[pads]]", "pad = 1", "force_N = [0, 1e3, 4e3]"]
+    >>> text = "\n".join([*lines, "deflection_m = [0, 4e-6, 1e-5]"])
+    >>> _ = Path("pivots.toml").write_text(text)
+    >>> [law.name for law in load_pivots("pivots.toml")]
+    ['measured']
     """
     path = Path(path)
     try:

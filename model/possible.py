@@ -62,11 +62,11 @@ def check_possible(bearing: Bearing) -> None:
     _check(bearing, bearing.name)
     _check(bearing.oil, "oil")
     _check(bearing.pivot, "pivot")
-    seen: Any = None
+    checked: Any = None
     for k, pad in enumerate(bearing.pads):
         _check(pad, f"pad {k + 1}")
-        if (pad.backing, pad.babbitt) != seen:  # the pads of a bearing are of one make, as a rule
-            seen = pad.backing, pad.babbitt
+        if (pad.backing, pad.babbitt) != checked:  # the pads of a bearing are of one make, as a rule
+            checked = pad.backing, pad.babbitt
             _check(pad.backing, f"pad {k + 1}, backing")
             _check(pad.babbitt, f"pad {k + 1}, babbitt")
 

@@ -83,6 +83,12 @@ def predict(
         The bearing, or the load, direction, speed or excitation, has a number that none can have.
     OptionError, EffectError
         Another argument has a wrong name, dimension or sign. All are `ModelError`, and a ValueError too.
+
+    Examples
+    --------
+    >>> p = ti.predict(rocker, load=5000.0, speed=2 * np.pi * 22, excitation=2 * np.pi * 25)
+    >>> print(f"kyy {p.kyy / 1e6:.1f} MN/m, thinnest film {1e6 * p.min_film:.1f} um")
+    kyy 202.5 MN/m, thinnest film 33.5 um
     """
     if not (options is None or isinstance(options, Options)):
         raise OptionError(f"options must be an Options object, got {options!r}")
@@ -174,8 +180,8 @@ def solve_as_it_runs(
     """Find the equilibrium with the clearances that belong to its own temperatures: `force` (2,) [N]."""
     growth = setup.growth
     if growth is not None and growth.journal is not None:
-        given = grown(setup.bearing, growth, setup.inlet_temperature, growth.journal)
-        setup = setup.change(bearing=given, grown=True)
+        grown_bearing = grown(setup.bearing, growth, setup.inlet_temperature, growth.journal)
+        setup = setup.change(bearing=grown_bearing, grown=True)
     equilibrium = solve_equilibrium(setup, force, speed, start)
     if setup.growth is not None:
         running = setup.bearing.with_pads(tuple(f.pad for f in equilibrium.films))

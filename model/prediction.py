@@ -50,6 +50,12 @@ class Prediction:
     setup : Setup
     solver : callable
         `model.predict.predict_setup`, which made it: a coarser mesh is solved with the same.
+
+    Examples
+    --------
+    >>> p = ti.predict(rocker, load=5000.0, speed=2 * np.pi * 22, excitation=2 * np.pi * np.array([25.0, 50.0]))
+    >>> p.k.shape, p.converged
+    ((2, 2, 2), True)
     """
 
     load: float
@@ -84,11 +90,11 @@ class Prediction:
         """Operating point, direct coefficients in MN/m and kN s/m, position and extremes, in one line."""
         lines = np.atleast_1d(np.asarray(self.excitation, float)) / (2 * math.pi)
         h = self.h.reshape(-1, 2, 2)[0]
-        found = [h[0, 0].real / 1e6, h[1, 1].real / 1e6, *(h.imag[[0, 1], [0, 1]] / (2e3 * math.pi * lines[0]))]
+        direct = [h[0, 0].real / 1e6, h[1, 1].real / 1e6, *(h.imag[[0, 1], [0, 1]] / (2e3 * math.pi * lines[0]))]
         more = f" and at {len(lines) - 1} more" if len(lines) > 1 else ""
         return (
-            f"{self}; at {lines[0]:.4g} Hz{more}: kxx {found[0]:.4g}, kyy {found[1]:.4g} MN/m, "
-            f"cxx {found[2]:.4g}, cyy {found[3]:.4g} kN s/m"
+            f"{self}; at {lines[0]:.4g} Hz{more}: kxx {direct[0]:.4g}, kyy {direct[1]:.4g} MN/m, "
+            f"cxx {direct[2]:.4g}, cyy {direct[3]:.4g} kN s/m"
         )
 
     def _repr_html_(self) -> str:
@@ -114,7 +120,9 @@ class Prediction:
         }
         for values, kind, unit in ((self.k, "k", "N_per_m"), (self.c, "c", "Ns_per_m")):
             columns = values.reshape(-1, 4).T
-            table.update({f"{kind}{at}_{unit}": one for at, one in zip(("xx", "xy", "yx", "yy"), columns, strict=True)})
+            table.update(
+                {f"{kind}{at}_{unit}": column for at, column in zip(("xx", "xy", "yx", "yy"), columns, strict=True)}
+            )
         x, y = self.position
         return pd.DataFrame(table | {"x_m": x, "y_m": y, "status": "; ".join(self.status)})
 

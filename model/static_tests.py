@@ -62,11 +62,11 @@ def polygon_sides(setup: Setup, push_load: float) -> PolygonSides:
         towards = np.array([math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)])
         normal = inverse.T @ towards
         size = float(np.hypot(*normal))
-        give = law.deflection(push_load) + float(towards @ setup.structure @ towards) * push_load
+        deflection = law.deflection(push_load) + float(towards @ setup.structure @ towards) * push_load
         rows.append(
             (
                 pad.assembled_clearance / size,
-                (pad.assembled_clearance + give) / size,
+                (pad.assembled_clearance + deflection) / size,
                 math.atan2(normal[1], normal[0]),
             )
         )

@@ -63,8 +63,8 @@ def flexing_impedance(
         out[k] = weights @ (pressure - rigid)[:, :2]
         if axial is not None:
             moment = axial[0].weights @ pressure
-            own = axial[0].stiffness - axial[1] * w * w - moment[2]
-            out[k] += np.outer(weights @ pressure[:, 2], moment[:2]) / own
+            pad_impedance = axial[0].stiffness - axial[1] * w * w - moment[2]
+            out[k] += np.outer(weights @ pressure[:, 2], moment[:2]) / pad_impedance
     return out
 
 
@@ -95,10 +95,10 @@ class _Bend:
 
 def _everywhere(film: PadFilm, pressure: ComplexArray) -> ComplexArray:
     """Pressure at all nodes, (n, m), from that at the unknown ones."""
-    whole = np.zeros((*film.work.pressure.shape, pressure.shape[1]), dtype=np.complex128)
-    inner = whole[1:-1, film.grid.first : -1]
+    field = np.zeros((*film.work.pressure.shape, pressure.shape[1]), dtype=np.complex128)
+    inner = field[1:-1, film.grid.first : -1]
     inner[:] = pressure.reshape(inner.shape)
-    return whole.reshape(-1, pressure.shape[1])
+    return field.reshape(-1, pressure.shape[1])
 
 
 def _by_shape(
@@ -124,7 +124,7 @@ def describing(amplitude: FloatArray, stick: float, slip: float) -> ComplexArray
     return np.asarray(stick / math.pi * (turning + 4.0j * share * (1.0 - share)), dtype=np.complex128)
 
 
-def friction_impedance(own: ComplexArray, drive: FloatArray, stick: float, slip: float) -> ComplexArray:
+def friction_impedance(pad_impedance: ComplexArray, drive: FloatArray, stick: float, slip: float) -> ComplexArray:
     """Rotational impedance of a pivot's friction.
 
     A pivot that sticks has the stiffness k_s of its contact; one that slides passes the moment M_f = mu W R,
@@ -141,13 +141,15 @@ def friction_impedance(own: ComplexArray, drive: FloatArray, stick: float, slip:
     `drive` (n, 2) [N m].
     """
     if not slip > 0.0:
-        return np.zeros_like(own)
-    low = np.full(own.shape, slip / stick)
-    held = np.abs(own + stick) * low >= drive  # tilted as far as the contact gives, it would take more than there is
-    high = np.maximum(2.0 * low, 2.0 * drive / np.maximum(np.abs(own), 1e-30) + 2.0 * low)
+        return np.zeros_like(pad_impedance)
+    low = np.full(pad_impedance.shape, slip / stick)
+    held = (
+        np.abs(pad_impedance + stick) * low >= drive
+    )  # tilted as far as the contact gives, it would take more than there is
+    high = np.maximum(2.0 * low, 2.0 * drive / np.maximum(np.abs(pad_impedance), 1e-30) + 2.0 * low)
     for _ in range(HALVINGS):
         middle = np.sqrt(low * high)
-        short = np.abs(own + describing(middle, stick, slip)) * middle < drive
+        short = np.abs(pad_impedance + describing(middle, stick, slip)) * middle < drive
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     return np.where(held, stick + 0.0j, describing(high, stick, slip))
 
@@ -215,7 +217,7 @@ def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
 
 
 def reduce_pads(
-    pads: list[PadMatrices], omega: FloatArray, vibration: float = 0.0, beside: list[ComplexArray] | None = None
+    pads: list[PadMatrices], omega: FloatArray, vibration: float = 0.0, added: list[ComplexArray] | None = None
 ) -> ComplexArray:
     """Eq. (10): the bearing's 2 x 2 impedance at every excitation frequency; `omega` (n,) [rad/s]."""
     total = np.zeros((len(omega), 2, 2), dtype=complex)
@@ -223,23 +225,25 @@ def reduce_pads(
         alike = [k for k, pad in enumerate(pads) if math.isinf(pad.pad_stiffness[1, 1]) == rigid]
         if not alike:
             continue
-        keep = slice(2, 3 if rigid else 4)
-        more = None if beside is None else np.array([beside[k] for k in alike])
-        z, film = _impedances([pads[k] for k in alike], omega, keep, more)
+        internal = slice(2, 3 if rigid else 4)
+        more = None if added is None else np.array([added[k] for k in alike])
+        z, film = _impedances([pads[k] for k in alike], omega, internal, more)
         smooth = [m for m, k in enumerate(alike) if not pads[k].friction[0]]
         if len(smooth) < len(alike):
             rough = [(m, pads[k]) for m, k in enumerate(alike) if pads[k].friction[0]]
             total = total + sum(_reduce_with_friction(pad, z[m], film[m], vibration) for m, pad in rough)
             z, film = z[smooth], film[smooth]
-        total = total + (z[..., :2, :2] - z[..., :2, keep] @ np.linalg.solve(film, z[..., keep, :2])).sum(axis=0)
+        total = total + (z[..., :2, :2] - z[..., :2, internal] @ np.linalg.solve(film, z[..., internal, :2])).sum(
+            axis=0
+        )
     return np.asarray(total, dtype=np.complex128)
 
 
 def _impedances(
-    pads: list[PadMatrices], omega: FloatArray, keep: slice, more: ComplexArray | None
+    pads: list[PadMatrices], omega: FloatArray, internal: slice, more: ComplexArray | None
 ) -> tuple[ComplexArray, ComplexArray]:
     """Film impedance (pads, n, 4, 4), with more beside it, and that of tilt and deflection with pad and pivot."""
-    s, inner = omega[:, None, None], slice(0, keep.stop - 2)
+    s, inner = omega[:, None, None], slice(0, internal.stop - 2)
     z = np.array([p.stiffness for p in pads])[:, None] + 1j * s * np.array([p.damping for p in pads])[:, None]
     if more is not None:
         z = z + more
@@ -247,30 +251,30 @@ def _impedances(
         np.array([table[inner, inner] for table in tables])[:, None]
         for tables in zip(*((p.pad_mass, p.pad_damping, p.pad_stiffness) for p in pads), strict=True)
     )
-    return z, z[..., keep, keep] - s**2 * mass + 1j * s * damping + stiffness
+    return z, z[..., internal, internal] - s**2 * mass + 1j * s * damping + stiffness
 
 
 def _reduce_with_friction(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
     """One pad of Eq. (10) whose pivot sticks or slides, X and Y excited one at a time."""
     out = z[:, :2, :2].copy()
-    keep = slice(2, 2 + film.shape[1])
+    internal = slice(2, 2 + film.shape[1])
     loose = broken_loose(pad, z, film, vibration)
     for axis in range(2):
         pads = film.copy()
         pads[:, 0, 0] += loose[:, axis] - pad.friction[0]
-        column = z[:, keep, axis : axis + 1]
-        out[:, :, axis : axis + 1] -= z[:, :2, keep] @ np.linalg.solve(pads, column)
+        column = z[:, internal, axis : axis + 1]
+        out[:, :, axis : axis + 1] -= z[:, :2, internal] @ np.linalg.solve(pads, column)
     return out
 
 
 def broken_loose(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
     """Rotational impedance (n, 2) of a pivot's friction [N m/rad] for the journal vibrating along X, along Y."""
     stick, slip = pad.friction
-    own, drive = film[:, 0, 0] - stick, z[:, 2, :2]
+    pad_impedance, drive = film[:, 0, 0] - stick, z[:, 2, :2]
     if film.shape[1] == 2:  # the pivot gives way as well
-        give = film[:, 0, 1] / film[:, 1, 1]
-        own, drive = own - give * film[:, 1, 0], drive - give[:, None] * z[:, 3, :2]
-    return friction_impedance(np.repeat(own[:, None], 2, axis=1), np.abs(drive) * vibration, stick, slip)
+        compliance = film[:, 0, 1] / film[:, 1, 1]
+        pad_impedance, drive = pad_impedance - compliance * film[:, 1, 0], drive - compliance[:, None] * z[:, 3, :2]
+    return friction_impedance(np.repeat(pad_impedance[:, None], 2, axis=1), np.abs(drive) * vibration, stick, slip)
 
 
 def axial_inertia(setup: Setup, film: PadFilm) -> float:
@@ -289,12 +293,12 @@ def axial_inertia(setup: Setup, film: PadFilm) -> float:
 def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> ComplexArray:
     """h(omega) of the bearing inside the measured displacement, effects of the structure included."""
     pads = [m for film in equilibrium.films if (m := pad_matrices(setup, film)) is not None]
-    beside = None
+    added = None
     if setup.options.perturbed_heat and setup.thermal != "isothermal":
-        beside = [_heat_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
+        added = [_heat_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
     elif setup.pads_follow or (setup.options.perturbed_bending and setup.flexible_pads):
-        beside = [_shape_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
-    return with_structure(setup, reduce_pads(pads, omega, setup.vibration, beside), omega)
+        added = [_shape_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
+    return with_structure(setup, reduce_pads(pads, omega, setup.vibration, added), omega)
 
 
 def _frames(setup: Setup, film: PadFilm) -> tuple[FloatArray, FloatArray]:
@@ -348,15 +352,17 @@ def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) 
             continue
         s = omega[:, None, None]
         z = pad.stiffness + 1j * s * pad.damping
-        keep = slice(0, 1) if math.isinf(pad.pad_stiffness[1, 1]) else slice(0, 2)
-        own = -(s**2) * pad.pad_mass + 1j * s * pad.pad_damping + pad.pad_stiffness
-        film_part = np.asarray(z[:, 2:, 2:][:, keep, keep] + own[:, keep, keep], dtype=np.complex128)
+        internal = slice(0, 1) if math.isinf(pad.pad_stiffness[1, 1]) else slice(0, 2)
+        pad_impedance = -(s**2) * pad.pad_mass + 1j * s * pad.pad_damping + pad.pad_stiffness
+        film_part = np.asarray(
+            z[:, 2:, 2:][:, internal, internal] + pad_impedance[:, internal, internal], dtype=np.complex128
+        )
         free = np.abs(broken_loose(pad, z, film_part, setup.vibration)) < pad.friction[0]
         (loose if free.any() else held).append(film.number)
     names = []
     if held:
         names.append(Condition(f"pivot friction holds pads {', '.join(map(str, held))}", "note", pads=tuple(held)))
     if loose:
-        said = f"vibration of {1e6 * setup.vibration:g} um breaks the pivots of pads {', '.join(map(str, loose))} loose"
-        names.append(Condition(said, "note", pads=tuple(loose)))
+        text = f"vibration of {1e6 * setup.vibration:g} um breaks the pivots of pads {', '.join(map(str, loose))} loose"
+        names.append(Condition(text, "note", pads=tuple(loose)))
     return tuple(names)

@@ -26,6 +26,11 @@ class Effect:
     ------
     EffectError
         Unknown effect or parameter, with the nearest known one.
+
+    Examples
+    --------
+    >>> Effect("soft_pivot", pad=5, stiffness_factor=0.3)
+    Effect('soft_pivot', pad=5, stiffness_factor=0.3)
     """
 
     name: str
@@ -56,9 +61,9 @@ def apply_effects(setup: Setup, effects: Iterable[Effect]) -> Setup:
     pads = len(setup.bearing.pads)
     for effect in effects:
         kind = kind_of(effect.name)
-        known = {p.name for p in kind.parameters_of(pads)}
-        if set(effect.parameters) != known:
-            raise EffectError(f"{effect.name}: the bearing has {pads} pads; give {', '.join(sorted(known))}.")
+        names = {p.name for p in kind.parameters_of(pads)}
+        if set(effect.parameters) != names:
+            raise EffectError(f"{effect.name}: the bearing has {pads} pads; give {', '.join(sorted(names))}.")
         if reason := kind.missing(setup.bearing):
             raise EffectError(f"{effect.name}: {reason}")
         pad = effect.parameters.get("pad")

@@ -11,7 +11,7 @@ from model.toml_text import parse_toml
 
 
 def load_effects(path: str | Path) -> tuple[Effect, ...]:
-    """Read an effects file: ``[[effects]]`` tables with ``name`` and the parameters.
+    r"""Read an effects file: ``[[effects]]`` tables with ``name`` and the parameters.
 
     Parameters are SI numbers or quantities with units; further keys of a table (``lo``, ``hi``, ``prior``, ..) may
     stand in a sub-table and are not read.
@@ -30,6 +30,13 @@ def load_effects(path: str | Path) -> tuple[Effect, ...]:
     ------
     EffectError
         Missing or broken file, unknown effect or parameter.
+
+    Examples
+    --------
+    >>> text = '[[effects]]\nname = "pad_offset"\npad = 1\nradial_offset = "5 um"'
+    >>> _ = Path("offset.toml").write_text(text)
+    >>> load_effects("offset.toml")
+    (Effect('pad_offset', pad=1, radial_offset=5e-06),)
     """
     path = Path(path)
     try:
@@ -49,11 +56,11 @@ def load_effects(path: str | Path) -> tuple[Effect, ...]:
     return tuple(_read_effect(table, f"{path.name}, effect {i}") for i, table in enumerate(tables, start=1))
 
 
-def _read_effect(table: Any, where: str) -> Effect:
+def _read_effect(table: Any, place: str) -> Effect:
     if not isinstance(table, dict) or not isinstance(table.get("name"), str):
-        raise EffectError(f'{where}: has no name. Add name = "...".')
+        raise EffectError(f'{place}: has no name. Add name = "...".')
     parameters = {k: v for k, v in table.items() if k != "name" and not isinstance(v, dict)}
     try:
         return Effect(table["name"], **parameters)
     except ValueError as error:
-        raise EffectError(f"{where}: {error}") from error
+        raise EffectError(f"{place}: {error}") from error

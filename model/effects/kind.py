@@ -156,8 +156,8 @@ class EffectKind:
         """
         if self.per_pad is None:
             return self.parameters
-        each = (replace(self.per_pad, name=f"{self.per_pad.name}_{k}") for k in range(1, pads + 1))
-        return (*self.parameters, *each)
+        pad_parameters = (replace(self.per_pad, name=f"{self.per_pad.name}_{k}") for k in range(1, pads + 1))
+        return (*self.parameters, *pad_parameters)
 
     def missing(self, bearing: Bearing) -> str:
         """Why a bearing cannot have this effect; empty if it can.
@@ -188,35 +188,35 @@ class EffectKind:
             Unknown, missing or impossible parameter.
         """
         numbered = sum(self.per_pad is not None and name.startswith(f"{self.per_pad.name}_") for name in values)
-        known = {p.name: p for p in self.parameters_of(max(1, min(numbered, MAX_PADS)))}
+        by_name = {p.name: p for p in self.parameters_of(max(1, min(numbered, MAX_PADS)))}
         for name in values:
-            if name not in known:
-                raise EffectError(f"{self.name}: no parameter {name!r}. {hint(name, known)}")
+            if name not in by_name:
+                raise EffectError(f"{self.name}: no parameter {name!r}. {hint(name, by_name)}")
         out = {}
-        for name, parameter in known.items():
+        for name, parameter in by_name.items():
             if name not in values:
                 raise EffectError(f"{self.name}: parameter {name!r} [{parameter.unit}] is missing.")
             out[name] = _number(values[name], parameter, f"{self.name}.{name}")
         return out
 
 
-def _number(value: Any, parameter: Parameter, where: str) -> float:
+def _number(value: Any, parameter: Parameter, place: str) -> float:
     if isinstance(value, str):
         try:
-            value = parse_quantity(value, parameter.dimension, where)
+            value = parse_quantity(value, parameter.dimension, place)
         except UnitError as error:
             raise EffectError(f"{error}.") from error
     if isinstance(value, bool) or not hasattr(value, "__float__"):
-        raise EffectError(f"{where}: must be a number [{parameter.unit}], got {value!r}.")
+        raise EffectError(f"{place}: must be a number [{parameter.unit}], got {value!r}.")
     try:
         value = int(value) if isinstance(value, int) and abs(value) < 2**53 else float(value)
     except OverflowError as error:
-        raise EffectError(f"{where}: a whole number of hundreds of digits is outside any physical range.") from error
+        raise EffectError(f"{place}: a whole number of hundreds of digits is outside any physical range.") from error
     if not parameter.low <= value <= parameter.high:
         bounds = f"{parameter.low:g} to {parameter.high:g} [{parameter.unit}]"
-        raise EffectError(f"{where}: {value:g} is outside the physical range {bounds}.")
+        raise EffectError(f"{place}: {value:g} is outside the physical range {bounds}.")
     if parameter.discrete:
         if value != int(value):
-            raise EffectError(f"{where}: a pad is a whole number, got {value!r}.")
+            raise EffectError(f"{place}: a pad is a whole number, got {value!r}.")
         return int(value)
     return float(value)

@@ -12,8 +12,10 @@ from model.setup import Setup
 def apply(setup: Setup, pad: int, radial_offset: float) -> Setup:
     """The assembled clearance of one pad is Cb + radial_offset."""
     return setup.change_pads(
-        lambda number, one: (
-            replace(one, assembled_clearance=one.assembled_clearance + radial_offset) if number == pad else one
+        lambda number, pad_drawing: (
+            replace(pad_drawing, assembled_clearance=pad_drawing.assembled_clearance + radial_offset)
+            if number == pad
+            else pad_drawing
         )
     )
 

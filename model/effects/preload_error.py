@@ -10,7 +10,7 @@ from model.setup import Setup
 
 def apply(setup: Setup, pad_clearance_change: float) -> Setup:
     """Cp of every pad changes by this; Cb stays."""
-    return setup.change_pads(lambda number, one: replace(one, pad_clearance=one.pad_clearance + pad_clearance_change))
+    return setup.change_pads(lambda number, pad: replace(pad, pad_clearance=pad.pad_clearance + pad_clearance_change))
 
 
 KIND = EffectKind(

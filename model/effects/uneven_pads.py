@@ -19,11 +19,11 @@ def apply(setup: Setup, **offsets: float) -> Setup:
     squares), so that offsets which differ by a shift are one and the same effect.
     """
     pads = setup.bearing.pads
-    given = np.array([offsets[f"offset_{k}"] for k in range(1, len(pads) + 1)])
+    clearances = np.array([offsets[f"offset_{k}"] for k in range(1, len(pads) + 1)])
     normals = np.array([[math.cos(p.pivot_angle), math.sin(p.pivot_angle)] for p in pads])
-    left = given - normals @ np.linalg.lstsq(normals, given, rcond=None)[0]
+    without_shift = clearances - normals @ np.linalg.lstsq(normals, clearances, rcond=None)[0]
     return setup.change_pads(
-        lambda number, pad: replace(pad, assembled_clearance=pad.assembled_clearance + float(left[number - 1]))
+        lambda number, pad: replace(pad, assembled_clearance=pad.assembled_clearance + float(without_shift[number - 1]))
     )
 
 

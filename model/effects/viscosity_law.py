@@ -13,8 +13,8 @@ def apply(setup: Setup, factor: float) -> Setup:
     """The exponent kappa of mu(T) times factor; mu at the stated supply temperature stays."""
     oil = setup.bearing.oil
     exponent = oil.viscosity_exponent * factor
-    kept = oil.viscosity_40 * math.exp((oil.viscosity_exponent - exponent) * (40.0 - oil.supply_temperature))
-    changed = replace(oil, viscosity_40=kept, viscosity_exponent=exponent)
+    viscosity = oil.viscosity_40 * math.exp((oil.viscosity_exponent - exponent) * (40.0 - oil.supply_temperature))
+    changed = replace(oil, viscosity_40=viscosity, viscosity_exponent=exponent)
     return setup.change(bearing=replace(setup.bearing, oil=changed))
 
 

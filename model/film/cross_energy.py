@@ -44,7 +44,7 @@ def cross_operator(
     """Set up and factorise the heat balances of a film."""
     nt, lines, cells = work.flow_x.shape[0], work.flow_x.shape[1], len(cross.edges) - 1
     n = lines * cells
-    factor, before, journal, made, carried, flows = operator
+    factor, before, journal, dissipation, carried, flows = operator
     factor[:] = 0.0
     before[:] = 0.0
     film = (grid, work, cross)
@@ -62,11 +62,11 @@ def cross_operator(
             journal[i, j, 0] = (1.0 - space.theta[j, cells - 1]) * exchange
             journal[i, j, 1] = space.theta[j, cells - 1] * exchange
         for k in range(n):
-            made[i, k] = 0.5 * heat[2] * last[k]
+            dissipation[i, k] = 0.5 * heat[2] * last[k]
         _dissipation(grid, work, cross, speed, i + 1, last)
         for k in range(n):
-            made[i, k] += 0.5 * heat[2] * last[k]
-        _make_less(cross.temperature[i + 1], heat[4], made[i], factor[i])
+            dissipation[i, k] += 0.5 * heat[2] * last[k]
+        _make_less(cross.temperature[i + 1], heat[4], dissipation[i], factor[i])
         _factorise(factor[i], cells)
     for j in range(lines):
         for m in range(cells):
@@ -75,13 +75,13 @@ def cross_operator(
 
 
 @inner
-def _make_less(temperature: FloatArray, thinning: float, made: FloatArray, factor: FloatArray) -> None:
+def _make_less(temperature: FloatArray, thinning: float, dissipation: FloatArray, factor: FloatArray) -> None:
     """A hotter film shears with less heat: taken as it will be, or the two would swing."""
     cells = temperature.shape[1]
-    for k in range(len(made)):
-        less = thinning * made[k]
+    for k in range(len(dissipation)):
+        less = thinning * dissipation[k]
         factor[k, cells] += less
-        made[k] += less * temperature[k // cells, k % cells]
+        dissipation[k] += less * temperature[k // cells, k % cells]
 
 
 @inner
@@ -155,7 +155,7 @@ class _Space(NamedTuple):
     """
 
     up: FloatArray
-    beside: FloatArray
+    sideways: FloatArray
     low: FloatArray
     high: FloatArray
     first: FloatArray
@@ -194,17 +194,17 @@ def _box(
     grid, work, cross = film
     lines, cells = space.theta.shape
     edges, conductivity, specific = cross.edges, heat[1], heat[0]
-    up, beside, low, high, first, last, carried, theta, shares = space
+    up, sideways, low, high, first, last, carried, theta, shares = space
     for j in range(lines - 1):
         _side_shares(cross, i, j, shares)
         aside = 0.5 * (work.flow_z[i, j] + work.flow_z[i + 1, j])
         for m in range(cells):
-            beside[j + 1, m] = aside * shares[m]
+            sideways[j + 1, m] = aside * shares[m]
     for j in range(lines):
         h = 0.5 * (work.thickness[i, j] + work.thickness[i + 1, j])
         station = conductivity * grid.dx * grid.height[j] / h
         least = 0.25 * LEAST_FLOW * speed * h * (work.density[i, j] + work.density[i + 1, j]) * grid.height[j]
-        _upward(flows, beside, grid.first, i, j, up[j])
+        _upward(flows, sideways, grid.first, i, j, up[j])
         for m in range(cells):
             wide, at = edges[m + 1] - edges[m], 0.5 * (edges[m + 1] + edges[m])
             carried[j, m] = specific * max(flows[i, j, m], least * wide)
@@ -217,39 +217,39 @@ def _box(
             else:
                 high[j, m] = heat[3] * station / (1.0 - at)
             if j == lines - 1:  # the edge is upwind: what leaves takes its temperature along
-                first[j, m] = 0.5 * specific * max(beside[j, m], 0.0)
+                first[j, m] = 0.5 * specific * max(sideways[j, m], 0.0)
             elif j > 0:
-                first[j, m] = conductivity * grid.dx / grid.dz[j - 1] * h * wide + 0.5 * specific * beside[j, m]
+                first[j, m] = conductivity * grid.dx / grid.dz[j - 1] * h * wide + 0.5 * specific * sideways[j, m]
             if j == 0 and grid.first == 1:
-                last[j, m] = 0.5 * specific * max(-beside[1, m], 0.0)
+                last[j, m] = 0.5 * specific * max(-sideways[1, m], 0.0)
             elif j < lines - 1:
-                last[j, m] = conductivity * grid.dx / grid.dz[j] * h * wide - 0.5 * specific * beside[j + 1, m]
-            whole = low[j, m] + high[j, m] + first[j, m] + last[j, m]
-            theta[j, m] = max(0.5, 1.0 - carried[j, m] / max(whole, 1e-300))
+                last[j, m] = conductivity * grid.dx / grid.dz[j] * h * wide - 0.5 * specific * sideways[j + 1, m]
+            magnitude = low[j, m] + high[j, m] + first[j, m] + last[j, m]
+            theta[j, m] = max(0.5, 1.0 - carried[j, m] / max(magnitude, 1e-300))
 
 
 @inner
-def _upward(flows: FloatArray, beside: FloatArray, first: int, i: int, j: int, up: FloatArray) -> None:
+def _upward(flows: FloatArray, sideways: FloatArray, first: int, i: int, j: int, up: FloatArray) -> None:
     """Oil that crosses the cells' upper faces between two stations, from what enters and leaves at their sides.
 
     What reaches an edge leaves over it at the same height. What is left over all cells, in a ruptured film, is none:
     there dissipation and flow shrink alike.
     """
     nt, cells = flows.shape[0], flows.shape[2]
-    edge = j == beside.shape[0] - 2 or (j == 0 and first == 1)
-    total, whole = 0.0, 0.0
+    edge = j == sideways.shape[0] - 2 or (j == 0 and first == 1)
+    total, magnitude = 0.0, 0.0
     for turn in range(2):
         running = 0.0
         for m in range(cells):
             behind, ahead = flows[max(i - 1, 0), j, m], flows[min(i + 1, nt - 1), j, m]
             gain = 0.5 * (behind - ahead) if 0 < i < nt - 1 else behind - ahead
             if not edge:
-                gain += beside[j, m] - beside[j + 1, m]
+                gain += sideways[j, m] - sideways[j + 1, m]
             if turn == 0:
                 total += gain
-                whole += abs(flows[i, j, m])
+                magnitude += abs(flows[i, j, m])
             else:
-                running += gain - total * abs(flows[i, j, m]) / whole
+                running += gain - total * abs(flows[i, j, m]) / magnitude
                 up[m + 1] = running
     up[cells] = 0.0
 
@@ -262,26 +262,26 @@ def _set_rows(space: _Space, factor: FloatArray, before: FloatArray) -> None:
     lines, cells = theta.shape
     for j in range(lines):
         for m in range(cells):
-            k, own = j * cells + m, theta[j, m]
+            k, own_theta = j * cells + m, theta[j, m]
             factor[k, cells] = carried[j, m]
             before[k, 0] = carried[j, m]
             if m > 0:
-                share = max(own, theta[j, m - 1])
+                share = max(own_theta, theta[j, m - 1])
                 factor[k, cells - 1] -= share * low[j, m]
                 factor[k, cells] += share * low[j, m]
                 before[k, 1] = (1.0 - share) * low[j, m]
-            share = own if m == cells - 1 else max(own, theta[j, m + 1])
+            share = own_theta if m == cells - 1 else max(own_theta, theta[j, m + 1])
             factor[k, cells] += share * high[j, m]
             if m < cells - 1:
                 factor[k, cells + 1] -= share * high[j, m]
             before[k, 2] = (1.0 - share) * high[j, m]
             if j > 0:
-                share = max(own, theta[j - 1, m])
+                share = max(own_theta, theta[j - 1, m])
                 factor[k, 0] -= share * first[j, m]
                 factor[k, cells] += share * first[j, m]
                 before[k, 3] = (1.0 - share) * first[j, m]
             if j < lines - 1:
-                share = max(own, theta[j + 1, m])
+                share = max(own_theta, theta[j + 1, m])
                 factor[k, 2 * cells] -= share * last[j, m]
                 factor[k, cells] += share * last[j, m]
                 before[k, 4] = (1.0 - share) * last[j, m]
@@ -289,7 +289,9 @@ def _set_rows(space: _Space, factor: FloatArray, before: FloatArray) -> None:
 
 
 @inner
-def _dissipation(grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float, i: int, made: FloatArray) -> None:
+def _dissipation(
+    grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float, i: int, dissipation: FloatArray
+) -> None:
     """Heat made in the cells of a station, per length dx and control-volume height [W], full film."""
     p, edges = work.pressure, cross.edges
     nt, nz, cells = work.flow_x.shape[0], work.flow_z.shape[1], len(cross.edges) - 1
@@ -310,7 +312,7 @@ def _dissipation(grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float,
             away = 0.5 * (edges[m + 1] + edges[m]) - cross.centre[i, j]
             shear = drag + slope * away
             squared = shear * shear + (across * away) ** 2 + driven * wide * wide / 12.0
-            made[j * cells + m] = squared * cross.fluidity[i, j, m] * wide * station
+            dissipation[j * cells + m] = squared * cross.fluidity[i, j, m] * wide * station
 
 
 @inner
@@ -324,6 +326,6 @@ def _factorise(band: FloatArray, width: int) -> None:
         for r in range(1, min(width, n - 1 - k) + 1):
             scale = band[k + r, width - r] * inverse
             band[k + r, width - r] = scale
-            other = band[k + r, width - r + 1 : 2 * width - r + 1]
+            row_below = band[k + r, width - r + 1 : 2 * width - r + 1]
             for s in range(width):
-                other[s] -= scale * upper[s]
+                row_below[s] -= scale * upper[s]

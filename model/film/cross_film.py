@@ -57,7 +57,7 @@ class CrossOperator(NamedTuple):
     #: (nt, nz + 1, 2): Exchange with the journal at the earlier and the later station [W/K].
     journal: FloatArray
     #: (nt, n): Dissipation [W], and what the balances take from it per kelvin, at the present temperature.
-    made: FloatArray
+    dissipation: FloatArray
     #: (nz + 1, cells): Heat carried over the trailing edge per kelvin [W/K].
     carried: FloatArray
     #: (nt, nz + 1, cells): Mass flow of the cells from station to station [kg/s].

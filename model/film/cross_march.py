@@ -26,7 +26,7 @@ def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray
     `fields` (nt + 1, n, 3) [degC], `sources` (nt, n) [W]; gives (3,) [W].
     """
     n, cells = fields.shape[1], operator.carried.shape[1]
-    taken = np.zeros(3)
+    heat_flow = np.zeros(3)
     for i in range(operator.factor.shape[0]):
         band, before, journal = operator.factor[i], operator.before[i], operator.journal[i]
         old, new = fields[i], fields[i + 1]
@@ -61,9 +61,9 @@ def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray
         for j in range(journal.shape[0]):
             k = j * cells + cells - 1
             for q in range(3):
-                taken[q] += journal[j, 0] * old[k, q] + journal[j, 1] * new[k, q]
-            taken[2] -= journal[j, 0] + journal[j, 1]
-    return taken
+                heat_flow[q] += journal[j, 0] * old[k, q] + journal[j, 1] * new[k, q]
+            heat_flow[2] -= journal[j, 0] + journal[j, 1]
+    return heat_flow
 
 
 @inner
@@ -75,7 +75,7 @@ def march_one(operator: CrossOperator, field: FloatArray, sources: FloatArray) -
     `field` (nt + 1, n) [K], `sources` (nt, nz + 1) [W].
     """
     n, cells = field.shape[1], operator.carried.shape[1]
-    taken = 0.0
+    heat_flow = 0.0
     for i in range(operator.factor.shape[0]):
         band, before = operator.factor[i], operator.before[i]
         old, new = field[i], field[i + 1]
@@ -102,26 +102,28 @@ def march_one(operator: CrossOperator, field: FloatArray, sources: FloatArray) -
             new[k] = value * band[k, cells]
         for j in range(operator.journal.shape[1]):
             k = j * cells + cells - 1
-            taken += operator.journal[i, j, 0] * old[k] + operator.journal[i, j, 1] * new[k]
-    return taken
+            heat_flow += operator.journal[i, j, 0] * old[k] + operator.journal[i, j, 1] * new[k]
+    return heat_flow
 
 
 @compiled
 def face_temperature(
-    work: FilmWork, edges: FloatArray, conductivity: float, field: FloatArray, taken: FloatArray, face: FloatArray
+    work: FilmWork, edges: FloatArray, conductivity: float, field: FloatArray, heat_flow: FloatArray, face: FloatArray
 ) -> None:
     """Temperature of the pad's face, from the two cells next to it and the heat flux into the pad.
 
     `edges` (cells + 1,), `taken` (nt + 1, nz + 1) [W/m^2], `face` (nt + 1, nz + 1) [degC].
     """
     cells = len(edges) - 1
-    one, two = 0.5 * (edges[0] + edges[1]), 0.5 * (edges[1] + edges[2])
+    first_centre, second_centre = 0.5 * (edges[0] + edges[1]), 0.5 * (edges[1] + edges[2])
     for i in range(face.shape[0]):
         for j in range(face.shape[1]):
-            slope = taken[i, j] * work.thickness[i, j] / conductivity
+            slope = heat_flow[i, j] * work.thickness[i, j] / conductivity
             first, second = field[i, j * cells], field[i, j * cells + 1]
-            bend = (second - first - slope * (two - one)) / (two * two - one * one)
-            face[i, j] = first - slope * one - bend * one * one
+            bend = (second - first - slope * (second_centre - first_centre)) / (
+                second_centre * second_centre - first_centre * first_centre
+            )
+            face[i, j] = first - slope * first_centre - bend * first_centre * first_centre
 
 
 @inner
@@ -149,30 +151,30 @@ def conduct(
     `missing` (nt + 1, nz + 1) [K].
     """
     flux, to_coarse, guess = pad
-    right = np.dot(to_coarse, missing.copy().ravel())
-    limit, size, shape = tolerance * tolerance * np.dot(right, right), right.size, missing.shape
+    rhs = np.dot(to_coarse, missing.copy().ravel())
+    limit, size, shape = tolerance * tolerance * np.dot(rhs, rhs), rhs.size, missing.shape
     steps, images, faces = np.empty((STEPS, size)), np.empty((STEPS, size)), np.empty((STEPS, *shape))
-    fields, taken = np.empty((STEPS, *answer[0].shape)), np.empty(STEPS)
-    gram, seen, left = np.empty((STEPS, STEPS)), np.empty(STEPS), right
+    fields, heat_flow = np.empty((STEPS, *answer[0].shape)), np.empty(STEPS)
+    gram, projections, residual = np.empty((STEPS, STEPS)), np.empty(STEPS), rhs
     weights: Any = np.empty(0)
     for k in range(STEPS):
-        steps[k] = np.dot(guess, left)
+        steps[k] = np.dot(guess, residual)
         steps[k] /= np.sqrt(np.dot(steps[k], steps[k]))
-        taken[k] = _conducted(film, operator, np.dot(flux, steps[k]), fields[k], faces[k])
+        heat_flow[k] = _conducted(film, operator, np.dot(flux, steps[k]), fields[k], faces[k])
         images[k] = steps[k] - np.dot(to_coarse, faces[k].ravel())
         gram[k, : k + 1] = np.dot(images[: k + 1], images[k])
         gram[: k + 1, k] = gram[k, : k + 1]
         if not gram[k, k] < BOUNDLESS:
             return np.nan
         gram[k, k] *= 1.0 + 1e-13  # images that hardly differ are of no use to each other
-        seen[k] = np.dot(images[k], right)
-        weights = np.linalg.solve(gram[: k + 1, : k + 1].copy(), seen[: k + 1])
-        left = right - np.dot(weights, images[: k + 1])
-        if np.dot(left, left) < limit:
+        projections[k] = np.dot(images[k], rhs)
+        weights = np.linalg.solve(gram[: k + 1, : k + 1].copy(), projections[: k + 1])
+        residual = rhs - np.dot(weights, images[: k + 1])
+        if np.dot(residual, residual) < limit:
             break
     more = 0.0
     for k in range(weights.size):
-        more += weights[k] * taken[k]
+        more += weights[k] * heat_flow[k]
         answer[0][:] += weights[k] * fields[k]
         answer[1][:] += weights[k] * faces[k]
     return more
@@ -190,6 +192,6 @@ def _conducted(
     grid, work, edges, conductivity = film
     heat = flux.reshape(face.shape)
     field[0] = 0.0
-    taken = march_one(operator, field, -station_heat(grid, heat))
+    heat_flow = march_one(operator, field, -station_heat(grid, heat))
     face_temperature(work, edges, conductivity, field, heat, face)
-    return taken
+    return heat_flow

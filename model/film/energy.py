@@ -32,7 +32,7 @@ def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running,
     rows, columns = temperature.shape
     fields = temperature.reshape((1, rows, columns))
     loss, sources = np.empty((rows, columns)), np.empty((1, rows, columns))
-    _made(grid, work, running.speed, sources[0], loss)
+    _dissipation(grid, work, running.speed, sources[0], loss)
     for i in range(rows):
         for j in range(columns):
             less = running.oil[1] * loss[i, j]
@@ -69,7 +69,7 @@ def _march_lines(
     conduct: FloatArray,
 ) -> float:
     """Set up and solve the equations of every line between two stations; see `march`."""
-    (loss, fields, sources), (lower, main, upper, right) = march, line
+    (loss, fields, sources), (lower, main, upper, rhs) = march, line
     specific, nz, limited = running.heat[0], work.flow_z.shape[1], 0.0
     h, flow_x, flow_z, density = work.thickness, work.flow_x, work.flow_z, work.density
     for i in range(flow_x.shape[0]):
@@ -96,7 +96,7 @@ def _march_lines(
                     high = -0.25 * specific * max(-north, 0.0)
             advect = specific * flow
             lower[j], main[j], upper[j] = low, advect - low - high + 0.5 * loss[i + 1, j], high
-            for m in range(right.shape[1]):
+            for m in range(rhs.shape[1]):
                 t = fields[m]
                 value = (advect + low + high - 0.5 * loss[i, j]) * t[i, j]
                 value += 0.5 * (sources[m, i, j] + sources[m, i + 1, j])
@@ -104,11 +104,11 @@ def _march_lines(
                     value -= low * t[i, j - 1]
                 if j < nz:
                     value -= high * t[i, j + 1]
-                right[j, m] = value
-        _tridiagonal(lower, main, upper, right)
-        for m in range(right.shape[1]):
+                rhs[j, m] = value
+        _tridiagonal(lower, main, upper, rhs)
+        for m in range(rhs.shape[1]):
             for j in range(nz + 1):
-                fields[m, i + 1, j] = right[j, m]
+                fields[m, i + 1, j] = rhs[j, m]
     return limited
 
 
@@ -159,12 +159,12 @@ def heat_by_drag(
 def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
     """Heat made per station of length dx and control-volume height [W], full film; shape (nt + 1, nz + 1)."""
     out, less = np.empty(work.pressure.shape), np.empty(work.pressure.shape)
-    _made(grid, work, speed, out, less)
+    _dissipation(grid, work, speed, out, less)
     return out
 
 
 @inner
-def _made(grid: FilmGrid, work: FilmWork, speed: float, made: FloatArray, less: FloatArray) -> None:
+def _dissipation(grid: FilmGrid, work: FilmWork, speed: float, dissipated: FloatArray, less: FloatArray) -> None:
     """Heat made per station [W], and how much less of it for every unit by which the viscosity falls, as a share."""
     p, h, mu = work.pressure, work.thickness, work.viscosity
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
@@ -187,21 +187,21 @@ def _made(grid: FilmGrid, work: FilmWork, speed: float, made: FloatArray, less: 
             shear = mu[i, j] * speed**2 / h[i, j]
             pressed = h[i, j] ** 3 / (12.0 * mu[i, j]) * (squared / sides + slope**2)
             station = grid.dx * grid.height[j]
-            made[i, j], less[i, j] = (shear + pressed) * station, max(shear - pressed, 0.0) * station
+            dissipated[i, j], less[i, j] = (shear + pressed) * station, max(shear - pressed, 0.0) * station
 
 
 @inner
-def _tridiagonal(lower: FloatArray, main: FloatArray, upper: FloatArray, right: FloatArray) -> None:
+def _tridiagonal(lower: FloatArray, main: FloatArray, upper: FloatArray, rhs: FloatArray) -> None:
     """Thomas' algorithm in place for the columns of `right`, (n, m); the solutions are left there."""
-    n, count = right.shape
+    n, count = rhs.shape
     for j in range(n):
         if j > 0:
             factor = lower[j] * main[j - 1]
             main[j] -= factor * upper[j - 1]
             for m in range(count):
-                right[j, m] -= factor * right[j - 1, m]
+                rhs[j, m] -= factor * rhs[j - 1, m]
         main[j] = 1.0 / main[j]
     for m in range(count):
-        right[n - 1, m] *= main[n - 1]
+        rhs[n - 1, m] *= main[n - 1]
         for j in range(n - 2, -1, -1):
-            right[j, m] = (right[j, m] - upper[j] * right[j + 1, m]) * main[j]
+            rhs[j, m] = (rhs[j, m] - upper[j] * rhs[j + 1, m]) * main[j]

@@ -111,8 +111,8 @@ def _pressure(
     for i in range(nt + 1):
         for j in range(nz):
             across[i, j, 0] = work.flow_z[i, j] * _side(work, running.oil, warmer, i, j)
-    given: Any = answer  # the loops of the real ones are compiled for complex numbers too
-    rhs = given.reshape((answer.shape[0], 1))
+    values: Any = answer  # the loops of the real ones are compiled for complex numbers too
+    rhs = values.reshape((answer.shape[0], 1))
     net_inflow(along, across, grid.first, rhs)
     for i in range(1, nt):
         for j in range(grid.first, nz):
@@ -120,7 +120,7 @@ def _pressure(
             stored = work.density[i, j] * _lighter(work, running.oil, i, j)[0] * warmer[i, j] * h[i, j]
             rhs[k, 0] -= 1j * omega * stored * grid.dx * grid.height[j]
     keep_ruptured(work, grid.first, rhs)
-    substitute(work.band, given)
+    substitute(work.band, values)
 
 
 @inner
@@ -128,12 +128,20 @@ def _face(
     grid: FilmGrid, work: FilmWork, running: Running, warmer: ComplexArray, i: int, j: int
 ) -> tuple[float, complex, complex]:
     """Couette flow of a face along [kg/s], relative change of its density and of its density over viscosity."""
-    one, two = work.density[i, j], work.density[i + 1, j]
-    light, other = one / work.viscosity[i, j], two / work.viscosity[i + 1, j]
-    couette = 0.125 * running.speed * (work.thickness[i, j] + work.thickness[i + 1, j]) * (one + two) * grid.height[j]
-    here, there = _lighter(work, running.oil, i, j), _lighter(work, running.oil, i + 1, j)
-    denser = (one * here[0] * warmer[i, j] + two * there[0] * warmer[i + 1, j]) / (one + two)
-    ratio = (light * here[1] * warmer[i, j] + other * there[1] * warmer[i + 1, j]) / (light + other)
+    density, density_next = work.density[i, j], work.density[i + 1, j]
+    light, light_next = density / work.viscosity[i, j], density_next / work.viscosity[i + 1, j]
+    couette = (
+        0.125
+        * running.speed
+        * (work.thickness[i, j] + work.thickness[i + 1, j])
+        * (density + density_next)
+        * grid.height[j]
+    )
+    change, change_next = _lighter(work, running.oil, i, j), _lighter(work, running.oil, i + 1, j)
+    denser = (density * change[0] * warmer[i, j] + density_next * change_next[0] * warmer[i + 1, j]) / (
+        density + density_next
+    )
+    ratio = (light * change[1] * warmer[i, j] + light_next * change_next[1] * warmer[i + 1, j]) / (light + light_next)
     return couette, denser, ratio
 
 
@@ -141,9 +149,9 @@ def _face(
 def _side(work: FilmWork, oil: tuple[float, float, float, float], warmer: ComplexArray, i: int, j: int) -> complex:
     """Relative change of density over viscosity at a face across."""
     light = work.density[i, j] / work.viscosity[i, j]
-    other = work.density[i, j + 1] / work.viscosity[i, j + 1]
-    here, there = _lighter(work, oil, i, j)[1], _lighter(work, oil, i, j + 1)[1]
-    return complex((light * here * warmer[i, j] + other * there * warmer[i, j + 1]) / (light + other))
+    light_next = work.density[i, j + 1] / work.viscosity[i, j + 1]
+    change, change_next = _lighter(work, oil, i, j)[1], _lighter(work, oil, i, j + 1)[1]
+    return complex((light * change * warmer[i, j] + light_next * change_next * warmer[i, j + 1]) / (light + light_next))
 
 
 @inner
@@ -193,13 +201,13 @@ class _March(NamedTuple):
 
     conductance: tuple[FloatArray, FloatArray]
     loss: ComplexArray
-    found: ComplexArray
-    made: ComplexArray
+    response: ComplexArray
+    dissipated: ComplexArray
     sides: ComplexArray
     lower: ComplexArray
     main: ComplexArray
     upper: ComplexArray
-    right: ComplexArray
+    rhs: ComplexArray
 
 
 @inner
@@ -225,21 +233,21 @@ def _temperature(
         np.zeros(nz + 1, dtype=np.complex128),
     )
     _march_lines(grid, work, running, change, march)
-    return march.found
+    return march.response
 
 
 @inner
 def _march_lines(grid: FilmGrid, work: FilmWork, running: Running, change: _Change, march: _March) -> None:
     """Set up and solve the equations of every line between two stations, one after the other."""
-    (gx, gz), loss, out, made, sides, lower, main, upper, right = march
+    (gx, gz), loss, out, dissipated, sides, lower, main, upper, rhs = march
     thicker, warmer, pressure = change
     t, h, flow_x, flow_z = work.temperature, work.thickness, work.flow_x, work.flow_z
     heat, nz = running.heat, flow_z.shape[1]
-    _made(grid, work, running.speed, change, 0, made[1])
+    _dissipation(grid, work, running.speed, change, 0, dissipated[1])
     _sides(work, running.oil, gz, change, 0, sides[1])
     for i in range(flow_x.shape[0]):
-        made[0], sides[0] = made[1], sides[1]
-        _made(grid, work, running.speed, change, i + 1, made[1])
+        dissipated[0], sides[0] = dissipated[1], sides[1]
+        _dissipation(grid, work, running.speed, change, i + 1, dissipated[1])
         _sides(work, running.oil, gz, change, i + 1, sides[1])
         thick = 0.5 * (thicker[i] + thicker[i + 1])
         for j in range(nz + 1):
@@ -249,7 +257,7 @@ def _march_lines(grid: FilmGrid, work: FilmWork, running: Running, change: _Chan
             flow = couette * (share + denser) - driven * (3.0 * share + ratio)
             flow -= gx[i, j] * (pressure[i + 1, j] - pressure[i, j])
             advect = heat[0] * flow_x[i, j]
-            value = 0.5 * (made[0, j] + made[1, j]) - heat[0] * flow * (t[i + 1, j] - t[i, j])
+            value = 0.5 * (dissipated[0, j] + dissipated[1, j]) - heat[0] * flow * (t[i + 1, j] - t[i, j])
             low, high = 0.0, 0.0
             if j > 0:
                 south = 0.5 * (flow_z[i, j - 1] + flow_z[i + 1, j - 1])
@@ -276,30 +284,32 @@ def _march_lines(grid: FilmGrid, work: FilmWork, running: Running, change: _Chan
                     changed -= 0.5 * pass_on * thick
                 value -= changed * (t[i + 1, j + 1] - t[i + 1, j] + t[i, j + 1] - t[i, j])
                 value -= high * (out[i, j + 1] - out[i, j])
-            right[j] = value + (advect - 0.5 * loss[i, j]) * out[i, j]
+            rhs[j] = value + (advect - 0.5 * loss[i, j]) * out[i, j]
             lower[j], main[j], upper[j] = low, advect - low - high + 0.5 * loss[i + 1, j], high
-        _tridiagonal(lower, main, upper, right)
-        out[i + 1] = right
+        _tridiagonal(lower, main, upper, rhs)
+        out[i + 1] = rhs
 
 
 @inner
-def _tridiagonal(lower: ComplexArray, main: ComplexArray, upper: ComplexArray, right: ComplexArray) -> None:
+def _tridiagonal(lower: ComplexArray, main: ComplexArray, upper: ComplexArray, rhs: ComplexArray) -> None:
     """Thomas' algorithm in place; the solution is left in `right`, (n,)."""
-    last = right.shape[0] - 1
+    last = rhs.shape[0] - 1
     for j in range(1, last + 1):
         scale = lower[j] / main[j - 1]
         main[j] -= scale * upper[j - 1]
-        right[j] -= scale * right[j - 1]
-    right[last] /= main[last]
+        rhs[j] -= scale * rhs[j - 1]
+    rhs[last] /= main[last]
     for j in range(last - 1, -1, -1):
-        right[j] = (right[j] - upper[j] * right[j + 1]) / main[j]
+        rhs[j] = (rhs[j] - upper[j] * rhs[j + 1]) / main[j]
 
 
 @inner
-def _made(grid: FilmGrid, work: FilmWork, speed: float, change: _Change, i: int, made: ComplexArray) -> None:
+def _dissipation(
+    grid: FilmGrid, work: FilmWork, speed: float, change: _Change, i: int, dissipated: ComplexArray
+) -> None:
     """Change of the heat made at a station, at the old temperature [W/m]."""
     thicker, _, pressure = change
-    for j in range(made.shape[0]):
+    for j in range(dissipated.shape[0]):
         h, mu = work.thickness[i, j], work.viscosity[i, j]
         share, wide = thicker[i] / h, h**3 / (12.0 * mu)
         steep, turned = (
@@ -307,7 +317,7 @@ def _made(grid: FilmGrid, work: FilmWork, speed: float, change: _Change, i: int,
             _steepness(grid, work.pressure, pressure, i, j),
         )
         density = -mu * speed**2 / h * share + wide * (3.0 * share * steep + 2.0 * turned)
-        made[j] = density * grid.dx * grid.height[j]
+        dissipated[j] = density * grid.dx * grid.height[j]
 
 
 @inner

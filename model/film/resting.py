@@ -30,7 +30,7 @@ class RestingFilm(NamedTuple):
 
 
 def resting_film(
-    grid: FilmGrid, wedge: tuple[float, float], surface_speed: float, oil: Oil, inlet: float, kept: float
+    grid: FilmGrid, wedge: tuple[float, float], surface_speed: float, oil: Oil, inlet: float, retained: float
 ) -> RestingFilm:
     """Film of an idle pad."""
     thickness = wedge[0] - wedge[1] * grid.cos
@@ -38,7 +38,7 @@ def resting_film(
         return RestingFilm(math.nan, math.nan, math.nan, math.nan)
     share = np.minimum(1.0, thickness[0] / thickness)
     density = float(oil.density(inlet))
-    slope = 2.0 * kept * surface_speed / (density * oil.specific_heat * thickness**2)
+    slope = 2.0 * retained * surface_speed / (density * oil.specific_heat * thickness**2)
     along = np.concatenate([[0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1])) * grid.dx])
     entering, exponent = float(oil.viscosity(inlet)), oil.viscosity_exponent
     rise = entering * along if exponent == 0.0 else np.log1p(exponent * entering * along) / exponent

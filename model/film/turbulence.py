@@ -38,10 +38,10 @@ def excess(reynolds: float, factor: float, exponent: float) -> tuple[float, floa
     if not reynolds > TRANSITION[0]:
         return 0.0, 0.0
     share = min(1.0, (reynolds - TRANSITION[0]) / (TRANSITION[1] - TRANSITION[0]))
-    whole = factor * reynolds**exponent
+    developed = factor * reynolds**exponent
     comes = share * share * (3.0 - 2.0 * share)
     rate = 6.0 * share * (1.0 - share) * reynolds / (TRANSITION[1] - TRANSITION[0])
-    return whole * comes, whole * (exponent * comes + rate)
+    return developed * comes, developed * (exponent * comes + rate)
 
 
 @compiled

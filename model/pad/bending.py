@@ -146,11 +146,11 @@ def wanted_shapes(
     """
     wanted: list[FloatArray] = [np.empty(0)] * len(bodies)
     for body in {id(b): b for b in bodies}.values():
-        same = [k for k, b in enumerate(bodies) if b is body]
-        pressure = np.column_stack([pressures[k].ravel() for k in same])
-        rise = np.column_stack([rises[k].ravel() for k in same])
+        alike = [k for k, b in enumerate(bodies) if b is body]
+        pressure = np.column_stack([pressures[k].ravel() for k in alike])
+        rise = np.column_stack([rises[k].ravel() for k in alike])
         shape = factor * (body.compliance @ pressure + body.expansion @ (body.to_coarse @ rise))
-        for column, k in enumerate(same):
+        for column, k in enumerate(alike):
             wanted[k] = shape[:, column].reshape(pressures[k].shape)
     return wanted
 
@@ -175,10 +175,10 @@ def bending_step(
         response, asked = np.vstack([response, axial.weights]), np.append(asked, axial.moment)
         held = np.diag(np.append(np.ones(bending), axial.stiffness))
     slopes = shape_slopes(grid, work, conductances(grid, work, *wedge), shapes)
-    right = np.empty((len(asked), 3))
-    right[:, 0] = asked
-    right[:, 1:] = response @ work.slopes[:, :2]
-    answer = np.asarray(np.linalg.solve(held - response @ slopes, right), dtype=float)
+    rhs = np.empty((len(asked), 3))
+    rhs[:, 0] = asked
+    rhs[:, 1:] = response @ work.slopes[:, :2]
+    answer = np.asarray(np.linalg.solve(held - response @ slopes, rhs), dtype=float)
     felt = (weights @ slopes) @ answer
     axial_step = answer[bending:].ravel()
     if axial is not None:

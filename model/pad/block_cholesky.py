@@ -21,38 +21,38 @@ BlockRow = dict[int, FloatArray]  # block row i of a lower triangle: column j <=
 
 def factor_rows(rows: Iterable[BlockRow]) -> Iterator[BlockRow]:
     """Factor a positive definite matrix K = L L^T, row by row of blocks."""
-    known: dict[int, BlockRow] = {}
+    previous: dict[int, BlockRow] = {}
     for i, row in enumerate(rows):
         first = min(row)
-        known = {j: known[j] for j in range(first, i)}  # the band: nothing before `first` is needed again
+        previous = {j: previous[j] for j in range(first, i)}  # the band: nothing before `first` is needed again
         row = {j: np.asfortranarray(block) for j, block in row.items()}
         for j in range(first, i):
             for k in range(first, j):
-                if k in row and k in known[j]:
+                if k in row and k in previous[j]:
                     sum_so_far = row[j] if j in row else np.zeros_like(row[k])
-                    row[j] = dgemm(-1.0, row[k], known[j][k], 1.0, sum_so_far, trans_b=1, overwrite_c=1)
+                    row[j] = dgemm(-1.0, row[k], previous[j][k], 1.0, sum_so_far, trans_b=1, overwrite_c=1)
             if j in row:
-                row[j] = dtrsm(1.0, known[j][j], row[j], side=1, lower=1, trans_a=1, overwrite_b=1)
+                row[j] = dtrsm(1.0, previous[j][j], row[j], side=1, lower=1, trans_a=1, overwrite_b=1)
         for k in range(first, i):
             if k in row:
                 row[i] = dsyrk(-1.0, row[k], 1.0, row[i], lower=1, overwrite_c=1)
         row[i] = cholesky(row[i], lower=True, overwrite_a=True, check_finite=False)
-        known[i] = row
+        previous[i] = row
         yield row
 
 
 def forward_rows(factor: Iterable[BlockRow], rhs: Iterable[FloatArray]) -> Iterator[FloatArray]:
     """Solve L Y = B, row by row of blocks: `rhs` (m, n_columns)."""
-    known: dict[int, FloatArray] = {}
-    for i, (row, given) in enumerate(zip(factor, rhs)):
-        known = {j: known[j] for j in range(min(row), i)}
-        block = np.array(given, dtype=float, order="F")
-        for j, solution in known.items():
+    previous: dict[int, FloatArray] = {}
+    for i, (row, rhs_block) in enumerate(zip(factor, rhs)):
+        previous = {j: previous[j] for j in range(min(row), i)}
+        block = np.array(rhs_block, dtype=float, order="F")
+        for j, solution in previous.items():
             if j in row:
                 width = solution.shape[1]
                 block[:, :width] = dgemm(-1.0, row[j], solution, 1.0, block[:, :width], overwrite_c=1)
-        known[i] = dtrsm(1.0, row[i], block, lower=1, overwrite_b=1)
-        yield known[i]
+        previous[i] = dtrsm(1.0, row[i], block, lower=1, overwrite_b=1)
+        yield previous[i]
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,8 +75,8 @@ class Line:
     def matrix(self, rows: int, columns: int, weight: FloatArray | float = 1.0) -> FloatArray:
         """Weighted product of basis functions or their derivatives."""
         points, factor = self.gauss
-        left, right = (self.tabulate(points, order) for order in (rows, columns))
-        return left.T @ ((factor * weight)[:, None] * right)
+        row_values, column_values = (self.tabulate(points, order) for order in (rows, columns))
+        return row_values.T @ ((factor * weight)[:, None] * column_values)
 
 
 def graded(start: float, stop: float, count: int, first: float, last: float) -> FloatArray:

@@ -105,10 +105,10 @@ class ElasticSector:
         out = {(a, b): np.zeros((3, n_r * n_z, 3, n_r * n_z)) for a in (0, 1) for b in (0, 1)}
         pairs = [
             (a, b, lame + (2.0 * shear if i == j else 0.0))
-            for i, left in enumerate(_NORMAL)
-            for j, right in enumerate(_NORMAL)
-            for a in left
-            for b in right
+            for i, strain_i in enumerate(_NORMAL)
+            for j, strain_j in enumerate(_NORMAL)
+            for a in strain_i
+            for b in strain_j
         ]
         pairs += [(a, b, shear) for strain in _SHEAR for a in strain for b in strain]
         radius = mesh.r.gauss[0]
@@ -201,14 +201,14 @@ def conduct(mesh: SectorMesh, convection: float, face: FloatArray, even: bool = 
     `face` (n_surface, n_columns) [K].
     """
     theta, n_r, n_z = mesh.theta, mesh.r.n_nodes, mesh.z.n_nodes
-    given = np.arange(n_r * n_z) < n_z
+    at_face = np.arange(n_r * n_z) < n_z
     prescribed = face.reshape(theta.n_nodes, n_z, -1).copy()
     if not even:
-        given[::n_z] = True
+        at_face[::n_z] = True
         prescribed[:, 0] = 0.0
-    known = np.zeros((theta.n_nodes, n_r * n_z, prescribed.shape[2]))
-    known[:, :n_z] = prescribed
-    load = np.zeros_like(known)  # K times the prescribed temperatures
+    face_field = np.zeros((theta.n_nodes, n_r * n_z, prescribed.shape[2]))
+    face_field[:, :n_z] = prescribed
+    load = np.zeros_like(face_field)  # K times the prescribed temperatures
     to_film: list[BlockRow] = []  # rows of K at the film face
     rows: list[BlockRow] = []
     for i, row in enumerate(_conduction_rows(mesh, convection)):
@@ -217,12 +217,12 @@ def conduct(mesh: SectorMesh, convection: float, face: FloatArray, even: bool = 
             load[i] += block[:, :n_z] @ prescribed[j]
             if j != i:  # blocks are symmetric: (j, i) is (i, j)
                 load[j] += block[:, :n_z] @ prescribed[i]
-            block[given] = block[:, given] = 0.0
-        row[i][given, given] = 1.0
+            block[at_face] = block[:, at_face] = 0.0
+        row[i][at_face, at_face] = 1.0
         rows.append(row)
     rhs = -load
-    rhs[:, given] = 0.0
-    field = BlockCholesky.factor(rows).solve(rhs) + known
+    rhs[:, at_face] = 0.0
+    field = BlockCholesky.factor(rows).solve(rhs) + face_field
     heat = np.zeros_like(prescribed)
     for i, row in enumerate(to_film):
         for j, block in row.items():
@@ -312,8 +312,8 @@ def operators_at(
 def _shapes(theta: Line, z: Line, count: int) -> dict[str, tuple[int, ...]]:
     n_surface = theta.n_nodes * z.n_nodes
     n_temperatures = theta.breaks.size * z.breaks.size
-    each = (count, n_surface, n_temperatures)
-    return {"compliance": (n_surface, n_surface), "expansion": each, "flux": each}
+    by_convection = (count, n_surface, n_temperatures)
+    return {"compliance": (n_surface, n_surface), "expansion": by_convection, "flux": by_convection}
 
 
 def _solve(

@@ -101,8 +101,8 @@ def _solve(line: Line, integrals: FloatArray) -> FloatArray:
 def _points(first: FloatArray, second: FloatArray, degree: int) -> tuple[FloatArray, FloatArray]:
     """Gauss points exact for products of piecewise polynomials of both sets of breaks."""
     merged = np.unique(np.concatenate((first, second)))
-    keep = np.concatenate(([True], np.diff(merged) > 1e-12 * (merged[-1] - merged[0])))
-    return gauss_rule(np.clip(merged[keep], first[0], first[-1]), degree + 1)
+    distinct = np.concatenate(([True], np.diff(merged) > 1e-12 * (merged[-1] - merged[0])))
+    return gauss_rule(np.clip(merged[distinct], first[0], first[-1]), degree + 1)
 
 
 Operators = Callable[[PadGeometry, MeshDensity, bool], PadOperators]

@@ -39,9 +39,9 @@ def cache_folder() -> Path | None:
     return base / "tpjb-ident"
 
 
-def storage_key(what: object) -> str:
+def storage_key(subject: object) -> str:
     """Hash of `what` (by its repr) and of the solver's source, so that neither can change unnoticed."""
-    return hashlib.sha256(f"{_source_digest()}{what!r}".encode()).hexdigest()[:32]
+    return hashlib.sha256(f"{_source_digest()}{subject!r}".encode()).hexdigest()[:32]
 
 
 @cache

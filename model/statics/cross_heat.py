@@ -135,9 +135,9 @@ def _answer(
     heat = (oil.specific_heat, oil.conductivity, film.kept, 1.0, oil.viscosity_exponent)
     back = cross_operator(film.grid, film.work, cross, surface_speed, heat, operator)
     taken = pad_heat(film, around)
-    fields = np.zeros((taken.shape[0], operator.made.shape[1], 3))
+    fields = np.zeros((taken.shape[0], operator.dissipation.shape[1], 3))
     fields[0, :, 1] = 1.0
-    sources = operator.made
+    sources = operator.dissipation
     sources[:, :: len(cross.edges) - 1] -= station_heat(film.grid, taken)
     kept = march_cross(operator, fields, sources)
     faces = np.empty((3, *taken.shape))
