@@ -15,7 +15,7 @@ _LEVELS = 100
 
 @dataclass
 class ChannelStatistics:
-    """Counts over all samples seen so far; feed it with `add`."""
+    """Counts over all samples so far; feed it with `add`."""
 
     samples: int = 0
     missing: int = 0
@@ -47,13 +47,13 @@ class ChannelStatistics:
     def _stretches(self, readings: FloatArray) -> None:
         """Extend the count of equal neighbours; a missing value ends a stretch."""
         previous = np.concatenate([[self._last], readings[:-1]])
-        same = readings == previous
-        self.repeats += int(np.count_nonzero(same))
-        breaks = np.flatnonzero(~same)
-        starts = np.concatenate([[0], breaks]) if same[0] else breaks
+        repeated = readings == previous
+        self.repeats += int(np.count_nonzero(repeated))
+        breaks = np.flatnonzero(~repeated)
+        starts = np.concatenate([[0], breaks]) if repeated[0] else breaks
         ends = np.append(starts[1:], len(readings))
         lengths = ends - starts
-        if same[0]:
+        if repeated[0]:
             lengths[0] += self._flat
         best = int(np.argmax(lengths))
         if int(lengths[best]) > self.longest_flat:
@@ -78,8 +78,8 @@ class ChannelStatistics:
         Coarse converters repeat readings: with a share p of repeats, the longest stretch among n samples
         is about log(n) / -log(p).
         """
-        others = max(self.values - self.longest_flat, 1)
-        share = min(max((self.repeats - self.longest_flat + 1) / others, 1e-6), 1.0 - 1.0 / others)
+        remainder = max(self.values - self.longest_flat, 1)
+        share = min(max((self.repeats - self.longest_flat + 1) / remainder, 1e-6), 1.0 - 1.0 / remainder)
         return math.log(max(self.values, 2)) / -math.log(share) if share > 0 else 1.0
 
     def clipped_share(self) -> float:

@@ -99,7 +99,7 @@ class Run:
             Sample after the last; default the end.
         """
         first, last = self._slice(start, stop)
-        self.sample_rate  # noqa: B018 (refuses a rate that times cannot be counted from)
+        self.sample_rate  # noqa: B018 (rejects a rate that times cannot be counted from)
         return self.reader.time(first, last)
 
     def _slice(self, start: int | None, stop: int | None) -> tuple[int, int]:
@@ -138,7 +138,7 @@ class Run:
             raise refuse(self.file, f"channel {name}", "is not described in the manifest", remedy, self.id)
         first, last = self._slice(start, stop)
         (reading,) = self.reader.read([name], first, last)
-        rate = self.sample_rate  # refused before times are counted from it
+        rate = self.sample_rate  # rejected before times are counted from it
         return Record(
             name=name,
             quantity=channel.quantity,
@@ -178,7 +178,7 @@ class Run:
         names = tuple(c.name for c in channels)
         first, last = self._slice(start, stop)
         rows = vector_rows(channels, self.reader.read(names, first, last))
-        rate = self.sample_rate  # refused before times are counted from it
+        rate = self.sample_rate  # rejected before times are counted from it
         return VectorRecord(
             quantity=quantity,
             values=np.ascontiguousarray(rows.T),

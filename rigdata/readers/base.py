@@ -12,9 +12,9 @@ from rigdata.arrays import FloatArray
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem
 
-#: A channel longer than this is refused: slices of it would be asked for by mistake [samples].
+#: A channel longer than this is rejected: slices of it would be asked for by mistake [samples].
 MAX_SAMPLES = 2**31
-#: One request for more samples of one channel than this is refused (it would be 4 GB) [samples].
+#: One request for more samples of one channel than this is rejected (it would be 4 GB) [samples].
 MAX_REQUEST = 2**29
 #: Sample rates beyond these are none [Hz]: times counted from them overflow.
 LEAST_RATE, MOST_RATE = 1e-6, 1e12

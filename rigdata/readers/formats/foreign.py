@@ -17,7 +17,7 @@ from rigdata.readers.base import FORMATS, suffix_hint, undescribed
 from rigdata.readers.cached_reader import CachedReader
 from rigdata.readers.series import Columns, Series, on_one_clock
 
-#: Larger files are refused: these formats are read whole [bytes].
+#: Larger files are rejected: these formats are read whole [bytes].
 LARGEST = 2**31
 _TEXT = (".asc", ".txt")
 

@@ -23,7 +23,7 @@ _UNITS = re.compile(r"unit|einheit|unite")
 _SHORTEST, _MOST_NAMES, _LONGEST = 8, 4096, 1000
 _DEEPEST = 4
 _HDF5 = b"\x89HDF\r\n\x1a\n"
-#: Unpacked bytes of all variables above which a file is refused.
+#: Unpacked bytes of all variables above which a file is rejected.
 LARGEST = 2**31
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15

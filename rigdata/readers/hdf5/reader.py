@@ -216,7 +216,7 @@ class Hdf5Reader:
         return dataset
 
     def _check_storage(self, dataset: Any, place: str) -> None:
-        """Refuse data that is outside the file, or needs foreign code or vast memory to unpack."""
+        """Reject data that is outside the file, or needs foreign code or vast memory to unpack."""
         if dataset.is_virtual or dataset.external:
             raise refuse(self.file, place, "holds its data in another file", "Copy the data into this file", self.run)
         for code, *_ in _filters(dataset):
@@ -250,7 +250,7 @@ class Hdf5Reader:
         return facts
 
     def _length(self, group: Any) -> int:
-        """Length that most channels have; one that differs is refused when it is asked for."""
+        """Length that most channels have; one that differs is rejected when it is asked for."""
         lengths: dict[int, int] = {}
         problems: list[Problem] = []
         for name in itertools.islice(group, _MAX_MEMBERS):

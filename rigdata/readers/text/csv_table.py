@@ -17,7 +17,7 @@ from rigdata.readers.text.byte_stream import all_lines, is_ascii_based, open_num
 from rigdata.readers.text.cells import MISSING, is_missing, is_number, is_stamp, number_pattern, stamp_seconds
 from rigdata.readers.text.head import Head, split_line
 
-#: Lines longer than this are refused [bytes].
+#: Lines longer than this are rejected [bytes].
 _BLOCK = 2**22
 #: Faults that are listed, and odd lines that are counted.
 _LISTED, _MOST_ODD = 5, 1000
