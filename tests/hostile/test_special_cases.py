@@ -123,16 +123,6 @@ def test_nan_and_infinities_are_missing_values_not_numbers(tmp_path):
     assert np.flatnonzero(np.isfinite(values)).tolist() == [0, 6]
 
 
-@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf, 1e300])
-def test_an_impossible_sample_rate_is_named(tmp_path, rate):
-    def fill(group):
-        group.create_dataset("X1A", data=np.arange(20.0))
-        group.attrs["sample_rate_hz"] = rate
-
-    with pytest.raises(RigDataError, match="sample_rate_hz"):
-        hdf5_campaign(tmp_path / "a.h5", fill).run("c-1").record("X1A")
-
-
 @pytest.mark.parametrize("gain", ["0 mV/um", "-7.78 mV/um", "nan mV/um", "inf mV/um", "1e999 mV/um", "1e-400 mV/um"])
 def test_zero_negative_and_endless_sensitivities_are_named(gain):
     with pytest.raises(RigDataError, match="sensitivity"):

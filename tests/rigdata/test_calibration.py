@@ -9,24 +9,24 @@ from rigdata.calibration import Channel, reading_gain, reading_zero
 from rigdata.units import UnitError
 
 
-def test_eddy_current_probe():
-    gain = reading_gain("displacement", "V", "7.78 mV/um")
-    channel = Channel("X1A", "displacement", "V", gain=gain, polarity=-1)
-    assert channel.to_si(np.array([7.78, 0.0])) == pytest.approx([-1e-3, 0.0])
+@pytest.mark.parametrize(
+    ("arguments", "gain"),
+    [
+        (("displacement", "V", "7.78 mV/um"), 1e-3 / 7.78),  # eddy-current probe
+        (("force", "mV", "2.0 mV/V", "20 kN", "5 V"), 2000.0),  # reading / (sensitivity * excitation) * full scale
+        (("force", "mV/V", "2.0 mV/V", "20 kN"), 10_000.0),  # a bridge amplifier that needs no supply
+        (("acceleration", "V", "10 mV/g"), 980.665),  # g is standard gravity
+        (("displacement", "um", "7.78 mV/um"), 1e-6),  # an engineering unit is already converted
+        (("speed", "rpm", None), 2 * np.pi / 60),
+    ],
+)
+def test_gain_of_a_chain(arguments, gain):
+    assert reading_gain(*arguments) == pytest.approx(gain)
 
 
-def test_load_cell_bridge():
-    """F = reading / (sensitivity * excitation) * full_scale."""
-    gain = reading_gain("force", "mV", "2.0 mV/V", "20 kN", "5 V")
-    assert Channel("L1H", "force", "mV", gain=gain).to_si(np.array([2.5])) == pytest.approx([5000.0])
-
-
-def test_bridge_amplifier_that_reads_mv_per_v_needs_no_supply():
-    assert reading_gain("force", "mV/V", "2.0 mV/V", "20 kN") == pytest.approx(10_000.0)
-
-
-def test_accelerometer_g_is_standard_gravity():
-    assert reading_gain("acceleration", "V", "10 mV/g") == pytest.approx(980.665)
+def test_polarity_and_zero():
+    channel = Channel("L", "force", "V", gain=100.0, zero=reading_zero("force", "V", "50 N"), polarity=-1)
+    assert channel.to_si(np.array([0.0, 1.0])) == pytest.approx([50.0, -50.0])
 
 
 def test_thermometer():
@@ -43,16 +43,6 @@ def test_temperature_of_reading_twenty(unit, zero, kelvin):
     gain = reading_gain("temperature", unit, "1 K/V")
     channel = Channel("T1", "temperature", unit, gain=gain, zero=reading_zero("temperature", unit, zero))
     assert channel.to_si(np.array([20.0])) == pytest.approx([kelvin])
-
-
-def test_engineering_unit_is_already_converted():
-    assert reading_gain("displacement", "um", "7.78 mV/um") == pytest.approx(1e-6)
-    assert reading_gain("speed", "rpm", None) == pytest.approx(2 * np.pi / 60)
-
-
-def test_zero_is_the_value_at_reading_zero():
-    channel = Channel("L", "force", "V", gain=100.0, zero=reading_zero("force", "V", "50 N"), polarity=-1)
-    assert channel.to_si(np.array([0.0, 1.0])) == pytest.approx([50.0, -50.0])
 
 
 @pytest.mark.parametrize(

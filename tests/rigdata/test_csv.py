@@ -94,6 +94,11 @@ def test_dialect_given_by_the_manifest(tmp_path):
     expect_good(make(tmp_path, text.encode("cp1252"), csv))
 
 
+def test_a_stated_encoding_that_needs_a_byte_order_mark_is_named_where_there_is_none(tmp_path):
+    run = make(tmp_path, table().encode("utf-16-le"), '[csv]\nencoding = "utf-16"\n')
+    refused(run, "cannot be read (UTF-16 stream does not start with BOM)")
+
+
 def test_byte_order_mark_wins_over_a_wrong_encoding(tmp_path):
     expect_good(make(tmp_path, table().encode("utf-8-sig"), '[csv]\nencoding = "cp1252"\n'))
 

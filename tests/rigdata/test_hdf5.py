@@ -117,7 +117,7 @@ def test_time_dataset(tmp_path):
     assert run.record("X1A", 0, 2).time == pytest.approx([0.001, 0.005])
 
 
-@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf, "abc", [1.0, 2.0]])
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf, 1e300, "abc", [1.0, 2.0]])
 def test_senseless_rates(tmp_path, rate):
     make(tmp_path / "c.h5", rate=rate)
     refused(tmp_path / "c.h5", "sample_rate_hz")
